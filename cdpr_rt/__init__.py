@@ -1,0 +1,1 @@
+"""Runtime of the controller: executive, controllers, identification; knows no bus."""

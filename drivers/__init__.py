@@ -1,0 +1,1 @@
+"""Master side: CAN buses, CANopen network, CiA 402 axes."""

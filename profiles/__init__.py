@@ -1,0 +1,1 @@
+"""Motors, drives, winches, cables and robots as validated data."""

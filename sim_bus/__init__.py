@@ -1,0 +1,1 @@
+"""Slave side: simulated bus, CANopen drives and motor physics."""

@@ -1,0 +1,5 @@
+"""The `cdpr` command."""
+
+
+def main() -> None:
+    """Run the command line."""
