@@ -1,0 +1,17 @@
+"""Errors of the runtime; each message says what happened, where, and what is allowed."""
+
+
+class ControlError(Exception):
+    """Something the runtime was asked for could not be done."""
+
+
+class TripError(ControlError):
+    """The supervisor or the device ended the motion; the message says which limit and value."""
+
+
+class InterruptedMotionError(ControlError):
+    """The operator asked for a stop; the motion was ended under control."""
+
+
+class RawLogError(ControlError):
+    """A raw measurement file cannot be written or read."""

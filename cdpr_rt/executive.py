@@ -1,0 +1,174 @@
+"""The cyclic executive: the one loop in which every controller runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from cdpr_rt.controllers.base import Controller, Idle
+from cdpr_rt.errors import InterruptedMotionError, TripError
+from cdpr_rt.exchange import AxisDevice, Setpoint
+from cdpr_rt.rawlog import RawLogWriter
+from cdpr_rt.recorder import Recorder
+from cdpr_rt.supervisor import Supervisor
+
+_DRAIN_ROWS = 2048
+
+
+class Motion(Protocol):
+    """A set-point over time, such as a `Leg`."""
+
+    duration_s: float
+
+    def fill(self, time_s: float, setpoint: Setpoint) -> None:
+        """Write the set-point at `time_s` after the start."""
+
+    def brake(self, time_s: float) -> Motion:
+        """Return the motion that stops from the state at `time_s`."""
+
+
+@dataclass
+class Lateness:
+    """How the paced loop kept its deadlines."""
+
+    cycles: int = 0
+    late: int = 0
+    """Cycles that started more than a tenth of a period after their deadline."""
+    worst_s: float = 0.0
+
+
+class Executive:
+    """Runs controllers on a device, one cycle after the other.
+
+    On a lockstep device the next SYNC goes out as soon as a cycle is done; otherwise each SYNC
+    has an absolute deadline. `stop_requested` is looked at once a cycle: what it ends, it ends
+    by a braking set-point under the same controller.
+    """
+
+    def __init__(
+        self,
+        device: AxisDevice,
+        supervisor: Supervisor,
+        stop_requested: Callable[[], bool],
+        on_progress: Callable[[float], None] | None = None,
+    ) -> None:
+        self.device = device
+        self.supervisor = supervisor
+        self.setpoint = Setpoint(device.n)
+        self.lateness = Lateness()
+        self._recorder = Recorder(device.n)
+        self._log: RawLogWriter | None = None
+        self._stop_requested = stop_requested
+        self._on_progress = on_progress
+        self._idle = Idle(device.n)
+        self._deadline = 0.0
+
+    def run(self, controller: Controller, motion: Motion, log: RawLogWriter | None = None) -> None:
+        """Run `controller` along `motion` to its end, recording into `log`.
+
+        However it ends, the last torque sent is zero and what was recorded is in the file.
+        Raises TripError when the supervisor or the device ends the motion, and
+        InterruptedMotionError after a requested stop.
+        """
+        controller.reset()
+        self.supervisor.reset()
+        self._recorder.clear()
+        self._log = log
+        try:
+            self._follow(controller, motion)
+        finally:
+            self._release()
+            self._drain()
+            self._log = None
+
+    def step(self, each_cycle: Callable[[], bool], timeout_s: float, what: str) -> None:
+        """Run cycles without torque, calling `each_cycle` after each exchange, until it is true.
+
+        A device's own procedure (homing, enabling) advances by its `each_cycle`. Raises TripError
+        after `timeout_s` of bus time, or when the device raises an alarm, and
+        InterruptedMotionError on request.
+        """
+        period = self.device.period_s
+        for _ in range(max(1, round(timeout_s / period))):
+            self._exchange()
+            self.setpoint.position_rad[:] = self.device.feedback.position_rad
+            self._idle.update(self.device.feedback, self.setpoint, self.device.command.torque_Nm)
+            done = each_cycle()
+            self.device.transmit()
+            self._look_for_alarm()
+            if done:
+                return
+            if self._stop_requested():
+                raise InterruptedMotionError(f"stopped on request while waiting for {what}")
+        raise TripError(f"{what}: not within {timeout_s:g} s")
+
+    def _follow(self, controller: Controller, motion: Motion) -> None:
+        device, setpoint, recorder = self.device, self.setpoint, self._recorder
+        feedback, command = device.feedback, device.command
+        period = device.period_s
+        cycles = round(motion.duration_s / period)
+        stopping = False
+        k = 0
+        while k <= cycles:
+            self._exchange()
+            motion.fill(k * period, setpoint)
+            controller.update(feedback, setpoint, command.torque_Nm)
+            reason = self.supervisor.check(feedback, setpoint, command.torque_Nm)
+            if reason:
+                self._trip(reason)
+            device.transmit()
+            recorder.append(feedback, setpoint, command, controller)
+            self._look_for_alarm()
+            if recorder.pending() >= _DRAIN_ROWS:
+                self._drain()
+                if self._on_progress is not None:
+                    self._on_progress(k * period)
+            if not stopping and self._stop_requested():
+                stopping = True
+                motion = motion.brake(k * period)
+                # the braking motion is entered where its ramp-up would end
+                k = round(0.5 * motion.duration_s / period)
+                cycles = round(motion.duration_s / period)
+            k += 1
+        if stopping:
+            raise InterruptedMotionError("stopped on request")
+
+    def _exchange(self) -> None:
+        if not self.device.lockstep:
+            self._await_deadline()
+        self.device.sync()
+        self.device.receive()
+
+    def _await_deadline(self) -> None:
+        now = time.monotonic()
+        period = self.device.period_s
+        self._deadline += period
+        if now > self._deadline + 10 * period or self._deadline - now > period:
+            self._deadline = now  # the loop starts, or stood still: a new time base
+        elif now < self._deadline:
+            time.sleep(self._deadline - now)
+        lag = time.monotonic() - self._deadline
+        self.lateness.cycles += 1
+        self.lateness.late += lag > 0.1 * period
+        self.lateness.worst_s = max(self.lateness.worst_s, lag)
+
+    def _look_for_alarm(self) -> None:
+        alarm = self.device.alarm()
+        if alarm:
+            self._trip(alarm)
+
+    def _trip(self, reason: str) -> None:
+        self._release()
+        raise TripError(reason)
+
+    def _release(self) -> None:
+        self.device.command.torque_Nm[:] = 0.0
+        self.device.transmit()
+
+    def _drain(self) -> None:
+        if self._log is None:
+            self._recorder.clear()
+        else:
+            self._recorder.drain(self._log)

@@ -1,0 +1,112 @@
+"""Raw measurement files: a JSON line that describes the columns, then rows of float64.
+
+A file is readable at any length: what was written before a crash, a full disk or a copy cut
+short is kept row by row.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from cdpr_rt.errors import RawLogError
+from cdpr_rt.exchange import FloatArray
+
+_FORMAT = "cdpr-rt raw log"
+_VERSION = 1
+_HEADER_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class RawLog:
+    """A raw log in memory: `columns` names, `rows` (samples, columns) and the `header`."""
+
+    path: Path
+    header: dict[str, Any]
+    rows: FloatArray
+    complete: bool
+    """Whether the file holds as many rows as its writer meant to leave."""
+
+    def column(self, name: str, axis: int = 0) -> FloatArray:
+        """Return one column, (samples,); raises RawLogError when the file has no such column."""
+        names: list[str] = self.header["columns"]
+        wanted = name if name in names else f"{name}[{axis}]"
+        if wanted not in names:
+            raise RawLogError(f"{self.path}: no column {name!r} for axis {axis}; it has {names}")
+        return self.rows[:, names.index(wanted)]
+
+
+class RawLogWriter:
+    """Writes rows to a file as they come; raises RawLogError when the disk does not take them."""
+
+    def __init__(self, path: Path, columns: list[str], meta: dict[str, Any]) -> None:
+        self.path = path
+        self._meta = {"format": _FORMAT, "version": _VERSION, "columns": columns, **meta}
+        self._width = len(columns)
+        self._rows = 0
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: IO[bytes] = path.open("wb", buffering=0)
+            self._write(self._header(None))
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> RawLogError:
+        return RawLogError(f"{self.path}: cannot record: {error.strerror or error}")
+
+    def _write(self, data: bytes | memoryview) -> None:
+        view = memoryview(data)
+        while view:
+            view = view[self._file.write(view) :]
+
+    def _header(self, rows: int | None) -> bytes:
+        text = json.dumps({**self._meta, "rows": rows}).encode()
+        if len(text) >= _HEADER_BYTES:
+            raise RawLogError(f"{self.path}: header of {len(text)} bytes, {_HEADER_BYTES} allowed")
+        return text.ljust(_HEADER_BYTES - 1) + b"\n"
+
+    def write(self, rows: FloatArray) -> None:
+        """Append `rows` (samples, columns), contiguous."""
+        try:
+            self._write(rows.data.cast("B"))
+        except OSError as error:
+            raise self._failed(error) from error
+        self._rows += len(rows)
+
+    def close(self) -> None:
+        """Note the number of rows in the header and close the file."""
+        try:
+            self._file.seek(0)
+            self._write(self._header(self._rows))
+            self._file.close()
+        except OSError as error:
+            raise self._failed(error) from error
+
+
+def read_raw_log(path: Path) -> RawLog:
+    """Read a raw log; a last row cut short is dropped.
+
+    Raises RawLogError when the file is missing, is not a raw log, or holds no whole row.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RawLogError(f"{path}: cannot be read: {error.strerror or error}") from error
+    try:
+        header = json.loads(data[:_HEADER_BYTES])
+        columns = header["columns"]
+        known = header["format"] == _FORMAT and header["version"] == _VERSION
+    except (ValueError, KeyError, TypeError):
+        known, columns = False, []
+    if not known or len(data) < _HEADER_BYTES:
+        raise RawLogError(f"{path}: not a raw log of version {_VERSION}, or cut within its header")
+    body = data[_HEADER_BYTES:]
+    samples = len(body) // (8 * len(columns))
+    if samples == 0:
+        raise RawLogError(f"{path}: holds no whole row of measurements")
+    rows = np.frombuffer(body, "<f8", samples * len(columns)).reshape(samples, len(columns))
+    return RawLog(path, header, rows, complete=header.get("rows") == samples)
