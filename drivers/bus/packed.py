@@ -1,0 +1,184 @@
+"""Fast path to a bus: packed 16-byte frames over a socket, in buffers allocated once."""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import select
+import socket
+import struct
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.bus import simbus_socket
+from drivers.bus.simbus_socket import FRAME_BYTES, Filters
+from drivers.bus.url import BusUrl
+from drivers.errors import BusError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Bytes = bytes | bytearray | memoryview
+
+FRAME = struct.Struct("=IB3x8s")
+"""`struct can_frame` of Linux: identifier with flags, length, data."""
+FRAME_DTYPE = np.dtype([("can_id", "=u4"), ("length", "u1"), ("pad", "V3"), ("data", "u1", (8,))])
+EFF_FLAG = 0x80000000
+RTR_FLAG = 0x40000000
+ERR_FLAG = 0x20000000
+
+_BUFFER_BYTES = 1 << 21
+_SEND_TIMEOUT_S = 1.0
+
+
+class FrameBuffer:
+    """Room for `n` frames, seen as one structured array and as `n` writable 16-byte views."""
+
+    def __init__(self, n: int) -> None:
+        self.array: NDArray[np.void] = np.zeros(n, FRAME_DTYPE)
+        """Shape (n,), fields can_id, length, data (8 bytes)."""
+        raw = memoryview(self.array.view(np.uint8).data)
+        self.rows: list[memoryview] = [
+            raw[start : start + FRAME_BYTES] for start in range(0, n * FRAME_BYTES, FRAME_BYTES)
+        ]
+        """The views to hand to `send` and `recv_into`."""
+
+
+class FramePort(Protocol):
+    """A bus as packed frames.
+
+    `send` and `recv_into` raise OSError as sockets do, so that nothing stands between the cycle
+    and the kernel: `BlockingIOError` when the time-out passed without a frame, any other OSError
+    or a `recv_into` of 0 when the bus is gone; `lost` words that as a BusError.
+    """
+
+    url: BusUrl
+    status: dict[str, Any]
+    """What the simulated bus told about itself at opening; empty on other buses."""
+
+    def send(self, frame: Bytes, /) -> int:
+        """Send one 16-byte frame."""
+
+    def recv_into(self, buffer: bytearray | memoryview, /) -> int:
+        """Wait for a frame up to the time-out, write it into `buffer`, return its length."""
+
+    def settimeout(self, seconds: float | None) -> None:
+        """Limit the wait of `recv_into`; None waits for ever, 0 does not wait."""
+
+    def drain(self) -> int:
+        """Throw away the frames that wait; return how many."""
+
+    def fileno(self) -> int:
+        """Return the descriptor to poll for readability."""
+
+    def lost(self, error: OSError | None = None) -> BusError:
+        """Return the BusError that tells why the bus cannot be used any more."""
+
+    def close(self) -> None:
+        """Leave the bus."""
+
+
+class PackedPort:
+    """Packed frames on a SEQPACKET (simbus) or raw CAN (socketcan) socket."""
+
+    def __init__(self, url: BusUrl, sock: socket.socket, status: dict[str, Any]) -> None:
+        self.url = url
+        self.status = status
+        self._sock = sock
+        self._scratch = bytearray(FRAME_BYTES)
+        seconds, fraction = int(_SEND_TIMEOUT_S), 0
+        timeval = struct.pack("ll", seconds, fraction)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
+        self.recv_into: Callable[[bytearray | memoryview], int] = sock.recv_into
+        self.fileno: Callable[[], int] = sock.fileno
+        self.close: Callable[[], None] = sock.close
+        self.send: Callable[[Bytes], int] = sock.send
+        if url.interface == "socketcan":
+            self.send = self._send_patiently
+
+    def settimeout(self, seconds: float | None) -> None:
+        """Limit the wait of `recv_into`; None waits for ever, 0 does not wait.
+
+        The kernel keeps the time (SO_RCVTIMEO), which saves the poll that a socket time-out of
+        Python's would put before each receive.
+        """
+        self._sock.setblocking(seconds != 0)
+        fraction, whole = math.modf(seconds or 0.0)
+        # 0 would mean for ever
+        micro = max(int(fraction * 1e6), 1) if seconds else 0
+        timeval = struct.pack("ll", int(whole), micro)
+        self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+
+    def drain(self) -> int:
+        """Throw away the frames that wait; return how many."""
+        count = 0
+        try:
+            while self._sock.recv_into(self._scratch, FRAME_BYTES, socket.MSG_DONTWAIT):
+                count += 1
+        except BlockingIOError:
+            pass
+        return count
+
+    def lost(self, error: OSError | None = None) -> BusError:
+        """Return the BusError that tells why the bus cannot be used any more."""
+        if isinstance(error, BlockingIOError):
+            return BusError(f"{self.url}: the bus takes or gives no frames (time-out)")
+        reason = error.strerror if error else "connection closed"
+        return BusError(f"{self.url}: the bus has gone away ({reason})")
+
+    def _send_patiently(self, frame: Bytes) -> int:
+        """Send, waiting while the interface's transmit queue is full, which CAN does not block."""
+        attempts = 1000
+        while True:
+            try:
+                return self._sock.send(frame)
+            except OSError as error:
+                attempts -= 1
+                if error.errno != errno.ENOBUFS or not attempts:
+                    raise
+            select.select([], [], [], _SEND_TIMEOUT_S / 1000)
+
+
+def open_simbus(url: BusUrl, filters: Filters | None) -> PackedPort:
+    """Join the simulated bus `url`.
+
+    Raises:
+        BusError: no such bus runs, or it refused.
+    """
+    sock = simbus_socket.connect(url.channel)
+    try:
+        status = simbus_socket.exchange(sock, filters)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
+    except BaseException:
+        sock.close()
+        raise
+    return PackedPort(url, sock, status)
+
+
+def open_socketcan(url: BusUrl, filters: Filters | None) -> PackedPort:
+    """Open a raw CAN socket on the network interface that `url` names.
+
+    Raises:
+        BusError: the kernel has no SocketCAN, or no such interface, or it is down.
+    """
+    try:
+        sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    except OSError as error:
+        raise BusError(f"{url}: this kernel has no SocketCAN ({error.strerror})") from None
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+        if filters is not None:
+            packed = b"".join(struct.pack("=II", can_id, mask) for can_id, mask in filters)
+            sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, packed)
+        sock.bind((url.channel,))
+    except OSError as error:
+        sock.close()
+        raise BusError(
+            f"{url}: cannot use the network interface {url.channel!r} "
+            f"({os.strerror(error.errno or 0)}); `ip link show type can` and `type vcan` list "
+            "what there is"
+        ) from None
+    return PackedPort(url, sock, {})

@@ -1,0 +1,89 @@
+"""Client end of the simulated bus: AF_UNIX SEQPACKET socket and its control messages."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+from collections.abc import Iterable
+from typing import Any
+
+from drivers.errors import BusError
+
+FRAME_BYTES = 16
+Filters = Iterable[tuple[int, int]]
+"""Pairs (identifier, mask); a frame passes when (frame id & mask) == (identifier & mask)."""
+
+_ANSWER_TIMEOUT_S = 5.0
+_CONTROL_BYTES = 65536
+
+
+def connect(name: str) -> socket.socket:
+    """Return a blocking socket connected to the bus `name`.
+
+    Raises:
+        BusError: no simulated bus of that name runs on this machine.
+    """
+    sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    try:
+        sock.connect(f"\0cdpr-rt/simbus/{name}")
+    except OSError as error:
+        sock.close()
+        raise BusError(
+            f"simbus:{name}: no simulated bus of that name is running ({error.strerror}); "
+            f"start one with: cdpr sim up winch-mpp0923d --bus simbus:{name}"
+        ) from None
+    return sock
+
+
+def control_message(message: dict[str, Any]) -> bytes:
+    """Return `message` as a packet: JSON, padded so that its length is not that of a frame."""
+    text = json.dumps(message, separators=(",", ":")).encode()
+    return text + b" " if len(text) == FRAME_BYTES else text
+
+
+def filter_message(filters: Filters) -> bytes:
+    """Return the packet that asks the hub to send only what passes one of `filters`."""
+    return control_message({"filters": [[can_id, mask] for can_id, mask in filters]})
+
+
+def exchange(sock: socket.socket, filters: Filters | None) -> dict[str, Any]:
+    """Set `filters` (None: everything) and return the hub's status.
+
+    Frames that came before the answer are dropped, so that nothing unfiltered is left behind.
+
+    Raises:
+        BusError: the hub did not answer in time, refused, or went away.
+    """
+    if filters is not None:
+        sock.send(filter_message(filters))
+    sock.send(control_message({"status": True}))
+    before = sock.gettimeout()
+    sock.settimeout(_ANSWER_TIMEOUT_S)
+    try:
+        while True:
+            packet = sock.recv(_CONTROL_BYTES)
+            if not packet:
+                raise BusError("the simulated bus closed the connection")
+            if len(packet) == FRAME_BYTES:
+                continue
+            answer = json.loads(packet)
+            if "error" in answer:
+                raise BusError(f"the simulated bus refused: {answer['error']}")
+            return dict(answer["status"])
+    except TimeoutError:
+        raise BusError(f"the simulated bus did not answer in {_ANSWER_TIMEOUT_S:g} s") from None
+    except OSError as error:
+        raise BusError(f"the simulated bus went away ({error.strerror})") from None
+    finally:
+        sock.settimeout(before)
+
+
+def query_status(name: str) -> dict[str, Any]:
+    """Return the status of the simulated bus `name`: see docs/wire.md for its keys.
+
+    Raises:
+        BusError: there is no such bus, or it does not answer.
+    """
+    with contextlib.closing(connect(name)) as sock:
+        return exchange(sock, [])

@@ -1,0 +1,115 @@
+"""Bus URLs: one text that names a CAN bus."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from urllib.parse import parse_qsl
+
+import can
+
+from drivers.errors import BusError
+
+ALLOWED = (
+    "allowed: simbus:NAME, socketcan:vcan0, slcan:/dev/ttyACM0?bitrate=1000000, "
+    "socketcand://host:port/can0, or interface:channel?key=value of python-can"
+)
+Option = str | int | float | bool
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_URL = re.compile(r"(?P<interface>[A-Za-z0-9_-]+):(?P<rest>.*)", re.DOTALL)
+_REMOTE = re.compile(r"//(?P<host>\[[^\]]+\]|[^/:]+):(?P<port>\d+)/(?P<channel>[^/]+)")
+
+
+@dataclass(frozen=True)
+class BusUrl:
+    """A bus, taken apart: interface, channel and the interface's further options."""
+
+    interface: str
+    channel: str
+    options: dict[str, Option] = field(default_factory=dict)
+
+    @classmethod
+    def parse(cls, text: str) -> BusUrl:
+        """Take `text` apart.
+
+        Raises:
+            BusError: the text names no bus; the message tells what is allowed.
+        """
+        match = _URL.fullmatch(text.strip())
+        if match is None:
+            raise BusError(f"bus {text!r}: an interface and a colon are missing; {ALLOWED}")
+        interface = match["interface"].lower()
+        rest, _, query = match["rest"].partition("?")
+        options = _options(text, query)
+        if interface == "simbus":
+            return cls(interface, _simbus_name(text, rest, options))
+        if interface not in can.VALID_INTERFACES:
+            known = ", ".join(sorted(can.VALID_INTERFACES))
+            raise BusError(
+                f"bus {text!r}: unknown interface {interface!r}; {ALLOWED} (one of {known})"
+            )
+        if interface == "socketcand":
+            return _socketcand(text, rest, options)
+        if not rest:
+            raise BusError(f"bus {text!r}: the channel after the colon is missing; {ALLOWED}")
+        if interface == "socketcan" and (len(rest) > 15 or "/" in rest):
+            raise BusError(
+                f"bus {text!r}: {rest!r} cannot be a network interface (at most 15 characters, "
+                "no '/'), for example socketcan:vcan0"
+            )
+        return cls(interface, rest, options)
+
+    @property
+    def starts_own_simulator(self) -> bool:
+        """Whether the command has to start a simulator of its own (`simbus:` without a name)."""
+        return self.interface == "simbus" and not self.channel
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether no motor of flesh and blood can hang on this bus."""
+        return self.interface == "simbus"
+
+    def __str__(self) -> str:
+        if self.interface == "socketcand":
+            return f"socketcand://{self.options['host']}:{self.options['port']}/{self.channel}"
+        query = "&".join(f"{key}={value}" for key, value in self.options.items())
+        return f"{self.interface}:{self.channel}" + (f"?{query}" if query else "")
+
+
+def _simbus_name(text: str, rest: str, options: dict[str, Option]) -> str:
+    if options:
+        raise BusError(f"bus {text!r}: a simbus takes no options, only simbus:NAME or simbus:")
+    if rest and _NAME.fullmatch(rest) is None:
+        raise BusError(
+            f"bus {text!r}: a simbus name has 1 to 64 letters, digits, '_', '.' or '-' and "
+            "begins with a letter or digit"
+        )
+    return rest
+
+
+def _socketcand(text: str, rest: str, options: dict[str, Option]) -> BusUrl:
+    match = _REMOTE.fullmatch(rest)
+    if match is None or not 0 < int(match["port"]) < 65536:
+        raise BusError(f"bus {text!r}: write it as socketcand://host:port/can0")
+    remote: dict[str, Option] = {"host": match["host"].strip("[]"), "port": int(match["port"])}
+    return BusUrl("socketcand", match["channel"], remote | options)
+
+
+def _options(text: str, query: str) -> dict[str, Option]:
+    try:
+        pairs = parse_qsl(query, keep_blank_values=False, strict_parsing=bool(query))
+    except ValueError:
+        raise BusError(f"bus {text!r}: options are written ?key=value&key=value") from None
+    return {key: _value(value) for key, value in pairs}
+
+
+def _value(text: str) -> Option:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
