@@ -1,0 +1,20 @@
+"""CANopen slave (CiA 301, LSS slave of CiA 305) on which simulated devices are built."""
+
+from sim_bus.canopen.abort import Abort, SdoAbort
+from sim_bus.canopen.application import NmtState, SlaveApplication
+from sim_bus.canopen.node import CanopenSlave
+from sim_bus.canopen.od import DictionaryError, Entry, ObjectDictionary
+from sim_bus.canopen.store import ParameterStore, StoreError
+
+__all__ = [
+    "Abort",
+    "CanopenSlave",
+    "DictionaryError",
+    "Entry",
+    "NmtState",
+    "ObjectDictionary",
+    "ParameterStore",
+    "SdoAbort",
+    "SlaveApplication",
+    "StoreError",
+]

@@ -1,0 +1,47 @@
+"""SDO abort codes (CiA 301) and the exception that carries one to the client."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Abort(IntEnum):
+    """SDO abort codes of CiA 301 that this server sends."""
+
+    TOGGLE_BIT = 0x05030000
+    TIMEOUT = 0x05040000
+    UNKNOWN_COMMAND = 0x05040001
+    BLOCK_SIZE = 0x05040002
+    SEQUENCE_NUMBER = 0x05040003
+    CRC = 0x05040004
+    OUT_OF_MEMORY = 0x05040005
+    UNSUPPORTED_ACCESS = 0x06010000
+    WRITE_ONLY = 0x06010001
+    READ_ONLY = 0x06010002
+    NO_OBJECT = 0x06020000
+    NOT_MAPPABLE = 0x06040041
+    PDO_LENGTH = 0x06040042
+    INCOMPATIBLE_PARAMETER = 0x06040043
+    INCOMPATIBLE_INTERNAL = 0x06040047
+    HARDWARE_ERROR = 0x06060000
+    LENGTH_MISMATCH = 0x06070010
+    LENGTH_TOO_HIGH = 0x06070012
+    LENGTH_TOO_LOW = 0x06070013
+    NO_SUBINDEX = 0x06090011
+    INVALID_VALUE = 0x06090030
+    VALUE_TOO_HIGH = 0x06090031
+    VALUE_TOO_LOW = 0x06090032
+    GENERAL = 0x08000000
+    CANNOT_STORE = 0x08000020
+    LOCAL_CONTROL = 0x08000021
+    DEVICE_STATE = 0x08000022
+    NO_DICTIONARY = 0x08000023
+    NO_DATA = 0x08000024
+
+
+class SdoAbort(Exception):
+    """Refusal of an access to the object dictionary; `code` goes to the client."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(f"SDO abort {code:08X}h")
+        self.code = int(code)

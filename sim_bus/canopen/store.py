@@ -1,0 +1,92 @@
+"""Non-volatile memory of a simulated device: stored parameters and LSS configuration."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from pathlib import Path
+
+from sim_bus.canopen.abort import Abort, SdoAbort
+from sim_bus.canopen.datatypes import Value
+from sim_bus.canopen.od import Entry, ObjectDictionary
+
+
+class StoreError(Exception):
+    """A parameter file that cannot be read."""
+
+
+class ParameterStore:
+    """Stored parameters, in a JSON file when `path` is given, else in memory.
+
+    Only values that differ from the default are kept, so that COB-IDs relative to the node id
+    follow it. `volatile` lists indexes never stored: process data such as controlword and targets.
+    Raises StoreError when the file exists and is not one of these.
+    """
+
+    def __init__(self, path: Path | None = None, volatile: Collection[int] = ()) -> None:
+        self._path = path
+        self._volatile = frozenset(volatile) | {0x1003, 0x1010, 0x1011}
+        self._values: dict[str, str | int | float] = {}
+        self.node_id: int | None = None
+        """Node id stored by LSS."""
+        self.bitrate: int | None = None
+        """Bit rate stored by LSS, bit/s."""
+        if path is not None and path.exists():
+            self._read(path)
+
+    def _read(self, path: Path) -> None:
+        try:
+            data = json.loads(path.read_text())
+            self._values = dict(data["values"])
+            for key, value in self._values.items():
+                bytes.fromhex(key)
+                if not isinstance(value, str | int | float):
+                    raise ValueError(f"value of {key}")
+            self.node_id = data["node_id"]
+            self.bitrate = data["bitrate"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise StoreError(f"{path}: not a parameter file: {error!r}") from error
+
+    def write(self) -> None:
+        """Write the file; raises SdoAbort with a hardware error when that fails."""
+        if self._path is None:
+            return
+        content = {"node_id": self.node_id, "bitrate": self.bitrate, "values": self._values}
+        partial = self._path.with_name(self._path.name + ".part")
+        try:
+            partial.write_text(json.dumps(content, indent=1) + "\n")
+            partial.replace(self._path)
+        except OSError as error:
+            raise SdoAbort(Abort.HARDWARE_ERROR) from error
+
+    def save(self, od: ObjectDictionary, area: range) -> None:
+        """Store the writable values of an area; raises SdoAbort when it cannot be kept."""
+        for entry in od:
+            if entry.index in area and entry.access in ("rw", "rww", "rwr"):
+                self._values.pop(_key(entry), None)
+                value = entry.value
+                if entry.index not in self._volatile and value != entry.default:
+                    self._values[_key(entry)] = value.hex() if isinstance(value, bytes) else value
+        self.write()
+
+    def restore_defaults(self, od: ObjectDictionary, area: range) -> None:
+        """Forget the stored values of an area; they count after the next reset."""
+        for entry in od:
+            if entry.index in area:
+                self._values.pop(_key(entry), None)
+        self.write()
+
+    def load(self, od: ObjectDictionary) -> None:
+        """Hand the stored values to the dictionary as its power-on values."""
+        for entry in od:
+            entry.stored = self._stored(entry)
+
+    def _stored(self, entry: Entry) -> Value | None:
+        value = self._values.get(_key(entry))
+        if isinstance(value, str) and isinstance(entry.codec.zero, bytes):
+            return bytes.fromhex(value)
+        return value
+
+
+def _key(entry: Entry) -> str:
+    return f"{entry.index:04X}{entry.sub:02X}"
