@@ -1,1 +1,36 @@
 """Motors, drives, winches, cables and robots as validated data."""
+
+from profiles.cable import Cable
+from profiles.catalogue import (
+    list_profiles,
+    load_all,
+    load_cable,
+    load_drive,
+    load_motor,
+    load_motor_ratings,
+    load_winch,
+    time_load_all,
+)
+from profiles.drive import DriveProfile, Pdo, PdoEntry
+from profiles.errors import ProfileError
+from profiles.motor import Motor, MotorRatings
+from profiles.winch import Winch
+
+__all__ = [
+    "Cable",
+    "DriveProfile",
+    "Motor",
+    "MotorRatings",
+    "Pdo",
+    "PdoEntry",
+    "ProfileError",
+    "Winch",
+    "list_profiles",
+    "load_all",
+    "load_cable",
+    "load_drive",
+    "load_motor",
+    "load_motor_ratings",
+    "load_winch",
+    "time_load_all",
+]

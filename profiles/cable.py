@@ -1,0 +1,88 @@
+"""Cables: a single one with what was measured on it, and a maker's table of sizes."""
+
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from profiles.reader import Profile
+from profiles.table import records
+from profiles.units import N_PER_KGF
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class ElongationPoint(Profile):
+    """Elastic elongation at a share of the breaking force."""
+
+    force_percent_of_breaking: float = Field(gt=0, le=100)
+    elongation_percent: float = Field(gt=0, le=100)
+
+
+class Cable(Profile):
+    """One cable; `elongation_percent_per_N` holds for the tensions it was measured at."""
+
+    name: str = Field(min_length=1)
+    material: str
+    source: str = ""
+    notes: tuple[str, ...] = ()
+    diameter_m: float = Field(gt=0, le=0.1)
+    weight_per_length_N_m: Positive
+    elongation_percent_per_N: Positive
+    elongation_measured_up_to_N: Positive | None = None
+    breaking_force_kgf: Positive
+    min_tension_N: float = Field(ge=0)
+    data_sheet_code: str | None = None
+
+    @property
+    def breaking_force_N(self) -> float:
+        """Average breaking force in N."""
+        return self.breaking_force_kgf * N_PER_KGF
+
+    @property
+    def stiffness_N(self) -> float:
+        """Axial stiffness EA in N: tension over strain."""
+        return 100.0 / self.elongation_percent_per_N
+
+    @model_validator(mode="after")
+    def _holds(self) -> Self:
+        if self.min_tension_N >= self.breaking_force_N:
+            raise ValueError(
+                f"min_tension_N: value {self.min_tension_N}; "
+                f"allowed: below the breaking force ({self.breaking_force_N:.0f} N)"
+            )
+        return self
+
+
+class CableSize(Profile):
+    """One row of a maker's table, as printed."""
+
+    code: str
+    diameter_mm: Positive
+    diameter_in: str
+    mass_kg_per_100_m: Positive
+    mass_lb_per_100_ft: Positive
+    breaking_force_kgf: Positive
+    breaking_force_lbf: Positive
+
+
+class CableSeries(Profile):
+    """A maker's table of sizes; its rows in the file are arrays in the order of `columns`."""
+
+    series: str
+    manufacturer: str
+    material: str
+    source: str
+    notes: tuple[str, ...]
+    columns: tuple[str, ...]
+    sizes: tuple[CableSize, ...]
+    elongation: tuple[ElongationPoint, ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _rows_to_records(cls, table: Any) -> Any:
+        if not isinstance(table, dict):
+            return table
+        columns, rows = table.get("columns"), table.get("sizes")
+        if not isinstance(columns, tuple) or not isinstance(rows, tuple):
+            return table
+        return {**table, "sizes": records(columns, rows)}

@@ -1,0 +1,192 @@
+"""Find profiles by name or path and load them, references included."""
+
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from profiles.cable import Cable, CableSeries
+from profiles.drive import DriveProfile
+from profiles.errors import ProfileError
+from profiles.motor import Motor, MotorRatings, MotorSeries
+from profiles.reader import closest, read_toml_model
+from profiles.winch import Winch, WinchFile
+
+Kind = Literal["motors", "drives", "cables", "winches"]
+KINDS: tuple[Kind, ...] = ("motors", "drives", "cables", "winches")
+SHIPPED = Path(__file__).parent
+
+_SERIES = ".series.toml"
+
+_T = TypeVar("_T")
+
+
+def load_motor(name: str | Path, beside: Path | None = None) -> Motor:
+    """Return a motor by name ("MPP0923D") or path; `beside` is a folder looked into first.
+
+    Raises ProfileError, also for a motor whose source gives its ratings only.
+    """
+    path = _find("motors", name, beside)
+    if path is not None:
+        return read_toml_model(path, Motor)
+    for series_path, series in _motor_series().items():
+        if str(name) in series.names():
+            motor = series.motor(str(name))
+            if motor is not None:
+                return motor
+            raise ProfileError(
+                series_path,
+                f"detail.{str(name)[3:]}",
+                f"the source gives the ratings of {name} only, not its torque constant and winding;"
+                " write these into a motor file of your own",
+            )
+    raise _unknown("motors", name, beside)
+
+
+def load_motor_ratings(name: str) -> MotorRatings:
+    """Return the printed ratings of a motor of a shipped series; raises ProfileError."""
+    for series in _motor_series().values():
+        if name in series.names():
+            return series.names()[name]
+    raise _unknown("motors", name, None)
+
+
+def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
+    """Return a drive by name or path, its `eds` an existing absolute path; raises ProfileError."""
+    path = _require("drives", name, beside)
+    drive = read_toml_model(path, DriveProfile)
+    eds = path.parent / drive.eds
+    if not eds.is_file():
+        raise ProfileError(path, "eds", f"value {str(drive.eds)!r}; allowed: a file beside this")
+    return drive.model_copy(update={"eds": eds.resolve()})
+
+
+def load_cable(name: str | Path, beside: Path | None = None) -> Cable:
+    """Return a cable by name or path; raises ProfileError."""
+    return read_toml_model(_require("cables", name, beside), Cable)
+
+
+def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
+    """Return a winch by name or path with the motor, drive and cable it names.
+
+    These are looked for beside the winch's own file, then among the shipped ones. Raises
+    ProfileError.
+    """
+    path = _require("winches", name, beside)
+    file = read_toml_model(path, WinchFile)
+    folder = path.parent
+    if file.node_id == file.master_node_id:
+        raise ProfileError(
+            path, "node_id", f"value {file.node_id}; allowed: another than master_node_id"
+        )
+    return Winch(
+        profile=path.stem,
+        motor=_referred(path, "motor", load_motor, file.motor, folder),
+        drive=_referred(path, "drive", load_drive, file.drive, folder),
+        cable=_referred(path, "cable", load_cable, file.cable, folder),
+        **file.model_dump(exclude={"motor", "drive", "cable"}),
+    )
+
+
+def list_profiles() -> dict[Kind, tuple[str, ...]]:
+    """Return the names of the shipped profiles by kind; motors include every one of a series."""
+    return {kind: tuple(sorted(_shipped_names(kind))) for kind in KINDS}
+
+
+def load_all() -> dict[Kind, dict[str, object]]:
+    """Read and validate every shipped profile; raises ProfileError.
+
+    A motor whose source has no size sheet appears with its ratings.
+    """
+    _motor_series.cache_clear()
+    _cable_series.cache_clear()
+    everything: dict[Kind, dict[str, object]] = {kind: {} for kind in KINDS}
+    for series in _motor_series().values():
+        for name, ratings in series.names().items():
+            everything["motors"][name] = series.motor(name) or ratings
+    for cables in _cable_series().values():
+        everything["cables"] |= {size.code: size for size in cables.sizes}
+    loaders: tuple[tuple[Kind, Callable[[str], object]], ...] = (
+        ("motors", load_motor),
+        ("drives", load_drive),
+        ("cables", load_cable),
+        ("winches", load_winch),
+    )
+    for kind, load in loaders:
+        for path in _files(kind):
+            everything[kind][path.stem] = load(path.stem)
+    return everything
+
+
+def time_load_all(repeats: int = 5) -> float:
+    """Return the best of `repeats` wall times of `load_all` in s, nothing kept from one to next."""
+    best = float("inf")
+    for _ in range(repeats):
+        start = time.perf_counter()
+        load_all()
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def _files(kind: Kind) -> list[Path]:
+    folder = SHIPPED / kind
+    return sorted(p for p in folder.glob("*.toml") if not p.name.endswith(_SERIES))
+
+
+@lru_cache(maxsize=1)
+def _motor_series() -> dict[Path, MotorSeries]:
+    paths = sorted((SHIPPED / "motors").glob("*" + _SERIES))
+    return {path: read_toml_model(path, MotorSeries) for path in paths}
+
+
+@lru_cache(maxsize=1)
+def _cable_series() -> dict[Path, CableSeries]:
+    paths = sorted((SHIPPED / "cables").glob("*" + _SERIES))
+    return {path: read_toml_model(path, CableSeries) for path in paths}
+
+
+def _shipped_names(kind: Kind) -> set[str]:
+    names = {path.stem for path in _files(kind)}
+    if kind == "motors":
+        for series in _motor_series().values():
+            names |= set(series.names())
+    return names
+
+
+def _find(kind: Kind, name: str | Path, beside: Path | None) -> Path | None:
+    """Return the file of a profile, or None where no file has this name."""
+    text = str(name)
+    folder = beside if beside is not None else Path()
+    if isinstance(name, Path) or "/" in text or text.endswith(".toml"):
+        return folder / Path(text).expanduser()
+    candidates = [SHIPPED / kind / f"{text}.toml"]
+    if beside is not None:
+        candidates.insert(0, beside / f"{text}.toml")
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _require(kind: Kind, name: str | Path, beside: Path | None) -> Path:
+    path = _find(kind, name, beside)
+    if path is None:
+        raise _unknown(kind, name, beside)
+    return path
+
+
+def _unknown(kind: Kind, name: str | Path, beside: Path | None) -> ProfileError:
+    known = _shipped_names(kind)
+    if beside is not None:
+        known |= {path.stem for path in beside.glob("*.toml")}
+    meant = closest(str(name), known)
+    hint = f"did you mean {meant!r}?" if meant else f"allowed: {', '.join(sorted(known))}"
+    return ProfileError(kind, "", f"no profile named {str(name)!r}; {hint} (or a path to a file)")
+
+
+def _referred(file: Path, key: str, load: Callable[[str, Path], _T], name: str, folder: Path) -> _T:
+    """Load what a file's key names; an unknown name is told with that file and key."""
+    try:
+        return load(name, folder)
+    except ProfileError as error:
+        if error.file in KINDS:
+            raise ProfileError(file, key, error.problem) from None
+        raise

@@ -1,0 +1,112 @@
+"""Servo drives: what the master must know of one, with its peculiarities as data."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from profiles.reader import Profile
+
+Sign = Literal[-1, 1]
+Unsigned8 = Annotated[int, Field(ge=0, le=0xFF)]
+Unsigned16 = Annotated[int, Field(ge=0, le=0xFFFF)]
+Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFFFFFF)]
+Mode = Annotated[int, Field(ge=-128, le=127)]
+
+
+class PdoEntry(Profile):
+    """One object in a PDO."""
+
+    index: Unsigned16
+    subindex: Unsigned8 = 0
+    bits: Literal[8, 16, 32]
+
+    @property
+    def mapping(self) -> int:
+        """The value of a mapping entry (CiA 301: index, sub-index, length)."""
+        return self.index << 16 | self.subindex << 8 | self.bits
+
+
+class Pdo(Profile):
+    """One PDO as the master configures it; times of 0 leave the function off."""
+
+    number: int = Field(ge=1, le=512)
+    cob_id_offset: int = Field(ge=0x180, le=0x57F)
+    transmission_type: Unsigned8
+    inhibit_time_s: float = Field(default=0.0, ge=0, le=6.5535)
+    event_timer_s: float = Field(default=0.0, ge=0, le=65.535)
+    entries: tuple[PdoEntry, ...] = Field(min_length=1, max_length=8)
+
+    @model_validator(mode="after")
+    def _fits_a_frame(self) -> Self:
+        bits = sum(e.bits for e in self.entries)
+        if bits > 64:
+            raise ValueError(f"entries: {bits} bits; allowed: at most 64 in one frame")
+        return self
+
+    def cob_id(self, node_id: int) -> int:
+        """Identifier of this PDO for a node."""
+        return self.cob_id_offset + node_id
+
+
+class Quirks(Profile):
+    """Where a drive departs from the standard."""
+
+    halt_before_mode_change: bool = False
+    disable_before_mode_change: bool = False
+
+
+class Verification(Profile):
+    """How well one fact of a profile is known."""
+
+    status: Literal["verified", "manual", "assumed"]
+    how: str = Field(min_length=1)
+
+
+class DriveProfile(Profile):
+    """One CiA 402 drive type.
+
+    `eds` is the path of its electronic data sheet; signs turn the drive's counting and torque into
+    the motor's; `torque_delay_s` is the nominal lag of its current loop and `feedback_delay_s` the
+    nominal age of the position it reports.
+    """
+
+    name: str = Field(min_length=1)
+    eds: Path = Field(strict=False)
+    vendor_id: Unsigned32
+    product_code: Unsigned32
+    revision: Unsigned32
+    serial: Unsigned32 | None = None
+    supported_modes: tuple[Mode, ...] = Field(min_length=1)
+    mode_torque: Mode = 10
+    homing_methods: tuple[Mode, ...] = ()
+    torque_unit: Literal["per_mille_of_rated"] = "per_mille_of_rated"
+    position_sign: Sign = 1
+    torque_sign: Sign = 1
+    homing_sign: Sign = 1
+    mode_display_timeout_s: float = Field(gt=0, le=10)
+    state_timeout_s: float = Field(gt=0, le=60)
+    feedback_delay_s: float = Field(ge=0, le=0.1)
+    torque_delay_s: float = Field(ge=0, le=0.1)
+    heartbeat_producer_s: float = Field(ge=0.001, le=65.535)
+    heartbeat_consumer_s: float = Field(ge=0.001, le=65.535)
+    rpdos: tuple[Pdo, ...] = Field(min_length=1)
+    tpdos: tuple[Pdo, ...] = Field(min_length=1)
+    quirks: Quirks = Quirks()
+    verified: dict[str, Verification] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.mode_torque not in self.supported_modes:
+            raise ValueError(
+                f"mode_torque: value {self.mode_torque}; allowed: one of supported_modes"
+            )
+        for kind, pdos in (("rpdos", self.rpdos), ("tpdos", self.tpdos)):
+            for key in ("number", "cob_id_offset"):
+                values = [getattr(pdo, key) for pdo in pdos]
+                if len(set(values)) < len(values):
+                    raise ValueError(f"{kind}: {key} {values}; allowed: each value once")
+        unknown = [fact for fact in self.verified if fact not in type(self).model_fields]
+        if unknown:
+            raise ValueError(f"verified.{unknown[0]}: unknown key; allowed: a key of this file")
+        return self

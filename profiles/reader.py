@@ -1,0 +1,139 @@
+"""Read a TOML file into a validated, frozen model."""
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from profiles.errors import ProfileError
+
+_SHOWN_VALUE_CHARS = 60
+
+
+class Profile(BaseModel):
+    """Base of every model read from TOML: frozen, strict about types, unknown keys refused.
+
+    Use tuples for arrays: lists of the file arrive as tuples.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True
+    )
+
+
+_M = TypeVar("_M", bound=BaseModel)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file, its arrays as tuples.
+
+    Raises ProfileError when the file cannot be read or is not TOML (with line and column).
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ProfileError(path, "", f"cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise ProfileError(path, "", f"is not UTF-8 text (byte {error.start})") from None
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ProfileError(path, "", f"is not valid TOML: {error}") from None
+    return {key: _with_tuples(value) for key, value in table.items()}
+
+
+def read_toml_model(path: Path, model: type[_M]) -> _M:
+    """Return the file as an instance of `model`.
+
+    Raises ProfileError, one line per fault, each with the key, the value and what is allowed;
+    a misspelt key is answered with the one that was probably meant.
+    """
+    return validated(path, read_toml(path), model)
+
+
+def validated(path: Path, table: Mapping[str, Any], model: type[_M]) -> _M:
+    """Return `table`, which came from `path`, as an instance of `model`; raises ProfileError."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        faults = list(_faults(model, error.errors(include_url=False)))
+    key, problem = faults[0]
+    further = [f"\n{path}: {k}: {p}" if k else f"\n{path}: {p}" for k, p in faults[1:]]
+    raise ProfileError(path, key, problem + "".join(further)) from None
+
+
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that `name` probably means, or None."""
+    by_folded = {k.casefold(): k for k in known}
+    found = difflib.get_close_matches(name.casefold(), by_folded, n=1, cutoff=0.6)
+    return by_folded[found[0]] if found else None
+
+
+def _with_tuples(value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_with_tuples(v) for v in value)
+    if isinstance(value, dict):
+        return {k: _with_tuples(v) for k, v in value.items()}
+    return value
+
+
+def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tuple[str, str]]:
+    """Yield (dotted key, problem), misspelt keys first, without the gaps they explain."""
+    explained: set[tuple[int | str, ...]] = set()
+    for error in errors:
+        if error["type"] == "extra_forbidden":
+            loc = error["loc"]
+            known = _keys_at(model, loc[:-1])
+            meant = closest(str(loc[-1]), known)
+            hint = f"did you mean {meant!r}?" if meant else f"allowed: {', '.join(sorted(known))}"
+            if meant:
+                explained.add((*loc[:-1], meant))
+            yield dotted(loc), f"unknown key; {hint}"
+    for error in errors:
+        if error["type"] == "missing" and error["loc"] not in explained:
+            yield dotted(error["loc"]), "this key is required and missing"
+        elif error["type"] == "value_error":
+            yield dotted(error["loc"]), error["msg"].removeprefix("Value error, ")
+        elif error["type"] not in ("missing", "extra_forbidden"):
+            allowed = error["msg"].removeprefix("Input should be ")
+            yield dotted(error["loc"]), f"value {_shown(error['input'])}; allowed: {allowed}"
+
+
+def dotted(loc: Iterable[int | str]) -> str:
+    """Return a place in a file as a person would write it: `pdos[1].entries[0].bits`."""
+    text = ""
+    for part in loc:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= _SHOWN_VALUE_CHARS else text[: _SHOWN_VALUE_CHARS - 3] + "..."
+
+
+def _keys_at(model: type[BaseModel], loc: Iterable[int | str]) -> list[str]:
+    """Return the keys which the model has at a place in the file."""
+    here: Any = model
+    for part in loc:
+        found = _model_in(here)
+        if found is not None and part in found.model_fields:
+            here = found.model_fields[str(part)].annotation
+        else:
+            here = next((a for a in reversed(get_args(here)) if a is not Ellipsis), here)
+    found = _model_in(here)
+    return list(found.model_fields) if found is not None else []
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the model which an annotation (`M`, `M | None`) means."""
+    if get_origin(annotation) in (Union, UnionType):
+        return next((m for a in get_args(annotation) if (m := _model_in(a))), None)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return None

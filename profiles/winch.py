@@ -1,0 +1,58 @@
+"""Winches: a motor, its drive, a gear, a drum and a cable."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
+
+from profiles.cable import Cable
+from profiles.drive import DriveProfile
+from profiles.motor import Motor
+from profiles.reader import Profile
+
+
+class WinchFile(Profile):
+    """A winch as its file has it; motor, drive and cable are names or paths of other profiles."""
+
+    name: str = Field(min_length=1)
+    notes: tuple[str, ...] = ()
+    motor: str
+    drive: str
+    cable: str
+    gear_ratio: float = Field(gt=0, le=1000)
+    drum_radius_m: float = Field(gt=0, le=10)
+    cable_sign: Literal[-1, 1] = 1
+    encoder_counts_per_turn: int = Field(ge=4, le=2**24)
+    node_id: int = Field(ge=1, le=127)
+    master_node_id: int = Field(default=127, ge=1, le=127)
+    bitrate_bit_s: Literal[10000, 20000, 50000, 125000, 250000, 500000, 800000, 1000000] = 1000000
+    sync_period_s: float = Field(default=0.001, ge=0.0001, le=1.0)
+
+
+@dataclass(frozen=True)
+class Winch:
+    """A winch with the profiles it names.
+
+    `gear_ratio` is motor turns per drum turn; `drum_radius_m` is effective, belt and rope included;
+    `cable_sign` is +1 where a positive motor angle pays cable out.
+    """
+
+    profile: str
+    name: str
+    motor: Motor
+    drive: DriveProfile
+    cable: Cable
+    gear_ratio: float
+    drum_radius_m: float
+    cable_sign: int
+    encoder_counts_per_turn: int
+    node_id: int
+    master_node_id: int
+    bitrate_bit_s: int
+    sync_period_s: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def cable_m_per_motor_rad(self) -> float:
+        """Cable paid out per radian of the motor, with its sign."""
+        return self.cable_sign * self.drum_radius_m / self.gear_ratio
