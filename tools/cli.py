@@ -1,5 +1,60 @@
-"""The `cdpr` command."""
+"""The `cdpr` command: its subcommands, and how errors become a message and an exit status."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import typer
+
+from cdpr_rt.errors import ControlError
+from drivers.errors import DriverError
+from profiles.errors import ProfileError
+from sim_bus.errors import SimulatorError
+from tools.errors import BAD_INPUT, DONE, FAILED, CommandError
+from tools.output import to_json
+
+app = typer.Typer(
+    name="cdpr",
+    help="Commission, run and simulate the winches of cable-driven parallel robots.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+_COMMANDS = ("bench", "cogging", "commission", "doctor", "drive", "profiles", "sim")
+_INTERRUPTED = 130
+
+
+def _register(arguments: list[str]) -> None:
+    """Load the commands; only the one that is asked for, since each brings libraries along."""
+    asked = [name for name in _COMMANDS if arguments and arguments[0] == name]
+    for name in asked or _COMMANDS:
+        importlib.import_module(f"tools.commands.{name}").register(app)
+
+
+def _exit_status(error: BaseException) -> int:
+    if isinstance(error, CommandError):
+        return error.exit_status
+    return BAD_INPUT if isinstance(error, ProfileError) else FAILED
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line; a known error is one line on standard error, never a traceback."""
+    _register(sys.argv[1:])
+    try:
+        app(standalone_mode=True)
+    except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
+        print(f"cdpr: {error}", file=sys.stderr)
+        status = _exit_status(error)
+        if "--json" in sys.argv:
+            print(to_json({"ok": False, "error": str(error), "exit_status": status}))
+        sys.exit(status)
+    except KeyboardInterrupt:
+        print("cdpr: interrupted", file=sys.stderr)
+        sys.exit(_INTERRUPTED)
+    sys.exit(DONE)
+
+
+if __name__ == "__main__":
+    main()

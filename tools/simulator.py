@@ -1,0 +1,80 @@
+"""A simulator that belongs to a command: its own process, ended with the command."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import IO
+
+from tools.errors import BadInputError, WorkFailedError
+
+# the first start on a machine compiles the physics
+_START_TIMEOUT_S = 180.0
+_STOP_TIMEOUT_S = 5.0
+
+
+class OwnSimulator:
+    """A running `cdpr sim up`; leaves when its standard input closes, so also when we die."""
+
+    def __init__(
+        self, winch: str, bus: str, plant: Path | None = None, truth_log: Path | None = None
+    ) -> None:
+        command = [sys.executable, "-m", "tools.cli", "sim", "up", winch, "--bus", bus]
+        command += ["--lockstep", "--exit-with-stdin"]
+        if plant is not None:
+            command += ["--plant", str(plant)]
+        if truth_log is not None:
+            command += ["--truth-log", str(truth_log)]
+        self.bus = bus
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,  # a Ctrl-C at the terminal is ours to handle, not its
+        )
+        try:
+            self._await_ready()
+        except BaseException:
+            self.stop()
+            raise
+
+    def _await_ready(self) -> None:
+        out = self._pipe(self.process.stdout)
+        deadline = time.monotonic() + _START_TIMEOUT_S
+        while time.monotonic() < deadline:
+            ready, _, _ = select.select([out], [], [], 0.1)
+            if ready:
+                if os.read(out.fileno(), 4096):
+                    return
+                break
+        errors = self._pipe(self.process.stderr)
+        if self.process.poll() is None and time.monotonic() >= deadline:
+            raise WorkFailedError(f"the simulator was not ready within {_START_TIMEOUT_S:g} s")
+        message = errors.read().decode(errors="replace").strip().removeprefix("cdpr: ")
+        kind = (
+            BadInputError if self.process.wait() == BadInputError.exit_status else WorkFailedError
+        )
+        raise kind(message or "the simulator ended before it was ready")
+
+    @staticmethod
+    def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
+        assert pipe is not None  # opened with PIPE
+        return pipe
+
+    def stop(self) -> None:
+        """End the simulator; what it logs is complete afterwards."""
+        with contextlib.suppress(OSError):
+            self._pipe(self.process.stdin).close()
+        try:
+            self.process.wait(_STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        for pipe in (self.process.stdout, self.process.stderr):
+            self._pipe(pipe).close()
