@@ -5,9 +5,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from profiles.reader import Profile
+from profiles.reader import Profile, one_of
 
-Sign = Literal[-1, 1]
+Sign = Annotated[int, one_of(-1, 1)]
 Unsigned8 = Annotated[int, Field(ge=0, le=0xFF)]
 Unsigned16 = Annotated[int, Field(ge=0, le=0xFFFF)]
 Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFFFFFF)]
@@ -19,7 +19,7 @@ class PdoEntry(Profile):
 
     index: Unsigned16
     subindex: Unsigned8 = 0
-    bits: Literal[8, 16, 32]
+    bits: Annotated[int, one_of(8, 16, 32)]
 
     @property
     def mapping(self) -> int:

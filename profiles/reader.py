@@ -7,7 +7,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from profiles.errors import ProfileError
@@ -24,6 +24,17 @@ class Profile(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True
     )
+
+
+def one_of(*allowed: int) -> AfterValidator:
+    """Return the constraint of an integer key to some values (a Literal would let `true` be 1)."""
+
+    def check(value: int) -> int:
+        if value not in allowed:
+            raise ValueError(f"value {value}; allowed: {' or '.join(map(str, allowed))}")
+        return value
+
+    return AfterValidator(check)
 
 
 _M = TypeVar("_M", bound=BaseModel)

@@ -1,14 +1,17 @@
 """Winches: a motor, its drive, a gear, a drum and a cable."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from profiles.cable import Cable
 from profiles.drive import DriveProfile
 from profiles.motor import Motor
-from profiles.reader import Profile
+from profiles.reader import Profile, one_of
+
+# Those of CiA 301.
+BITRATES_bit_s = (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
 
 
 class WinchFile(Profile):
@@ -21,11 +24,11 @@ class WinchFile(Profile):
     cable: str
     gear_ratio: float = Field(gt=0, le=1000)
     drum_radius_m: float = Field(gt=0, le=10)
-    cable_sign: Literal[-1, 1] = 1
+    cable_sign: Annotated[int, one_of(-1, 1)] = 1
     encoder_counts_per_turn: int = Field(ge=4, le=2**24)
     node_id: int = Field(ge=1, le=127)
     master_node_id: int = Field(default=127, ge=1, le=127)
-    bitrate_bit_s: Literal[10000, 20000, 50000, 125000, 250000, 500000, 800000, 1000000] = 1000000
+    bitrate_bit_s: Annotated[int, one_of(*BITRATES_bit_s)] = 1_000_000
     sync_period_s: float = Field(default=0.001, ge=0.0001, le=1.0)
 
 

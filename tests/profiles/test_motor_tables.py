@@ -1,0 +1,136 @@
+"""The printed tables obey the laws that tie their columns together, row by row.
+
+A wrong digit in one column breaks the law with its neighbour: pounds against newtons, peak against
+continuous, power against torque and speed.
+"""
+
+import math
+
+import pytest
+
+from profiles import load_motor, load_motor_ratings
+from profiles.catalogue import SHIPPED
+from profiles.motor import Motor, MotorDetail, MotorRatings, MotorSeries
+from profiles.reader import read_toml_model
+from profiles.units import RAD_S_PER_RPM, kg_m2_PER_lb_in_s2
+
+SERIES = read_toml_model(SHIPPED / "motors" / "parker-mpp-mpj.series.toml", MotorSeries)
+ROWS_230 = SERIES.ratings.models_230_VAC
+ROWS_460 = SERIES.ratings.models_460_VAC
+ROWS = {row.model: row for row in ROWS_230 + ROWS_460}
+
+# Factors with which the source was evidently computed.
+LB_IN_PER_NM = 8.85
+KW_PER_HP = 0.75
+PEAK_OVER_STALL_CURRENT = 3.16
+
+
+def _within_last_digit(a: float, b: float, factor: float, digit_a: float, digit_b: float) -> bool:
+    """Tell whether a * factor equals b when each is rounded to its last digit."""
+    return abs(a * factor - b) <= 0.5001 * (digit_a * factor + digit_b) + 3e-4 * abs(b)
+
+
+def test_the_source_has_19_and_25_models_and_8_size_sheets():
+    assert (len(ROWS_230), len(ROWS_460)) == (19, 25)
+    assert len(ROWS) == 44
+    assert set(SERIES.detail) == {m for m in ROWS if m.startswith("092")}
+
+
+@pytest.mark.parametrize("row", ROWS.values(), ids=ROWS)
+def test_columns_of_a_row_agree(row: MotorRatings):
+    w = _within_last_digit
+    assert w(row.stall_torque_Nm, row.stall_torque_lb_in, LB_IN_PER_NM, 0.01, 0.01)
+    assert w(row.peak_torque_Nm, row.peak_torque_lb_in, LB_IN_PER_NM, 0.01, 0.01)
+    assert w(row.rated_power_HP, row.rated_power_kW, KW_PER_HP, 0.02, 0.01)
+    assert w(row.stall_current_Arms, row.peak_current_Arms, PEAK_OVER_STALL_CURRENT, 0.01, 0.01)
+    for lb_in, kg_m2 in (
+        (row.mpp_inertia_lb_in_s2, row.mpp_inertia_kg_m2),
+        (row.mpj_inertia_lb_in_s2, row.mpj_inertia_kg_m2),
+    ):
+        if lb_in is None or kg_m2 is None:
+            assert lb_in is None
+            assert kg_m2 is None
+        else:
+            assert lb_in * kg_m2_PER_lb_in_s2 == pytest.approx(kg_m2, rel=0.004)
+    torque_at_rated_speed = row.rated_power_kW * 1e3 / (row.rated_speed_rpm * RAD_S_PER_RPM)
+    assert 0.4 * row.stall_torque_Nm < torque_at_rated_speed < row.stall_torque_Nm
+
+
+@pytest.mark.parametrize("model", SERIES.detail)
+def test_columns_of_a_size_sheet_agree(model: str):
+    d: MotorDetail = SERIES.detail[model]
+    w = _within_last_digit
+    assert w(d.stall_torque_Nm, d.stall_torque_in_lb, LB_IN_PER_NM, 0.01, 0.1)
+    assert w(d.peak_torque_Nm, d.peak_torque_in_lb, LB_IN_PER_NM, 0.01, 0.1)
+    assert w(d.rated_torque_Nm, d.rated_torque_in_lb, LB_IN_PER_NM, 0.01, 0.1)
+    speed = d.rated_speed_rpm * RAD_S_PER_RPM
+    assert w(d.rated_torque_Nm, d.rated_power_kW, speed / 1e3, 0.01, 0.01)
+    k_t = d.voltage_constant_Vrms_per_krpm * math.sqrt(3) / (1e3 * RAD_S_PER_RPM)
+    assert k_t == pytest.approx(d.torque_constant_Nm_per_Arms, abs=6e-4)
+    from_current = d.stall_current_Arms * k_t
+    assert from_current == pytest.approx(d.stall_torque_Nm, rel=0.01 + 0.05 / d.stall_current_Arms)
+    assert w(d.mass_kg, d.mass_lb, 2.2046, 0.02, 0.01)
+    assert d.mpp_inertia_in_lb_s2 * kg_m2_PER_lb_in_s2 == pytest.approx(
+        d.mpp_inertia_kg_m2, rel=2e-4
+    )
+    if d.mpj_inertia_kg_m2 is None or d.mpj_inertia_in_lb_s2 is None:
+        assert d.mpj_inertia_kg_m2 == d.mpj_inertia_in_lb_s2
+    else:
+        assert d.mpj_inertia_in_lb_s2 * kg_m2_PER_lb_in_s2 == pytest.approx(
+            d.mpj_inertia_kg_m2, rel=3e-4
+        )
+
+
+@pytest.mark.parametrize("model", SERIES.detail)
+def test_size_sheet_agrees_with_the_table_of_all_models(model: str):
+    d, row = SERIES.detail[model], ROWS[model]
+    assert d.stall_torque_Nm == row.stall_torque_Nm
+    assert d.peak_torque_Nm == row.peak_torque_Nm
+    assert d.rated_power_kW == row.rated_power_kW
+    assert abs(d.rated_speed_rpm - row.rated_speed_rpm) <= 0.5
+    assert abs(d.stall_current_Arms - row.stall_current_Arms) <= 0.051
+    assert abs(d.peak_current_Arms - row.peak_current_Arms) <= 0.051
+    assert d.mpp_inertia_kg_m2 == pytest.approx(row.mpp_inertia_kg_m2, rel=1e-3)
+    assert (d.mpj_inertia_kg_m2 is None) == (row.mpj_inertia_kg_m2 is None)
+
+
+def test_mpj_inertias_of_size_92_disagree_as_noted_and_the_sheet_is_used():
+    row = load_motor_ratings("MPJ0922D")
+    assert row.mpj_inertia_kg_m2 == 6.90e-4
+    assert row.mpj_inertia_kg_m2 == row.mpp_inertia_lb_in_s2
+    assert load_motor("MPJ0922D").rotor_inertia_kg_m2 == 4.261e-4
+    assert any("0922" in note for note in SERIES.notes)
+
+
+def test_rows_copied_by_eye():
+    assert tuple(ROWS["0923D"].model_dump().values()) == (
+        *("0923D", 4947.33, 1.55, 2.07, 1.00e-3, 1.13e-4, None, None),
+        *(4.03, 35.63, 11.55, 102.23, 7.23, 22.85),
+    )
+    assert tuple(ROWS["1426P"].model_dump().values()) == (
+        *("1426P", 3371.51, 6.26, 8.35, 1.90e-2, 2.15e-3, 7.38e-2, 8.34e-3),
+        *(25.70, 227.47, 72.25, 639.38, 13.07, 41.31),
+    )
+    assert tuple(ROWS["2708N"].model_dump().values()) == (
+        *("2708N", 1961.51, 21.13, 28.17, 3.13e-1, 3.54e-2, None, None),
+        *(149.65, 1324.37, 386.95, 3424.50, 49.96, 157.89),
+    )
+
+
+def test_the_thesis_motor():
+    motor = load_motor("MPP0923D")
+    assert isinstance(motor, Motor)
+    assert motor.pole_pairs == 4
+    assert motor.torque_constant_Nm_per_Arms == 0.561
+    assert (motor.rated_torque_Nm, motor.stall_torque_Nm, motor.peak_torque_Nm) == (
+        3.0,
+        4.03,
+        11.55,
+    )
+    assert (motor.rated_current_Arms, motor.peak_current_Arms) == (5.59, 22.8)
+    assert motor.rated_speed_rad_s == pytest.approx(518.05, abs=0.01)
+    assert motor.rated_power_W == pytest.approx(1550, abs=5)
+    assert (motor.resistance_ohm, motor.inductance_H) == (1.20, pytest.approx(6e-3))
+    assert motor.rotor_inertia_kg_m2 == 1.130e-4
+    assert motor.max_dc_bus_voltage_V == 340
+    assert load_motor("MPP0923R").max_dc_bus_voltage_V == 650

@@ -1,0 +1,313 @@
+"""Shipped profiles load; whatever is wrong in a file is told with its file, key and value."""
+
+import math
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+import profiles
+from profiles import ProfileError
+from profiles.cable import Cable, CableSeries
+from profiles.catalogue import KINDS, SHIPPED
+from profiles.drive import DriveProfile
+from profiles.motor import Motor, MotorRatings, MotorSeries
+from profiles.reader import Profile, read_toml_model
+from profiles.winch import WinchFile
+
+FILES: dict[Path, type[Profile]] = {
+    SHIPPED / "motors" / "parker-mpp-mpj.series.toml": MotorSeries,
+    SHIPPED / "drives" / "generic-cia402.toml": DriveProfile,
+    SHIPPED / "cables" / "barry-dyneema.series.toml": CableSeries,
+    SHIPPED / "cables" / "dyneema-4.8mm.toml": Cable,
+    SHIPPED / "winches" / "winch-mpp0923d.toml": WinchFile,
+}
+repeatable = settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=60,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+files = st.sampled_from(list(FILES))
+JUNK = [-1e6, math.nan, math.inf, "three", True, {}, [[]]]
+
+
+def _toml(value: Any) -> str:
+    """Write a value in TOML's inline form."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_toml(k)} = {_toml(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_toml(v) for v in value) + "]"
+    return repr(value)
+
+
+def _document(table: dict[str, Any]) -> str:
+    return "".join(f"{_toml(k)} = {_toml(v)}\n" for k, v in table.items())
+
+
+def _read(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def _write(tmp_path: Path, source: Path, table: dict[str, Any]) -> Path:
+    path = tmp_path / source.name
+    path.write_text(_document(table), encoding="utf-8")
+    return path
+
+
+def test_every_file_is_covered_here():
+    shipped = {p for kind in KINDS for p in (SHIPPED / kind).glob("*.toml")}
+    assert shipped == set(FILES)
+
+
+def test_load_all_holds_every_listed_profile():
+    everything = profiles.load_all()
+    for kind, names in profiles.list_profiles().items():
+        assert set(names) <= set(everything[kind])
+        assert names
+    complete = [m for m in everything["motors"].values() if isinstance(m, Motor)]
+    assert len(complete) == 14  # 8 MPP and 6 MPJ of size 92
+    assert all(isinstance(m, Motor | MotorRatings) for m in everything["motors"].values())
+
+
+def test_load_all_is_timed_over_real_work():
+    assert 0 < profiles.time_load_all(repeats=1) < 60
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.name)
+def test_written_out_and_read_again_it_is_the_same(path: Path, tmp_path: Path):
+    again = _write(tmp_path, path, _read(path))
+    assert read_toml_model(again, FILES[path]) == read_toml_model(path, FILES[path])
+
+
+@given(path=files, data=st.data())
+@repeatable
+def test_a_misspelt_key_is_refused_and_the_right_one_named(path: Path, data, tmp_path: Path):
+    table = _read(path)
+    key = data.draw(st.sampled_from([k for k in table if len(k) > 4]))
+    at = data.draw(st.integers(1, len(key) - 2))
+    wrong = key[:at] + key[at + 1 :]
+    assume(wrong not in FILES[path].model_fields)
+    table[wrong] = table.pop(key)
+    bad = _write(tmp_path, path, table)
+    with pytest.raises(ProfileError) as caught:
+        read_toml_model(bad, FILES[path])
+    message = str(caught.value)
+    assert message.startswith(f"{bad}: {wrong}: ")
+    assert f"did you mean {key!r}?" in message
+    assert "required and missing" not in message
+    assert caught.value.key == wrong
+
+
+@given(path=files, data=st.data())
+@repeatable
+def test_a_senseless_value_is_refused_with_its_key(path: Path, data, tmp_path: Path):
+    table = _read(path)
+    key = data.draw(st.sampled_from(sorted(table)))
+    junk = [j for j in JUNK if type(j) is not type(table[key])]
+    if isinstance(table[key], (int, float)):
+        junk += [-1e6, math.nan, math.inf]
+    table[key] = data.draw(st.sampled_from(junk))
+    bad = _write(tmp_path, path, table)
+    with pytest.raises(ProfileError) as caught:
+        read_toml_model(bad, FILES[path])
+    assert str(caught.value).startswith(f"{bad}: ")
+    assert key.split(".", maxsplit=1)[0] in str(caught.value)
+
+
+@given(path=files, data=st.data())
+@repeatable
+def test_a_missing_key_is_named_unless_it_has_a_default(path: Path, data, tmp_path: Path):
+    table = _read(path)
+    key = data.draw(st.sampled_from(sorted(table)))
+    del table[key]
+    cut = _write(tmp_path, path, table)
+    if FILES[path].model_fields[key].is_required():
+        with pytest.raises(ProfileError, match=f"{key}: this key is required"):
+            read_toml_model(cut, FILES[path])
+    else:
+        read_toml_model(cut, FILES[path])
+
+
+@given(path=files, share=st.floats(0, 1))
+@repeatable
+def test_a_file_cut_short_never_gives_anything_but_a_profile_error(
+    path: Path, share: float, tmp_path: Path
+):
+    whole = path.read_bytes()
+    cut = tmp_path / path.name
+    cut.write_bytes(whole[: int(share * len(whole))])
+    try:
+        read_toml_model(cut, FILES[path])
+    except ProfileError as error:
+        assert str(error).startswith(str(cut))
+
+
+@pytest.mark.parametrize(
+    ("content", "part"),
+    [
+        (b"poles = \n", "line 1, column 9"),
+        (b"poles = 8\npoles = 8\n", "line 2"),
+        (b"\xff\xfe", "is not UTF-8 text"),
+    ],
+)
+def test_a_file_that_is_not_toml(content: bytes, part: str, tmp_path: Path):
+    path = tmp_path / "m.toml"
+    path.write_bytes(content)
+    with pytest.raises(ProfileError, match=part):
+        read_toml_model(path, Motor)
+
+
+def test_missing_file_and_folder(tmp_path: Path):
+    with pytest.raises(ProfileError, match="cannot be read: No such file"):
+        profiles.load_motor(tmp_path / "none.toml")
+    with pytest.raises(ProfileError, match="cannot be read: Is a directory"):
+        profiles.load_motor(tmp_path)
+
+
+def test_nested_keys_are_dotted_and_answered(tmp_path: Path):
+    source = SHIPPED / "drives" / "generic-cia402.toml"
+    table = _read(source)
+    table["tpdos"][0]["entries"][1]["bit"] = table["tpdos"][0]["entries"][1].pop("bits")
+    with pytest.raises(ProfileError) as caught:
+        read_toml_model(_write(tmp_path, source, table), DriveProfile)
+    assert "tpdos[0].entries[1].bit: unknown key; did you mean 'bits'?" in str(caught.value)
+
+
+def test_every_fault_of_a_file_is_told(tmp_path: Path):
+    source = SHIPPED / "winches" / "winch-mpp0923d.toml"
+    table = _read(source) | {"gear_ratio": -4.0, "node_id": 128}
+    with pytest.raises(ProfileError) as caught:
+        read_toml_model(_write(tmp_path, source, table), WinchFile)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 2
+    assert "gear_ratio: value -4.0; allowed: greater than 0" in lines[0]
+    assert "node_id: value 128; allowed: less than or equal to 127" in lines[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        ({"mode_torque": 7}, "mode_torque: value 7; allowed: one of supported_modes"),
+        ({"verified": {"colour": {"status": "assumed", "how": "x"}}}, r"verified\.colour"),
+        ({"torque_sign": True}, "torque_sign: value True; allowed: a valid integer"),
+        ({"torque_sign": 2}, "torque_sign: value 2; allowed: -1 or 1"),
+        ({"quirks": {"halt_befor_mode_change": True}}, "did you mean 'halt_before_mode_change'"),
+    ],
+)
+def test_contradictions_within_a_drive(change: dict[str, Any], part: str, tmp_path: Path):
+    source = SHIPPED / "drives" / "generic-cia402.toml"
+    with pytest.raises(ProfileError, match=part):
+        read_toml_model(_write(tmp_path, source, _read(source) | change), DriveProfile)
+
+
+def test_more_than_a_frame_in_a_pdo(tmp_path: Path):
+    source = SHIPPED / "drives" / "generic-cia402.toml"
+    table = _read(source)
+    table["tpdos"][0]["entries"].append({"index": 0x606C, "bits": 32})
+    with pytest.raises(ProfileError, match="96 bits; allowed: at most 64"):
+        read_toml_model(_write(tmp_path, source, table), DriveProfile)
+
+
+def test_a_row_of_another_length_is_named(tmp_path: Path):
+    source = SHIPPED / "motors" / "parker-mpp-mpj.series.toml"
+    table = _read(source)
+    del table["ratings"]["models_460_VAC"][2][-1]
+    with pytest.raises(ProfileError, match=r"ratings: row 2 is .*0923R.*allowed: 14 values"):
+        read_toml_model(_write(tmp_path, source, table), MotorSeries)
+
+
+def test_peak_below_rated_is_refused(tmp_path: Path):
+    motor = profiles.load_motor("MPP0923D").model_dump(mode="json") | {"peak_torque_Nm": 2.0}
+    path = tmp_path / "weak.toml"
+    path.write_text(_document(motor), encoding="utf-8")
+    with pytest.raises(ProfileError, match=r"peak_torque_Nm: value 2\.0; allowed: not below rated"):
+        profiles.load_motor(path)
+
+
+def test_unknown_names_are_answered_with_the_likely_one():
+    with pytest.raises(ProfileError, match="no profile named 'mpp923d'; did you mean 'MPP0923D'"):
+        profiles.load_motor("mpp923d")
+    with pytest.raises(ProfileError, match="did you mean 'winch-mpp0923d'"):
+        profiles.load_winch("winch-mpp923d")
+    with pytest.raises(ProfileError, match="allowed: generic-cia402"):
+        profiles.load_drive("zzz")
+
+
+def test_a_motor_with_ratings_only_says_so():
+    assert profiles.load_motor_ratings("MPP1152C").peak_torque_Nm == 15.69
+    with pytest.raises(ProfileError, match="ratings of MPP1152C only"):
+        profiles.load_motor("MPP1152C")
+    with pytest.raises(ProfileError, match="no profile named 'MPJ0923D'"):
+        profiles.load_motor_ratings("MPJ0923D")
+
+
+def test_the_shipped_winch():
+    winch = profiles.load_winch("winch-mpp0923d")
+    assert winch.motor == profiles.load_motor("MPP0923D")
+    assert winch.drive == profiles.load_drive("generic-cia402")
+    assert winch.drive.eds.is_absolute()
+    assert winch.profile == "winch-mpp0923d"
+    # 22 deg/s at the motor move the cable by 10 mm/s; a turn by 163 mm.
+    assert winch.cable_m_per_motor_rad * math.radians(22) == pytest.approx(0.010, rel=0.003)
+    assert winch.cable_m_per_motor_rad * 2 * math.pi == pytest.approx(0.163, abs=5e-4)
+
+
+def test_a_users_winch_finds_its_own_profiles_beside_it_then_the_shipped_ones(tmp_path: Path):
+    own = profiles.load_motor("MPP0922D").model_dump(mode="json") | {"model": "mine"}
+    (tmp_path / "my-motor.toml").write_text(_document(own), encoding="utf-8")
+    shutil.copy(SHIPPED / "cables" / "dyneema-4.8mm.toml", tmp_path / "rope.toml")
+    source = SHIPPED / "winches" / "winch-mpp0923d.toml"
+    table = _read(source) | {"motor": "my-motor", "cable": "rope.toml"}
+    path = _write(tmp_path, source, table)
+    winch = profiles.load_winch(path)
+    assert winch.motor.model == "mine"
+    assert winch.cable == profiles.load_cable("dyneema-4.8mm")
+    assert winch.drive.name == "Generic CiA 402 torque servo"
+    path.write_text(_document(table | {"motor": "my-moter"}), encoding="utf-8")
+    with pytest.raises(ProfileError) as caught:
+        profiles.load_winch(str(path))
+    assert str(caught.value).startswith(f"{path}: motor: no profile named 'my-moter'")
+    assert "did you mean 'my-motor'?" in str(caught.value)
+
+
+def test_a_node_cannot_be_its_own_master(tmp_path: Path):
+    source = SHIPPED / "winches" / "winch-mpp0923d.toml"
+    path = _write(tmp_path, source, _read(source) | {"node_id": 127})
+    with pytest.raises(ProfileError, match="node_id: value 127; allowed: another than master"):
+        profiles.load_winch(path)
+
+
+def test_a_drive_without_its_eds(tmp_path: Path):
+    shutil.copy(SHIPPED / "drives" / "generic-cia402.toml", tmp_path)
+    with pytest.raises(ProfileError, match=r"eds: value 'generic-cia402\.eds'; allowed: a file"):
+        profiles.load_drive(tmp_path / "generic-cia402.toml")
+
+
+def test_cable_table_agrees_with_itself_and_with_the_cable_in_use():
+    path = SHIPPED / "cables" / "barry-dyneema.series.toml"
+    series = read_toml_model(path, CableSeries)
+    assert len(series.sizes) == 15
+    for size in series.sizes:
+        whole, _, fraction = size.diameter_in.rpartition("-")
+        top, _, bottom = fraction.partition("/")
+        inches = int(whole or 0) + int(top) / int(bottom or 1)
+        assert inches * 25.4 == pytest.approx(size.diameter_mm, abs=0.06)
+        lb_per_100_ft = size.mass_kg_per_100_m * 0.67197
+        assert lb_per_100_ft == pytest.approx(size.mass_lb_per_100_ft, abs=0.1)
+        kgf = size.breaking_force_lbf * 0.45359237
+        assert kgf == pytest.approx(size.breaking_force_kgf, rel=0.012)
+    cable = profiles.load_cable("dyneema-4.8mm")
+    row = next(s for s in series.sizes if s.code == cable.data_sheet_code)
+    assert cable.diameter_m == pytest.approx(row.diameter_mm * 1e-3)
+    assert cable.breaking_force_kgf == row.breaking_force_kgf
+    assert cable.breaking_force_N == pytest.approx(23144, abs=1)
+    assert cable.stiffness_N == pytest.approx(40e3)
