@@ -45,11 +45,11 @@ class Output:
 
     def say(self, text: str) -> None:
         """Write a line for people."""
-        self.text.print(text, markup=False)
+        self.text.print(text, markup=False, soft_wrap=True)
 
     def note(self, text: str) -> None:
         """Write a line on what is going on, to standard error."""
-        self.notes.print(text, markup=False, style="dim")
+        self.notes.print(text, markup=False, style="dim", soft_wrap=True)
 
     def result(self, result: dict[str, Any]) -> None:
         """Write the JSON line, when it is wanted; it is the last line of standard output."""

@@ -1,0 +1,136 @@
+"""Runs that measure a motor: what is commanded, and where in the recording to look."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.controllers.base import Controller
+from cdpr_rt.errors import RawLogError
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.executive import Executive
+from cdpr_rt.identification import SweepData
+from cdpr_rt.rawlog import RawLog, RawLogWriter
+from cdpr_rt.recorder import column_names
+from cdpr_rt.trajectory import Leg
+
+_RAMP_S = 0.5
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass at constant speed: motor angle to cover after a lead-in, in one direction."""
+
+    speed_rad_s: float
+    """Signed."""
+    lead_in_rad: float
+    """Covered first and left out, so that friction and controller have settled."""
+    distance_rad: float
+
+    def leg(self, start_rad: FloatArray) -> Leg:
+        """Return the set-point of n axes that start at `start_rad` (n,)."""
+        cruise = (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s)
+        speed = np.full(np.shape(start_rad), self.speed_rad_s)
+        return Leg(start_rad, speed, cruise, _RAMP_S)
+
+    def duration_s(self) -> float:
+        """Return how long the pass takes."""
+        return (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s) + 2.0 * _RAMP_S
+
+    def measured(self) -> tuple[float, float]:
+        """Return from when to when, in seconds from the start, the pass counts."""
+        begin = _RAMP_S + self.lead_in_rad / abs(self.speed_rad_s)
+        return begin, begin + self.distance_rad / abs(self.speed_rad_s)
+
+
+def both_ways(speed_rad_s: float, lead_in_rad: float, turns: float) -> tuple[Pass, Pass]:
+    """Return a pass forward and one backward over whole turns."""
+    distance = turns * math.tau
+    return (
+        Pass(speed_rad_s, lead_in_rad, distance),
+        Pass(-speed_rad_s, lead_in_rad, distance),
+    )
+
+
+def run_pass(
+    executive: Executive,
+    controller: Controller,
+    what: Pass,
+    path: Path,
+    meta: dict[str, Any],
+) -> Path:
+    """Run `controller` along one pass from where the axes stand, recording into `path`.
+
+    Raises what `Executive.run` raises; the file is closed and kept in every case.
+    """
+    device = executive.device
+    begin, end = what.measured()
+    meta = {
+        **meta,
+        "axes": device.n,
+        "period_s": device.period_s,
+        "speed_rad_s": what.speed_rad_s,
+        "measured_from_s": begin,
+        "measured_until_s": end,
+        "first_cycle": device.feedback.cycle + 1,
+    }
+    log = RawLogWriter(path, column_names(device.n), meta)
+    try:
+        executive.run(controller, what.leg(device.feedback.position_rad), log)
+    finally:
+        log.close()
+    return path
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The part of one recorded pass that counts, for one axis; arrays are (samples,)."""
+
+    sweep: SweepData
+    effort_Nm: FloatArray
+    cycle: FloatArray
+    period_s: float
+    complete: bool
+    """False when the recording ends before the pass does."""
+
+
+def measured_part(log: RawLog, axis: int = 0) -> Measured:
+    """Cut the part that counts out of a recorded pass and refer it to the encoder index.
+
+    Raises RawLogError when the recording ends before that part, holds no pass, or the index was
+    not known in it.
+    """
+    try:
+        period = float(log.header["period_s"])
+        begin, end = float(log.header["measured_from_s"]), float(log.header["measured_until_s"])
+        first_cycle = int(log.header["first_cycle"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise RawLogError(f"{log.path}: not the recording of a pass ({error})") from error
+    since_start = (log.column("cycle") - first_cycle) * period
+    part = (since_start >= begin) & (since_start < end) & (log.column("valid", axis) != 0.0)
+    if not part.any():
+        raise RawLogError(
+            f"{log.path}: ends after {since_start[-1]:.1f} s; the part to be measured begins at "
+            f"{begin:.1f} s"
+        )
+    if not log.column("index_known", axis)[part].all():
+        raise RawLogError(f"{log.path}: axis {axis}: the encoder index was not known in this run")
+    index = log.column("index_rad", axis)[part]
+    sweep = SweepData(
+        time_s=log.column("time_s")[part],
+        angle_rad=log.column("position_rad", axis)[part] - index,
+        torque_Nm=log.column("torque_sent_Nm", axis)[part],
+        setpoint_rad=log.column("setpoint_rad", axis)[part] - index,
+        setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s", axis)[part],
+    )
+    return Measured(
+        sweep=sweep,
+        effort_Nm=log.column("effort_Nm", axis)[part],
+        cycle=log.column("cycle")[part],
+        period_s=period,
+        complete=bool(since_start[-1] >= end - 2 * period),
+    )

@@ -1,0 +1,75 @@
+"""`cdpr profiles`: what is known of motors, drives, cables and winches."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import Annotated, Any
+
+import typer
+from pydantic import BaseModel
+
+import profiles as catalogue
+from profiles.reader import closest
+from tools.errors import BadInputError
+from tools.output import Output
+
+app = typer.Typer(help="Profiles of motors, drives, cables and winches.", no_args_is_help=True)
+
+_JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON line.")]
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the command group."""
+    parent.add_typer(app, name="profiles")
+
+
+@app.command("list")
+def list_(as_json: _JsonFlag = False) -> None:
+    """List the shipped profiles by kind."""
+    out = Output(as_json)
+    names = catalogue.list_profiles()
+    for kind, of_kind in names.items():
+        out.say(f"{kind}:")
+        out.say("  " + ", ".join(of_kind))
+    out.result({"ok": True, **names})
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(help="A name from `cdpr profiles list`.")],
+    as_json: _JsonFlag = False,
+) -> None:
+    """Show everything that a profile says."""
+    out = Output(as_json)
+    kinds = [kind for kind, names in catalogue.list_profiles().items() if name in names]
+    if not kinds:
+        names = itertools.chain(*catalogue.list_profiles().values())
+        meant = closest(name, names)
+        hint = f"did you mean {meant!r}?" if meant else "`cdpr profiles list` shows what there is"
+        raise BadInputError(f"profile {name!r}: not shipped; {hint}")
+    content = _plain(catalogue.load_all()[kinds[0]][name])
+    out.say(f"{kinds[0]}: {name}")
+    for key, value in _flat(content):
+        out.say(f"  {key} = {value}")
+    out.result({"ok": True, "kind": kinds[0], "profile": content})
+
+
+def _plain(profile: object) -> dict[str, Any]:
+    if isinstance(profile, BaseModel):
+        return profile.model_dump(mode="json")
+    assert dataclasses.is_dataclass(profile)  # the catalogue holds nothing else
+    values = {f.name: getattr(profile, f.name) for f in dataclasses.fields(profile)}
+    return {k: _plain(v) if isinstance(v, BaseModel) else v for k, v in values.items()}
+
+
+def _flat(table: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    rows: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        if isinstance(value, dict):
+            rows += _flat(value, f"{prefix}{key}.")
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], str):
+            rows += [(f"{prefix}{key}", text) for text in value]
+        else:
+            rows.append((prefix + key, value))
+    return rows
