@@ -311,3 +311,12 @@ def test_cable_table_agrees_with_itself_and_with_the_cable_in_use():
     assert cable.breaking_force_kgf == row.breaking_force_kgf
     assert cable.breaking_force_N == pytest.approx(23144, abs=1)
     assert cable.stiffness_N == pytest.approx(40e3)
+
+
+def test_the_examples_of_the_manual_load(tmp_path: Path):
+    page = Path(__file__).parents[2] / "docs" / "describing-your-winch.md"
+    examples = page.read_text(encoding="utf-8").split("```toml\n")[1:]
+    for name, example in zip(("winch", "my-motor", "my-cable"), examples, strict=True):
+        (tmp_path / f"{name}.toml").write_text(example.split("```")[0], encoding="utf-8")
+    assert profiles.load_winch(tmp_path / "winch.toml").motor.model == "My motor"
+    assert profiles.load_cable(tmp_path / "my-cable.toml").min_tension_N == 20
