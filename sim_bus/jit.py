@@ -1,0 +1,13 @@
+"""Compile the numeric kernels of the simulation to machine code."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def jit(function: _F) -> _F:
+    """Return `function` compiled by numba, cached on disk, with its type kept for the checker."""
+    return cast(_F, numba.njit(cache=True)(function))

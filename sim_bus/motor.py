@@ -1,0 +1,94 @@
+"""One simulated motor with its inner loops: the compiled step and a plain object around it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from sim_bus import rotor, servo
+from sim_bus.jit import jit
+from sim_bus.motor_state import CONTROL_STEP_S, MotorArray, MotorRatings, build_motor
+from sim_bus.plant import Plant
+
+
+class Sample(NamedTuple):
+    """What `run` returns: the drive's feedback at the end of the step, then the truth."""
+
+    flags: int
+    """Flags of `rotor` (index edges) and `servo`, or-ed."""
+    count: int
+    """Encoder counter from power-up, `feedback_delay_s` old, with noise."""
+    torque_permille: int
+    """Measured torque in per mille of rated torque, at the nominal torque constant."""
+    velocity_counts_s: int
+    """Displayed velocity."""
+    angle_rad: float
+    """True mechanical angle over all turns, and below the other true figures."""
+    velocity_rad_s: float
+    motor_Nm: float
+    """inertia × acceleration = motor − cogging − friction."""
+    cogging_Nm: float
+    friction_Nm: float
+    rise_K: float
+
+
+@jit
+def run(
+    motor: Any, until: float, kind: int, target: float
+) -> tuple[int, int, int, int, float, float, float, float, float, float]:
+    """Advance one motor to bus time `until` under one kind of control; see `Sample`."""
+    m = motor[0]
+    dt = until - m.time
+    flags = 0
+    if dt > 0.0:
+        energised = kind != servo.OFF
+        n = max(1, math.ceil(dt / CONTROL_STEP_S - 1e-6))
+        h = dt / n
+        start = m.time
+        rotor.warm_up(m, dt, energised)
+        for i in range(n):
+            flags |= servo.control(m, kind, target, h)
+            for _ in range(m.steps_per_control):
+                rotor.step_rotor(m, h / m.steps_per_control, m.torque_demand, energised)
+                flags |= rotor.step_disc(m)
+            m.time = start + (i + 1) * h
+            rotor.remember_angle(m)
+            servo.observe(m, rotor.read_counter(m, m.angle), h)
+        m.time = until
+        flags |= servo.watch(m, kind, target, dt)
+    flags |= servo.switches(m)
+    count = int(rotor.read_counter(m, rotor.delayed_angle(m)))
+    permille = int(math.floor(1000.0 * m.sensed / m.rated_torque + 0.5))
+    speed = int(math.floor(m.displayed_velocity + 0.5))
+    return (
+        flags,
+        count,
+        permille,
+        speed,
+        m.angle,
+        m.velocity,
+        m.torque_gain * m.sensed,
+        m.cogging_Nm,
+        m.friction_Nm,
+        m.rise,
+    )
+
+
+class Motor:
+    """A motor outside any drive: its power stage obeys at once, nobody watches its faults."""
+
+    def __init__(self, plant: Plant, ratings: MotorRatings | None = None) -> None:
+        self.ratings = ratings or MotorRatings()
+        self.plant = plant
+        self.record: MotorArray = build_motor(plant, self.ratings)
+        self.time_s = 0.0
+
+    def step(self, dt_s: float, kind: int, target: float) -> Sample:
+        """Advance by `dt_s` seconds; `kind` and `target` as named in `sim_bus.servo`."""
+        self.time_s += dt_s
+        return Sample(*run(self.record, self.time_s, kind, target))
+
+    def step_torque(self, dt_s: float, torque_Nm: float) -> Sample:
+        """Advance by `dt_s` seconds under a torque command, rounded to per mille of rated."""
+        permille = round(1000.0 * torque_Nm / self.ratings.rated_torque_Nm)
+        return self.step(dt_s, servo.TORQUE, float(permille))

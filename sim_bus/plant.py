@@ -1,0 +1,189 @@
+"""The plant file: the truth about one simulated drive and motor, which no controller may read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from profiles.reader import read_toml_model
+
+MAX_COGGING_TERMS = 32
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class MotorPlant(_Section):
+    """Rotor and torque constant."""
+
+    torque_constant_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.04
+    """Relative: true torque constant = nominal × (1 + this)."""
+    inertia_kg_m2: Annotated[float, Field(ge=1e-6, le=10.0)] = 1.130e-4
+    initial_angle_deg: Annotated[float, Field(ge=-36000.0, le=36000.0)] = 0.0
+    """Mechanical angle at power-up; the encoder counts from zero there."""
+
+
+class CoggingTerm(_Section):
+    """One harmonic of the cogging."""
+
+    order: Annotated[int, Field(ge=1, le=2000)] = 4
+    """Periods per motor turn."""
+    amplitude_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.06
+    phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 17.0
+    kind: Literal["torque", "current_offset"] = "torque"
+
+
+class FrictionPlant(_Section):
+    """LuGre friction with a Stribeck curve."""
+
+    coulomb_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.08
+    breakaway_Nm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.10
+    stribeck_rad_s: Annotated[float, Field(ge=1e-4, le=100.0)] = 0.2
+    viscous_Nms_rad: Annotated[float, Field(ge=0.0, le=10.0)] = 5e-4
+    sigma0_Nm_rad: Annotated[float, Field(gt=0.0, le=1e6)] = 20.0
+    """Stiffness of the bristles."""
+    sigma1_Nms_rad: Annotated[float, Field(ge=0.0, le=100.0)] = 0.02
+    """Damping of the bristles."""
+    direction_asymmetry: Annotated[float, Field(ge=-1.5, le=1.5)] = 0.1
+    """Relative: forward friction × (1 + a/2), backward × (1 − a/2)."""
+
+    @model_validator(mode="after")
+    def _breakaway_not_below_coulomb(self) -> Self:
+        if self.breakaway_Nm < self.coulomb_Nm:
+            raise ValueError(
+                f"breakaway_Nm = {self.breakaway_Nm} must not be below "
+                f"coulomb_Nm = {self.coulomb_Nm}"
+            )
+        return self
+
+
+class EncoderPlant(_Section):
+    """Incremental encoder with one index pulse a turn."""
+
+    counts_per_turn: Annotated[int, Field(ge=16, le=2**26)] = 8192
+    index_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 123.4
+    """Mechanical angle of the index pulse."""
+    index_present: bool = True
+    """False: the index pulse never comes."""
+    noise_counts: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.3
+    """Standard deviation of the reading before it is rounded."""
+
+
+class DrivePlant(_Section):
+    """Delays and thresholds of the drive itself."""
+
+    current_loop_bandwidth_Hz: Annotated[float, Field(ge=10.0, le=5000.0)] = 500.0
+    feedback_delay_s: Annotated[float, Field(ge=0.0, le=0.01)] = 0.0005
+    """Age of the encoder reading that a SYNC latches."""
+    mode_display_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.005
+    """From writing 6060h until the mode acts and 6061h shows it."""
+    enable_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.002
+    """From the command to enable operation until the state is reached."""
+    i2t_time_constant_s: Annotated[float, Field(ge=0.01, le=1000.0)] = 10.0
+    overcurrent_Arms: Annotated[float, Field(gt=0.0, le=1000.0)] = 30.0
+    """Current that trips the overcurrent fault."""
+    overspeed_ratio: Annotated[float, Field(ge=1.0, le=10.0)] = 1.2
+    """Overspeed fault at this multiple of the maximum motor speed (6080h)."""
+
+
+class ThermalPlant(_Section):
+    """Warming of an energised drive and what it does to cogging and friction."""
+
+    cogging_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.001
+    friction_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.004
+    time_constant_s: Annotated[float, Field(ge=1.0, le=1e6)] = 600.0
+    rise_K: Annotated[float, Field(ge=0.0, le=80.0)] = 10.0
+    """Temperature rise that an energised drive settles at."""
+    ambient_C: Annotated[float, Field(ge=-40.0, le=85.0)] = 25.0
+    """Temperature at power-up, where the figures of the other sections hold."""
+
+
+class LoadPlant(_Section):
+    """What the motor turns."""
+
+    inertia_kg_m2: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Inertia of the load on the motor side, rigidly coupled."""
+
+
+class LimitsPlant(_Section):
+    """Mechanical angles of the switches, over several turns; a switch left out does not exist."""
+
+    negative_deg: float | None = None
+    """Negative limit switch: active below."""
+    positive_deg: float | None = None
+    """Positive limit switch: active above."""
+    home_from_deg: float | None = None
+    home_to_deg: float | None = None
+    """Home switch: active between the two; one given alone leaves the other side open."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for low, high in (("negative_deg", "positive_deg"), ("home_from_deg", "home_to_deg")):
+            a, b = getattr(self, low), getattr(self, high)
+            if a is not None and b is not None and a >= b:
+                raise ValueError(f"{low} = {a} must be below {high} = {b}")
+        return self
+
+
+class Plant(_Section):
+    """All sections of a plant file; every key has a default."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
+    motor: MotorPlant = MotorPlant()
+    cogging: Annotated[
+        tuple[CoggingTerm, ...], Field(max_length=MAX_COGGING_TERMS, strict=False)
+    ] = (CoggingTerm(),)
+    friction: FrictionPlant = FrictionPlant()
+    encoder: EncoderPlant = EncoderPlant()
+    drive: DrivePlant = DrivePlant()
+    thermal: ThermalPlant = ThermalPlant()
+    load: LoadPlant = LoadPlant()
+    limits: LimitsPlant = LimitsPlant()
+
+    @classmethod
+    def load_file(cls, path: str | Path) -> Plant:
+        """Read a plant file.
+
+        Raises profiles.errors.ProfileError naming file, key, value and what is allowed.
+        """
+        return read_toml_model(Path(path), cls)
+
+    @property
+    def inertia_kg_m2(self) -> float:
+        """Inertia of rotor and load together."""
+        return self.motor.inertia_kg_m2 + self.load.inertia_kg_m2
+
+    def cogging_Nm(
+        self, angle_rad: ArrayLike, *, energised: bool = True, rise_K: float = 0.0
+    ) -> NDArray[np.float64]:
+        """Return the torque that holds the rotor against the cogging at mechanical angles.
+
+        `angle_rad` counts from the mechanical zero, in which frame the index lies at
+        `encoder.index_deg`: c = Σ A sin(order·θ + phase). The offset ripple acts while energised.
+        """
+        angle = np.asarray(angle_rad, dtype=np.float64)
+        total = np.zeros_like(angle)
+        for term in self.cogging:
+            wave = term.amplitude_Nm * np.sin(term.order * angle + np.deg2rad(term.phase_deg))
+            if term.kind == "torque":
+                total += (1.0 + self.thermal.cogging_per_K * rise_K) * wave
+            elif energised:
+                total += (1.0 + self.motor.torque_constant_error) * wave
+        return total
+
+    def friction_Nm(self, velocity_rad_s: ArrayLike, *, rise_K: float = 0.0) -> NDArray[np.float64]:
+        """Return the friction torque that opposes steady motion at the given velocities."""
+        v = np.asarray(velocity_rad_s, dtype=np.float64)
+        f = self.friction
+        sign = np.sign(v)
+        level = f.coulomb_Nm + (f.breakaway_Nm - f.coulomb_Nm) * np.exp(
+            -((v / f.stribeck_rad_s) ** 2)
+        )
+        dry = sign * (1.0 + 0.5 * f.direction_asymmetry * sign) * level
+        scale = 1.0 + self.thermal.friction_per_K * rise_K
+        return np.asarray(scale * (dry + f.viscous_Nms_rad * v))

@@ -1,0 +1,142 @@
+"""Physics of one motor: current loop, cogging, LuGre friction, rotor, encoder disc (compiled)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from sim_bus.jit import jit
+from sim_bus.motor_state import DELAY_SLOTS
+
+INDEX_ROSE = 1
+INDEX_FELL = 2
+
+
+@jit
+def gaussian(m: Any) -> float:
+    """Draw from the standard normal distribution: SplitMix64, then Box and Muller."""
+    m.random += np.uint64(0x9E3779B97F4A7C15)
+    z = m.random
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    u = (float(z >> np.uint64(32)) + 0.5) * 2.0**-32
+    v = float(z & np.uint64(0xFFFFFFFF)) * 2.0**-32
+    return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
+
+
+@jit
+def step_rotor(m: Any, h: float, demand: float, energised: bool) -> None:
+    """Advance the physics by `h` seconds under a torque demand (Nm, nominal).
+
+    Implicit Euler in bristle and velocity, so that any bristle stiffness stays stable;
+    LuGre: dz/dt = v − σ0|v|z/g(v), F = σ0 z + σ1 dz/dt + viscous·v (Canudas de Wit et al., 1995).
+    """
+    cogging = 0.0
+    for k in range(m.n_torque):
+        cogging += m.amplitude[k] * math.sin(m.order[k] * m.angle + m.phase[k])
+    cogging *= 1.0 + m.cogging_per_K * m.rise
+    offset = 0.0
+    if energised:
+        for k in range(m.n_torque, m.n_cogging):
+            offset += m.amplitude[k] * math.sin(m.order[k] * m.angle + m.phase[k])
+    # The loop drives what its sensors show to the demand: the true current lacks their offset.
+    m.current += (1.0 - math.exp(-m.current_rate * h)) * (demand - offset - m.current)
+    m.sensed = m.current + offset
+    torque = m.torque_gain * m.current - cogging
+
+    w, z = m.velocity, m.bristle
+    warm = max(0.0, 1.0 + m.friction_per_K * m.rise)
+    side = 1.0 + 0.5 * m.asymmetry * math.copysign(1.0, w if w != 0.0 else z)
+    ratio = w / m.stribeck
+    level = m.coulomb + (m.breakaway - m.coulomb) * math.exp(-ratio * ratio)
+    g = max(1e-9, warm * side * level)
+    viscous = warm * m.viscous
+    s0, s1, inertia = m.sigma0, m.sigma1, m.inertia
+    aa = 1.0 + h * s0 * abs(w) / g
+    A = inertia / h + s0 * h / aa + s1 / aa + viscous
+    B = inertia / h * w + torque - s0 * z / aa - s1 * (z / aa - z) / h
+    w = B / A
+    z_new = (z + h * w) / aa
+    m.friction_Nm = s0 * z_new + s1 * (z_new - z) / h + viscous * w
+    m.cogging_Nm = cogging + m.torque_gain * offset
+    m.bristle = z_new
+    m.velocity = w
+    m.angle += h * w
+
+
+@jit
+def step_disc(m: Any) -> int:
+    """Move the encoder disc to the rotor's angle and latch the counter at index pulse edges.
+
+    The pulse is one count wide. Returns INDEX_ROSE and INDEX_FELL, or-ed.
+    """
+    old = m.disc
+    new = int(math.floor(m.angle * m.counts_per_rad + 0.5))
+    m.disc = new
+    if new == old or m.index_present == 0:
+        return 0
+    edges, n, x = 0, m.counts_per_turn, m.index
+    if new > old:
+        pulse = x + (new - x) // n * n
+        if pulse > old:
+            edges |= INDEX_ROSE
+            m.rise_count = pulse - m.zero
+        pulse = x + (new - 1 - x) // n * n
+        if pulse >= old:
+            edges |= INDEX_FELL
+            m.fall_count = pulse + 1 - m.zero
+    else:
+        pulse = x - (x - new) // n * n
+        if pulse < old:
+            edges |= INDEX_ROSE
+            m.rise_count = pulse - m.zero
+        pulse = x - (x - new - 1) // n * n
+        if pulse <= old:
+            edges |= INDEX_FELL
+            m.fall_count = pulse - 1 - m.zero
+    return edges
+
+
+@jit
+def read_counter(m: Any, angle: float) -> float:
+    """Return the encoder counter for a rotor angle, with noise and rounding."""
+    reading = angle * m.counts_per_rad
+    if m.noise > 0.0:
+        reading += m.noise * gaussian(m)
+    return math.floor(reading + 0.5) - float(m.zero)
+
+
+@jit
+def remember_angle(m: Any) -> None:
+    """Store time and angle for the delayed reading; close-lying ones are skipped."""
+    if (m.time - m.slot_time[m.slot]) * 128.0 >= m.delay:
+        m.slot = (m.slot + 1) % DELAY_SLOTS
+        m.slot_time[m.slot] = m.time
+        m.slot_angle[m.slot] = m.angle
+
+
+@jit
+def delayed_angle(m: Any) -> float:
+    """Return the rotor angle `delay` ago, interpolated between the stored ones."""
+    wanted = m.time - m.delay
+    after_time, after = m.time, m.angle
+    for back in range(DELAY_SLOTS):
+        k = (m.slot - back) % DELAY_SLOTS
+        before_time, before = m.slot_time[k], m.slot_angle[k]
+        if before_time <= wanted:
+            if before_time == -math.inf or after_time <= before_time:
+                return float(before)
+            share = (wanted - before_time) / (after_time - before_time)
+            return float(before + share * (after - before))
+        after_time, after = before_time, before
+    return float(after)
+
+
+@jit
+def warm_up(m: Any, dt: float, energised: bool) -> None:
+    """Let the temperature rise follow its first-order law for `dt` seconds."""
+    goal = m.rise_limit if energised else 0.0
+    m.rise += (1.0 - math.exp(-m.heating_rate * dt)) * (goal - m.rise)
