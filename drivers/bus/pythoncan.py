@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import can
 
 from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG, Bytes
@@ -17,9 +19,8 @@ def open_python_can(url: BusUrl, filters: Filters | None = None) -> can.BusABC:
         BusError: the interface cannot be opened; the message holds python-can's reason.
     """
     try:
-        bus = can.Bus(
-            channel=url.channel, interface=url.interface, ignore_config=True, **url.options
-        )
+        options: dict[str, Any] = dict(url.options)
+        bus = can.Bus(url.channel, url.interface, ignore_config=True, **options)
         bus.set_filters(_python_can_filters(filters))
     except BusError:
         raise

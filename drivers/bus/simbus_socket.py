@@ -16,6 +16,8 @@ Filters = Iterable[tuple[int, int]]
 
 _ANSWER_TIMEOUT_S = 5.0
 _CONTROL_BYTES = 65536
+# the hub takes control messages below 448 bytes; a pair has up to 24
+_FILTERS_A_MESSAGE = 16
 
 
 def connect(name: str) -> socket.socket:
@@ -42,9 +44,13 @@ def control_message(message: dict[str, Any]) -> bytes:
     return text + b" " if len(text) == FRAME_BYTES else text
 
 
-def filter_message(filters: Filters) -> bytes:
-    """Return the packet that asks the hub to send only what passes one of `filters`."""
-    return control_message({"filters": [[can_id, mask] for can_id, mask in filters]})
+def set_filters(sock: socket.socket, filters: Filters) -> None:
+    """Ask the hub to send only what passes one of `filters`; takes effect some time after."""
+    pairs = [[can_id, mask] for can_id, mask in filters]
+    sock.send(control_message({"filters": pairs[:_FILTERS_A_MESSAGE]}))
+    for start in range(_FILTERS_A_MESSAGE, len(pairs), _FILTERS_A_MESSAGE):
+        part = pairs[start : start + _FILTERS_A_MESSAGE]
+        sock.send(control_message({"more_filters": part}))
 
 
 def exchange(sock: socket.socket, filters: Filters | None) -> dict[str, Any]:
@@ -56,7 +62,7 @@ def exchange(sock: socket.socket, filters: Filters | None) -> dict[str, Any]:
         BusError: the hub did not answer in time, refused, or went away.
     """
     if filters is not None:
-        sock.send(filter_message(filters))
+        set_filters(sock, filters)
     sock.send(control_message({"status": True}))
     before = sock.gettimeout()
     sock.settimeout(_ANSWER_TIMEOUT_S)

@@ -1,0 +1,114 @@
+"""One participant of the bus on a socket: its filters and its losses."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import re
+import select
+import socket
+from collections.abc import Callable
+
+from sim_bus.errors import BusSetupError
+
+PACKET_BYTES = 448
+"""Longest packet taken from a client; a bytes object of this size comes from Python's own pool."""
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_SO_SNDBUFFORCE = 32
+_SEND_BUFFER_BYTES = 1 << 22
+_BACKLOG = 64
+_PATIENCE = 500
+_PATIENCE_STEP_S = 0.0002
+
+
+class Client:
+    """A peer that sends and takes frames through `sock`."""
+
+    __slots__ = ("dropped", "essential", "filters", "receive", "send", "sock")
+
+    def __init__(self, sock: socket.socket, *, essential: bool = False) -> None:
+        sock.setblocking(False)
+        _widen(sock)
+        self.sock = sock
+        self.essential = essential
+        """Whether the bus itself hangs on this socket (a real CAN interface)."""
+        self.filters: list[tuple[int, int]] | None = None
+        """Pairs (identifier, mask) as for CAN_RAW_FILTER, None for everything."""
+        self.dropped = 0
+        self.receive: Callable[[int], bytes] = sock.recv
+        self.send: Callable[[bytes], object] = self._send_patiently if essential else sock.send
+
+    def wants(self, can_id: int) -> bool:
+        """Return whether a frame with this identifier and these flags passes the filters."""
+        if self.filters is None:
+            return True
+        return any((can_id & mask) == (wanted & mask) for wanted, mask in self.filters)
+
+    def _send_patiently(self, frame: bytes) -> None:
+        """Send, waiting while the transmit queue of a CAN interface is full."""
+        for _ in range(_PATIENCE):
+            try:
+                self.sock.send(frame)
+            except OSError as error:
+                if error.errno not in (errno.ENOBUFS, errno.EAGAIN):
+                    raise
+                select.select([], [], [], _PATIENCE_STEP_S)
+            else:
+                return
+        raise BlockingIOError
+
+
+def _widen(sock: socket.socket) -> None:
+    """Let a client fall far behind before it loses frames; privileged processes may go further."""
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+    with contextlib.suppress(PermissionError):
+        sock.setsockopt(socket.SOL_SOCKET, _SO_SNDBUFFORCE, _SEND_BUFFER_BYTES)
+
+
+def listening_socket(name: str) -> socket.socket:
+    """Return the socket on which clients of the bus `name` arrive.
+
+    Raises:
+        BusSetupError: the name is malformed or in use.
+    """
+    if _NAME.fullmatch(name) is None:
+        raise BusSetupError(
+            f"bus name {name!r}: allowed are 1 to 64 letters, digits, '_', '.' or '-', beginning "
+            "with a letter or digit"
+        )
+    sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+    try:
+        sock.bind(f"\0cdpr-rt/simbus/{name}")
+    except OSError as error:
+        sock.close()
+        if error.errno == errno.EADDRINUSE:
+            raise BusSetupError(
+                f"simbus:{name} is in use by another simulator; choose another name or stop it"
+            ) from None
+        raise BusSetupError(f"simbus:{name} cannot be opened: {error.strerror}") from None
+    sock.listen(_BACKLOG)
+    return sock
+
+
+def raw_can_socket(interface: str) -> socket.socket:
+    """Return a raw CAN socket on the network interface.
+
+    Raises:
+        BusSetupError: the kernel has no SocketCAN, or there is no such interface.
+    """
+    try:
+        sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    except OSError as error:
+        raise BusSetupError(
+            f"socketcan:{interface}: this kernel has no SocketCAN ({error.strerror})"
+        ) from None
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SEND_BUFFER_BYTES)
+        sock.bind((interface,))
+    except OSError as error:
+        sock.close()
+        raise BusSetupError(
+            f"socketcan:{interface}: cannot use this network interface ({error.strerror})"
+        ) from None
+    return sock

@@ -1,0 +1,399 @@
+"""The bus: clients on sockets and nodes of this process, joined frame by frame."""
+
+from __future__ import annotations
+
+import errno
+import functools
+import math
+import os
+import select
+import socket
+import time
+from collections.abc import Callable, Sequence
+
+from sim_bus.bus_load import BusLoad, is_acyclic
+from sim_bus.client import PACKET_BYTES, Client, listening_socket
+from sim_bus.clock import HOLD_S, BusClock, ClockMode
+from sim_bus.control import handle
+from sim_bus.errors import SimulatorError
+from sim_bus.frame import (
+    ERR_FLAG,
+    FRAME_BYTES,
+    HEADER,
+    SYNC_ID,
+    arbitration_key,
+    base_id,
+    bits_by_length,
+)
+from sim_bus.node_protocol import LocalNode
+
+_BURST = 64
+_EVENTS = 64
+_MOST_ROUTES = 4096
+_FINE_WAIT_S = 0.01
+
+
+class Route:
+    """What becomes of the frames with one identifier, worked out once."""
+
+    __slots__ = ("acyclic", "bits", "clients", "configures", "key", "longest", "nodes", "sync")
+
+    def __init__(self, can_id: int, clients: list[Client], nodes: list[LocalNode]) -> None:
+        self.key = arbitration_key(can_id)
+        self.bits = bits_by_length(can_id)
+        # error frames are no traffic: no length is right for them
+        self.longest = -1 if can_id & ERR_FLAG else 8
+        self.acyclic = is_acyclic(can_id)
+        self.configures = self.acyclic or base_id(can_id) == 0
+        self.sync = can_id == SYNC_ID
+        self.clients = tuple(clients)
+        self.nodes = tuple(nodes)
+
+
+class Hub:
+    """A CAN bus in one thread: routing, bus time, accounting, and the loop that drives them.
+
+    Frames that wait together are sent in the order of arbitration: those of the nodes after one
+    SYNC, and those of several clients found waiting at the same moment.
+    """
+
+    def __init__(
+        self,
+        nodes: Sequence[LocalNode] = (),
+        *,
+        mode: ClockMode = ClockMode.LOCKSTEP,
+        bitrate: int = 1_000_000,
+        name: str = "",
+        truth_log: str | None = None,
+    ) -> None:
+        self.name = name
+        self.truth_log = truth_log
+        self.nodes = tuple(nodes)
+        self.clock = BusClock(mode, time.monotonic())
+        self.load = BusLoad(bitrate, lockstep=mode is ClockMode.LOCKSTEP)
+        self.sync_count = 0
+        self.malformed = 0
+        self.dropped = 0
+        self._paced = mode is ClockMode.PACED
+        self._clients: dict[int, Client] = {}
+        self._routes: dict[int, Route] = {}
+        self._accepts = [node.accepts for node in self.nodes]
+        self._now_s = 0.0
+        self._just_synced = False
+        self._leftover = False
+        self._batch: list[tuple[int, int, int, Route, bytes, LocalNode]] = []
+        self._poller = select.epoll()
+        self._handlers: dict[int, Callable[[], None]] = {}
+        self._stopping = False
+        self._failure: str | None = None
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._listener: socket.socket | None = None
+        self.watch(self._wake, lambda: None)
+
+    # -- what the loop listens to
+
+    def watch(self, descriptor: int, handler: Callable[[], None]) -> None:
+        """Call `handler` whenever `descriptor` is readable."""
+        self._poller.register(descriptor, select.EPOLLIN)
+        self._handlers[descriptor] = handler
+
+    def listen(self) -> None:
+        """Open the bus under its name.
+
+        Raises:
+            BusSetupError: the name is malformed or in use.
+        """
+        self._listener = listening_socket(self.name)
+        self.watch(self._listener.fileno(), self._accept)
+
+    def attach(self, sock: socket.socket, *, essential: bool = False) -> None:
+        """Let the peer of `sock` take part; the end of an essential one ends the hub."""
+        client = Client(sock, essential=essential)
+        descriptor = sock.fileno()
+        self._clients[descriptor] = client
+        self._routes.clear()
+        self.watch(descriptor, functools.partial(self._pump, client))
+
+    def _accept(self) -> None:
+        assert self._listener is not None
+        try:
+            sock, _ = self._listener.accept()
+        except OSError:
+            # the peer has gone already
+            return
+        self.attach(sock)
+
+    def _remove(self, client: Client, reason: str) -> None:
+        descriptor = client.sock.fileno()
+        if descriptor < 0:
+            return
+        del self._clients[descriptor], self._handlers[descriptor]
+        self._poller.unregister(descriptor)
+        client.sock.close()
+        self._routes.clear()
+        if client.essential:
+            self._failure = reason
+            self._stopping = True
+
+    # -- the loop
+
+    def stop(self) -> None:
+        """End `run` soon; may be called from a signal handler or another thread."""
+        self._stopping = True
+        os.eventfd_write(self._wake, 1)
+
+    def run(self) -> None:
+        """Carry frames until `stop` is called.
+
+        Raises:
+            SimulatorError: an essential client has gone.
+        """
+        while not self._stopping:
+            events = self._poller.poll(self._wait_s(), _EVENTS)
+            self._just_synced = False
+            if len(events) == 1:
+                self._handlers[events[0][0]]()
+            elif events:
+                self._serve_all(events)
+            if not self.clock.held:
+                self._tick()
+            elif not events:
+                self._advance(self.clock.now(time.monotonic()))
+            if self._leftover:
+                self._flush()
+        if self._failure is not None:
+            raise SimulatorError(self._failure)
+
+    def close(self) -> None:
+        """Close the nodes and every socket."""
+        for node in self.nodes:
+            node.close()
+        for client in self._clients.values():
+            client.sock.close()
+        self._clients.clear()
+        if self._listener is not None:
+            self._listener.close()
+        self._poller.close()
+        os.close(self._wake)
+
+    def _wait_s(self) -> float | None:
+        if self._leftover:
+            return 0.0
+        if self._just_synced:
+            return HOLD_S
+        event_s = min((node.next_event() for node in self.nodes), default=math.inf)
+        wait_s = self.clock.wall_wait(time.monotonic(), event_s)
+        if wait_s == math.inf:
+            return None
+        if wait_s < _FINE_WAIT_S:
+            # epoll counts whole milliseconds, which is too coarse for timers of the bus
+            select.select([self._poller], [], [], wait_s)
+            return 0.0
+        return wait_s
+
+    def _tick(self) -> None:
+        """Let the nodes' timers run when one is due."""
+        now_s = self.clock.now(time.monotonic())
+        for node in self.nodes:
+            if node.next_event() <= now_s:
+                self._advance(now_s)
+                return
+
+    def _advance(self, now_s: float) -> None:
+        self._now_s = now_s
+        for node in self.nodes:
+            node.advance(now_s)
+        self._check_accepts()
+        self._flush()
+
+    def _check_accepts(self) -> None:
+        for i, node in enumerate(self.nodes):
+            if node.accepts is not self._accepts[i]:
+                self._accepts[i] = node.accepts
+                self._routes.clear()
+
+    # -- frames from clients
+
+    def _serve_all(self, events: list[tuple[int, int]]) -> None:
+        """Serve several descriptors; clients with frames waiting contend for the bus."""
+        contenders = []
+        for descriptor, _ in events:
+            client = self._clients.get(descriptor)
+            if client is not None:
+                contenders.append(client)
+            elif descriptor in self._handlers:
+                self._handlers[descriptor]()
+        waiting: dict[Client, tuple[int, bytes]] = {}
+        for client in contenders:
+            self._fetch(client, waiting)
+        budget = _BURST
+        while waiting:
+            winner = min(waiting, key=lambda client: waiting[client][0])
+            frame = waiting.pop(winner)[1]
+            budget -= 1
+            if not self._take(frame, winner) and budget > 0:
+                self._fetch(winner, waiting)
+
+    def _fetch(self, client: Client, waiting: dict[Client, tuple[int, bytes]]) -> None:
+        try:
+            packet = client.receive(PACKET_BYTES)
+            while len(packet) != FRAME_BYTES:
+                if not self._control(client, packet):
+                    return
+                packet = client.receive(PACKET_BYTES)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._remove(client, f"lost: {error.strerror}")
+            return
+        waiting[client] = (arbitration_key(HEADER.unpack_from(packet)[0]), packet)
+
+    def _pump(self, client: Client) -> None:
+        """Take the frames of one client until none waits or a SYNC has been answered.
+
+        The sender of a SYNC waits for the answers, so looking for more would only cost a call.
+        """
+        try:
+            for _ in range(_BURST):
+                packet = client.receive(PACKET_BYTES)
+                if len(packet) == FRAME_BYTES:
+                    if self._take(packet, client):
+                        return
+                elif not self._control(client, packet):
+                    return
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._remove(client, f"lost: {error.strerror}")
+
+    def _control(self, client: Client, packet: bytes) -> bool:
+        """Obey a control message; return False when the client has gone."""
+        if not packet:
+            self._remove(client, "lost: connection closed")
+            return False
+        answer = handle(self, client, packet)
+        if answer is not None:
+            self._deliver(answer, client)
+        self._routes.clear()
+        return True
+
+    def _take(self, frame: bytes, source: Client) -> bool:
+        """Carry one frame of a client; return whether it was a SYNC."""
+        can_id, length = HEADER.unpack_from(frame)
+        route = self._routes.get(can_id) or self._route(can_id)
+        if length > route.longest:
+            self.malformed += 1
+            return False
+        load = self.load
+        load.frames += 1
+        if route.sync:
+            self._sync(frame, source, route, length)
+            return True
+        now_s = self.clock.now(time.monotonic())
+        if now_s > self._now_s:
+            self._advance(now_s)
+        if route.acyclic:
+            load.acyclic_bits += route.bits[length]
+        else:
+            load.cycle_bits += route.bits[length]
+            if self._paced:
+                load.occupy(now_s, route.bits[length])
+        for peer in route.clients:
+            if peer is not source:
+                self._deliver(frame, peer)
+        if route.nodes:
+            for node in route.nodes:
+                node.receive(frame, now_s)
+            if route.configures:
+                self._check_accepts()
+            self._flush()
+        return False
+
+    def _sync(self, frame: bytes, source: Client, route: Route, length: int) -> None:
+        """Move bus time, let the nodes come up to it, then let all see the SYNC."""
+        nodes = self.nodes
+        period_s = 0.0
+        for node in nodes:
+            period_s = max(period_s, node.sync_period_s)
+        self._now_s = now_s = self.clock.sync(time.monotonic(), period_s)
+        self._just_synced = self.clock.held
+        for node in nodes:
+            node.advance(now_s)
+        # timers that ran out before the SYNC send before it
+        self._flush()
+        self._count_sync(now_s, route.bits[length])
+        for peer in route.clients:
+            if peer is not source:
+                self._deliver(frame, peer)
+        for node in route.nodes:
+            node.receive(frame, now_s)
+        self._flush()
+
+    def _count_sync(self, now_s: float, bits: int) -> None:
+        self.sync_count += 1
+        self.load.sync(now_s)
+        self.load.cycle_bits += bits
+        if self._paced:
+            self.load.occupy(now_s, bits)
+
+    def _deliver(self, packet: bytes, peer: Client) -> None:
+        try:
+            peer.send(packet)
+        except BlockingIOError:
+            # a client that does not read loses frames; the bus does not wait for it
+            peer.dropped += 1
+            self.dropped += 1
+        except OSError as error:
+            if error.errno not in (errno.EPIPE, errno.ECONNRESET) or peer.essential:
+                self._remove(peer, f"lost: {error.strerror}")
+
+    def _route(self, can_id: int) -> Route:
+        if len(self._routes) >= _MOST_ROUTES:
+            self._routes.clear()
+        clients = [client for client in self._clients.values() if client.wants(can_id)]
+        nodes = [node for node in self.nodes if node.accepts is None or can_id in node.accepts]
+        self._routes[can_id] = route = Route(can_id, clients, nodes)
+        return route
+
+    # -- frames from nodes
+
+    def _flush(self) -> None:
+        """Send what stands in the outboxes, in the order of arbitration.
+
+        Frames that other nodes of this process send in answer wait for the next call, so that a
+        ring of nodes that answer each other cannot keep the clients out.
+        """
+        batch = self._batch
+        self._leftover = False
+        for node in self.nodes:
+            if node.outbox:
+                for frame in node.outbox:
+                    can_id, length = HEADER.unpack_from(frame)
+                    route = self._routes.get(can_id) or self._route(can_id)
+                    batch.append((route.key, len(batch), length, route, frame, node))
+                node.outbox.clear()
+        if not batch:
+            return
+        if len(batch) > 1:
+            batch.sort()
+        for _, _, length, route, frame, node in batch:
+            self._emit(frame, length, route, node)
+        batch.clear()
+
+    def _emit(self, frame: bytes, length: int, route: Route, source: LocalNode) -> None:
+        load = self.load
+        load.frames += 1
+        if route.sync:
+            self._count_sync(self._now_s, route.bits[length])
+        elif route.acyclic:
+            load.acyclic_bits += route.bits[length]
+        else:
+            load.cycle_bits += route.bits[length]
+            if self._paced:
+                load.occupy(self._now_s, route.bits[length])
+        for peer in route.clients:
+            self._deliver(frame, peer)
+        for node in route.nodes:
+            if node is not source:
+                node.receive(frame, self._now_s)
+                self._leftover = self._leftover or bool(node.outbox)

@@ -1,0 +1,98 @@
+"""Run nodes on a bus of their own, or on a real one, until told to stop."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from sim_bus.client import raw_can_socket
+from sim_bus.clock import ClockMode
+from sim_bus.control import status
+from sim_bus.errors import BusSetupError
+from sim_bus.hub import Hub
+from sim_bus.node_protocol import LocalNode
+
+
+def serve(
+    nodes: Sequence[LocalNode],
+    bus: str,
+    *,
+    mode: ClockMode = ClockMode.LOCKSTEP,
+    bitrate: int = 1_000_000,
+    truth_log: str | None = None,
+    until_stdin_ends: bool = False,
+) -> None:
+    """Run `nodes` on `bus` until SIGTERM or SIGINT, then close them.
+
+    `bus` is simbus:NAME, which is opened here, or socketcan:IFACE, which must exist. When all is
+    up, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}}.
+    With `until_stdin_ends` the end of standard input (a pipe whose other end the parent holds)
+    stops it too, so that a simulator never outlives the command that started it.
+
+    Raises:
+        BusSetupError: the bus cannot be opened.
+        SimulatorError: a real interface went away while running.
+    """
+    interface, _, channel = bus.partition(":")
+    hub = Hub(
+        nodes,
+        mode=mode,
+        bitrate=bitrate,
+        name=channel if interface == "simbus" else bus,
+        truth_log=truth_log,
+    )
+    try:
+        if interface == "simbus":
+            hub.listen()
+        elif interface == "socketcan":
+            hub.attach(raw_can_socket(channel), essential=True)
+        else:
+            raise BusSetupError(
+                f"bus {bus!r}: simulated drives run on simbus:NAME or socketcan:IFACE"
+            )
+        with _stopped_by_signals(hub):
+            if until_stdin_ends:
+                _stop_with_stdin(hub)
+            ready = {"ready": {"bus": bus, "pid": os.getpid(), **status(hub)}}
+            print(json.dumps(ready), flush=True)
+            # what lives from here on is never garbage, so it need not be searched
+            gc.collect()
+            gc.freeze()
+            hub.run()
+    finally:
+        hub.close()
+
+
+@contextmanager
+def _stopped_by_signals(hub: Hub) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = {
+        number: signal.signal(number, lambda *_: hub.stop())
+        for number in (signal.SIGTERM, signal.SIGINT)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _stop_with_stdin(hub: Hub) -> None:
+    descriptor = sys.stdin.fileno()
+
+    def read() -> None:
+        if not os.read(descriptor, 4096):
+            hub.stop()
+
+    try:
+        hub.watch(descriptor, read)
+    except PermissionError:
+        raise BusSetupError("standard input must be a pipe to be watched for its end") from None
