@@ -39,7 +39,7 @@ class Abort(IntEnum):
     NO_DATA = 0x08000024
 
 
-class SdoAbort(Exception):
+class SdoAbort(Exception):  # noqa: N818 - the name CiA 301 gives it
     """Refusal of an access to the object dictionary; `code` goes to the client."""
 
     def __init__(self, code: int) -> None:

@@ -2,18 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
 
+from sim_bus.canopen import wire
 from sim_bus.canopen.application import NmtState, SlaveApplication
-from sim_bus.canopen.od import ObjectDictionary
-from sim_bus.canopen.store import ParameterStore
+from sim_bus.canopen.emcy import EmergencyProducer
+from sim_bus.canopen.heartbeat import HeartbeatConsumers, HeartbeatProducer
+from sim_bus.canopen.lss import UNCONFIGURED, LssSlave
+from sim_bus.canopen.od import APPLICATION, COMMUNICATION, ObjectDictionary
+from sim_bus.canopen.pdo import PdoService
+from sim_bus.canopen.sdo_server import SdoServer
+from sim_bus.canopen.store import ParameterStore, serve_store
+from sim_bus.canopen.sync import SyncConsumer
+from sim_bus.canopen.timers import Timers
+
+_IDENTIFIER = struct.Struct("<I").unpack_from
+_NMT_COMMANDS = {
+    1: NmtState.OPERATIONAL,
+    2: NmtState.STOPPED,
+    128: NmtState.PRE_OPERATIONAL,
+}
+_RESET_NODE = 129
+_RESET_COMMUNICATION = 130
 
 
 class CanopenSlave:
     """Communication part of a simulated device; all times are bus time in seconds.
 
     The first `advance` boots it. `outbox` is one list for good: whoever sends its frames
-    empties it with `clear()`.
+    empties it with `clear()`. A node id stored by LSS wins over `node_id`; 255 starts it
+    unconfigured, with LSS only. Raises DictionaryError when the EDS cannot be served.
     """
 
     def __init__(
@@ -26,41 +44,141 @@ class CanopenSlave:
         bitrate: int = 1_000_000,
     ) -> None:
         self.od = od
-        self.node_id = node_id
+        self.app = app
+        self.store = store or ParameterStore()
+        self.node_id = self.store.node_id or node_id
         """Active node id, 255 while unconfigured."""
-        self.bitrate = bitrate
+        self.bitrate = self.store.bitrate or bitrate
         self.nmt_state = NmtState.INITIALISING
         self.sync_period_s = 0.0
         """Communication cycle period (1006h)."""
         self.outbox: list[bytes] = []
         """16-byte frames to send."""
         self.accepts: frozenset[int] = frozenset()
-        """CAN identifiers (with flags) that concern this node now."""
+        """CAN identifiers that concern this node now."""
+        self.now = 0.0
+        """Bus time of the last call."""
+        self.muted = False
+        """Whether it neither sends nor listens (LSS switches the bit timing)."""
+        self.timers = Timers()
+        self.timers.add(self._boot).arm(0.0)
+        self._handlers: dict[int, wire.Handler] = {}
+        od.set_node_id(self.node_id)
+        od.power_on(COMMUNICATION)
+        serve_store(self.store, od)
+        self._emcy = EmergencyProducer(self)
+        self._heartbeat = HeartbeatProducer(self)
+        self._consumers = HeartbeatConsumers(self)
+        self._sdo = SdoServer(self)
+        self._lss = LssSlave(self)
+        self.sync = SyncConsumer(self)
+        self.pdo = PdoService(self)
 
     def receive(self, frame: bytes, now: float) -> None:
         """Take a frame (16 bytes, struct can_frame) seen on the bus."""
+        self.now = now
+        handler = self._handlers.get(_IDENTIFIER(frame)[0])
+        if handler is not None:
+            handler(frame, now)
+            if self.pdo.event_driven:
+                self.pdo.offer_events(now)
 
     def advance(self, now: float) -> None:
-        """Run what was due until `now`."""
+        """Run what was due until `now`, and see whether event-driven TPDOs have news."""
+        self.now = now
+        if now >= self.timers.next_due:
+            self.timers.run(now)
+            if self.muted:
+                self.outbox.clear()
+        if self.pdo.event_driven and not self.muted:
+            self.pdo.offer_events(now)
 
     def next_event(self) -> float:
         """Bus time at which `advance` should be called at the latest, math.inf if none."""
-        return 0.0
+        return self.timers.next_due
 
     def emergency(self, code: int, register_bits: int, vendor: bytes = b"") -> None:
         """Report an error: EMCY frame, 1001h (bit 0 is added), 1003h; nothing while it stands."""
+        self._emcy.raise_error(code, register_bits, vendor)
 
     def emergency_clear(self, code: int | None = None) -> None:
         """Take back one error, or all; sends the EMCY error reset if there was any."""
+        self._emcy.clear(code)
 
     def trigger_tpdo(self, number: int) -> None:
         """Send an event-driven TPDO (number from 1) for a reason of the application's own."""
+        self.pdo.trigger(number, self.now)
 
     def set_nmt_state(self, state: NmtState) -> None:
-        """Change the NMT state for a reason of the application's own (6007h)."""
+        """Change the NMT state, by command or for a reason of the application's own (6007h)."""
+        if state == self.nmt_state:
+            return
+        self.nmt_state = state
+        if state in (NmtState.STOPPED, NmtState.INITIALISING):
+            self._sdo.finish()
+        self.sync.set_state()
+        self.pdo.set_state()
+        self._emcy.flush(self.now)
+        self.app.on_nmt(state)
+
+    def reset_node(self) -> None:
+        """Restart the whole node with its power-on values."""
+        self.set_nmt_state(NmtState.INITIALISING)
+        self.store.load(self.od)
+        self.od.power_on(APPLICATION)
+        self._emcy.reset_node()
+        self.app.on_reset_node()
+        self.reset_communication()
+
+    def reset_communication(self) -> None:
+        """Restart communication with its power-on values and the node id LSS may have set."""
+        self.set_nmt_state(NmtState.INITIALISING)
+        self.node_id = self._lss.pending_node_id
+        self.store.load(self.od)
+        self.od.set_node_id(self.node_id)
+        self.od.power_on(COMMUNICATION)
+        self._emcy.reset_communication()
+        self._consumers.configure()
+        self.sync.configure()
+        self.pdo.configure()
+        if self.node_id == UNCONFIGURED:
+            self.rebuild_handlers()
+            return
+        self._heartbeat.boot()
+        self.set_nmt_state(NmtState.PRE_OPERATIONAL)
+
+    def rebuild_handlers(self) -> None:
+        """Work out anew which identifiers are listened to."""
+        handlers: dict[int, wire.Handler] = {}
+        state = self.nmt_state
+        if state != NmtState.INITIALISING:
+            handlers.update(self.pdo.handlers())
+            handlers.update(self._consumers.handlers())
+            if state != NmtState.STOPPED:
+                handlers[self.sync.identifier] = self.sync.receive
+                handlers[wire.SDO_REQUEST + self.node_id] = self._sdo.receive
+            guarding = wire.ERROR_CONTROL + self.node_id | wire.RTR_FLAG
+            handlers[guarding] = self._heartbeat.answer_guarding
+            handlers[wire.NMT_COMMAND] = self._receive_nmt
+        handlers[wire.LSS_MASTER] = self._lss.receive
+        if self.muted:
+            handlers.clear()
+        self._handlers = handlers
+        self.accepts = frozenset(identifier & ~wire.RTR_FLAG for identifier in handlers)
 
     def close(self) -> None:
         """End; nothing is held open."""
 
+    def _boot(self, _now: float) -> None:
+        self.reset_node()
 
-SyncHandler = Callable[[bytes, float], None]
+    def _receive_nmt(self, frame: bytes, _now: float) -> None:
+        command, node = frame[8], frame[9]
+        if frame[4] != 2 or node not in (0, self.node_id):
+            return
+        if command == _RESET_NODE:
+            self.reset_node()
+        elif command == _RESET_COMMUNICATION:
+            self.reset_communication()
+        elif command in _NMT_COMMANDS:
+            self.set_nmt_state(_NMT_COMMANDS[command])

@@ -133,6 +133,8 @@ class ObjectDictionary:
     def __init__(self) -> None:
         self._entries: dict[tuple[int, int], Entry] = {}
         self._indexes: set[int] = set()
+        self.dummies: frozenset[int] = frozenset()
+        """Data types (0001h to 0007h) that an RPDO mapping may use to skip bytes."""
         self.bitrates: frozenset[int] = frozenset()
         """Bit rates the EDS allows, bit/s."""
 
@@ -148,7 +150,10 @@ class ObjectDictionary:
         except Exception as error:
             raise DictionaryError(f"{path}: not a readable EDS: {error}") from error
         od.bitrates = frozenset(parsed.device_information.allowed_baudrates)
+        od.dummies = frozenset(index for index in parsed if index < min(COMMUNICATION))
         for record in parsed.values():
+            if record.index in od.dummies:
+                continue
             if isinstance(record, ODVariable):
                 od.add(_entry(record))
             else:
@@ -212,6 +217,12 @@ class ObjectDictionary:
         """Set a value for the device's own use, without access rules, limits or hooks."""
         self.entry(index, sub).value = value
 
+    def set_default(self, index: int, sub: int, value: Value) -> None:
+        """Give an object another default than the EDS: what the device has after a reset."""
+        entry = self.entry(index, sub)
+        entry.base_default = entry.default = entry.value = value
+        entry.relative = False
+
     def on_read(self, index: int, sub: int, fn: Callable[[], Value]) -> None:
         """Let `fn` give the value whenever it is read, by SDO, PDO or the device."""
         self.entry(index, sub).getter = fn
@@ -227,9 +238,9 @@ class ObjectDictionary:
             entry.default = base + node_id if entry.relative and isinstance(base, int) else base
 
     def power_on(self, area: range) -> None:
-        """Put power-on values (stored or default) into an area of the dictionary."""
+        """Put power-on values (stored or default) into the writable objects of an area."""
         for entry in self:
-            if entry.index in area:
+            if entry.index in area and entry.writable:
                 entry.power_on()
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.datatypes import Value
 from sim_bus.canopen.od import Entry, ObjectDictionary
+
+Hook = Callable[[Value], None]
 
 
 class StoreError(Exception):
@@ -90,3 +92,36 @@ class ParameterStore:
 
 def _key(entry: Entry) -> str:
     return f"{entry.index:04X}{entry.sub:02X}"
+
+
+_SAVE = int.from_bytes(b"save", "little")
+_LOAD = int.from_bytes(b"load", "little")
+_AREAS = {
+    1: range(0x1000, 0xC000),
+    2: range(0x1000, 0x2000),
+    3: range(0x6000, 0xA000),
+    4: range(0x2000, 0x6000),
+}
+"""Area of the dictionary by sub-index of 1010h and 1011h."""
+_ON_COMMAND = 1
+
+
+def serve_store(store: ParameterStore, od: ObjectDictionary) -> None:
+    """Let 1010h store and 1011h restore parameters, on the signatures "save" and "load"."""
+
+    def hook(area: range, signature: int, act: Callable[[ObjectDictionary, range], None]) -> Hook:
+        def write(value: Value) -> None:
+            if value != signature:
+                raise SdoAbort(Abort.CANNOT_STORE)
+            act(od, area)
+
+        return write
+
+    for index, signature, act in (
+        (0x1010, _SAVE, store.save),
+        (0x1011, _LOAD, store.restore_defaults),
+    ):
+        for entry in od.subs(index):
+            if entry.sub in _AREAS:
+                entry.getter = lambda: _ON_COMMAND
+                entry.hook = hook(_AREAS[entry.sub], signature, act)
