@@ -11,6 +11,7 @@ from sim_bus.canopen import wire
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.application import NmtState
 from sim_bus.canopen.datatypes import Value
+from sim_bus.frame import pack_frame
 
 if TYPE_CHECKING:
     from sim_bus.canopen.node import CanopenSlave
@@ -115,7 +116,7 @@ class EmergencyProducer:
                 return
             data = self._queue.popleft()
             if not cob_id & _INVALID:
-                slave.outbox.append(wire.frame(cob_id & 0x7FF, data))
+                slave.outbox.append(pack_frame(cob_id & 0x7FF, data))
                 self._free_at = now + inhibit_s
 
     def _history_reader(self, position: int) -> Callable[[], Value]:

@@ -8,6 +8,7 @@ from sim_bus.canopen import emcy, wire
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.application import NmtState
 from sim_bus.canopen.datatypes import Value
+from sim_bus.frame import pack_frame
 
 if TYPE_CHECKING:
     from sim_bus.canopen.node import CanopenSlave
@@ -28,7 +29,7 @@ class HeartbeatProducer:
     def boot(self) -> None:
         """Send the boot-up message and take the period from 1017h."""
         slave = self._slave
-        slave.outbox.append(wire.frame(wire.ERROR_CONTROL + slave.node_id, b"\x00"))
+        slave.outbox.append(pack_frame(wire.ERROR_CONTROL + slave.node_id, b"\x00"))
         self._toggle = 0
         self._start(slave.od.get_int(0x1017, 0, 0))
 
@@ -55,7 +56,7 @@ class HeartbeatProducer:
 
     def _send(self, state: int) -> None:
         slave = self._slave
-        slave.outbox.append(wire.frame(wire.ERROR_CONTROL + slave.node_id, bytes([state])))
+        slave.outbox.append(pack_frame(wire.ERROR_CONTROL + slave.node_id, bytes([state])))
 
 
 class _Consumer:

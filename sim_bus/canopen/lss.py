@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from sim_bus.canopen import wire
 from sim_bus.canopen.abort import SdoAbort
+from sim_bus.frame import pack_frame
 
 if TYPE_CHECKING:
     from sim_bus.canopen.node import CanopenSlave
@@ -71,7 +72,7 @@ class LssSlave:
             command(frame[8:16])
 
     def _send(self, data: bytes) -> None:
-        self._slave.outbox.append(wire.frame(wire.LSS_SLAVE, data.ljust(8, b"\x00")))
+        self._slave.outbox.append(pack_frame(wire.LSS_SLAVE, data.ljust(8, b"\x00")))
 
     def _address(self, part: int) -> int:
         return self._slave.od.get_int(0x1018, part + 1, 0)

@@ -15,6 +15,7 @@ from sim_bus.canopen.sdo_server import SdoServer
 from sim_bus.canopen.store import ParameterStore, serve_store
 from sim_bus.canopen.sync import SyncConsumer
 from sim_bus.canopen.timers import Timers
+from sim_bus.frame import RTR_FLAG
 
 _IDENTIFIER = struct.Struct("<I").unpack_from
 _NMT_COMMANDS = {
@@ -157,14 +158,14 @@ class CanopenSlave:
             if state != NmtState.STOPPED:
                 handlers[self.sync.identifier] = self.sync.receive
                 handlers[wire.SDO_REQUEST + self.node_id] = self._sdo.receive
-            guarding = wire.ERROR_CONTROL + self.node_id | wire.RTR_FLAG
+            guarding = wire.ERROR_CONTROL + self.node_id | RTR_FLAG
             handlers[guarding] = self._heartbeat.answer_guarding
             handlers[wire.NMT_COMMAND] = self._receive_nmt
         handlers[wire.LSS_MASTER] = self._lss.receive
         if self.muted:
             handlers.clear()
         self._handlers = handlers
-        self.accepts = frozenset(identifier & ~wire.RTR_FLAG for identifier in handlers)
+        self.accepts = frozenset(identifier & ~RTR_FLAG for identifier in handlers)
 
     def close(self) -> None:
         """End; nothing is held open."""

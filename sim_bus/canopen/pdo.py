@@ -9,6 +9,7 @@ from sim_bus.canopen import emcy, wire
 from sim_bus.canopen.application import NmtState
 from sim_bus.canopen.rpdo import Rpdo
 from sim_bus.canopen.tpdo import EVERY_SYNC, RTR_SYNCHRONOUS, Tpdo
+from sim_bus.frame import RTR_FLAG
 
 if TYPE_CHECKING:
     from sim_bus.canopen.node import CanopenSlave
@@ -81,7 +82,7 @@ class PdoService:
             handlers[identifier] = _both(earlier, rpdo.receive) if earlier else rpdo.receive
         for tpdo in self._tpdos_in_use:
             if tpdo.parameters.rtr_allowed:
-                handlers[tpdo.parameters.identifier | wire.RTR_FLAG] = tpdo.answer_remote
+                handlers[tpdo.parameters.identifier | RTR_FLAG] = tpdo.answer_remote
         return handlers
 
     def at_sync(self, now: float, counter: int) -> None:

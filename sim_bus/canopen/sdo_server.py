@@ -14,6 +14,7 @@ from sim_bus.canopen.sdo_transfer import (
     Transfer,
     announced_size,
 )
+from sim_bus.frame import pack_frame
 
 if TYPE_CHECKING:
     from sim_bus.canopen.node import CanopenSlave
@@ -64,7 +65,7 @@ class SdoServer:
     def send(self, data: bytes) -> None:
         """Send a response, padded to 8 bytes."""
         cob_id = wire.SDO_RESPONSE + self._slave.node_id
-        self._slave.outbox.append(wire.frame(cob_id, data.ljust(8, b"\x00")))
+        self._slave.outbox.append(pack_frame(cob_id, data.ljust(8, b"\x00")))
 
     def finish(self) -> None:
         """Drop the present transfer, if any."""

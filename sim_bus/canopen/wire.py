@@ -1,11 +1,8 @@
-"""Frames as `struct can_frame` (16 bytes) and the predefined connection set of CiA 301."""
+"""Identifiers of the predefined connection set (CiA 301) and what handles a frame."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
-
-RTR_FLAG = 0x40000000
 
 FRAME_HEAD = "<IB3x"
 """Identifier and length; the kernel's structure is in host order, little endian on all hosts
@@ -21,18 +18,6 @@ LSS_SLAVE = 0x7E4
 
 Handler = Callable[[bytes, float], None]
 """Takes a frame and the bus time (s) it was seen at."""
-
-_FRAME = struct.Struct(FRAME_HEAD + "8s")
-
-
-def frame(cob_id: int, data: bytes) -> bytes:
-    """Frame with up to 8 data bytes."""
-    return _FRAME.pack(cob_id, len(data), data)
-
-
-def payload(frame: bytes) -> bytes:
-    """Return the data bytes of a frame."""
-    return frame[8 : 8 + frame[4]]
 
 
 def is_restricted(identifier: int) -> bool:
