@@ -1,4 +1,4 @@
-"""SDO block transfer of CiA 301, server side."""
+"""SDO block transfer of CiA 301, server side; CRC when the client asks for it."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class BlockUpload:
         self._position = 0
         self._sent = 0
         self._last_sent = False
-        self._crc = bool(request[0] & _CRC_SUPPORTED)
+        self._crc = request[0] & _CRC_SUPPORTED
         self._state = "start"
-        server.send(_LONG.pack(0xC6, entry.index, entry.sub, len(data)))
+        server.send(_LONG.pack(0xC2 | self._crc, entry.index, entry.sub, len(data)))
 
     def handles(self, command: int) -> bool:
         """Take the other block upload requests."""
@@ -90,11 +90,11 @@ class BlockDownload:
         self._server = server
         self._entry = entry
         self._size = announced_size(entry, request, 0x02)
-        self._crc = bool(request[0] & _CRC_SUPPORTED)
+        self._crc = request[0] & _CRC_SUPPORTED
         self._data = bytearray()
         self._sequence = 0
         self._complete = False
-        server.send(_LONG.pack(0xA4, entry.index, entry.sub, BLOCK_SIZE))
+        server.send(_LONG.pack(0xA0 | self._crc, entry.index, entry.sub, BLOCK_SIZE))
 
     def handles(self, command: int) -> bool:
         """Take every frame while segments come, then only the end request."""

@@ -1,0 +1,23 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from slave_bench import Bench, odd_eds
+
+
+@pytest.fixture
+def bench() -> Bench:
+    """A booted slave in PRE-OPERATIONAL."""
+    return Bench().boot()
+
+
+@pytest.fixture(scope="session")
+def odd_eds_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return odd_eds(tmp_path_factory.mktemp("eds"))
+
+
+@pytest.fixture
+def odd_bench(odd_eds_path: Path) -> Bench:
+    """A booted slave with objects of every type."""
+    return Bench(odd_eds_path).boot()
