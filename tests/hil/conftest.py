@@ -1,0 +1,50 @@
+"""Run the tests marked `vcan` on a real vcan0, in a guest kernel where this machine has none.
+
+In the second case one boot runs all of them, by a pytest of its own inside, whose reports are
+replayed here test by test. Without a guest they are reported as skipped, with the reason.
+"""
+
+import os
+from functools import cache
+
+import pytest
+import vcan_guest
+import vcan_replay
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks for groups
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the tests that share vcan0 in one process."""
+    for item in items:
+        if item.get_closest_marker("vcan"):
+            item.add_marker(pytest.mark.xdist_group(vcan_replay.GROUP))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
+    """Replay what a `vcan` test did in the guest; every other test runs as usual."""
+    if not item.get_closest_marker("vcan") or _runs_here():
+        return None
+    stash = item.session.stash
+    if _OUTCOME not in stash:
+        wanted = [i for i in item.session.items if i.get_closest_marker("vcan")]
+        stash[_OUTCOME] = vcan_replay.run_in_guest([vcan_replay.plain_name(i) for i in wanted])
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    for report in vcan_replay.replay(item, stash[_OUTCOME]):
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Inside the guest, hand every report to the run outside."""
+    if vcan_replay.REPORTS_VARIABLE in os.environ:
+        vcan_replay.append(report, os.environ[vcan_replay.REPORTS_VARIABLE])
+
+
+@cache
+def _runs_here() -> bool:
+    return vcan_replay.REPORTS_VARIABLE in os.environ or vcan_guest.own_vcan()
+
+
+_OUTCOME = pytest.StashKey[vcan_replay.Outcome]()

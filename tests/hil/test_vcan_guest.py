@@ -1,0 +1,89 @@
+"""A vcan test counts as passed only where it ran: the guest's outcomes are replayed faithfully."""
+
+import json
+from pathlib import Path
+
+import pytest
+import vcan_guest
+from vcan_guest import NoGuestError
+from vcan_replay import Outcome, parse, plain_name, replay
+
+
+def _phase(item: pytest.Item, when: str, outcome: str, longrepr: object = None) -> str:
+    return json.dumps(
+        {
+            "nodeid": plain_name(item),
+            "location": list(item.location),
+            "keywords": {},
+            "outcome": outcome,
+            "longrepr": longrepr,
+            "when": when,
+            "sections": [],
+            "duration": 0.1,
+            "start": 0.0,
+            "stop": 0.1,
+        }
+    )
+
+
+def _outcomes(item: pytest.Item, outcome: Outcome) -> list[str]:
+    return [f"{r.when} {r.outcome}" for r in replay(item, outcome)]
+
+
+def test_without_a_guest_it_is_skipped_with_the_reason(request: pytest.FixtureRequest):
+    (report,) = replay(request.node, Outcome({}, "", "no apt-get"))
+    assert report.outcome == "skipped"
+    assert isinstance(report.longrepr, tuple)
+    assert report.longrepr[2].endswith("no guest kernel: no apt-get")
+
+
+def test_what_the_guest_reported_comes_out_again(request: pytest.FixtureRequest):
+    item = request.node
+    ran = [_phase(item, when, "passed") for when in ("setup", "call", "teardown")]
+    whole = Outcome(parse("".join(line + "\n" for line in ran)), "")
+    assert _outcomes(item, whole) == ["setup passed", "call passed", "teardown passed"]
+    ran[1] = _phase(item, "call", "failed", "assert 1 == 2")
+    failed = Outcome(parse("".join(line + "\n" for line in ran)), "")
+    assert _outcomes(item, failed) == ["setup passed", "call failed", "teardown passed"]
+    ran[1] = _phase(item, "call", "skipped", ["f.py", 3, "Skipped: no"])
+    skipped = Outcome(parse("".join(line + "\n" for line in ran)), "")
+    assert [r.longrepr for r in replay(item, skipped)][1] == ("f.py", 3, "Skipped: no")
+
+
+@pytest.mark.parametrize("lines", [0, 1, 2])
+def test_a_guest_that_dies_fails_the_test(request: pytest.FixtureRequest, lines: int):
+    item = request.node
+    ran = [_phase(item, when, "passed") for when in ("setup", "call", "teardown")]
+    cut = "".join(line + "\n" for line in ran[:lines]) + ran[lines][:-5]
+    last = list(replay(item, Outcome(parse(cut), "Kernel panic")))[-1]
+    assert last.outcome == "failed"
+    assert "Kernel panic" in str(last.longrepr)
+
+
+def test_a_machine_without_apt_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(NoGuestError, match="no apt-get here to fetch user-mode-linux"):
+        vcan_guest.obtain(tmp_path / "guest")
+
+
+def test_a_kernel_that_does_not_start_is_told_so(tmp_path: Path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "modules").mkdir()
+    kernel = tmp_path / "linux.uml"
+    kernel.write_text("#!/bin/sh\necho cannot map memory\n")
+    kernel.chmod(0o755)
+    guest = vcan_guest.Guest(kernel, tmp_path / "modules", kernel)
+    with pytest.raises(NoGuestError, match="did not start: cannot map memory"):
+        vcan_guest.run(guest, ["true"], tmp_path, {}, tmp_path / "run")
+
+
+def test_a_guest_that_hangs_is_stopped(tmp_path: Path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "modules").mkdir()
+    kernel = tmp_path / "linux.uml"
+    kernel.write_text(f"#!/bin/sh\necho > {tmp_path}/run/ready\nsleep 60\n")
+    kernel.chmod(0o755)
+    guest = vcan_guest.Guest(kernel, tmp_path / "modules", kernel)
+    run = vcan_guest.run(guest, ["true"], tmp_path, {}, tmp_path / "run", timeout_s=0.3)
+    assert run.exit_code is None
+    assert "stopped after 0 s" in run.output

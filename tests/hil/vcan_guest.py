@@ -1,0 +1,203 @@
+"""A real SocketCAN `vcan0`: the machine's own, or one in a guest kernel that runs as a process.
+
+The guest is Debian's user-mode-linux with the machine's files as its root, so that it runs the very
+same tree and environment. Its packages are downloaded and unpacked into a cache, never installed.
+"""
+
+import contextlib
+import os
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+INTERFACE = "vcan0"
+PACKAGES = ("user-mode-linux", "busybox-static")
+MEMORY_MB = 2048
+DOWNLOAD_TIMEOUT_S = 240
+RUN_TIMEOUT_S = 300
+_CONSOLE_TAIL_LINES = 30
+
+
+class NoGuestError(Exception):
+    """The guest cannot be had or does not start on this machine; the text says why."""
+
+
+@dataclass(frozen=True)
+class Guest:
+    """Where the parts of the guest are."""
+
+    kernel: Path
+    modules: Path
+    busybox: Path
+
+
+@dataclass(frozen=True)
+class GuestRun:
+    """What is left of one run: the command's exit code (None when it did not end) and output."""
+
+    exit_code: int | None
+    output: str
+
+
+def own_vcan() -> bool:
+    """Tell whether this machine's kernel has `vcan0`; as root, add it where it is missing."""
+    if _is_up():
+        return True
+    ip = shutil.which("ip", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")
+    if os.geteuid() == 0 and ip and hasattr(socket, "AF_CAN"):
+        for words in (("add", INTERFACE, "type", "vcan"), ("set", INTERFACE, "up")):
+            subprocess.run([ip, "link", *words], check=False, capture_output=True)
+    return _is_up()
+
+
+def _is_up() -> bool:
+    try:
+        flags = Path(f"/sys/class/net/{INTERFACE}/flags").read_text(encoding="ascii")
+        socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
+    except (OSError, AttributeError):
+        return False
+    return bool(int(flags, 16) & 1)
+
+
+def obtain(cache: Path) -> Guest:
+    """Return the guest's parts from `cache`, fetched by apt where missing; raises NoGuestError."""
+    guest = _unpacked(cache)
+    if guest is not None:
+        return guest
+    for tool in ("apt-get", "dpkg"):
+        if shutil.which(tool) is None:
+            raise NoGuestError(f"no {tool} here to fetch {' and '.join(PACKAGES)} with")
+    cache.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="vcan-guest-", dir=cache.parent) as scratch:
+        fresh = Path(scratch) / "unpacked"
+        for package in _download(Path(scratch)):
+            _run(["dpkg", "-x", str(package), str(fresh)], Path(scratch))
+        if _unpacked(fresh) is None:
+            raise NoGuestError(f"{' and '.join(PACKAGES)} hold no kernel for this machine")
+        with contextlib.suppress(OSError):  # another run was quicker
+            fresh.rename(cache)
+    guest = _unpacked(cache)
+    if guest is None:
+        raise NoGuestError(f"{cache} is in the way; remove it")
+    return guest
+
+
+def _unpacked(folder: Path) -> Guest | None:
+    kernel, busybox = folder / "usr/bin/linux.uml", folder / "bin/busybox"
+    modules = sorted((folder / "usr/lib/uml/modules").glob("*/"))
+    if kernel.is_file() and busybox.is_file() and modules:
+        return Guest(kernel, modules[-1], busybox)
+    return None
+
+
+def _download(folder: Path) -> list[Path]:
+    """Fetch the packages; with lists of our own where the machine's do not know them."""
+    get = ["apt-get", "-q", "-o", "Acquire::Retries=2", "-o", "Acquire::http::Timeout=30"]
+    try:
+        _run([*get, "download", *PACKAGES], folder)
+    except NoGuestError:
+        for name in ("lists/partial", "cache/archives/partial"):
+            (folder / name).mkdir(parents=True)
+        own = ["-o", f"Dir::State::Lists={folder}/lists", "-o", f"Dir::Cache={folder}/cache"]
+        _run([*get, *own, "update"], folder)
+        _run([*get, *own, "download", *PACKAGES], folder)
+    return sorted(folder.glob("*.deb"))
+
+
+def _run(command: list[str], folder: Path) -> None:
+    try:
+        subprocess.run(
+            command,
+            cwd=folder,
+            check=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=DOWNLOAD_TIMEOUT_S,
+        )
+    except subprocess.CalledProcessError as error:
+        last = (error.stdout.strip().splitlines() or ["no output"])[-1]
+        raise NoGuestError(f"{shlex.join(command[:1])} failed: {last}") from None
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise NoGuestError(f"{command[0]}: {error}") from None
+
+
+def run(
+    guest: Guest,
+    command: list[str],
+    cwd: Path,
+    environment: dict[str, str],
+    run_dir: Path,
+    timeout_s: float = RUN_TIMEOUT_S,
+) -> GuestRun:
+    """Boot the guest, run `command` in it, wait until it is off.
+
+    `run_dir` is an empty folder whose path holds no blanks; the guest may write there and nowhere
+    else on the machine. Raises NoGuestError when the guest never got as far as the command.
+    """
+    exports = "".join(f"export {k}={shlex.quote(v)}\n" for k, v in environment.items())
+    (run_dir / "command.sh").write_text(
+        f"{exports}cd {shlex.quote(str(cwd))} && exec {shlex.join(command)}\n"
+    )
+    shutil.copy(Path(__file__).parent / "guest_init.sh", run_dir / "init.sh")
+    shutil.copy(guest.busybox, run_dir / "busybox")
+    (run_dir / "modules").symlink_to(guest.modules.resolve())
+    console = run_dir / "console.txt"
+    problem = _boot(guest, run_dir, console, timeout_s)
+    if not (run_dir / "ready").exists():
+        tail = console.read_text(errors="replace").strip().splitlines()[-3:]
+        raise NoGuestError(f"the guest kernel did not start{problem}: {' / '.join(tail)}")
+    output = "".join(
+        path.read_text(errors="replace")
+        for path in (run_dir / "output.txt", console)
+        if path.exists()
+    )
+    tail = "\n".join(output.splitlines()[-_CONSOLE_TAIL_LINES:])
+    code = run_dir / "exit_code"
+    return GuestRun(int(code.read_text()) if code.exists() else None, f"{tail}{problem}")
+
+
+def _boot(guest: Guest, run_dir: Path, console: Path, timeout_s: float) -> str:
+    """Run the guest kernel to its end; return what went wrong in words, or nothing."""
+    words = [
+        *(f"mem={MEMORY_MB}M", "root=/dev/root", "rootfstype=hostfs", "rootflags=/", "ro", "quiet"),
+        *(f"init={run_dir}/init.sh", f"RUN_DIR={run_dir}"),
+        *("con=null", "con0=fd:0,fd:1", "ssl=null"),
+    ]
+    # Its memory is a file in TMPDIR: in /dev/shm where there is room for it.
+    shm = Path("/dev/shm")
+    roomy = shm.is_dir() and shutil.disk_usage(shm).free > MEMORY_MB << 20
+    environment = {
+        "PATH": os.environ.get("PATH", os.defpath),
+        "HOME": str(run_dir),
+        "TMPDIR": str(shm if roomy else run_dir),
+    }
+    with console.open("wb") as out:
+        try:
+            process = subprocess.Popen(
+                # timeout: it ends even where this process is killed first.
+                ["timeout", "-k", "5", str(timeout_s + 30), str(guest.kernel), *words],
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+            )
+        except OSError as error:
+            return f" ({error})"
+        try:
+            process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            return f" (stopped after {timeout_s:.0f} s)"
+        finally:
+            # The guest's processes are processes here as well, in a group of their own.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    return ""

@@ -1,0 +1,97 @@
+"""Run tests in one boot of the guest and give their reports to the pytest outside."""
+
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+import vcan_guest
+from vcan_guest import NoGuestError
+
+REPOSITORY = Path(__file__).parents[2]
+GUEST_CACHE = REPOSITORY / "build" / "vcan-guest"
+REPORTS_VARIABLE = "CDPR_VCAN_REPORTS"
+GROUP = "vcan"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Reports by test name, and the guest's last words; or why there was no guest."""
+
+    reports: dict[str, list[dict[str, Any]]]
+    output: str
+    no_guest: str | None = None
+
+
+def run_in_guest(names: Sequence[str]) -> Outcome:
+    """Run tests (pytest's names of them) by a pytest inside the guest."""
+    with tempfile.TemporaryDirectory(prefix="cdpr-vcan-", dir="/tmp") as scratch:
+        written = Path(scratch) / "reports.jsonl"
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *names]
+        environment = {
+            REPORTS_VARIABLE: str(written),
+            "HOME": os.environ.get("HOME", "/root"),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
+        try:
+            guest = vcan_guest.obtain(GUEST_CACHE)
+            run = vcan_guest.run(guest, command, REPOSITORY, environment, Path(scratch))
+        except NoGuestError as error:
+            return Outcome({}, "", str(error))
+        text = written.read_text(encoding="utf-8") if written.exists() else ""
+    return Outcome(parse(text), f"{run.output}\nexit code {run.exit_code}")
+
+
+def parse(text: str) -> dict[str, list[dict[str, Any]]]:
+    """Return the reports, one JSON object a line, by test; a last line cut short is left out."""
+    reports: dict[str, list[dict[str, Any]]] = {}
+    for line in text.splitlines(keepends=True):
+        if line.endswith("\n"):
+            report = json.loads(line)
+            reports.setdefault(report["nodeid"], []).append(report)
+    return reports
+
+
+def append(report: pytest.TestReport, path: str) -> None:
+    """Write one report, inside the guest."""
+    with Path(path).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(report._to_json()) + "\n")
+
+
+def replay(item: pytest.Item, outcome: Outcome) -> Iterator[pytest.TestReport]:
+    """Yield what the guest reported of a test; where it ended without, a failure that says so."""
+    if outcome.no_guest is not None:
+        reason = f"Skipped: no vcan0 here and no guest kernel: {outcome.no_guest}"
+        yield _report(item, "skipped", (str(item.path), None, reason))
+        return
+    phases = outcome.reports.get(plain_name(item), [])
+    for phase in phases:
+        yield _restored(item, phase)
+    if not any(phase["when"] == "teardown" for phase in phases):
+        words = f"did not end in the guest, whose last words were:\n{outcome.output}"
+        yield _report(item, "failed", words)
+
+
+def plain_name(item: pytest.Item) -> str:
+    """Return a test's name without the group that pytest-xdist puts behind it."""
+    return item.nodeid.removesuffix(f"@{GROUP}")
+
+
+def _restored(item: pytest.Item, data: dict[str, Any]) -> pytest.TestReport:
+    if isinstance(data.get("longrepr"), list):  # a skip: path, line, reason
+        data = data | {"longrepr": tuple(data["longrepr"])}
+    report = pytest.TestReport._from_json(data)
+    report.nodeid = item.nodeid
+    return report
+
+
+def _report(
+    item: pytest.Item, outcome: Literal["failed", "skipped"], longrepr: str | tuple[str, None, str]
+) -> pytest.TestReport:
+    keywords = dict(item.keywords)
+    return pytest.TestReport(item.nodeid, item.location, keywords, outcome, longrepr, "call")
