@@ -64,9 +64,20 @@ def serve(
             # what lives from here on is never garbage, so it need not be searched
             gc.collect()
             gc.freeze()
+            if mode is ClockMode.LOCKSTEP:
+                _let_sender_finish()
             hub.run()
     finally:
         hub.close()
+
+
+def _let_sender_finish() -> None:
+    """Do not preempt a master on the same core at each frame, but when it waits for answers.
+
+    Saves two changes of context a cycle; a scheduling class that the user chose is kept.
+    """
+    if os.sched_getscheduler(0) == os.SCHED_OTHER:
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 @contextmanager

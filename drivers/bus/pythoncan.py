@@ -11,6 +11,9 @@ from drivers.bus.simbus_socket import FRAME_BYTES, Filters
 from drivers.bus.url import BusUrl
 from drivers.errors import BusError
 
+_EFF_MASK = 0x1FFFFFFF
+_SFF_MASK = 0x7FF
+
 
 def open_python_can(url: BusUrl, filters: Filters | None = None) -> can.BusABC:
     """Return a python-can bus for `url`, for acyclic work; `filters` None lets all through.
@@ -32,14 +35,16 @@ def open_python_can(url: BusUrl, filters: Filters | None = None) -> can.BusABC:
 def _python_can_filters(filters: Filters | None) -> list[can.typechecking.CanFilter] | None:
     if filters is None:
         return None
-    return [
-        {
-            "can_id": can_id & 0x1FFFFFFF,
-            "can_mask": mask & 0x1FFFFFFF,
-            "extended": bool(can_id & EFF_FLAG),
+    result: list[can.typechecking.CanFilter] = []
+    for can_id, mask in filters:
+        entry: can.typechecking.CanFilter = {
+            "can_id": can_id & _EFF_MASK,
+            "can_mask": mask & _EFF_MASK,
         }
-        for can_id, mask in filters
-    ]
+        if mask & EFF_FLAG:
+            entry["extended"] = bool(can_id & EFF_FLAG)
+        result.append(entry)
+    return result
 
 
 class PythonCanPort:
@@ -56,7 +61,7 @@ class PythonCanPort:
         can_id, length, data = FRAME.unpack(frame)
         extended = bool(can_id & EFF_FLAG)
         message = can.Message(
-            arbitration_id=can_id & (0x1FFFFFFF if extended else 0x7FF),
+            arbitration_id=can_id & (_EFF_MASK if extended else _SFF_MASK),
             is_extended_id=extended,
             is_remote_frame=bool(can_id & RTR_FLAG),
             dlc=length,
@@ -65,7 +70,7 @@ class PythonCanPort:
         try:
             self._bus.send(message)
         except can.CanError as error:
-            raise OSError(error.error_code or 0, str(error)) from error
+            raise OSError(str(error)) from error
         return FRAME_BYTES
 
     def recv_into(self, buffer: bytearray | memoryview, /) -> int:
@@ -73,7 +78,7 @@ class PythonCanPort:
         try:
             message = self._bus.recv(self._timeout_s)
         except can.CanError as error:
-            raise OSError(error.error_code or 0, str(error)) from error
+            raise OSError(str(error)) from error
         if message is None:
             raise BlockingIOError
         can_id = message.arbitration_id

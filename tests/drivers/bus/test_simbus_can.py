@@ -1,0 +1,150 @@
+"""The python-can interface "simbus", driven by python-can's own tools."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+
+from drivers.bus import BusUrl, open_python_can
+from drivers.errors import BusError
+
+
+def message(can_id: int, data: bytes = b"") -> can.Message:
+    return can.Message(arbitration_id=can_id, data=data, is_extended_id=can_id > 0x7FF)
+
+
+def test_frames_go_both_ways(simulator: Any) -> None:
+    with (
+        can.Bus(interface="simbus", channel=simulator.name) as one,
+        can.Bus(interface="simbus", channel=simulator.name) as two,
+    ):
+        sent = [
+            message(0x123, b"abc"),
+            message(0x12345678, b"12345678"),
+            can.Message(arbitration_id=0x701, is_remote_frame=True, dlc=1, is_extended_id=False),
+        ]
+        for entry in sent:
+            one.send(entry)
+        for entry in sent:
+            got = two.recv(5.0)
+            assert got is not None
+            assert got.equals(
+                entry, timestamp_delta=None, check_channel=False, check_direction=False
+            )
+            assert got.timestamp == pytest.approx(time.time(), abs=5.0)
+            assert got.channel == simulator.name
+        assert one.recv(0.02) is None
+        assert one.state is can.BusState.ACTIVE
+
+
+def test_filters_are_applied_and_can_change(simulator: Any) -> None:
+    filters = [{"can_id": 0x181, "can_mask": 0x7FF, "extended": False}]
+    with (
+        can.Bus(interface="simbus", channel=simulator.name, can_filters=filters) as bus,
+        can.Bus(interface="simbus", channel=simulator.name) as other,
+    ):
+        time.sleep(0.05)
+        for can_id in (0x180, 0x181, 0x10000181):
+            other.send(message(can_id))
+        got = bus.recv(5.0)
+        assert got is not None
+        assert (got.arbitration_id, got.is_extended_id) == (0x181, False)
+        assert bus.recv(0.02) is None
+        bus.set_filters(None)
+        time.sleep(0.05)
+        other.send(message(0x10000181))
+        got = bus.recv(5.0)
+        assert got is not None
+        assert got.is_extended_id
+
+
+def test_notifier_and_periodic_sending(simulator: Any) -> None:
+    with (
+        can.Bus(interface="simbus", channel=simulator.name) as bus,
+        can.Bus(interface="simbus", channel=simulator.name) as master,
+    ):
+        reader = can.BufferedReader()
+        notifier = can.Notifier(bus, [reader])
+        task = master.send_periodic(message(0x80), 0.005)
+        seen = [reader.get_message(5.0) for _ in range(30)]
+        task.stop()
+        notifier.stop()
+    ids = [entry.arbitration_id for entry in seen if entry]
+    assert ids == [0x80, 0x181, 0x281] * 10
+
+
+def test_the_stock_logger_in_another_process(simulator: Any, tmp_path: Path) -> None:
+    log = tmp_path / "bus.asc"
+    logger = subprocess.Popen(
+        [sys.executable, "-m", "can.logger", "-i", "simbus", "-c", simulator.name, "-f", log],
+        stdout=subprocess.PIPE,
+    )
+    try:
+        assert logger.stdout is not None
+        while b"Can Logger" not in logger.stdout.readline():
+            assert logger.poll() is None
+        with can.Bus(interface="simbus", channel=simulator.name) as bus:
+            for _ in range(50):
+                bus.send(message(0x80))
+                assert bus.recv(5.0) is not None
+                assert bus.recv(5.0) is not None
+            deadline = time.monotonic() + 5.0
+            while logger.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.2)
+                logger.send_signal(2)
+    finally:
+        logger.kill()
+        logger.communicate()
+    with can.LogReader(log) as reader:
+        ids = [entry.arbitration_id for entry in reader]
+    assert ids == [0x80, 0x181, 0x281] * 50
+
+
+def test_a_killed_simulator_ends_with_a_can_error(simulator: Any) -> None:
+    bus = can.Bus(interface="simbus", channel=simulator.name)
+    simulator.kill()
+    with pytest.raises(can.CanOperationError, match="gone away"):
+        bus.recv(5.0)
+    with pytest.raises(can.CanOperationError, match="gone away"):
+        bus.send(message(0x80))
+    bus.shutdown()
+
+
+def test_a_bus_that_takes_no_frames_is_reported(simulator: Any) -> None:
+    with can.Bus(interface="simbus", channel=simulator.name) as bus:
+        simulator.process.send_signal(19)
+        with pytest.raises(can.CanOperationError, match="buffer full"):
+            for _ in range(100_000):
+                bus.send(message(0x123), timeout=0.05)
+        simulator.process.send_signal(18)
+        bus.send(message(0x123), timeout=5.0)
+
+
+def test_running_buses_are_found(simulator: Any) -> None:
+    found = can.detect_available_configs(interfaces=["simbus"])
+    assert {"interface": "simbus", "channel": simulator.name} in list(found)
+
+
+def test_no_bus_is_one_clear_error() -> None:
+    with pytest.raises(can.CanInitializationError, match="simbus:nobody-home"):
+        can.Bus(interface="simbus", channel="nobody-home")
+    with pytest.raises(BusError, match="no simulated bus of that name"):
+        open_python_can(BusUrl.parse("simbus:nobody-home"))
+
+
+def test_opened_by_url_with_filters(simulator: Any) -> None:
+    url = BusUrl.parse(f"simbus:{simulator.name}")
+    bus = open_python_can(url, [(0x280, 0x780)])
+    with open_python_can(url) as other:
+        time.sleep(0.05)
+        other.send(message(0x80))
+        got = bus.recv(5.0)
+        assert got is not None
+        assert got.arbitration_id == 0x281
+    bus.shutdown()
