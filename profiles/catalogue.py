@@ -89,19 +89,19 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     )
 
 
-def list_profiles() -> dict[Kind, tuple[str, ...]]:
+def list_profiles() -> dict[str, tuple[str, ...]]:
     """Return the names of the shipped profiles by kind; motors include every one of a series."""
     return {kind: tuple(sorted(_shipped_names(kind))) for kind in KINDS}
 
 
-def load_all() -> dict[Kind, dict[str, object]]:
+def load_all() -> dict[str, dict[str, object]]:
     """Read and validate every shipped profile; raises ProfileError.
 
     A motor whose source has no size sheet appears with its ratings.
     """
     _motor_series.cache_clear()
     _cable_series.cache_clear()
-    everything: dict[Kind, dict[str, object]] = {kind: {} for kind in KINDS}
+    everything: dict[str, dict[str, object]] = {kind: {} for kind in KINDS}
     for series in _motor_series().values():
         for name, ratings in series.names().items():
             everything["motors"][name] = series.motor(name) or ratings
