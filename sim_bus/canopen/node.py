@@ -139,9 +139,9 @@ class CanopenSlave:
         self.od.set_node_id(self.node_id)
         self.od.power_on(COMMUNICATION)
         self._emcy.reset_communication()
+        self.pdo.forget_faults()
         self._consumers.configure()
         self.sync.configure()
-        self.pdo.configure()
         if self.node_id == UNCONFIGURED:
             self.rebuild_handlers()
             return

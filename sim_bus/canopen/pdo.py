@@ -36,24 +36,18 @@ class PdoService:
         self.event_driven: list[Tpdo] = []
         """Event-driven TPDOs that are in use now."""
 
-    def configure(self) -> None:
-        """Take all parameters from the dictionary."""
-        for pdo in self._all():
-            pdo.configure()
-
     def set_state(self) -> None:
-        """Start or stop with the NMT state."""
+        """Start or stop with the NMT state; parameters and the device's hooks are taken anew."""
         slave = self._slave
-        for pdo in self._all():
-            pdo.stop()
+        for rpdo in self._rpdos:
+            rpdo.configure()
+        for tpdo in self._tpdos:
+            tpdo.configure()
         if slave.nmt_state == NmtState.OPERATIONAL:
             for tpdo in self._tpdos:
                 if tpdo.usable:
                     tpdo.start(slave.now)
         self.collect()
-
-    def _all(self) -> list[Rpdo | Tpdo]:
-        return [*self._rpdos, *self._tpdos]
 
     def collect(self) -> None:
         """Sort the PDOs in use by what they do, and have their frames delivered."""
@@ -111,6 +105,11 @@ class PdoService:
         for tpdo in self.event_driven:
             if tpdo.record.number == number:
                 tpdo.force(now)
+
+    def forget_faults(self) -> None:
+        """Forget what was wrong with RPDOs (communication starts afresh)."""
+        for rpdo in self._rpdos:
+            rpdo.fault = 0
 
     def report_faults(self) -> None:
         """Bring the EMCYs of RPDOs in line with what is wrong with them."""
