@@ -16,7 +16,7 @@ class Sample(NamedTuple):
 
     flags: int
     """Flags of `rotor` (index edges) and `servo`, or-ed."""
-    count: int
+    counts: int
     """Encoder counter from power-up, `feedback_delay_s` old, with noise."""
     torque_permille: int
     """Measured torque in per mille of rated torque, at the nominal torque constant."""
@@ -57,14 +57,11 @@ def run(
         m.time = until
         flags |= servo.watch(m, kind, target, dt)
     flags |= servo.switches(m)
-    count = int(rotor.read_counter(m, rotor.delayed_angle(m)))
-    permille = int(math.floor(1000.0 * m.sensed / m.rated_torque + 0.5))
-    speed = int(math.floor(m.displayed_velocity + 0.5))
     return (
         flags,
-        count,
-        permille,
-        speed,
+        rotor.read_counter(m, rotor.delayed_angle(m)),
+        math.floor(1000.0 * m.sensed / m.rated_torque + 0.5),
+        math.floor(m.displayed_velocity + 0.5),
         m.angle,
         m.velocity,
         m.torque_gain * m.sensed,

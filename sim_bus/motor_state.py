@@ -14,7 +14,6 @@ from sim_bus.plant import MAX_COGGING_TERMS, Plant
 CONTROL_STEP_S = 5e-5
 """Period of the inner loops, and the longest step of the physics."""
 DELAY_SLOTS = 256
-_DELAY_SPACING = 128
 
 _F8 = np.float64
 _PHYSICS = [
@@ -82,7 +81,6 @@ _SERVO = [
     ("limit_negative", _F8),  # Nm, a positive figure
     ("torque_slope", _F8),  # Nm/s
     ("torque_offset", _F8),  # Nm, feed-forward of the position and velocity loops
-    ("velocity_offset", _F8),  # counts/s
     ("speed_limit", _F8),  # counts/s
     ("acceleration", _F8),  # counts/s2
     ("deceleration", _F8),

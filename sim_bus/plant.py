@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from profiles.reader import read_toml_model
+from profiles.reader import Profile, read_toml_model
 
 MAX_COGGING_TERMS = 32
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class MotorPlant(_Section):
+class MotorPlant(Profile):
     """Rotor and torque constant."""
 
     torque_constant_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.04
@@ -28,7 +24,7 @@ class MotorPlant(_Section):
     """Mechanical angle at power-up; the encoder counts from zero there."""
 
 
-class CoggingTerm(_Section):
+class CoggingTerm(Profile):
     """One harmonic of the cogging."""
 
     order: Annotated[int, Field(ge=1, le=2000)] = 4
@@ -38,11 +34,12 @@ class CoggingTerm(_Section):
     kind: Literal["torque", "current_offset"] = "torque"
 
 
-class FrictionPlant(_Section):
+class FrictionPlant(Profile):
     """LuGre friction with a Stribeck curve."""
 
     coulomb_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.08
     breakaway_Nm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.10
+    """At least `coulomb_Nm`; 1.25 times that where only `coulomb_Nm` is given."""
     stribeck_rad_s: Annotated[float, Field(ge=1e-4, le=100.0)] = 0.2
     viscous_Nms_rad: Annotated[float, Field(ge=0.0, le=10.0)] = 5e-4
     sigma0_Nm_rad: Annotated[float, Field(gt=0.0, le=1e6)] = 20.0
@@ -51,6 +48,15 @@ class FrictionPlant(_Section):
     """Damping of the bristles."""
     direction_asymmetry: Annotated[float, Field(ge=-1.5, le=1.5)] = 0.1
     """Relative: forward friction × (1 + a/2), backward × (1 − a/2)."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _breakaway_follows_coulomb(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "breakaway_Nm" not in data:
+            coulomb = data.get("coulomb_Nm")
+            if isinstance(coulomb, int | float):
+                return {**data, "breakaway_Nm": 1.25 * coulomb}
+        return data
 
     @model_validator(mode="after")
     def _breakaway_not_below_coulomb(self) -> Self:
@@ -62,7 +68,7 @@ class FrictionPlant(_Section):
         return self
 
 
-class EncoderPlant(_Section):
+class EncoderPlant(Profile):
     """Incremental encoder with one index pulse a turn."""
 
     counts_per_turn: Annotated[int, Field(ge=16, le=2**26)] = 8192
@@ -74,7 +80,7 @@ class EncoderPlant(_Section):
     """Standard deviation of the reading before it is rounded."""
 
 
-class DrivePlant(_Section):
+class DrivePlant(Profile):
     """Delays and thresholds of the drive itself."""
 
     current_loop_bandwidth_Hz: Annotated[float, Field(ge=10.0, le=5000.0)] = 500.0
@@ -91,7 +97,7 @@ class DrivePlant(_Section):
     """Overspeed fault at this multiple of the maximum motor speed (6080h)."""
 
 
-class ThermalPlant(_Section):
+class ThermalPlant(Profile):
     """Warming of an energised drive and what it does to cogging and friction."""
 
     cogging_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.001
@@ -103,14 +109,14 @@ class ThermalPlant(_Section):
     """Temperature at power-up, where the figures of the other sections hold."""
 
 
-class LoadPlant(_Section):
+class LoadPlant(Profile):
     """What the motor turns."""
 
     inertia_kg_m2: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Inertia of the load on the motor side, rigidly coupled."""
 
 
-class LimitsPlant(_Section):
+class LimitsPlant(Profile):
     """Mechanical angles of the switches, over several turns; a switch left out does not exist."""
 
     negative_deg: float | None = None
@@ -130,14 +136,14 @@ class LimitsPlant(_Section):
         return self
 
 
-class Plant(_Section):
+class Plant(Profile):
     """All sections of a plant file; every key has a default."""
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
     motor: MotorPlant = MotorPlant()
-    cogging: Annotated[
-        tuple[CoggingTerm, ...], Field(max_length=MAX_COGGING_TERMS, strict=False)
-    ] = (CoggingTerm(),)
+    cogging: Annotated[tuple[CoggingTerm, ...], Field(max_length=MAX_COGGING_TERMS)] = (
+        CoggingTerm(),
+    )
     friction: FrictionPlant = FrictionPlant()
     encoder: EncoderPlant = EncoderPlant()
     drive: DrivePlant = DrivePlant()

@@ -74,7 +74,7 @@ def step_disc(m: Any) -> int:
     The pulse is one count wide. Returns INDEX_ROSE and INDEX_FELL, or-ed.
     """
     old = m.disc
-    new = int(math.floor(m.angle * m.counts_per_rad + 0.5))
+    new = math.floor(m.angle * m.counts_per_rad + 0.5)
     m.disc = new
     if new == old or m.index_present == 0:
         return 0
@@ -101,18 +101,28 @@ def step_disc(m: Any) -> int:
 
 
 @jit
-def read_counter(m: Any, angle: float) -> float:
+def restart_counter(motor: Any) -> None:
+    """Let the counter start again at zero where the rotor stands, as at power-up."""
+    m = motor[0]
+    m.zero = m.disc
+    m.rise_count = 0
+    m.fall_count = 0
+
+
+@jit
+def read_counter(m: Any, angle: float) -> int:
     """Return the encoder counter for a rotor angle, with noise and rounding."""
     reading = angle * m.counts_per_rad
     if m.noise > 0.0:
         reading += m.noise * gaussian(m)
-    return math.floor(reading + 0.5) - float(m.zero)
+    counts: int = math.floor(reading + 0.5) - m.zero
+    return counts
 
 
 @jit
 def remember_angle(m: Any) -> None:
     """Store time and angle for the delayed reading; close-lying ones are skipped."""
-    if (m.time - m.slot_time[m.slot]) * 128.0 >= m.delay:
+    if (m.time - m.slot_time[m.slot]) * (DELAY_SLOTS // 2) >= m.delay:
         m.slot = (m.slot + 1) % DELAY_SLOTS
         m.slot_time[m.slot] = m.time
         m.slot_angle[m.slot] = m.angle

@@ -36,7 +36,7 @@ SWITCH_HOME = 1 << 13
 
 
 @jit
-def observe(m: Any, counter: float, h: float) -> None:
+def observe(m: Any, counter: int, h: float) -> None:
     """Update the tracking observer (both poles at `observer_rate`) with a counter reading."""
     error = counter - m.observed_position
     rate = m.observer_rate
@@ -56,7 +56,6 @@ def engage(m: Any, kind: int) -> None:
     if abs(m.displayed_velocity) < m.standstill_velocity:
         m.reference_velocity = 0.0
     m.reference_acceleration = 0.0
-    m.interpolation_left = 0.0
     m.integral = m.torque_demand / m.velocity_gain
     m.in_target_since = math.inf
     m.following_since = math.inf
@@ -124,7 +123,6 @@ def motion_torque(m: Any, kind: int, h: float) -> float:
         # Within a count of rest the integrator would only hunt across the stiction.
         frozen = abs(lag) <= 1.0 and m.reference_velocity == 0.0
     else:
-        velocity += m.velocity_offset
         frozen = False
     error = (velocity - m.observed_velocity) * rad
     if not frozen:

@@ -1,0 +1,166 @@
+"""One motor as the drive's firmware sees it: objects of the dictionary in, feedback out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from sim_bus import servo
+from sim_bus.canopen.od import ObjectDictionary
+from sim_bus.motor import run
+from sim_bus.motor_state import MotorRatings, build_motor
+from sim_bus.plant import Plant
+from sim_bus.rotor import restart_counter
+
+_WINDOW_OFF = 0xFFFFFFFF
+
+
+def to_int32(value: int) -> int:
+    """Wrap a count into the range of INTEGER32 objects."""
+    return (value + 0x80000000 & 0xFFFFFFFF) - 0x80000000
+
+
+class Axis:
+    """Power stage, inner loops and feedback of one motor.
+
+    Positions here are encoder counts from power-up; `position_offset` leads to those of the
+    dictionary (position actual = counter + offset).
+    """
+
+    def __init__(self, od: ObjectDictionary, plant: Plant, ratings: MotorRatings) -> None:
+        self.od = od
+        self.plant = plant
+        self.ratings = ratings
+        self.motor = build_motor(plant, ratings)
+        self.kind = servo.OFF
+        self.target = 0.0
+        self.setpoint: Callable[[], float] | None = None
+        """Gives the target of every step anew, where a mode follows an object."""
+        self.time = 0.0
+        self.flags = 0
+        self.position_offset = 0
+        self._lowest, self._highest = -math.inf, math.inf
+        self.clipped = False
+        """Whether a software limit (607Dh) holds the target back."""
+        self._position = od.entry(0x6064)
+        self._torque = od.entry(0x6077)
+        self.sample = run(self.motor, 0.0, servo.OFF, 0.0)
+        self._bind_feedback()
+
+    def step(self, until: float) -> int:
+        """Advance physics and inner loops to bus time `until`; return the flags of `motor.run`."""
+        if self.setpoint is not None:
+            self.target = self.setpoint()
+        self.sample = sample = run(self.motor, until, self.kind, self.target)
+        self.time = until
+        counts = sample[1] + self.position_offset
+        if not -0x80000000 <= counts <= 0x7FFFFFFF:
+            counts = to_int32(counts)
+        self._position.value = counts
+        self._torque.value = sample[2]
+        self.flags = sample[0]
+        return self.flags
+
+    def drive(self, kind: int, target: float) -> None:
+        """Switch the power stage on under a kind of control (named in `servo`)."""
+        self.kind = kind
+        self.target = target
+        self.setpoint = None
+        self.flags &= ~(servo.ON_TARGET | servo.REFERENCE_DONE | servo.FOLLOWING_ERROR)
+
+    def switch_off(self) -> None:
+        """Switch the power stage off: the motor coasts."""
+        self.drive(servo.OFF, 0.0)
+
+    def reboot(self) -> None:
+        """Start as at power-up, the rotor where it stands: an incremental encoder forgets."""
+        self.switch_off()
+        restart_counter(self.motor)
+        self.position_offset = 0
+        self.motor["observed_position"] = 0.0
+        self.motor["i2t"] = 0.0
+        self.configure()
+
+    def read(self, field: str) -> float:
+        """Return a field of the motor's record."""
+        return float(self.motor[field][0])
+
+    def object(self, index: int, sub: int = 0) -> int:
+        """Return an integer object."""
+        return self.od.get_int(index, sub)
+
+    def configure(self) -> None:
+        """Take limits and windows from the dictionary."""
+        get, m = self.od.get_int, self.motor
+        rated = get(0x6076) * 1e-3
+        m["rated_torque"] = rated
+        constant = self.ratings.torque_constant_Nm_per_Arms
+        m["rated_current"] = get(0x6075) * 1e-3 * constant
+        peak = min(self.ratings.peak_torque_Nm, get(0x6073) * get(0x6075) * 1e-6 * constant)
+        most = min(peak, get(0x6072) * 1e-3 * rated)
+        m["limit_positive"] = min(most, get(0x60E0) * 1e-3 * rated)
+        m["limit_negative"] = min(most, get(0x60E1) * 1e-3 * rated)
+        speed = get(0x6080) / 60.0 * self.plant.encoder.counts_per_turn
+        m["speed_limit"] = speed
+        m["overspeed"] = self.plant.drive.overspeed_ratio * speed
+        window = get(0x6065)
+        m["following_window"] = math.inf if window == _WINDOW_OFF else window
+        m["following_time"] = get(0x6066) * 1e-3
+        m["standstill_velocity"] = get(0x606F)
+        m["standstill_time"] = get(0x6070) * 1e-3
+        low, high = get(0x607D, 1), get(0x607D, 2)
+        self._lowest, self._highest = (low, high) if low < high else (-math.inf, math.inf)
+
+    @property
+    def speed_limit(self) -> float:
+        """Highest velocity a profile may ask for, counts/s."""
+        return min(float(self.object(0x607F)), self.read("speed_limit"))
+
+    def set_ramps(self, acceleration: float, deceleration: float) -> None:
+        """Set the ramps of the velocity and position profile, counts/s², within 60C5h, 60C6h."""
+        self.motor["acceleration"] = min(acceleration, self.object(0x60C5))
+        self.motor["deceleration"] = min(deceleration, self.object(0x60C6))
+
+    def set_steps(self) -> None:
+        """Let velocity references act without a ramp."""
+        self.motor["acceleration"] = self.motor["deceleration"] = math.inf
+
+    def set_torque_slope(self, permille_s: float) -> None:
+        """Set the torque slope, per mille of rated torque per second."""
+        self.motor["torque_slope"] = permille_s * 1e-3 * self.read("rated_torque")
+
+    def set_window(self, window: float, time_s: float) -> None:
+        """Set the window around the target and how long the value must stay in it."""
+        self.motor["target_window"] = math.inf if window == _WINDOW_OFF else window
+        self.motor["target_window_time"] = time_s
+
+    def clip_position(self, position: float) -> float:
+        """Hold a target position of the dictionary within 607Dh; return it as counter value."""
+        clipped = max(self._lowest, min(self._highest, position))
+        self.clipped = clipped != position
+        return float(clipped - self.position_offset)
+
+    def digital_inputs(self) -> int:
+        """Return 60FDh: bit 0 negative limit, 1 positive limit, 2 home switch."""
+        return (self.flags // servo.SWITCH_NEGATIVE) & 0b111
+
+    def _permille(self, torque_Nm: float) -> int:
+        return round(1000.0 * torque_Nm / self.read("rated_torque"))
+
+    def _bind_feedback(self) -> None:
+        od = self.od
+        dictionary: dict[int, Callable[[], int]] = {
+            0x6062: lambda: to_int32(round(self.read("reference_position")) + self.position_offset),
+            0x6063: lambda: to_int32(self.sample[1]),
+            0x6069: lambda: round(self.read("observed_velocity")),
+            0x606B: lambda: round(self.read("reference_velocity")),
+            0x606C: lambda: self.sample[3],
+            0x6074: lambda: self._permille(self.read("torque_demand")),
+            0x6078: lambda: round(1000.0 * self.read("sensed") / self.read("rated_current")),
+            0x60F4: lambda: round(self.read("reference_position") - self.read("observed_position")),
+            0x60FC: lambda: to_int32(round(self.read("reference_position"))),
+            0x60FD: self.digital_inputs,
+        }
+        for index, getter in dictionary.items():
+            if (index, 0) in od:
+                od.on_read(index, 0, getter)

@@ -1,0 +1,265 @@
+"""A simulated servo drive with its motor: CANopen slave, CiA 402 and physics as one bus node."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+from typing_extensions import override
+
+from profiles.winch import Winch
+from sim_bus import servo
+from sim_bus.canopen import (
+    Abort,
+    CanopenSlave,
+    Entry,
+    NmtState,
+    ObjectDictionary,
+    ParameterStore,
+    SdoAbort,
+    SlaveApplication,
+)
+from sim_bus.canopen.datatypes import Value
+from sim_bus.cia402.axis import Axis
+from sim_bus.cia402.homing import IN_PLACE, METHODS
+from sim_bus.cia402.machine import Machine
+from sim_bus.cia402.misbehaviour import Misbehaviour
+from sim_bus.cia402.touch_probe import TouchProbes
+from sim_bus.cia402.words import ErrorCode
+from sim_bus.motor_state import MotorRatings
+from sim_bus.plant import Plant
+from sim_bus.truth_log import TruthLog
+
+TICK_S = 1e-3
+"""Longest step between two looks of the state machine."""
+_ASLEEP_S = 0.1
+_SYNC_ID = b"\x80\x00\x00\x00"
+_EDS_COUNTS_PER_TURN = 8192
+
+PROCESS_DATA = frozenset(
+    {0x6040, 0x6060, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60B8, 0x60C1, 0x60FF, 0x2F00}
+)
+"""Objects that are never stored."""
+_CONFIGURATION = (
+    *(0x6065, 0x6066, 0x6067, 0x6068, 0x606D, 0x606E, 0x606F, 0x6070),
+    *(0x6072, 0x6073, 0x6075, 0x6076, 0x607D, 0x607F, 0x6080),
+    *(0x6083, 0x6084, 0x6087, 0x609A, 0x60C5, 0x60C6, 0x60E0, 0x60E1),
+)
+_FIXED = (0x607E, 0x608F, 0x6091, 0x6092)
+_IN_COUNTS = (
+    *((index, 0) for index in (0x6065, 0x6067, 0x606D, 0x606F, 0x607F, 0x6081)),
+    *((index, 0) for index in (0x6083, 0x6084, 0x6085, 0x609A, 0x60C5, 0x60C6)),
+    *((0x6092, 1), (0x6099, 1), (0x6099, 2)),
+)
+
+
+class SimDrive(SlaveApplication):
+    """One drive on the bus (a `LocalNode`), fed with frames and bus time by whoever runs it."""
+
+    def __init__(
+        self,
+        eds: Path,
+        node_id: int,
+        plant: Plant,
+        ratings: MotorRatings | None = None,
+        *,
+        truth_log: Path | None = None,
+        store: Path | None = None,
+        bitrate: int = 1_000_000,
+    ) -> None:
+        """Build the drive, switched on at bus time 0.
+
+        `truth_log` and `store` (parameters kept by 1010h) are files to write. Raises
+        DictionaryError for an EDS that lacks objects, StoreError for a damaged store, OSError when
+        the truth log cannot be created.
+        """
+        ratings = ratings or MotorRatings()
+        self.od = od = ObjectDictionary.from_eds(eds, node_id)
+        _adapt(od, plant, ratings)
+        self._slave = CanopenSlave(
+            od, node_id, self, store=ParameterStore(store, PROCESS_DATA), bitrate=bitrate
+        )
+        self.outbox = self._slave.outbox
+        self.axis = Axis(od, plant, ratings)
+        self.probes = TouchProbes(self.axis)
+        self.machine = Machine(self.axis, self._slave)
+        self.misbehaviour = Misbehaviour(od, self.machine, self.outbox)
+        self._bind_configuration()
+        motor = self.axis.motor
+        self._log = None
+        if truth_log is not None:
+            index = float(motor["index"][0]) / float(motor["counts_per_rad"][0])
+            self._log = TruthLog(truth_log, node_id, index, float(motor["angle"][0]))
+        self._log_idle_at = math.inf
+        self.sync_count = 0
+        """SYNCs seen."""
+
+    @classmethod
+    def for_winch(
+        cls,
+        winch: Winch,
+        plant: Plant,
+        *,
+        truth_log: Path | None = None,
+        store: Path | None = None,
+    ) -> Self:
+        """Build the drive that a winch's profile describes."""
+        motor = winch.motor
+        ratings = MotorRatings(
+            rated_torque_Nm=motor.rated_torque_Nm,
+            peak_torque_Nm=motor.peak_torque_Nm,
+            rated_current_Arms=motor.rated_current_Arms,
+            peak_current_Arms=motor.peak_current_Arms,
+            torque_constant_Nm_per_Arms=motor.torque_constant_Nm_per_Arms,
+            rated_speed_rad_s=motor.rated_speed_rad_s,
+        )
+        return cls(
+            winch.drive.eds,
+            winch.node_id,
+            plant,
+            ratings,
+            truth_log=truth_log,
+            store=store,
+            bitrate=winch.bitrate_bit_s,
+        )
+
+    # -- LocalNode
+
+    @property
+    def node_id(self) -> int:
+        """Node id in use."""
+        return self._slave.node_id
+
+    @property
+    def sync_period_s(self) -> float:
+        """Communication cycle period (1006h), 0 while not set."""
+        return self._slave.sync_period_s
+
+    @property
+    def accepts(self) -> frozenset[int]:
+        """Identifiers the drive listens to."""
+        return self._slave.accepts
+
+    def advance(self, now: float) -> None:
+        """Bring physics, state machine and communication timers to bus time `now`."""
+        axis, machine = self.axis, self.machine
+        while now - axis.time > 1e-9:
+            ahead = now - axis.time
+            flags = axis.step(now if ahead < 1.5 * TICK_S else axis.time + TICK_S)
+            if flags & self.probes.watching:
+                self.probes.latch(flags)
+            if machine.needs_tick(flags):
+                machine.tick()
+        if now > self._log_idle_at and self._log is not None:
+            self._log.flush()
+            self._log_idle_at = math.inf
+        self._slave.advance(now)
+        if self.misbehaviour.active:
+            self.misbehaviour.spoil_outbox()
+
+    def receive(self, frame: bytes, now: float) -> None:
+        """Take a frame seen on the bus."""
+        if frame[:4] == _SYNC_ID:
+            if self._log is not None:
+                self._log.append(self.sync_count, now, self.axis.sample[4:])
+                self._log_idle_at = now + _ASLEEP_S
+            self.sync_count += 1
+        self._slave.receive(frame, now)
+        if self.misbehaviour.active:
+            self.misbehaviour.spoil_outbox()
+
+    def next_event(self) -> float:
+        """Return the bus time at which `advance` is due at the latest."""
+        axis = self.axis
+        resting = axis.kind == servo.OFF and abs(axis.sample[5]) < 1e-3
+        wait = _ASLEEP_S if resting and not self.machine.needs_tick(axis.flags) else TICK_S
+        return min(self._slave.next_event(), axis.time + wait)
+
+    def close(self) -> None:
+        """Flush and close the truth log."""
+        self._slave.close()
+        if self._log is not None:
+            self._log.close()
+
+    # -- what the slave tells
+
+    @override
+    def after_rpdo(self, now: float) -> None:
+        """Take the set-points of a new cycle."""
+        self.machine.sync()
+
+    @override
+    def on_nmt(self, state: NmtState) -> None:
+        """React to the loss of control by the master."""
+        if state in (NmtState.STOPPED, NmtState.INITIALISING):
+            self.machine.abort_connection(ErrorCode.COMMUNICATION)
+
+    @override
+    def on_reset_node(self) -> None:
+        """Reboot: the rotor stays where it is, the counter starts again."""
+        self.misbehaviour.reset()
+        self.probes.reset()
+        self.machine.restart()
+
+    @override
+    def on_heartbeat_lost(self, node: int) -> None:
+        """React to a silent master as 6007h says."""
+        self.machine.abort_connection(ErrorCode.HEARTBEAT)
+
+    @override
+    def on_rpdo_timeout(self, number: int) -> None:
+        """React to missing commands as 6007h says."""
+        self.machine.abort_connection(ErrorCode.RPDO_TIMEOUT)
+
+    # -- objects
+
+    def _bind_configuration(self) -> None:
+        for entry in self.od:
+            if entry.index in _CONFIGURATION and entry.writable:
+                entry.hook = self._change_noter(entry)
+            elif entry.index in _FIXED and entry.writable:
+                entry.hook = _fixed(entry)
+        known = frozenset(METHODS) | IN_PLACE
+        self.od.on_write(0x6098, 0, _only(lambda value: value in known))
+
+    def _change_noter(self, entry: Entry) -> Callable[[Value], None]:
+        def note(value: Value) -> None:
+            if value != entry.value:
+                self.machine.configuration_changed = True
+
+        return note
+
+
+def _only(allowed: Callable[[Any], bool]) -> Callable[[Value], None]:
+    def check(value: Value) -> None:
+        if not allowed(value):
+            raise SdoAbort(Abort.INVALID_VALUE)
+
+    return check
+
+
+def _fixed(entry: Entry) -> Callable[[Value], None]:
+    return _only(lambda value: value == entry.value)
+
+
+def _adapt(od: ObjectDictionary, plant: Plant, ratings: MotorRatings) -> None:
+    """Give the dictionary the defaults that follow from motor and encoder."""
+    counts = plant.encoder.counts_per_turn
+    for index, sub in _IN_COUNTS:
+        entry = od.entry(index, sub)
+        scaled = max(1, round(od.get_int(index, sub) * counts / _EDS_COUNTS_PER_TURN))
+        _default(entry, min(scaled, entry.codec.high or scaled))
+    _default(od.entry(0x608F, 1), counts)
+    _default(od.entry(0x6075), round(ratings.rated_current_Arms * 1e3))
+    _default(od.entry(0x6076), round(ratings.rated_torque_Nm * 1e3))
+    peak = round(1e3 * ratings.peak_torque_Nm / ratings.rated_torque_Nm)
+    for index in (0x6072, 0x60E0, 0x60E1):
+        _default(od.entry(index), peak)
+    _default(od.entry(0x6073), round(1e3 * ratings.peak_current_Arms / ratings.rated_current_Arms))
+    _default(od.entry(0x6080), round(ratings.rated_speed_rad_s * 60.0 / (2.0 * math.pi)))
+
+
+def _default(entry: Entry, value: int) -> None:
+    entry.base_default = entry.default = entry.value = value
