@@ -272,9 +272,10 @@ class Hub:
             self._remove(client, "lost: connection closed")
             return False
         answer = handle(self, client, packet)
-        if answer is not None:
+        if answer is None:
+            self._routes.clear()
+        else:
             self._deliver(answer, client)
-        self._routes.clear()
         return True
 
     def _take(self, frame: bytes, source: Client) -> bool:

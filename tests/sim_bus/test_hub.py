@@ -107,7 +107,8 @@ def test_clients_that_wait_together_contend_for_the_bus(stub_node: type) -> None
 def test_nodes_hear_each_other_and_only_what_they_accept(
     start_bus: StartBus, stub_node: type
 ) -> None:
-    talker = stub_node(1, answers=(pack_frame(0x181, b"x"),))
+    # with a cycle period bus time is held after SYNC, so that nothing but frames can matter
+    talker = stub_node(1, sync_period_s=0.001, answers=(pack_frame(0x181, b"x"),))
     listener = stub_node(2, accepts=frozenset((0x181,)))
     bus = start_bus(talker, listener)
     member = bus.join()

@@ -85,6 +85,20 @@ def test_acyclic_frames_load_the_bus_but_make_no_overrun() -> None:
     assert load.load(0.01) == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize(("can_id", "overruns"), [(0x581, 0), (0x601, 0), (0x7E5, 0), (0x481, 1)])
+def test_sdo_between_two_syncs_waits_for_gaps(
+    start_bus: Callable[..., object], stub_node: type, can_id: int, overruns: int
+) -> None:
+    """Twenty frames of 135 us do not fit 1 ms, which matters where they have priority."""
+    node = stub_node(1, sync_period_s=0.001)
+    member = start_bus(node).join()  # type: ignore[attr-defined]
+    member.send(0x80)
+    for _ in range(20):
+        member.send(can_id, bytes(8))
+    member.send(0x80)
+    assert member.status()["overruns"] == overruns
+
+
 @given(st.lists(st.integers(55, 160), max_size=40), st.integers(1, 3000))
 @LAW
 def test_paced_overrun_when_the_wire_is_still_busy(sizes: list[int], period_us: int) -> None:

@@ -47,15 +47,16 @@ def test_opening_tells_what_the_bus_is(simulator: Any) -> None:
 
 def test_many_filters(simulator: Any) -> None:
     """More filters than one control message holds."""
-    filters = [(0x80000000 | can_id, 0xFFFFFFFF) for can_id in range(100)] + [(0x281, 0x7FF)]
+    filters = [(EFF_FLAG | can_id, 0xFFFFFFFF) for can_id in range(100)] + [(0x281, 0x7FF)]
     port = open_port(BusUrl.parse(f"simbus:{simulator.name}"), filters)
     other = open_port(BusUrl.parse(f"simbus:{simulator.name}"), [])
     port.settimeout(5.0)
     rx = bytearray(16)
-    for can_id in (0x80000000 | 99, 0x80000000 | 100, 0x80):
+    for can_id in (EFF_FLAG | 5, EFF_FLAG | 40, EFF_FLAG | 99, EFF_FLAG | 100, 0x80):
         other.send(frame(can_id))
-    port.recv_into(rx)
-    assert rx == frame(0x80000000 | 99)
+    for can_id in (EFF_FLAG | 5, EFF_FLAG | 40, EFF_FLAG | 99):
+        port.recv_into(rx)
+        assert rx == frame(can_id)
     port.recv_into(rx)
     assert rx == frame(0x281, b"other")
     port.close()
