@@ -1,0 +1,18 @@
+"""Cogging, friction and inertia of a motor from recorded runs, by the thesis' method and a better one."""
+
+from cdpr_rt.identification.better import identify_better, refine
+from cdpr_rt.identification.result import BetterResult, Estimate, Harmonic
+from cdpr_rt.identification.sweep import IdentificationError, SweepData
+from cdpr_rt.identification.thesis import ThesisResult, identify_thesis
+
+__all__ = [
+    "BetterResult",
+    "Estimate",
+    "Harmonic",
+    "IdentificationError",
+    "SweepData",
+    "ThesisResult",
+    "identify_better",
+    "identify_thesis",
+    "refine",
+]

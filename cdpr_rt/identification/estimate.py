@@ -1,0 +1,165 @@
+"""The final fit over windows with chosen orders: coefficients, lags, and their confidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.identification import design
+from cdpr_rt.identification.design import Layout
+from cdpr_rt.identification.sweep import TWO_PI
+from cdpr_rt.identification.windows import Windows
+
+CLUSTERS_PER_TURN = 24
+_ROUNDS = 4
+_SPEED_SPREAD = np.geomspace(0.5, 2.0, 9)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Knowledge from before about one column's coefficient."""
+
+    column: int
+    mean: float
+    deviation: float
+
+
+@dataclass
+class Rows:
+    """All rows of the fit: columns `x` (r, p), torque `y`, weight, direction and cluster (r,)."""
+
+    x: FloatArray
+    y: FloatArray
+    weight: FloatArray
+    direction: FloatArray
+    cluster: FloatArray
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Coefficients of the used columns and of the static lag (last), with their covariance."""
+
+    layout: Layout
+    used: list[int]
+    beta: FloatArray
+    covariance: FloatArray
+    lag_rad: float
+    residual_Nm: FloatArray
+
+    def value(self, column: int) -> float:
+        """Return a column's coefficient, 0 where it was not used."""
+        return float(self.beta[self.used.index(column)]) if column in self.used else 0.0
+
+    def deviation(self, column: int) -> float:
+        """Return the standard error of a column's coefficient, 0 where it was not used."""
+        if column not in self.used:
+            return 0.0
+        i = self.used.index(column)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+
+def gather(windows: Sequence[Windows], layout: Layout, weight: FloatArray) -> Rows:
+    """Collect the rows whose kind has a weight."""
+    xs, ys, ws, ds, cs = [], [], [], [], []
+    clusters = 0
+    for w, kind in zip(windows, design.kinds(windows), strict=True):
+        keep = np.flatnonzero((kind >= 0) & (weight[np.maximum(kind, 0)] > 0.0))
+        place = np.floor(w.centre_rad * (CLUSTERS_PER_TURN / TWO_PI)).astype(int)
+        place += clusters - int(place.min())
+        clusters = int(place.max()) + 1
+        xs.append(design.matrix(w, layout, 0, w.torque_Nm.size)[keep])
+        ys.append(w.torque_Nm[keep])
+        ws.append(weight[kind[keep]])
+        ds.append(w.direction[keep])
+        cs.append(place[keep])
+    parts = (np.concatenate(a) for a in (xs, ys, ws, ds, cs))
+    return Rows(*parts)
+
+
+def best_stribeck_speed(
+    windows: Sequence[Windows], orders: tuple[int, ...], weight: FloatArray, speed: float, used: list[int]
+) -> float:
+    """Return the Stribeck speed near `speed` that leaves the smallest error."""
+    layout = Layout(orders, tuple(float(speed * s) for s in _SPEED_SPREAD))
+    rows = gather(windows, layout, weight)
+    harmonics = list(range(layout.first_order, layout.columns))
+    errors = []
+    for i in range(len(layout.stribeck_rad_s)):
+        columns = [*used, *layout.stribeck(i), *harmonics]
+        root = np.sqrt(rows.weight)
+        x, y = rows.x[:, columns] * root[:, None], rows.y * root
+        a, b = x.T @ x, x.T @ y
+        scale = np.sqrt(np.diag(a))
+        beta = np.linalg.solve(a / np.outer(scale, scale) + 1e-10 * np.eye(len(columns)), b / scale)
+        errors.append(float(y @ y - (b / scale) @ beta))
+    return layout.stribeck_rad_s[int(np.argmin(errors))]
+
+
+def fit(
+    windows: Sequence[Windows], layout: Layout, weight: FloatArray, used: list[int], priors: list[Prior],
+    lag_prior: tuple[float, float],
+) -> Fit:
+    """Fit the used columns, all harmonics and the static lag by Gauss-Newton steps.
+
+    `lag_prior` is mean and standard deviation in rad. The covariance is the sandwich over clusters
+    of neighbouring windows, so that errors may depend on one another within a cluster.
+    """
+    rows = gather(windows, layout, weight)
+    harmonics = list(range(layout.first_order, layout.columns))
+    columns = [*used, *harmonics]
+    orders = np.repeat(np.array(layout.orders, float), 2)
+    precision, mean = np.zeros(len(columns) + 1), np.zeros(len(columns) + 1)
+    for p in priors:
+        if p.column in columns:
+            i = columns.index(p.column)
+            precision[i], mean[i] = p.deviation**-2, p.mean
+    precision[-1] = lag_prior[1] ** -2
+    lag = lag_prior[0]
+    beta = np.zeros(len(columns) + 1)
+    for step in range(_ROUNDS):
+        x = rows.x[:, columns].copy()
+        turned = _turned(x[:, len(used) :], orders, rows.direction * lag)
+        x[:, len(used) :] = turned
+        slope = _slope(turned, orders, beta[len(used) : -1])
+        x = np.column_stack([x, -rows.direction * slope])
+        mean[-1] = lag_prior[0] - lag
+        a = (x * rows.weight[:, None]).T @ x
+        scale = np.sqrt(np.diag(a) + precision + 1e-300)
+        scaled = (a + np.diag(precision)) / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+        inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
+        right = x.T @ (rows.weight * rows.y) + precision * mean
+        beta = inverse @ right
+        if step < _ROUNDS - 1:
+            lag += float(beta[-1])
+    residual = rows.y - x @ beta
+    covariance = inverse @ (_meat(x, rows, residual) + np.diag(precision)) @ inverse
+    return Fit(layout, columns, beta[:-1], covariance, lag + float(beta[-1]), residual)
+
+
+def _turned(harmonics: FloatArray, orders: FloatArray, by: FloatArray) -> FloatArray:
+    """Return the cosine and sine columns of angles reduced by `by` (r,)."""
+    turn = by[:, None] * orders[None, ::2]
+    c, s = harmonics[:, ::2], harmonics[:, 1::2]
+    out = np.empty_like(harmonics)
+    out[:, ::2] = c * np.cos(turn) + s * np.sin(turn)
+    out[:, 1::2] = s * np.cos(turn) - c * np.sin(turn)
+    return out
+
+
+def _slope(harmonics: FloatArray, orders: FloatArray, beta: FloatArray) -> FloatArray:
+    """Return the derivative of the cogging by the angle, (r,)."""
+    n = orders[::2]
+    return np.asarray(harmonics[:, ::2] @ (n * beta[1::2]) - harmonics[:, 1::2] @ (n * beta[::2]))
+
+
+def _meat(x: FloatArray, rows: Rows, residual: FloatArray) -> FloatArray:
+    """Return the sum over clusters of the outer product of their score."""
+    score = x * (rows.weight * residual)[:, None]
+    order = np.argsort(rows.cluster, kind="stable")
+    edges = np.flatnonzero(np.diff(rows.cluster[order])) + 1
+    sums = np.add.reduceat(score[order], np.concatenate([[0], edges]), axis=0)
+    count = sums.shape[0]
+    return np.asarray(sums.T @ sums * (count / max(1, count - x.shape[1] // 8)))

@@ -1,0 +1,101 @@
+"""What the better method finds, and what it means for the compensation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_rt.compensation import FrictionFeedforward
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.identification.sweep import TWO_PI
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and the half-width of its 95 % confidence interval, both in the value's unit."""
+
+    value: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """One order of the cogging: cosine·cos(order·θ) + sine·sin(order·θ), θ from the index."""
+
+    order: int
+    cosine_Nm: float
+    sine_Nm: float
+    amplitude_Nm: Estimate
+    phase_deg: Estimate
+    """Of amplitude·sin(order·θ + phase)."""
+    per_pole_pair: float
+    hint: str
+
+
+@dataclass(frozen=True)
+class BetterResult:
+    """The identified motor; torques in the unit of what was sent, angles from the index."""
+
+    harmonics: tuple[Harmonic, ...]
+    friction: FrictionFeedforward
+    coulomb_forward_Nm: Estimate
+    coulomb_backward_Nm: Estimate
+    viscous_Nms_rad: Estimate
+    inertia_kg_m2: Estimate
+    inertia_measured: bool
+    """False where no run was fast enough and the value handed in was kept."""
+    latency_s: Estimate
+    lag_rad: Estimate
+    """Static part of the lag: half of what the curves of the two directions are shifted by."""
+    pole_pairs: int
+    coverage: float
+    """Share of the turn on which the rotor was seen sliding."""
+    excluded_fraction: float
+    """Share of the windows in which it stood still or turned against the ramp."""
+    residual_rms_Nm: float
+    held_back_error_Nm: FloatArray
+    """Error of prediction of held-back turns with 0, 1, 2, ... orders, (k + 1,)."""
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """The orders that were found, rising."""
+        return tuple(h.order for h in self.harmonics)
+
+    @property
+    def amplitudes_Nm(self) -> tuple[float, ...]:
+        """The amplitude of each order."""
+        return tuple(h.amplitude_Nm.value for h in self.harmonics)
+
+    def cogging_Nm(self, angle_rad: FloatArray) -> FloatArray:
+        """Return the torque that holds the rotor against the cogging, without lag."""
+        out = np.zeros_like(np.asarray(angle_rad, float))
+        for h in self.harmonics:
+            out += h.cosine_Nm * np.cos(h.order * angle_rad)
+            out += h.sine_Nm * np.sin(h.order * angle_rad)
+        return out
+
+    def tables(self, m: int) -> FloatArray:
+        """Return the cogging on m samples over the turn for both directions, (2, m)."""
+        angle = np.arange(m) * (TWO_PI / m)
+        lag = self.lag_rad.value
+        return np.vstack([self.cogging_Nm(angle - lag), self.cogging_Nm(angle + lag)])
+
+
+def hint(order: int, pole_pairs: int) -> str:
+    """Say in words where a cogging of this order usually comes from."""
+    ratio = order / pole_pairs
+    if math.isclose(ratio, 1.0):
+        return "once per pole pair: offset of a current sensor, or unequal magnets"
+    if math.isclose(ratio, 2.0):
+        return "twice per pole pair: unequal gains of the current sensors, or magnets"
+    if order == 1:
+        return "once per turn: eccentric rotor, encoder or coupling"
+    if order == 2:
+        return "twice per turn: oval stator, bent shaft or coupling"
+    if math.isclose(ratio % 6.0, 0.0, abs_tol=1e-9):
+        return "sixth per pole pair: slots against magnets, or harmonics of the back EMF"
+    if math.isclose(ratio % 1.0, 0.0, abs_tol=1e-9):
+        return "a multiple of the pole pairs: slots against magnets"
+    return "no multiple of the pole pairs: unequal slots or magnets, or something coupled"

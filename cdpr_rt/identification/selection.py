@@ -1,0 +1,130 @@
+"""Choice of the cogging's orders by predicting turns that were held back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.identification.design import Equations, Layout, Normal
+
+_MOST = 40
+_FEWEST_ROWS = 20
+_RIDGE = 1e-10
+_EMPTY = 1e-20
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Orders in falling significance, and how well ever more of them predict held-back turns.
+
+    `error_Nm` (k + 1,) is the rms error of prediction with 0, 1, ... k orders.
+    """
+
+    orders: tuple[int, ...]
+    error_Nm: FloatArray
+
+
+def total(parts: dict[tuple[int, int], Normal], weight: FloatArray, without: int = -1) -> Normal:
+    """Sum weighted normal equations over kinds and over all folds but one."""
+    size = next(iter(parts.values())).xy.size
+    out = Normal(np.zeros((size, size)), np.zeros(size))
+    for (fold, kind), part in parts.items():
+        if fold != without and weight[kind] > 0.0:
+            out.xx += weight[kind] * part.xx
+            out.xy += weight[kind] * part.xy
+            out.yy += weight[kind] * part.yy
+            out.rows += part.rows
+    return out
+
+
+def solve(normal: Normal, columns: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Return the coefficients of the chosen columns and the inverse of their normal matrix.
+
+    A column that is zero in all rows gets the coefficient zero.
+    """
+    xx = normal.xx[np.ix_(columns, columns)]
+    size = np.diag(xx)
+    scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
+    scaled = xx / np.outer(scale, scale) + _RIDGE * np.eye(len(columns))
+    inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
+    return inverse @ normal.xy[columns], inverse
+
+
+def squared_error(part: Normal, columns: list[int], beta: FloatArray) -> float:
+    """Return the sum of squared errors of a prediction over a part's rows."""
+    xy, xx = part.xy[columns], part.xx[np.ix_(columns, columns)]
+    return max(0.0, float(part.yy - 2.0 * beta @ xy + beta @ xx @ beta))
+
+
+def noise_weights(equations: Equations, columns: list[int], beta: FloatArray) -> FloatArray:
+    """Return a weight for each kind of row: one over its mean squared error, 0 for too few rows."""
+    weight = np.zeros(equations.kinds)
+    for kind in range(equations.kinds):
+        parts = [p for key, p in equations.parts.items() if key[1] == kind]
+        rows = sum(p.rows for p in parts)
+        if rows >= _FEWEST_ROWS:
+            mean = sum(squared_error(p, columns, beta) for p in parts) / rows
+            weight[kind] = 1.0 / max(mean, 1e-10)
+    return weight
+
+
+def choose(equations: Equations, fixed: list[int], weight: FloatArray) -> Choice:
+    """Choose the orders whose harmonics predict turns that were not fitted.
+
+    Each fold is held back once. The others rank the orders by significance, and ever larger sets
+    predict the fold. The smallest set is taken whose error exceeds the best by no more than one
+    standard error of the paired differences between folds. Ranks are averaged over folds.
+    """
+    layout = equations.layout
+    held = [f for f in range(equations.folds) if _rows(equations, f, weight) >= _FEWEST_ROWS]
+    errors, ranks = [], np.zeros(len(layout.orders))
+    for fold in held:
+        train = total(equations.parts, weight, without=fold)
+        ranking = _rank(train, fixed, layout)
+        ranks[ranking] += np.arange(ranking.size)
+        test = total({k: p for k, p in equations.parts.items() if k[0] == fold}, weight)
+        errors.append(_path(train, test, fixed, layout, ranking))
+    overall = _rank(total(equations.parts, weight), fixed, layout)
+    mean = np.mean(errors, axis=0)
+    best = int(np.argmin(mean))
+    gap = np.array(errors) - np.array(errors)[:, best : best + 1]
+    spread = gap.std(axis=0, ddof=1) / math.sqrt(len(held)) if len(held) > 1 else 0.0 * mean
+    size = int(np.flatnonzero(gap.mean(axis=0) <= spread)[0])
+    unit = total(equations.parts, weight)
+    per_row = unit.rows / max(float(np.sum([weight[k[1]] * p.rows for k, p in equations.parts.items()])), 1e-300)
+    return Choice(
+        tuple(sorted(layout.orders[i] for i in overall[:size])), np.sqrt(mean * per_row)
+    )
+
+
+def _rows(equations: Equations, fold: int, weight: FloatArray) -> int:
+    return sum(p.rows for (f, k), p in equations.parts.items() if f == fold and weight[k] > 0.0)
+
+
+def _rank(train: Normal, fixed: list[int], layout: Layout) -> FloatArray:
+    """Return the places of the orders by falling significance."""
+    columns = fixed + [c for i in range(len(layout.orders)) for c in layout.order(i)]
+    beta, inverse = solve(train, columns)
+    statistic = np.zeros(len(layout.orders))
+    for i in range(len(layout.orders)):
+        pair = slice(len(fixed) + 2 * i, len(fixed) + 2 * i + 2)
+        statistic[i] = beta[pair] @ np.linalg.solve(inverse[pair, pair], beta[pair])
+    return np.argsort(-statistic)
+
+
+def _path(
+    train: Normal, test: Normal, fixed: list[int], layout: Layout, ranking: FloatArray
+) -> FloatArray:
+    """Return the mean squared (weighted) error on held-back rows with 0, 1, ... orders."""
+    most = min(_MOST, ranking.size)
+    errors = np.zeros(most + 1)
+    columns = list(fixed)
+    for size in range(most + 1):
+        if size:
+            columns += layout.order(int(ranking[size - 1]))
+        beta, _ = solve(train, columns)
+        errors[size] = squared_error(test, columns, beta) / test.rows
+    return errors

@@ -1,0 +1,154 @@
+"""The rotor's equation of motion in weak form: one row for every short window of a run.
+
+J·θ'' + cogging(θ) + friction(v) = torque is averaged with a smooth bump, the cubic B-spline of four
+box averages. Two of the boxes turn the acceleration into a second difference of averaged angles, so
+that the encoder's reading is never differentiated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+
+from cdpr_rt.exchange import BoolArray, FloatArray
+from cdpr_rt.identification.sweep import SweepData, period_s
+
+_FAST_rad_s = np.deg2rad(30.0)
+_STEP_rad = np.deg2rad(0.2)
+_SHORTEST_s = 0.009
+_LONGEST_s = 0.039
+_FAST_STEP_s = 0.015
+_SMOOTHING_s = 0.004
+_SMOOTHING_COUNTS = 1.5
+_STANDING = 0.2
+
+
+@dataclass(frozen=True)
+class Windows:
+    """One run cut into windows; what is not described otherwise has shape (r,).
+
+    `angle_rad` and `velocity_rad_s` are samples, smoothed and thinned out: window i is their
+    average with weights `bump` (4·stride,) from sample i·stride on.
+    """
+
+    angle_rad: FloatArray
+    velocity_rad_s: FloatArray
+    bump: FloatArray
+    stride: int
+    torque_Nm: FloatArray
+    torque_rate_Nm_s: FloatArray
+    acceleration_rad_s2: FloatArray
+    centre_rad: FloatArray
+    centre_s: FloatArray
+    direction: FloatArray
+    """Sign of the mean velocity."""
+    sliding: BoolArray
+    """The rotor moves in one direction all through the window."""
+    creeping: BoolArray
+    """It moves with the ramp, but not all the time."""
+    fast: bool
+    """Whether the run's set-point is fast enough to tell the inertia."""
+    cruise_rad_s: float
+    """The run's highest set-point speed."""
+
+
+def contiguous(runs: Sequence[SweepData]) -> list[SweepData]:
+    """Split runs where the time jumps or the set-point turns around."""
+    pieces = []
+    for run in runs:
+        step = np.diff(run.time_s)
+        sign = np.sign(run.setpoint_velocity_rad_s)
+        moving = np.flatnonzero(sign)
+        turned = moving[1:][np.diff(sign[moving]) != 0]
+        breaks = np.flatnonzero(np.abs(step - np.median(step)) > 0.5 * np.median(step)) + 1
+        edges = np.unique(np.concatenate([[0], breaks, turned, [run.time_s.size]])).astype(int)
+        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+            if stop - start >= 100:
+                pieces.append(SweepData(*(a[start:stop] for a in vars(run).values())))
+    return pieces
+
+
+def encoder_step_rad(run: SweepData) -> float:
+    """Return the encoder's resolution as the record shows it."""
+    steps = np.abs(np.diff(run.angle_rad))
+    steps = steps[steps > 1e-9]
+    return float(steps.min()) if steps.size else 1e-6
+
+
+def _odd(x: float) -> int:
+    return max(1, 2 * round((x - 1.0) / 2.0) + 1)
+
+
+def cut(run: SweepData, latency_s: float) -> Windows | None:
+    """Cut one contiguous run into windows, None where it is too short for any.
+
+    `latency_s` is the time from the instant an angle was true to the mean instant at which the
+    torque sent in that cycle acts: an angle belongs to the torque sent one latency earlier.
+    """
+    period = period_s(run)
+    speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))
+    fast = speed > _FAST_rad_s
+    thin = 1 if fast else _odd(0.003 / period)
+    spacing = _FAST_STEP_s if fast else min(max(_STEP_rad / max(speed, 1e-3), _SHORTEST_s), _LONGEST_s)
+    stride = _odd(spacing / period / thin)
+    step = stride * thin
+    rows = (run.time_s.size - 1) // step - 4
+    if rows < 1:
+        return None
+    smoothing = _SMOOTHING_COUNTS * encoder_step_rad(run) / max(speed, 1e-3)
+    smoothing = min(max(smoothing, _SMOOTHING_s), 4.0 * spacing) / period
+    origin = run.angle_rad[0]
+    reading = run.angle_rad - origin
+    angle = gaussian_filter1d(reading, smoothing, mode="nearest") + origin
+    velocity = gaussian_filter1d(reading, smoothing, order=1, mode="nearest") / period
+    cycle = np.arange(run.time_s.size)
+    torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
+    centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
+    boxed = uniform_filter1d(uniform_filter1d(reading, step), step)
+    smooth_torque = torque
+    for _ in range(4):
+        smooth_torque = uniform_filter1d(smooth_torque, step)
+    mean = uniform_filter1d(velocity, 2 * step + 1)[centre]
+    direction = np.sign(mean)
+    low = _extreme(velocity * 1.0, rows, step, np.minimum)
+    high = _extreme(velocity, rows, step, np.maximum)
+    least = np.where(direction > 0.0, low, -high)
+    moving = np.abs(mean) > _STANDING * np.abs(run.setpoint_velocity_rad_s[centre])
+    along = direction * run.setpoint_velocity_rad_s[centre] > 0.0
+    sliding = moving & (least > 0.1 * np.abs(mean)) & (direction != 0.0)
+    return Windows(
+        angle_rad=angle[(thin - 1) // 2 :: thin],
+        velocity_rad_s=velocity[(thin - 1) // 2 :: thin],
+        bump=_bump(stride),
+        stride=stride,
+        torque_Nm=smooth_torque[centre],
+        torque_rate_Nm_s=(smooth_torque[centre + 1] - smooth_torque[centre - 1]) / (2.0 * period),
+        acceleration_rad_s2=(boxed[centre + step] - 2.0 * boxed[centre] + boxed[centre - step])
+        / (step * period) ** 2,
+        centre_rad=angle[centre],
+        centre_s=run.time_s[centre],
+        direction=direction,
+        sliding=np.asarray(sliding, np.bool_),
+        creeping=np.asarray(~sliding & moving & along, np.bool_),
+        fast=fast,
+        cruise_rad_s=speed,
+    )
+
+
+def _bump(stride: int) -> FloatArray:
+    """Return the weights of a window on thinned samples, (4·stride + 1,), centred at 2·stride."""
+    box = np.ones(stride) / stride
+    four = np.convolve(np.convolve(box, box), np.convolve(box, box))
+    weights = np.zeros(4 * stride + 1)
+    weights[2:-2] = four
+    return weights
+
+
+def _extreme(values: FloatArray, rows: int, step: int, pick: np.ufunc) -> FloatArray:
+    """Return the least or greatest value in the inner half of each window, (rows,)."""
+    blocks = values[: (rows + 4) * step].reshape(rows + 4, step)
+    block = pick.reduce(blocks, axis=1)
+    return np.asarray(pick(block[1 : rows + 1], block[2 : rows + 2]))
