@@ -13,17 +13,24 @@ class LocalNode(Protocol):
     the order of arbitration, and clears the list (the list object itself stays the same).
     """
 
-    node_id: int
-    sync_period_s: float
-    """Communication cycle period (1006h), 0 while it is not set."""
     outbox: list[bytes]
-    accepts: AbstractSet[int] | None
-    """Identifiers (11 bits, or 29 bits with the EFF flag) the node wants, None for all.
 
-    A node that changes its mind assigns a new set; the bus looks at the attribute again after
-    every frame outside the cyclic exchange (anything but SYNC and PDOs) and after `advance`
-    while bus time runs by itself.
-    """
+    @property
+    def node_id(self) -> int:
+        """Node id in use."""
+
+    @property
+    def sync_period_s(self) -> float:
+        """Communication cycle period (1006h), 0 while it is not set."""
+
+    @property
+    def accepts(self) -> AbstractSet[int] | None:
+        """Identifiers (11 bits, or 29 bits with the EFF flag) the node wants, None for all.
+
+        A node that changes its mind shows a new set; the bus looks at the attribute again after
+        every frame outside the cyclic exchange (anything but SYNC and PDOs) and after `advance`
+        while bus time runs by itself.
+        """
 
     def receive(self, frame: bytes, now: float) -> None:
         """Take a frame seen on the bus, SYNC included; never one of the node's own."""
