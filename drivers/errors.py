@@ -7,3 +7,29 @@ class DriverError(Exception):
 
 class BusError(DriverError):
     """The CAN bus cannot be named, opened or used any more."""
+
+
+class SdoError(DriverError):
+    """An object of a node could not be read or written; names node, object and reason."""
+
+
+class BootError(DriverError):
+    """A node did not boot; `letter` is the step of CiA 302-2 that failed.
+
+    B no answer, C device type, D vendor, M product, N revision, O serial number,
+    J configuration, K no heartbeat, L already operational.
+    """
+
+    def __init__(self, letter: str, node_id: int, problem: str, advice: str) -> None:
+        self.letter = letter
+        self.node_id = node_id
+        self.advice = advice
+        super().__init__(f"node {node_id} did not boot (step {letter}): {problem}; {advice}")
+
+
+class DriveFaultError(DriverError):
+    """A drive reports a fault or did not reach the state that was asked for."""
+
+
+class ModeRefusedError(DriverError):
+    """A drive does not take the mode of operation that was asked for."""

@@ -1,0 +1,244 @@
+"""One winch on a bus, opened for a command and left without power, however the command ends."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import canopen
+import typer
+
+from cdpr_rt.errors import TripError
+from cdpr_rt.executive import Executive
+from cdpr_rt.realtime import one_core, paced_realtime
+from cdpr_rt.supervisor import Limits, Supervisor
+from drivers.axis_group import AxisConfig, AxisGroup
+from drivers.boot import BootReport, BootSettings, boot
+from drivers.bus import BusUrl, query_status
+from drivers.cia402 import Mode, State, fault_text
+from drivers.errors import BusError, DriveFaultError, SdoError
+from drivers.homing import Homing
+from drivers.network import CanNetwork
+from profiles import Winch
+from tools.errors import BadInputError, WorkFailedError
+from tools.output import Output
+from tools.simulator import OwnSimulator
+
+_SPEED_SHARE = 0.2
+_FOLLOWING_ERROR_RAD = 6.0
+_INDEX_TIMEOUT_S = 30.0
+
+
+class WinchSession:
+    """A booted winch and the executive that runs its axis."""
+
+    def __init__(
+        self,
+        winch: Winch,
+        url: BusUrl,
+        network: CanNetwork,
+        device: AxisGroup,
+        executive: Executive,
+        report: BootReport,
+    ) -> None:
+        self.winch = winch
+        self.url = url
+        self.network = network
+        self.device = device
+        self.executive = executive
+        self.boot = report
+
+    @property
+    def latency_s(self) -> float:
+        """From the instant an angle was true to the middle of the cycle its torque acts in."""
+        drive = self.winch.drive
+        return drive.feedback_delay_s + drive.torque_delay_s + 1.5 * self.device.period_s
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What a cogging profile is bound to."""
+        boot = self.boot
+        return {
+            "winch": self.winch.profile,
+            "motor": self.winch.motor.model,
+            "vendor_id": boot.vendor_id,
+            "product_code": boot.product_code,
+            "revision": boot.revision,
+            "serial": boot.serial,
+            "encoder_counts_per_turn": boot.counts_per_turn,
+        }
+
+    def set_mode(self, mode: int) -> None:
+        """Ask for a mode of operation and wait until the drive confirms it.
+
+        Raises ModeRefusedError when it does not.
+        """
+        self.device.ask_mode(mode)
+        timeout = self.winch.drive.mode_display_timeout_s
+        try:
+            self.executive.step(self.device.mode_confirmed, timeout, "the mode's confirmation")
+        except TripError as error:
+            if self.device.alarm() or self.device.mode_confirmed():
+                raise
+            raise self.device.unconfirmed_mode() from error
+
+    def enable(self) -> None:
+        """Switch the power stage on; the torque is zero until a controller runs."""
+        self._lead_to(State.OPERATION_ENABLED)
+
+    def disable(self) -> None:
+        """Switch the power stage off, so that computation may take its time."""
+        self._lead_to(State.SWITCH_ON_DISABLED)
+        self.device.stop_cycling()
+
+    def _lead_to(self, state: State) -> None:
+        self.device.request(state)
+        timeout = 4.0 * self.winch.drive.state_timeout_s
+        what = f"node {self.winch.node_id}: the state {state.label!r}"
+        self.executive.step(lambda: self.device.reached(state), timeout, what)
+
+    def find_index(self, method: int = 34) -> None:
+        """Find the encoder index by homing, which turns the motor by up to a turn."""
+        homing = Homing(self.device, 0, method)
+        homing.configure()
+        self.set_mode(Mode.HOMING)
+        self.enable()
+        try:
+            self.executive.step(homing.update, _INDEX_TIMEOUT_S, "the encoder index (homing)")
+        except BaseException:
+            homing.abort()
+            raise
+        self.disable()
+
+    def refuse_a_fault(self) -> None:
+        """Raise DriveFaultError when the drive is in fault, with its code in words."""
+        self.executive.step(lambda: True, 1.0, "the drive's answer")
+
+    def bus_status(self) -> dict[str, Any]:
+        """Return what a simulated bus tells of itself, an empty table on others."""
+        return query_status(self.url.channel) if self.url.is_simulated else {}
+
+
+def _fault_of(network: CanNetwork, node_id: int) -> str:
+    try:
+        code = network.read_int(node_id, 0x603F)
+    except SdoError:
+        return "the drive does not say why"
+    return fault_text(code) if code else "no code given (603Fh = 0)"
+
+
+@contextmanager
+def _stop_on_signals() -> Iterator[Callable[[], bool]]:
+    """Turn Ctrl-C and SIGTERM into a flag that the executive looks at."""
+    wanted: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        if wanted:
+            raise KeyboardInterrupt  # asked twice: leave at once, the drive is still disabled
+        wanted.append(number)
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(wanted)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def open_bus(text: str) -> BusUrl:
+    """Return the bus that `text` names; raises BadInputError."""
+    try:
+        return BusUrl.parse(text)
+    except BusError as error:
+        raise BadInputError(str(error)) from error
+
+
+def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
+    """Ask before a real motor is energised; raises BadInputError when nobody agrees."""
+    if url.is_simulated or yes:
+        return
+    if not typer.confirm(f"{what} on {url}: the motor will turn. Go on?", err=True):
+        raise BadInputError("not confirmed; nothing was energised")
+
+
+@contextmanager
+def open_winch(
+    winch: Winch,
+    url: BusUrl,
+    out: Output,
+    plant: Path | None = None,
+    truth_log: Path | None = None,
+) -> Iterator[WinchSession]:
+    """Boot the winch's drive on `url`, with a simulator of its own where the bus has no name.
+
+    Whatever ends the block, the drive's power stage is off afterwards. Raises BadInputError for
+    a bus that cannot be opened and the drivers' errors for a drive that does not boot.
+    """
+    with ExitStack() as stack:
+        stop_requested = stack.enter_context(_stop_on_signals())
+        if url.starts_own_simulator:
+            url = _own_simulator(stack, winch, out, plant, truth_log)
+        elif plant is not None:
+            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+        drive = winch.drive
+        try:
+            network = CanNetwork(
+                url, [winch.node_id], winch.master_node_id, drive.heartbeat_consumer_s / 4
+            )
+        except BusError as error:
+            raise BadInputError(str(error)) from error
+        stack.callback(network.close)
+        network.add_node(winch.node_id, canopen.import_od(str(drive.eds), winch.node_id))
+        limit = min(winch.motor.rated_torque_Nm, winch.motor.peak_torque_Nm)
+        settings = BootSettings(winch.master_node_id, winch.sync_period_s, limit)
+        report = boot(network, winch.node_id, drive, settings)
+        network.start_heartbeat()
+        device = AxisGroup(
+            url,
+            network,
+            [
+                AxisConfig(
+                    winch.node_id,
+                    drive,
+                    report.rated_torque_Nm,
+                    report.counts_per_turn,
+                    report.supported_modes,
+                    limit,
+                )
+            ],
+            winch.sync_period_s,
+            winch.master_node_id,
+            drive.heartbeat_consumer_s / 4,
+        )
+        stack.callback(device.close)
+        if not device.lockstep:
+            for notice in stack.enter_context(paced_realtime()):
+                out.note(notice)
+        limits = Limits(limit, _SPEED_SHARE * winch.motor.rated_speed_rad_s, _FOLLOWING_ERROR_RAD)
+        supervisor = Supervisor(limits, device.n, device.period_s)
+        executive = Executive(device, supervisor, stop_requested)
+        session = WinchSession(winch, url, network, device, executive, report)
+        try:
+            yield session
+        except TripError as error:
+            if device.faulted().any():
+                code = _fault_of(network, winch.node_id)
+                raise DriveFaultError(f"{error}: {code}") from error
+            raise
+
+
+def _own_simulator(
+    stack: ExitStack, winch: Winch, out: Output, plant: Path | None, truth_log: Path | None
+) -> BusUrl:
+    import os
+
+    url = open_bus(f"simbus:own-{os.getpid()}")
+    out.note("starting the simulated drive ...")
+    simulator = OwnSimulator(winch.profile, str(url), plant, truth_log)
+    stack.callback(simulator.stop)
+    stack.enter_context(one_core(simulator.process.pid))
+    return url
