@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import struct
 from pathlib import Path
@@ -48,6 +49,11 @@ def odd_eds(directory: Path) -> Path:
     return path
 
 
+@functools.cache
+def _parsed(eds: Path) -> canopen.ObjectDictionary:
+    return canopen.import_od(str(eds))
+
+
 class Recorder(SlaveApplication):
     """An application that notes what it is told."""
 
@@ -88,7 +94,7 @@ class Bench:
         self.slave = CanopenSlave(self.od, node_id, self.app, store=store)
         self.now = 0.0
         self.network = DirectNetwork(self)
-        self.remote = self.network.add_node(node_id, str(eds)) if node_id < 128 else None
+        self.remote = self.network.add_node(node_id, _parsed(eds)) if node_id < 128 else None
 
     def boot(self) -> Bench:
         self.slave.advance(self.now)

@@ -1,0 +1,105 @@
+"""Frames nobody should send: the slave neither falls nor lets go of what is protected."""
+
+from __future__ import annotations
+
+import struct
+from time import perf_counter
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from slave_bench import NODE, Bench
+
+from sim_bus.canopen import ObjectDictionary, SlaveApplication
+
+IDENTIFIERS = [
+    0x000, 0x080, 0x085, 0x100, 0x180 + NODE, 0x200 + NODE, 0x300 + NODE, 0x580 + NODE,
+    0x600 + NODE, 0x700 + NODE, 0x77F, 0x7E4, 0x7E5, 0x200 + NODE | 0x40000000,
+    0x180 + NODE | 0x40000000, 0x600 + NODE | 0x80000000, 0x700 + NODE | 0x40000000, 0x20000004,
+]  # fmt: skip
+
+sdo_heads = st.builds(
+    lambda command, index, sub, rest: struct.pack("<BHB", command, index, sub) + rest,
+    st.sampled_from([0x21, 0x22, 0x23, 0x2B, 0x2F, 0x40, 0xA0, 0xA4, 0xC0, 0xC6]),
+    st.sampled_from(
+        [
+            0x1000,
+            0x1018,
+            0x1008,
+            0x1400,
+            0x1600,
+            0x1801,
+            0x1A01,
+            0x1016,
+            0x1019,
+            0x6041,
+            0x6064,
+            0x2F10,
+        ]
+    ),
+    st.integers(0, 6),
+    st.binary(min_size=4, max_size=4),
+)
+frames = st.one_of(
+    st.tuples(st.sampled_from(IDENTIFIERS), st.binary(max_size=8)),
+    st.tuples(st.just(0x600 + NODE), sdo_heads),
+    st.tuples(st.integers(0, 0xFFFFFFFF), st.binary(max_size=8)),
+)
+
+
+def protected(od: ObjectDictionary) -> dict[tuple[int, int], object]:
+    served = (0x1001, 0x1003)
+    return {(e.index, e.sub): e.value for e in od if not e.writable and e.index not in served}
+
+
+@settings(derandomize=True, max_examples=120, deadline=None)
+@given(garbage=st.lists(frames, max_size=60), state=st.sampled_from([1, 2, 128]))
+def test_garbage_changes_nothing_protected(garbage: list[tuple[int, bytes]], state: int) -> None:
+    bench = Bench().boot()
+    before = protected(bench.od)
+    bench.nmt(state)
+    for number, (identifier, data) in enumerate(garbage):
+        bench.send(identifier, data)
+        if number % 7 == 0:
+            bench.sync()
+    assert protected(bench.od) == before
+    bench.send(0x7E5, bytes([4, 0]).ljust(8, b"\0"))
+    assert bench.nmt(129, 0)[-1:] == [(0x700 + bench.slave.node_id, b"\0")]
+    assert bench.sdo(b"\x40\x00\x10")[0] == 0x43
+
+
+def test_frames_for_others_are_not_even_asked_for(bench: Bench) -> None:
+    bench.start()
+    accepted = bench.slave.accepts
+    assert {0, 0x80, 0x200 + NODE, 0x600 + NODE, 0x7E5} <= accepted
+    assert not accepted & {0x600 + NODE + 1, 0x200 + NODE + 1, 0x180 + NODE + 1}
+
+
+def test_cost_of_a_sync_stays_small() -> None:
+    """A bound far above the usual cost, to notice an order of magnitude."""
+    bench = Bench(app=SlaveApplication()).boot()
+    bench.configure_pdo(0x1801, [0x60610008, 0x60B90010, 0x60BA0020], 0)
+    bench.start()
+    slave = bench.slave
+    sync = struct.pack("<IB3x8s", 0x80, 0, b"")
+    rpdo = struct.pack("<IB3x8s", 0x200 + NODE, 4, b"")
+    best = 1.0
+    cycles = 500
+    for _ in range(8):
+        start = perf_counter()
+        for _ in range(cycles):
+            bench.now += 1e-3
+            slave.advance(bench.now)
+            slave.receive(sync, bench.now)
+            slave.outbox.clear()
+            slave.receive(rpdo, bench.now)
+        best = min(best, (perf_counter() - start) / cycles)
+    assert best < 30e-6
+
+
+@pytest.mark.parametrize("node_id", [1, 127])
+def test_node_ids_at_the_ends_of_the_range(node_id: int) -> None:
+    bench = Bench(node_id=node_id)
+    bench.slave.advance(0.0)
+    assert bench.take() == [(0x700 + node_id, b"\0")]
+    assert bench.read(0x1400, 1) == (0x200 + node_id).to_bytes(4, "little")
