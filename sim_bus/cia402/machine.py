@@ -260,6 +260,7 @@ class Machine:
         if self.ignore_modes == 0:
             self._wanted_mode = number
             self._mode_due = self.axis.time + self._plant.mode_display_delay_s
+            self._pending = True
 
     def _change_mode(self) -> None:
         self._mode_due = math.inf
