@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from drivers.bus import BusUrl
+from drivers.errors import BusError
+from profiles import load_winch
+from sim_bus.clock import ClockMode
+from sim_bus.drive import SimDrive
+from sim_bus.plant import Plant
+from sim_bus.server import serve
 from tools.errors import BadInputError
-from drivers.bus.url import BusUrl
 
 app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
 
@@ -16,3 +24,72 @@ app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
     parent.add_typer(app, name="sim")
+
+
+@app.callback()
+def _group() -> None:
+    """Simulated winches on a CAN bus."""
+
+
+@app.command()
+def up(
+    winch: Annotated[str, typer.Argument(help="Winch profile: a name or the path of a file.")],
+    bus: Annotated[str, typer.Option(help="simbus:NAME, opened here, or socketcan:IFACE.")],
+    plant: Annotated[
+        Path | None, typer.Option(help="Plant file: the truth about motor and drive.")
+    ] = None,
+    lockstep: Annotated[
+        bool,
+        typer.Option(
+            "--lockstep/--paced", help="Bus time moves with each SYNC, or with the clock."
+        ),
+    ] = True,
+    nodes: Annotated[
+        int, typer.Option(min=1, max=16, help="So many drives, node ids counted up.")
+    ] = 1,
+    truth_log: Annotated[
+        Path | None, typer.Option(help="Write the true motion to this file (one drive only).")
+    ] = None,
+    exit_with_stdin: Annotated[
+        bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
+    ] = False,
+) -> None:
+    """Run simulated drives until Ctrl-C; tells on standard output when they are up."""
+    profile = load_winch(winch)
+    url = _bus(bus)
+    truth = Plant() if plant is None else Plant.load_file(plant)
+    if truth_log is not None and nodes > 1:
+        raise BadInputError("--truth-log: one drive only; leave out --nodes")
+    first = profile.node_id
+    if first + nodes - 1 > 127:
+        raise BadInputError(f"--nodes {nodes}: node ids end at 127, the first is {first}")
+    with ExitStack() as stack:
+        drives = []
+        for node_id in range(first, first + nodes):
+            one = dataclasses.replace(profile, node_id=node_id)
+            try:
+                drive = SimDrive.for_winch(one, truth, truth_log=truth_log)
+            except OSError as error:
+                raise BadInputError(f"--truth-log {truth_log}: {error.strerror}") from error
+            stack.callback(drive.close)
+            drives.append(drive)
+        serve(
+            drives,
+            str(url),
+            mode=ClockMode.LOCKSTEP if lockstep else ClockMode.PACED,
+            bitrate=profile.bitrate_bit_s,
+            truth_log=str(truth_log) if truth_log else None,
+            until_stdin_ends=exit_with_stdin,
+        )
+
+
+def _bus(text: str) -> BusUrl:
+    try:
+        url = BusUrl.parse(text)
+    except BusError as error:
+        raise BadInputError(str(error)) from error
+    if url.interface not in ("simbus", "socketcan") or not url.channel:
+        raise BadInputError(
+            f"--bus {text}: simulated drives run on simbus:NAME or socketcan:IFACE"
+        )
+    return url
