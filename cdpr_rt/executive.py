@@ -52,16 +52,16 @@ class Executive:
         device: AxisDevice,
         supervisor: Supervisor,
         stop_requested: Callable[[], bool],
-        on_progress: Callable[[float], None] | None = None,
     ) -> None:
         self.device = device
         self.supervisor = supervisor
         self.setpoint = Setpoint(device.n)
         self.lateness = Lateness()
+        self.on_progress: Callable[[float], None] | None = None
+        """Called every few thousand cycles with the time since the motion's start."""
         self._recorder = Recorder(device.n)
         self._log: RawLogWriter | None = None
         self._stop_requested = stop_requested
-        self._on_progress = on_progress
         self._idle = Idle(device.n)
         self._deadline = 0.0
 
@@ -123,8 +123,8 @@ class Executive:
             self._look_for_alarm()
             if recorder.pending() >= _DRAIN_ROWS:
                 self._drain()
-                if self._on_progress is not None:
-                    self._on_progress(k * period)
+                if self.on_progress is not None:
+                    self.on_progress(k * period)
             if not stopping and self._stop_requested():
                 stopping = True
                 motion = motion.brake(k * period)

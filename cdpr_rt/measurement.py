@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,6 @@ from cdpr_rt.rawlog import RawLog, RawLogWriter
 from cdpr_rt.recorder import column_names
 from cdpr_rt.trajectory import Leg
 
-_RAMP_S = 0.5
-
 
 @dataclass(frozen=True)
 class Pass:
@@ -30,30 +28,33 @@ class Pass:
     lead_in_rad: float
     """Covered first and left out, so that friction and controller have settled."""
     distance_rad: float
+    ramp_s: float = 0.5
+    """Time to reach the speed, and to stop."""
+    with_ramps: bool = False
+    """Whether speeding up and slowing down count too, as they must to tell the inertia."""
 
     def leg(self, start_rad: FloatArray) -> Leg:
         """Return the set-point of n axes that start at `start_rad` (n,)."""
         cruise = (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s)
         speed = np.full(np.shape(start_rad), self.speed_rad_s)
-        return Leg(start_rad, speed, cruise, _RAMP_S)
+        return Leg(start_rad, speed, cruise, self.ramp_s)
 
     def duration_s(self) -> float:
         """Return how long the pass takes."""
-        return (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s) + 2.0 * _RAMP_S
+        return (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s) + 2.0 * self.ramp_s
 
     def measured(self) -> tuple[float, float]:
         """Return from when to when, in seconds from the start, the pass counts."""
-        begin = _RAMP_S + self.lead_in_rad / abs(self.speed_rad_s)
+        if self.with_ramps:
+            return 0.0, self.duration_s()
+        begin = self.ramp_s + self.lead_in_rad / abs(self.speed_rad_s)
         return begin, begin + self.distance_rad / abs(self.speed_rad_s)
 
 
 def both_ways(speed_rad_s: float, lead_in_rad: float, turns: float) -> tuple[Pass, Pass]:
     """Return a pass forward and one backward over whole turns."""
-    distance = turns * math.tau
-    return (
-        Pass(speed_rad_s, lead_in_rad, distance),
-        Pass(-speed_rad_s, lead_in_rad, distance),
-    )
+    there = Pass(speed_rad_s, lead_in_rad, turns * math.tau)
+    return there, replace(there, speed_rad_s=-speed_rad_s)
 
 
 def run_pass(

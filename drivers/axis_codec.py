@@ -31,12 +31,12 @@ _FAULT_RESET = 0x80
 
 @jit
 def _signed(frame: NDArray[np.uint8], start: int, size: int) -> int:
-    value = 0
+    value = np.int64(0)
     for k in range(size):
-        value |= np.int64(frame[start + k]) << (8 * k)
-    if value >> (8 * size - 1):
-        value -= np.int64(1) << (8 * size)
-    return value
+        value |= np.int64(frame[start + k]) << np.int64(8 * k)
+    if value >> np.int64(8 * size - 1):
+        value -= np.int64(1) << np.int64(8 * size)
+    return int(value)
 
 
 @jit
@@ -136,14 +136,15 @@ def encode(
     wanted: FloatArray,
     sent: FloatArray,
     alarm: Ints,
-) -> None:
+) -> bool:
     """Write controlword and target torque of n axes into their RPDOs `frames` (n, 16).
 
     The torque is rounded to the drive's unit; what rounding left over is carried into the next
     cycle (first-order error feedback), so that the mean is kept below the unit. `layout` (n, 2)
     holds the first byte of controlword and target torque, `words` the controlword by target and
-    present state.
+    present state. Returns whether any axis has raised an alarm.
     """
+    alarmed = False
     for i in range(wanted.size):
         units = 0
         # in homing and the like the drive makes its own torque; here it must be asked for none
@@ -158,6 +159,7 @@ def encode(
         else:
             residual[i] = 0.0
         sent[i] = units * scale[i, 1]
+        alarmed = alarmed or alarm[i] != ALARM_NONE
         word = words[state[i, TARGET], state[i, STATE]] | state[i, EXTRA_WORD]
         at = FRAME_DATA + layout[i, CONTROLWORD]
         frames[i, at] = word & 0xFF
@@ -165,3 +167,4 @@ def encode(
         at = FRAME_DATA + layout[i, TARGET_TORQUE]
         frames[i, at] = units & 0xFF
         frames[i, at + 1] = (units >> 8) & 0xFF
+    return alarmed

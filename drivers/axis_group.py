@@ -91,6 +91,7 @@ class AxisGroup:
         self._state[:, codec.TARGET] = State.SWITCH_ON_DISABLED
         self._state[:, codec.STATE] = State.UNKNOWN
         self._alarms = np.zeros(self.n, np.int64)
+        self._alarmed = False
         self._residual = np.zeros(self.n)
         self._silence = ""
         self._received = 0
@@ -226,7 +227,7 @@ class AxisGroup:
     def transmit(self) -> None:
         """Send controlwords and torques, to act from the next SYNC on."""
         command = self.command
-        codec.encode(
+        self._alarmed = codec.encode(
             self._tx_bytes,
             self._tx_layout,
             CONTROLWORD_TABLE,
@@ -250,7 +251,7 @@ class AxisGroup:
         """Return why the drives must not go on being driven, or an empty text."""
         if self.network.alarm_text:
             return self.network.alarm_text
-        if self._alarms.any():
+        if self._alarmed:
             return self._alarm_text()
         return self._silence if self.lockstep else ""
 
@@ -317,6 +318,7 @@ class AxisGroup:
     def clear_alarms(self) -> None:
         """Forget latched alarms."""
         self._alarms[:] = 0
+        self._alarmed = False
         self._silence = ""
         self.network.clear_alarm()
 

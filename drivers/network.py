@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import can
 import canopen
@@ -71,6 +72,7 @@ class CanNetwork:
         self._bus = open_python_can(url, filters)
         self._canopen = canopen.Network(self._bus)
         self._canopen.connect()
+        self._nodes: dict[int, canopen.RemoteNode] = {}
         self._lock = threading.Lock()
         self._heartbeat_s = heartbeat_s
         self._heartbeat = can.Message(
@@ -86,14 +88,14 @@ class CanNetwork:
 
     def add_node(self, node_id: int, dictionary: ObjectDictionary) -> None:
         """Make a node known, with the object dictionary its EDS describes."""
-        node = self._canopen.add_node(node_id, dictionary)
+        node = self._nodes[node_id] = self._canopen.add_node(node_id, dictionary)
         node.sdo.RESPONSE_TIMEOUT = _SDO_TIMEOUT_S
         node.emcy.add_callback(lambda error: self._on_emergency(node_id, error))
         node.nmt.add_heartbeat_callback(lambda state: self._on_heartbeat(node_id, state))
 
     def dictionary(self, node_id: int) -> ObjectDictionary:
         """Return the node's object dictionary."""
-        return self._canopen[node_id].object_dictionary
+        return self._nodes[node_id].object_dictionary
 
     def _on_emergency(self, node_id: int, error: canopen.emcy.EmcyError) -> None:
         emergency = Emergency(node_id, error.code, error.register, error.data, time.monotonic())
@@ -118,10 +120,10 @@ class CanNetwork:
         variable = self._variable(node_id, index, sub)
         with self._lock:
             try:
-                value: int | str | bytes = variable.raw
+                value: Any = variable.raw
             except (SdoAbortedError, SdoCommunicationError, can.CanError, OSError) as error:
                 raise self._sdo_error(node_id, index, sub, "read", error) from error
-        return value
+        return value if isinstance(value, int | str) else bytes(value)
 
     def read_int(self, node_id: int, index: int, sub: int = 0) -> int:
         """Return an integer object's value; raises SdoError."""
@@ -143,9 +145,9 @@ class CanNetwork:
                     f"node {node_id}: object {index:04X}h:{sub} cannot hold {value}"
                 ) from error
 
-    def _variable(self, node_id: int, index: int, sub: int) -> canopen.sdo.base.SdoVariable:
+    def _variable(self, node_id: int, index: int, sub: int) -> Any:
         try:
-            entry = self._canopen[node_id].sdo[index]
+            entry: Any = self._nodes[node_id].sdo[index]
             return entry if not hasattr(entry, "values") else entry[sub]
         except KeyError:
             raise SdoError(
@@ -164,7 +166,7 @@ class CanNetwork:
 
     def reset_communication(self, node_id: int, timeout_s: float) -> bool:
         """Reset the node's communication; return whether its boot-up message came in time."""
-        nmt = self._canopen[node_id].nmt
+        nmt = self._nodes[node_id].nmt
         self._expect_boot_up = True
         try:
             nmt.send_command(130)
@@ -179,11 +181,11 @@ class CanNetwork:
 
     def start(self, node_id: int) -> None:
         """Command the node to operational."""
-        self._canopen[node_id].nmt.send_command(1)
+        self._nodes[node_id].nmt.send_command(1)
 
     def wait_for_heartbeat(self, node_id: int, timeout_s: float) -> int | None:
         """Return the NMT state of the node's next heartbeat, None when none came."""
-        nmt = self._canopen[node_id].nmt
+        nmt = self._nodes[node_id].nmt
         try:
             nmt.wait_for_heartbeat(timeout_s)
         except canopen.nmt.NmtError:

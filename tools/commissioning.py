@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,22 +12,24 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.compensation import AxisCompensation, Compensation
+from cdpr_rt.controllers.base import Controller
 from cdpr_rt.controllers.pid import Pid
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.measurement import Pass, both_ways, run_pass
-from cdpr_rt.tuning import PidDesign, design_pid, sweep_gain
+from cdpr_rt.tuning import PidDesign, sweep_gain
 from tools.output import Output
 from tools.session import WinchSession
 
 METHODS = ("none", "thesis", "better")
-BANDWIDTHS_HZ = (3.0, 5.0, 8.0, 10.0, 15.0, 25.0)
-DEFAULT_BANDWIDTH_HZ = 8.0
 
-_SWEEP_SPEED_RAD_S = math.radians(3.0)
-_SWEEP_TURNS = 2
+SWEEP_SPEED_RAD_S = math.radians(3.0)
+SWEEP_TURNS = 2
 # the rotor trails the set-point by friction over gain; both directions' trail fits in here
-_SWEEP_LEAD_IN_RAD = math.radians(30.0)
-_VALIDATION_SPEED_RAD_S = math.radians(22.0)
+SWEEP_LEAD_IN_RAD = math.radians(30.0)
+VALIDATION_SPEED_RAD_S = math.radians(22.0)
+_FAST_SPEEDS_RAD_S = (math.radians(90.0), math.radians(270.0))
+_FAST_RAMP_S = 0.25
+_TORQUE_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -40,35 +42,58 @@ class Paths:
         """Return the file of one recorded pass."""
         return self.out / "raw" / f"{name}.raw"
 
+    def passes(self, name: str) -> list[Path]:
+        """Return the recorded passes whose names begin with `name`, in the order they were run."""
+        found = (self.out / "raw").glob(f"{name}-[0-9]*.raw")
+        return sorted(found, key=lambda path: int(path.stem.rsplit("-", 1)[1]))
+
     @property
     def profile(self) -> Path:
         """Return the file of the cogging profile."""
         return self.out / "cogging-profile.json"
 
     @property
+    def results(self) -> Path:
+        """Return the file of the results."""
+        return self.out / "report.json"
+
+    @property
+    def page(self) -> Path:
+        """Return the report for people."""
+        return self.out / "report.html"
+
+    @property
     def truth(self) -> Path:
         """Return the simulator's own log, which only the report reads."""
-        return self.out / "raw" / "simulator-truth.log"
+        return self.out / "simulator-truth.log"
 
 
 class Measurement:
-    """Runs passes of one winch and keeps what is common to them."""
+    """Runs passes of one winch and records them."""
 
     def __init__(self, session: WinchSession, out: Output, paths: Paths) -> None:
         self._session = session
         self._out = out
         self._paths = paths
-        motor = session.winch.motor
         # an unloaded rotor needs little: enough for any cogging, too little to do harm
-        self._limit_Nm = np.full(session.device.n, 0.25 * motor.rated_torque_Nm)
+        rated = session.winch.motor.rated_torque_Nm
+        self._limit_Nm = np.full(session.device.n, _TORQUE_SHARE * rated)
 
     def sweep(self, inertia_kg_m2: float) -> list[Path]:
         """Sweep both directions slowly under the proportional controller (Tremblay, 1.3, 1.4)."""
         gain = sweep_gain(inertia_kg_m2, self._session.latency_s)
         controller = Proportional(np.full(self._session.device.n, gain), self._limit_Nm)
-        passes = both_ways(_SWEEP_SPEED_RAD_S, _SWEEP_LEAD_IN_RAD, _SWEEP_TURNS)
-        meta = {"what": "sweep", "gain_Nm_rad": gain}
-        return self._run(controller, "sweep", passes, meta)
+        passes = both_ways(SWEEP_SPEED_RAD_S, SWEEP_LEAD_IN_RAD, SWEEP_TURNS)
+        return self._run("sweep", controller, passes, {"gain_Nm_rad": gain})
+
+    def fast_legs(self, design: PidDesign) -> list[Path]:
+        """Turn back and forth at higher speeds, which tells inertia and viscous friction."""
+        passes = [
+            dataclasses.replace(one, ramp_s=_FAST_RAMP_S, with_ramps=True)
+            for speed in _FAST_SPEEDS_RAD_S
+            for one in both_ways(speed, 0.0, 1.0)
+        ]
+        return self.track("fast", design, None, passes)
 
     def track(
         self,
@@ -76,10 +101,29 @@ class Measurement:
         design: PidDesign,
         compensation: AxisCompensation | None,
         passes: Sequence[Pass],
-        meta: dict[str, Any],
+        meta: dict[str, Any] | None = None,
     ) -> list[Path]:
         """Follow ramps under the PID, with or without compensation (Tremblay, 1.5)."""
         device = self._session.device
         known = Compensation([compensation], device.period_s) if compensation else None
         controller = Pid([design.gains], self._limit_Nm, device.period_s, known)
-        return self._run(controller, name, passes, {**meta, "gains": vars(design.gains)})
+        gains = {"gains": dataclasses.asdict(design.gains), "bandwidth_Hz": design.bandwidth_Hz}
+        return self._run(name, controller, passes, gains | (meta or {}))
+
+    def _run(
+        self, name: str, controller: Controller, passes: Sequence[Pass], meta: dict[str, Any]
+    ) -> list[Path]:
+        session = self._session
+        meta = {**meta, "what": name, "identity": session.identity}
+        meta["sync_offset"] = session.sync_offset()
+        total = sum(one.duration_s() for one in passes)
+        recorded = []
+        with self._out.progress(name, total) as advance:
+            done = 0.0
+            for number, one in enumerate(passes):
+                session.executive.on_progress = lambda t, done=done: advance(done + t)
+                path = self._paths.raw(f"{name}-{number}")
+                recorded.append(run_pass(session.executive, controller, one, path, meta))
+                done += one.duration_s()
+        session.executive.on_progress = None
+        return recorded

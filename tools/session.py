@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -24,7 +25,7 @@ from drivers.errors import BusError, DriveFaultError, SdoError
 from drivers.homing import Homing
 from drivers.network import CanNetwork
 from profiles import Winch
-from tools.errors import BadInputError, WorkFailedError
+from tools.errors import BadInputError
 from tools.output import Output
 from tools.simulator import OwnSimulator
 
@@ -114,9 +115,9 @@ class WinchSession:
             raise
         self.disable()
 
-    def refuse_a_fault(self) -> None:
-        """Raise DriveFaultError when the drive is in fault, with its code in words."""
-        self.executive.step(lambda: True, 1.0, "the drive's answer")
+    def sync_offset(self) -> int:
+        """Return how many SYNCs a simulated bus had seen before our first cycle."""
+        return int(self.bus_status().get("sync_count", 0)) - self.device.feedback.cycle
 
     def bus_status(self) -> dict[str, Any]:
         """Return what a simulated bus tells of itself, an empty table on others."""
@@ -234,8 +235,6 @@ def open_winch(
 def _own_simulator(
     stack: ExitStack, winch: Winch, out: Output, plant: Path | None, truth_log: Path | None
 ) -> BusUrl:
-    import os
-
     url = open_bus(f"simbus:own-{os.getpid()}")
     out.note("starting the simulated drive ...")
     simulator = OwnSimulator(winch.profile, str(url), plant, truth_log)

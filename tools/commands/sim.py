@@ -89,7 +89,5 @@ def _bus(text: str) -> BusUrl:
     except BusError as error:
         raise BadInputError(str(error)) from error
     if url.interface not in ("simbus", "socketcan") or not url.channel:
-        raise BadInputError(
-            f"--bus {text}: simulated drives run on simbus:NAME or socketcan:IFACE"
-        )
+        raise BadInputError(f"--bus {text}: simulated drives run on simbus:NAME or socketcan:IFACE")
     return url
