@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 
 TWO_PI = 2.0 * math.pi
 
 # columns of the parameter array of one axis
-_LOOK_AHEAD, _ERROR_FILTER, _BLEND = 0, 1, 2
+_LOOK_AHEAD, _OBSERVER_POLE, _BLEND = 0, 1, 2
 _COULOMB_FORWARD, _COULOMB_BACKWARD, _STRIBECK_FORWARD, _STRIBECK_BACKWARD = 3, 4, 5, 6
-_STRIBECK_SPEED, _VISCOUS, _AVAILABLE, _SPEED_FILTER = 7, 8, 9, 10
-_COLUMNS = 11
+_STRIBECK_SPEED, _VISCOUS, _AVAILABLE = 7, 8, 9
+_COLUMNS = 10
 # columns of the state of one axis
-_FADE, _DEVIATION, _STARTED, _LAST, _SLOPE = 0, 1, 2, 3, 4
-_STATES = 5
+_FADE, _STARTED, _DEVIATION, _DRIFT = 0, 1, 2, 3
+_STATES = 4
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,17 @@ class AxisCompensation:
 
     `table_Nm[0]` is for increasing angles, `table_Nm[1]` for decreasing ones; sample j lies at
     2π·j/m from the index. `look_ahead_s` is the time from the instant an angle was true to the
-    mean instant at which the torque computed from it acts. The angle looked up is the set-point's
-    plus the deviation from it, smoothed with `error_filter_s` (0: the encoder's reading itself).
+    mean instant at which the torque computed from it acts. Angle and velocity are the set-point's
+    plus the deviation from it and the deviation's rate, both from a tracking observer with a double
+    pole of time constant `observer_s` (0: the encoder's reading and the set-point's velocity).
+    Friction is evaluated at that velocity, for the set-point's direction: where it falls with
+    speed, this takes away the negative damping that makes a rotor stick and slip.
     """
 
     table_Nm: FloatArray
     friction: FrictionFeedforward = FrictionFeedforward()
     look_ahead_s: float = 0.0
-    error_filter_s: float = 0.0
-    speed_filter_s: float = 0.0
+    observer_s: float = 0.0
     blend_speed_rad_s: float = 0.02
     """Set-point speed above which one direction's table counts alone."""
 
@@ -63,7 +65,7 @@ def _torque(
     fade_step: float,
     position: FloatArray,
     index: FloatArray,
-    index_known: FloatArray,
+    index_known: BoolArray,
     reference: FloatArray,
     speed: FloatArray,
     out: FloatArray,
@@ -78,20 +80,21 @@ def _torque(
         state[i, _FADE] = min(1.0, state[i, _FADE] + fade_step)
         velocity = speed[i]
         deviation = position[i] - reference[i]
+        pole = parameters[i, _OBSERVER_POLE]
         if state[i, _STARTED] == 0.0:
             state[i, _STARTED] = 1.0
             state[i, _DEVIATION] = deviation
-            state[i, _LAST] = deviation
-            state[i, _SLOPE] = 0.0
-        filter_s = parameters[i, _SPEED_FILTER]
-        state[i, _SLOPE] = (filter_s * state[i, _SLOPE] + deviation - state[i, _LAST]) / (
-            filter_s + period
-        )
-        state[i, _LAST] = deviation
-        share = period / (period + parameters[i, _ERROR_FILTER])
-        state[i, _DEVIATION] += share * (deviation - state[i, _DEVIATION])
-        angle = reference[i] + state[i, _DEVIATION]
-        angle += velocity * parameters[i, _LOOK_AHEAD] - index[i]
+            state[i, _DRIFT] = 0.0
+        moving = velocity
+        if pole > 0.0:
+            state[i, _DEVIATION] += period * state[i, _DRIFT]
+            surprise = deviation - state[i, _DEVIATION]
+            state[i, _DEVIATION] += (1.0 - pole * pole) * surprise
+            state[i, _DRIFT] += (1.0 - pole) * (1.0 - pole) / period * surprise
+            deviation = state[i, _DEVIATION]
+            moving += state[i, _DRIFT]
+        angle = reference[i] + deviation + moving * parameters[i, _LOOK_AHEAD] - index[i]
+        moving = max(moving, 0.0) if velocity >= 0.0 else min(moving, 0.0)
         turns = angle / TWO_PI
         place = (turns - math.floor(turns)) * size
         low = int(place)
@@ -101,10 +104,6 @@ def _torque(
         forward = (1.0 - part) * tables[i, 0, low] + part * tables[i, 0, high]
         backward = (1.0 - part) * tables[i, 1, low] + part * tables[i, 1, high]
         side = min(max(velocity / parameters[i, _BLEND], -1.0), 1.0)
-        moving = velocity
-        if filter_s > 0.0:
-            moving += state[i, _SLOPE]
-            moving = max(moving, 0.0) if velocity >= 0.0 else min(moving, 0.0)
         fall = moving / parameters[i, _STRIBECK_SPEED]
         stribeck = math.exp(-fall * fall)
         forward += parameters[i, _COULOMB_FORWARD] + parameters[i, _STRIBECK_FORWARD] * stribeck
@@ -114,11 +113,11 @@ def _torque(
         out[i] = state[i, _FADE] * total
 
 
-def _row(axis: AxisCompensation) -> list[float]:
+def _row(axis: AxisCompensation, period_s: float) -> list[float]:
     f = axis.friction
     return [
         axis.look_ahead_s,
-        axis.error_filter_s,
+        math.exp(-period_s / axis.observer_s) if axis.observer_s > 0.0 else 0.0,
         axis.blend_speed_rad_s,
         f.coulomb_forward_Nm,
         f.coulomb_backward_Nm,
@@ -127,7 +126,6 @@ def _row(axis: AxisCompensation) -> list[float]:
         f.stribeck_speed_rad_s,
         f.viscous_Nms_rad,
         1.0,
-        axis.speed_filter_s,
     ]
 
 
@@ -153,7 +151,7 @@ class Compensation:
         for i, axis in enumerate(axes):
             if axis is not None:
                 self._tables[i] = axis.table_Nm
-                self._parameters[i] = _row(axis)
+                self._parameters[i] = _row(axis, period_s)
         self._state = np.zeros((n, _STATES))
         self._period_s = period_s
         self._fade_step = min(1.0, period_s / fade_in_s) if fade_in_s > 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""Gains of the motor's position loops from its inertia and the loop's latency, by stated margins."""
+"""Gains of the motor's position loops from inertia and latency, by stated margins."""
 
 from __future__ import annotations
 
@@ -65,9 +65,7 @@ def loop_response(
     cycle in which its torque acts, so half a period of the hold is already in it.
     """
     back = np.exp(-1j * omega * period_s)
-    slope = (1.0 - back) / (
-        gains.derivative_filter_s + period_s - gains.derivative_filter_s * back
-    )
+    slope = (1.0 - back) / (gains.derivative_filter_s + period_s - gains.derivative_filter_s * back)
     control = (
         gains.proportional_Nm_rad
         + gains.integral_Nm_rad_s * period_s / (1.0 - back)

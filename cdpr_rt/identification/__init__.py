@@ -1,4 +1,4 @@
-"""Cogging, friction and inertia of a motor from recorded runs, by the thesis' method and a better one."""
+"""Cogging, friction and inertia of a motor from recorded runs, by two methods."""
 
 from cdpr_rt.identification.better import identify_better, refine
 from cdpr_rt.identification.result import BetterResult, Estimate, Harmonic

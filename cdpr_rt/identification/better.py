@@ -66,15 +66,15 @@ def refine(better: BetterResult, run_legs: Sequence[SweepData]) -> BetterResult:
 def _windows(legs: Sequence[SweepData], latency_s: float) -> list[Windows]:
     windows = [w for run in contiguous(legs) if (w := cut(run, latency_s)) is not None]
     for sign, word in ((1.0, "increasing"), (-1.0, "decreasing")):
-        if not any(np.any(w.sliding & (w.direction == sign)) for w in windows):
-            raise IdentificationError(f"the rotor was never seen sliding with {word} angle")
+        if not any(np.any((w.sliding | w.creeping) & (w.direction == sign)) for w in windows):
+            raise IdentificationError(f"the rotor was never seen moving with {word} angle")
     return windows
 
 
 def _fixed(equations: Equations, which: int | None) -> list[int]:
     """Return the columns besides harmonics that the rows can tell."""
     parts = [p for p in equations.parts.values() if p.rows]
-    size = sum(np.diag(p.xx) for p in parts)
+    size = np.sum([np.diag(p.xx) for p in parts], axis=0)
     wanted = [design.INERTIA, design.INERTIA_SLOW, design.COULOMB, design.COULOMB + 1]
     wanted += [design.VISCOUS] if size[design.INERTIA] > 0.0 else []
     wanted += [design.CREEP, design.CREEP + 1]

@@ -70,7 +70,12 @@ class Equations:
 
 @jit
 def _harmonics(
-    angle: FloatArray, bump: FloatArray, stride: int, first: int, orders: FloatArray, out: FloatArray
+    angle: FloatArray,
+    bump: FloatArray,
+    stride: int,
+    first: int,
+    orders: FloatArray,
+    out: FloatArray,
 ) -> None:
     rows = out.shape[0]
     top = int(orders.max()) if orders.size else 0
@@ -103,7 +108,7 @@ def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArra
     direction = windows.direction[rows]
     up, down = np.maximum(direction, 0.0), np.minimum(direction, 0.0)
     out[:, INERTIA if windows.fast else INERTIA_SLOW] = windows.acceleration_rad_s2[rows]
-    out[:, LATENCY] = windows.torque_rate_Nm_s[rows]
+    out[:, LATENCY] = windows.torque_rate_Nm_s[rows] * sliding
     out[:, COULOMB], out[:, COULOMB + 1] = up * sliding, down * sliding
     out[:, CREEP], out[:, CREEP + 1] = up * creeping, down * creeping
     speeds = [windows.velocity_rad_s]
@@ -158,7 +163,9 @@ def accumulate(windows: Sequence[Windows], layout: Layout) -> Equations:
         for first in range(0, w.torque_Nm.size, _CHUNK):
             last = min(first + _CHUNK, w.torque_Nm.size)
             x, y = matrix(w, layout, first, last), w.torque_Nm[first:last]
-            for key in {(int(a), int(b)) for a, b in zip(f[first:last], k[first:last], strict=True)}:
+            for key in {
+                (int(a), int(b)) for a, b in zip(f[first:last], k[first:last], strict=True)
+            }:
                 if key[1] < 0:
                     continue
                 mask = (f[first:last] == key[0]) & (k[first:last] == key[1])

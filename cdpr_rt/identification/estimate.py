@@ -80,7 +80,11 @@ def gather(windows: Sequence[Windows], layout: Layout, weight: FloatArray) -> Ro
 
 
 def best_stribeck_speed(
-    windows: Sequence[Windows], orders: tuple[int, ...], weight: FloatArray, speed: float, used: list[int]
+    windows: Sequence[Windows],
+    orders: tuple[int, ...],
+    weight: FloatArray,
+    speed: float,
+    used: list[int],
 ) -> float:
     """Return the Stribeck speed near `speed` that leaves the smallest error."""
     layout = Layout(orders, tuple(float(speed * s) for s in _SPEED_SPREAD))
@@ -99,7 +103,11 @@ def best_stribeck_speed(
 
 
 def fit(
-    windows: Sequence[Windows], layout: Layout, weight: FloatArray, used: list[int], priors: list[Prior],
+    windows: Sequence[Windows],
+    layout: Layout,
+    weight: FloatArray,
+    used: list[int],
+    priors: list[Prior],
     lag_prior: tuple[float, float],
 ) -> Fit:
     """Fit the used columns, all harmonics and the static lag by Gauss-Newton steps.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,24 +77,23 @@ class BetterResult:
 
     def tables(self, m: int) -> FloatArray:
         """Return the cogging on m samples over the turn for both directions, (2, m)."""
-        angle = np.arange(m) * (TWO_PI / m)
+        angle: FloatArray = np.arange(m) * (TWO_PI / m)
         lag = self.lag_rad.value
         return np.vstack([self.cogging_Nm(angle - lag), self.cogging_Nm(angle + lag)])
 
 
 def hint(order: int, pole_pairs: int) -> str:
     """Say in words where a cogging of this order usually comes from."""
-    ratio = order / pole_pairs
-    if math.isclose(ratio, 1.0):
-        return "once per pole pair: offset of a current sensor, or unequal magnets"
-    if math.isclose(ratio, 2.0):
-        return "twice per pole pair: unequal gains of the current sensors, or magnets"
-    if order == 1:
-        return "once per turn: eccentric rotor, encoder or coupling"
-    if order == 2:
-        return "twice per turn: oval stator, bent shaft or coupling"
-    if math.isclose(ratio % 6.0, 0.0, abs_tol=1e-9):
-        return "sixth per pole pair: slots against magnets, or harmonics of the back EMF"
-    if math.isclose(ratio % 1.0, 0.0, abs_tol=1e-9):
+    known = {
+        2: "twice per turn: oval stator, bent shaft or coupling",
+        1: "once per turn: eccentric rotor, encoder or coupling",
+        2 * pole_pairs: "twice per pole pair: unequal gains of the current sensors, or magnets",
+        pole_pairs: "once per pole pair: offset of a current sensor, or unequal magnets",
+    }
+    if order in known:
+        return known[order]
+    if order % (6 * pole_pairs) == 0:
+        return "a multiple of six per pole pair: slots against magnets, or the back EMF's shape"
+    if order % pole_pairs == 0:
         return "a multiple of the pole pairs: slots against magnets"
     return "no multiple of the pole pairs: unequal slots or magnets, or something coupled"

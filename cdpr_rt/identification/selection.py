@@ -7,8 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from numpy.typing import NDArray
+
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.identification.design import Equations, Layout, Normal
+
+IntArray = NDArray[np.intp]
 
 _MOST = 40
 _FEWEST_ROWS = 20
@@ -94,17 +98,17 @@ def choose(equations: Equations, fixed: list[int], weight: FloatArray) -> Choice
     spread = gap.std(axis=0, ddof=1) / math.sqrt(len(held)) if len(held) > 1 else 0.0 * mean
     size = int(np.flatnonzero(gap.mean(axis=0) <= spread)[0])
     unit = total(equations.parts, weight)
-    per_row = unit.rows / max(float(np.sum([weight[k[1]] * p.rows for k, p in equations.parts.items()])), 1e-300)
-    return Choice(
-        tuple(sorted(layout.orders[i] for i in overall[:size])), np.sqrt(mean * per_row)
+    per_row = unit.rows / max(
+        float(np.sum([weight[k[1]] * p.rows for k, p in equations.parts.items()])), 1e-300
     )
+    return Choice(tuple(sorted(layout.orders[i] for i in overall[:size])), np.sqrt(mean * per_row))
 
 
 def _rows(equations: Equations, fold: int, weight: FloatArray) -> int:
     return sum(p.rows for (f, k), p in equations.parts.items() if f == fold and weight[k] > 0.0)
 
 
-def _rank(train: Normal, fixed: list[int], layout: Layout) -> FloatArray:
+def _rank(train: Normal, fixed: list[int], layout: Layout) -> IntArray:
     """Return the places of the orders by falling significance."""
     columns = fixed + [c for i in range(len(layout.orders)) for c in layout.order(i)]
     beta, inverse = solve(train, columns)
@@ -116,7 +120,7 @@ def _rank(train: Normal, fixed: list[int], layout: Layout) -> FloatArray:
 
 
 def _path(
-    train: Normal, test: Normal, fixed: list[int], layout: Layout, ranking: FloatArray
+    train: Normal, test: Normal, fixed: list[int], layout: Layout, ranking: IntArray
 ) -> FloatArray:
     """Return the mean squared (weighted) error on held-back rows with 0, 1, ... orders."""
     most = min(_MOST, ranking.size)

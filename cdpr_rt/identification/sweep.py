@@ -16,7 +16,7 @@ _SHORTEST_TURNS = 0.98
 
 
 class IdentificationError(ControlError):
-    """The recorded runs do not carry what was to be identified; the message says what is missing."""
+    """The recorded runs do not carry what was to be identified; the message says what lacks."""
 
 
 @dataclass(frozen=True)

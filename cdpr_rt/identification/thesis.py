@@ -82,7 +82,9 @@ def identify_thesis(legs: Sequence[SweepData]) -> ThesisResult:
     both = np.vstack(bad)
     usable = both[::-1] & ~both  # where this direction is good and the other needs it
     repaired = both & usable[::-1]
-    curves = np.vstack([_repair(raw[i], raw[1 - i], repaired[i], ~(both[0] | both[1])) for i in (0, 1)])
+    curves = np.vstack(
+        [_repair(raw[i], raw[1 - i], repaired[i], ~(both[0] | both[1])) for i in (0, 1)]
+    )
     size = 2 * round(0.5 * WINDOW_deg / 360.0 * GRID) + 1
     filtered = savgol_filter(curves, size, _DEGREE, axis=1, mode="wrap")
     return ThesisResult(

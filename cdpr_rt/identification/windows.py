@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
@@ -23,7 +24,9 @@ _LONGEST_s = 0.039
 _FAST_STEP_s = 0.015
 _SMOOTHING_s = 0.004
 _SMOOTHING_COUNTS = 1.5
+_SMOOTHING_SPEED_rad_s = 0.3
 _STANDING = 0.2
+_QUASI_STATIC_rad_s = np.deg2rad(10.0)
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ def contiguous(runs: Sequence[SweepData]) -> list[SweepData]:
         turned = moving[1:][np.diff(sign[moving]) != 0]
         breaks = np.flatnonzero(np.abs(step - np.median(step)) > 0.5 * np.median(step)) + 1
         edges = np.unique(np.concatenate([[0], breaks, turned, [run.time_s.size]])).astype(int)
-        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        for start, stop in pairwise(edges):
             if stop - start >= 100:
                 pieces.append(SweepData(*(a[start:stop] for a in vars(run).values())))
     return pieces
@@ -92,18 +95,21 @@ def cut(run: SweepData, latency_s: float) -> Windows | None:
     speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))
     fast = speed > _FAST_rad_s
     thin = 1 if fast else _odd(0.003 / period)
-    spacing = _FAST_STEP_s if fast else min(max(_STEP_rad / max(speed, 1e-3), _SHORTEST_s), _LONGEST_s)
+    spacing = (
+        _FAST_STEP_s if fast else min(max(_STEP_rad / max(speed, 1e-3), _SHORTEST_s), _LONGEST_s)
+    )
     stride = _odd(spacing / period / thin)
     step = stride * thin
     rows = (run.time_s.size - 1) // step - 4
     if rows < 1:
         return None
-    smoothing = _SMOOTHING_COUNTS * encoder_step_rad(run) / max(speed, 1e-3)
+    smoothing = _SMOOTHING_COUNTS * encoder_step_rad(run) / min(speed, _SMOOTHING_SPEED_rad_s)
     smoothing = min(max(smoothing, _SMOOTHING_s), 4.0 * spacing) / period
-    origin = run.angle_rad[0]
-    reading = run.angle_rad - origin
-    angle = gaussian_filter1d(reading, smoothing, mode="nearest") + origin
-    velocity = gaussian_filter1d(reading, smoothing, order=1, mode="nearest") / period
+    reading = run.angle_rad - run.angle_rad[0]
+    deviation = run.angle_rad - run.setpoint_rad
+    angle = run.setpoint_rad + gaussian_filter1d(deviation, smoothing, mode="nearest")
+    drift = gaussian_filter1d(deviation, smoothing, order=1, mode="nearest") / period
+    velocity = run.setpoint_velocity_rad_s + drift
     cycle = np.arange(run.time_s.size)
     torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
     centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
@@ -113,12 +119,14 @@ def cut(run: SweepData, latency_s: float) -> Windows | None:
         smooth_torque = uniform_filter1d(smooth_torque, step)
     mean = uniform_filter1d(velocity, 2 * step + 1)[centre]
     direction = np.sign(mean)
-    low = _extreme(velocity * 1.0, rows, step, np.minimum)
+    low = _extreme(velocity, rows, step, np.minimum)
     high = _extreme(velocity, rows, step, np.maximum)
     least = np.where(direction > 0.0, low, -high)
     moving = np.abs(mean) > _STANDING * np.abs(run.setpoint_velocity_rad_s[centre])
     along = direction * run.setpoint_velocity_rad_s[centre] > 0.0
     sliding = moving & (least > 0.1 * np.abs(mean)) & (direction != 0.0)
+    if speed < _QUASI_STATIC_rad_s:  # it sticks and slips within a window: no friction curve here
+        sliding[:] = False
     return Windows(
         angle_rad=angle[(thin - 1) // 2 :: thin],
         velocity_rad_s=velocity[(thin - 1) // 2 :: thin],
