@@ -186,18 +186,22 @@ class CyclicPosition(Mode):
     @override
     def start(self) -> None:
         axis = self.axis
-        axis.drive(servo.FOLLOW_POSITION, 0.0)
         axis.set_window(0.0, 0.0)
-        target: Any = axis.od.entry(0x607A)
-        offset: Any = axis.od.entry(0x60B0)
-        axis.setpoint = lambda: axis.clip_position(target.value + offset.value)
+        axis.drive(servo.FOLLOW_POSITION, self._target())
+        axis.motor["interpolation_left"] = self._period()
 
     @override
     def sync(self) -> None:
+        self.axis.target = self._target()
+        self.axis.motor["interpolation_left"] = self._period()
+        _feed_torque_offset(self.axis)
+
+    def _target(self) -> float:
         axis = self.axis
-        period = axis.object(0x60C2, 1) * 10.0 ** axis.object(0x60C2, 2)
-        axis.motor["interpolation_left"] = period
-        _feed_torque_offset(axis)
+        return axis.clip_position(axis.object(0x607A) + axis.object(0x60B0))
+
+    def _period(self) -> float:
+        return self.axis.object(0x60C2, 1) * 10.0 ** self.axis.object(0x60C2, 2)
 
     @override
     def status(self) -> int:
