@@ -67,6 +67,15 @@ class StoredMethod(_Part):
     look_ahead_s: Annotated[float, Field(ge=0.0)]
     observer_s: Annotated[float, Field(ge=0.0)]
 
+    def compensation(self) -> AxisCompensation:
+        """Return what an axis' compensation needs."""
+        return AxisCompensation(
+            table_Nm=np.array(self.table_Nm, float),
+            friction=FrictionFeedforward(**self.friction.model_dump()),
+            look_ahead_s=self.look_ahead_s,
+            observer_s=self.observer_s,
+        )
+
 
 class CoggingProfile(_Part):
     """All that was learnt about one motor, and whose it is."""
@@ -151,13 +160,7 @@ class CoggingProfile(_Part):
                 "the encoder index of this axis is not known: home it, or latch the index with the "
                 "touch probe, before its cogging profile can be applied"
             )
-        stored = self.thesis if method == "thesis" else self.better
-        return AxisCompensation(
-            table_Nm=np.array(stored.table_Nm, float),
-            friction=FrictionFeedforward(**stored.friction.model_dump()),
-            look_ahead_s=stored.look_ahead_s,
-            observer_s=stored.observer_s,
-        )
+        return (self.thesis if method == "thesis" else self.better).compensation()
 
 
 TABLE_SAMPLES = 4096

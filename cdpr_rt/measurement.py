@@ -11,7 +11,7 @@ import numpy as np
 
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.errors import RawLogError
-from cdpr_rt.exchange import FloatArray
+from cdpr_rt.exchange import BoolArray, FloatArray
 from cdpr_rt.executive import Executive
 from cdpr_rt.identification import SweepData
 from cdpr_rt.rawlog import RawLog, RawLogWriter
@@ -88,22 +88,24 @@ def run_pass(
 
 
 @dataclass(frozen=True)
-class Measured:
-    """The part of one recorded pass that counts, for one axis; arrays are (samples,)."""
+class Recording:
+    """One recorded pass of one axis, angles from the index; arrays are (samples,)."""
 
     sweep: SweepData
     effort_Nm: FloatArray
     cycle: FloatArray
+    judged: BoolArray
+    """The samples that count: at full speed after the lead-in."""
     period_s: float
     complete: bool
     """False when the recording ends before the pass does."""
 
 
-def measured_part(log: RawLog, axis: int = 0) -> Measured:
-    """Cut the part that counts out of a recorded pass and refer it to the encoder index.
+def recording(log: RawLog, axis: int = 0) -> Recording:
+    """Take a raw log as the recording of a pass and refer it to the encoder index.
 
-    Raises RawLogError when the recording ends before that part, holds no pass, or the index was
-    not known in it.
+    Raises RawLogError when the log is of something else, ends before the part that counts, or
+    the index was not known in it.
     """
     try:
         period = float(log.header["period_s"])
@@ -111,27 +113,29 @@ def measured_part(log: RawLog, axis: int = 0) -> Measured:
         first_cycle = int(log.header["first_cycle"])
     except (KeyError, TypeError, ValueError) as error:
         raise RawLogError(f"{log.path}: not the recording of a pass ({error})") from error
+    answered = log.column("valid", axis) != 0.0
     since_start = (log.column("cycle") - first_cycle) * period
-    part = (since_start >= begin) & (since_start < end) & (log.column("valid", axis) != 0.0)
-    if not part.any():
+    judged = ((since_start >= begin) & (since_start < end))[answered]
+    if not judged.any():
         raise RawLogError(
             f"{log.path}: ends after {since_start[-1]:.1f} s; the part to be measured begins at "
             f"{begin:.1f} s"
         )
-    if not log.column("index_known", axis)[part].all():
+    if not log.column("index_known", axis)[answered].all():
         raise RawLogError(f"{log.path}: axis {axis}: the encoder index was not known in this run")
-    index = log.column("index_rad", axis)[part]
+    index = log.column("index_rad", axis)[answered]
     sweep = SweepData(
-        time_s=log.column("time_s")[part],
-        angle_rad=log.column("position_rad", axis)[part] - index,
-        torque_Nm=log.column("torque_sent_Nm", axis)[part],
-        setpoint_rad=log.column("setpoint_rad", axis)[part] - index,
-        setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s", axis)[part],
+        time_s=log.column("time_s")[answered],
+        angle_rad=log.column("position_rad", axis)[answered] - index,
+        torque_Nm=log.column("torque_sent_Nm", axis)[answered],
+        setpoint_rad=log.column("setpoint_rad", axis)[answered] - index,
+        setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s", axis)[answered],
     )
-    return Measured(
+    return Recording(
         sweep=sweep,
-        effort_Nm=log.column("effort_Nm", axis)[part],
-        cycle=log.column("cycle")[part],
+        effort_Nm=log.column("effort_Nm", axis)[answered],
+        cycle=log.column("cycle")[answered],
+        judged=judged,
         period_s=period,
         complete=bool(since_start[-1] >= end - 2 * period),
     )

@@ -13,6 +13,7 @@ from typing import Any
 import canopen
 import typer
 
+from cdpr_rt.cogging_profile import DriveIdentity
 from cdpr_rt.errors import TripError
 from cdpr_rt.executive import Executive
 from cdpr_rt.realtime import one_core, paced_realtime
@@ -60,18 +61,22 @@ class WinchSession:
         return drive.feedback_delay_s + drive.torque_delay_s + 1.5 * self.device.period_s
 
     @property
-    def identity(self) -> dict[str, Any]:
-        """What a cogging profile is bound to."""
+    def drive_identity(self) -> DriveIdentity:
+        """What a cogging profile is bound to, besides the motor."""
         boot = self.boot
-        return {
-            "winch": self.winch.profile,
-            "motor": self.winch.motor.model,
-            "vendor_id": boot.vendor_id,
-            "product_code": boot.product_code,
-            "revision": boot.revision,
-            "serial": boot.serial,
-            "encoder_counts_per_turn": boot.counts_per_turn,
-        }
+        return DriveIdentity(
+            vendor_id=boot.vendor_id,
+            product_code=boot.product_code,
+            revision=boot.revision,
+            serial=boot.serial,
+            encoder_counts_per_turn=boot.counts_per_turn,
+        )
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What raw data keep of where they come from."""
+        whose = {"winch": self.winch.profile, "motor": self.winch.motor.model}
+        return whose | self.drive_identity.model_dump()
 
     def set_mode(self, mode: int) -> None:
         """Ask for a mode of operation and wait until the drive confirms it.

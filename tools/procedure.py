@@ -1,0 +1,204 @@
+"""The whole commissioning of one winch, from a drive that is off to a report."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from cdpr_rt.cogging_profile import (
+    CoggingProfile,
+    DriveIdentity,
+    stored_better,
+    stored_harmonics,
+    stored_thesis,
+)
+from cdpr_rt.compensation import AxisCompensation
+from cdpr_rt.identification import (
+    BetterResult,
+    SweepData,
+    ThesisResult,
+    identify_better,
+    identify_thesis,
+    refine,
+)
+from cdpr_rt.measurement import Pass, both_ways
+from cdpr_rt.tuning import PidDesign, TuningError, design_pid
+from profiles import Winch
+from tools.commissioning import METHODS, VALIDATION_SPEED_RAD_S, Measurement, Paths
+from tools.evaluation import recordings
+from tools.output import Output
+from tools.session import WinchSession
+
+BANDWIDTHS_HZ = (3.0, 5.0, 8.0, 10.0, 15.0, 25.0)
+DEFAULT_BANDWIDTH_HZ = 8.0
+
+_LEAD_IN_RAD = math.tau
+_SHORT_LEAD_IN_RAD = math.pi
+
+
+@dataclasses.dataclass(frozen=True)
+class Identified:
+    """What both methods found."""
+
+    thesis: ThesisResult
+    better: BetterResult
+
+
+def legs(paths: list[Path]) -> list[SweepData]:
+    """Return recorded passes as the identification takes them; raises RawLogError."""
+    return [run.sweep for _, run in recordings(paths)]
+
+
+def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
+    """Identify from the recorded passes in `paths`, the second pass included where there is one.
+
+    Raises RawLogError and IdentificationError.
+    """
+    sweep, fast, again = (legs(paths.passes(name)) for name in ("sweep", "fast", "refine"))
+    thesis = identify_thesis(sweep)
+    inertia, pole_pairs = winch.motor.rotor_inertia_kg_m2, winch.motor.poles // 2
+    better = identify_better(sweep + fast, inertia, latency_s, pole_pairs)
+    if again:
+        better = refine(better, again)
+    return Identified(thesis, better)
+
+
+def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, paths: Paths) -> None:
+    """Write the cogging profile."""
+    better = found.better
+    raw = [p.name for name in ("sweep", "fast", "refine") for p in paths.passes(name)]
+    CoggingProfile(
+        motor=winch.motor.model,
+        drive=winch.drive.name,
+        identity=identity,
+        created=datetime.now(UTC).replace(microsecond=0),
+        raw_data=raw,
+        inertia_kg_m2=better.inertia_kg_m2.value,
+        harmonics=stored_harmonics(better),
+        residual_rms_Nm=better.residual_rms_Nm,
+        repaired_fraction=found.thesis.repaired_fraction,
+        coverage=better.coverage,
+        thesis=stored_thesis(found.thesis),
+        better=stored_better(better),
+    ).save(paths.profile)
+
+
+class Commissioning:
+    """Runs the steps on an open session; each leaves its files in `paths`."""
+
+    def __init__(self, session: WinchSession, out: Output, paths: Paths) -> None:
+        self._session = session
+        self._out = out
+        self._paths = paths
+        self._measure = Measurement(session, out, paths)
+
+    def run(self, bandwidth_Hz: float, bandwidths_Hz: tuple[float, ...]) -> dict[str, Any]:
+        """Do everything on the bus; return what the report has to know of it."""
+        session, winch = self._session, self._session.winch
+        started = time.monotonic()
+        session.find_index()
+        session.set_mode(winch.drive.mode_torque)
+        self.measure()
+        found = identify(winch, session.latency_s, self._paths)
+        self.measure_again(found, bandwidth_Hz)
+        found = identify(winch, session.latency_s, self._paths)
+        identity = session.drive_identity
+        store_profile(winch, identity, found, self._paths)
+        designs = self.validate(bandwidth_Hz, bandwidths_Hz)
+        status = session.bus_status()
+        return {
+            "pid": [dataclasses.asdict(design) for design in designs],
+            "bandwidth_Hz": bandwidth_Hz,
+            "latency_s": session.latency_s,
+            "bus": {
+                "url": str(session.url),
+                "period_s": session.device.period_s,
+                "lockstep": session.device.lockstep,
+                "cycles": session.device.feedback.cycle,
+                "missed": session.device.missed,
+                "late": session.executive.lateness.late,
+                "wall_s": time.monotonic() - started,
+                **{key: status[key] for key in ("load", "peak_cycle_load", "overruns") if status},
+            },
+        }
+
+    def measure(self) -> None:
+        """Record the sweeps and the fast legs."""
+        session = self._session
+        inertia = session.winch.motor.rotor_inertia_kg_m2
+        self._out.note("sweeping at 3 deg/s, two turns each way")
+        session.enable()
+        self._measure.sweep(inertia)
+        design = design_pid(
+            inertia, session.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s
+        )
+        self._measure.fast_legs(design)
+        session.disable()
+
+    def measure_again(self, found: Identified, bandwidth_Hz: float) -> None:
+        """Record a second pass under compensation, from which the residual is identified."""
+        known = self._compensations(found)["better"]
+        session = self._session
+        self._out.note("second pass at 22 deg/s under compensation")
+        session.enable()
+        passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 2)
+        self._measure.track("refine", self._design(found.better, bandwidth_Hz), known, passes)
+        session.disable()
+
+    def _design(self, better: BetterResult, bandwidth_Hz: float) -> PidDesign:
+        session = self._session
+        inertia = better.inertia_kg_m2.value
+        return design_pid(inertia, session.latency_s, bandwidth_Hz, session.device.period_s)
+
+    @staticmethod
+    def _compensations(found: Identified) -> dict[str, AxisCompensation]:
+        stored = {"thesis": stored_thesis(found.thesis), "better": stored_better(found.better)}
+        return {name: method.compensation() for name, method in stored.items()}
+
+    def validate(self, bandwidth_Hz: float, bandwidths_Hz: tuple[float, ...]) -> list[PidDesign]:
+        """Record the ramps of thesis 1.5 without and with each compensation.
+
+        Both ways at the default bandwidth, one way at the others. Returns the loops' designs.
+        """
+        session = self._session
+        profile = CoggingProfile.load(self._paths.profile)
+        known: dict[str, AxisCompensation | None] = {
+            method: profile.compensation(method, session.drive_identity, session.winch.motor.model)
+            for method in ("thesis", "better")
+        }
+        known["none"] = None
+        self._out.note("validating on ramps of 22 deg/s")
+        designs = []
+        for wanted in (bandwidth_Hz, *(b for b in bandwidths_Hz if b != bandwidth_Hz)):
+            try:
+                design = design_pid(
+                    profile.inertia_kg_m2, session.latency_s, wanted, session.device.period_s
+                )
+            except TuningError as error:
+                if wanted == bandwidth_Hz:
+                    raise
+                self._out.note(str(error))
+                continue
+            designs.append(design)
+            session.enable()
+            for method in METHODS:
+                name = validation_name(method, wanted)
+                passes = self._ramps(wanted == bandwidth_Hz)
+                self._measure.track(name, design, known[method], passes, {"method": method})
+            session.disable()
+        return designs
+
+    @staticmethod
+    def _ramps(both: bool) -> tuple[Pass, ...]:
+        if both:
+            return both_ways(VALIDATION_SPEED_RAD_S, _LEAD_IN_RAD, 1)
+        return (Pass(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, math.tau),)
+
+
+def validation_name(method: str, bandwidth_Hz: float) -> str:
+    """Return the name under which a validation run is recorded."""
+    return f"validate-{bandwidth_Hz:g}Hz-{method}"
