@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import config
 
+_SETTINGS: Any = config
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
@@ -22,7 +24,7 @@ def _kernel_cache() -> str:
         text = source.read_bytes()
         if b"from sim_bus.jit import" in text:
             digest.update(text)
-    base = Path(numba.config.CACHE_DIR or here / "__pycache__")
+    base = Path(_SETTINGS.CACHE_DIR or here / "__pycache__")
     return str(base / f"kernels-{digest.hexdigest()[:12]}")
 
 
@@ -31,9 +33,9 @@ _CACHE = _kernel_cache()
 
 def jit(function: _F) -> _F:
     """Return `function` compiled by numba, cached on disk, with its type kept for the checker."""
-    elsewhere = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _CACHE
+    elsewhere = _SETTINGS.CACHE_DIR
+    _SETTINGS.CACHE_DIR = _CACHE
     try:
         return cast(_F, numba.njit(cache=True)(function))
     finally:
-        numba.config.CACHE_DIR = elsewhere
+        _SETTINGS.CACHE_DIR = elsewhere

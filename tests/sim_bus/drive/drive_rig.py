@@ -16,7 +16,7 @@ NODE = 5
 PERIOD_S = 1e-3
 
 
-class SdoRefused(Exception):
+class SdoRefusedError(Exception):
     def __init__(self, code: int) -> None:
         super().__init__(f"{code:08X}h")
         self.code = code
@@ -55,7 +55,7 @@ class Rig:
     def read(self, index: int, sub: int = 0, *, signed: bool = False) -> int:
         ((_, data),) = self.send(0x600 + NODE, struct.pack("<BHB4x", 0x40, index, sub))
         if data[0] == 0x80:
-            raise SdoRefused(struct.unpack_from("<I", data, 4)[0])
+            raise SdoRefusedError(struct.unpack_from("<I", data, 4)[0])
         size = 4 - (data[0] >> 2 & 3)
         return int.from_bytes(data[4 : 4 + size], "little", signed=signed)
 
@@ -67,7 +67,7 @@ class Rig:
         answer = self.send(0x600 + NODE, struct.pack("<BHB", command, index, sub) + payload)
         (data,) = (data for cob_id, data in answer if cob_id == 0x580 + NODE)
         if data[0] == 0x80:
-            raise SdoRefused(struct.unpack_from("<I", data, 4)[0])
+            raise SdoRefusedError(struct.unpack_from("<I", data, 4)[0])
 
     # -- time without SYNC
     def run(self, seconds: float) -> None:
@@ -79,12 +79,12 @@ class Rig:
 
     # -- cyclic exchange
     def map_pdos(self) -> None:
-        for communication, mapping, cob_id, kind, entries in (
+        for communication, mapping, base, kind, entries in (
             (0x1400, 0x1600, 0x200, 1, (0x60400010, 0x60710010)),
             (0x1800, 0x1A00, 0x180, 1, (0x60410010, 0x60640020, 0x60770010)),
             (0x1801, 0x1A01, 0x280, 0, (0x60610008, 0x60B90010, 0x60BA0020)),
         ):
-            cob_id += NODE
+            cob_id = base + NODE
             self.write(communication, 0x80000000 | cob_id, 1)
             self.write(communication, kind, 2)
             self.write(mapping, 0)

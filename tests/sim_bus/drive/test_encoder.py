@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -85,7 +86,7 @@ def test_index_latches_once_a_turn_at_its_angle(
         angle = start + count * 2 * math.pi / counts
         off = (angle - math.radians(index_deg) + math.pi) % (2 * math.pi) - math.pi
         assert abs(off) <= 1.01 * 2 * math.pi / counts
-    assert all(abs(b - a) % counts == 0 for a, b in zip(latched, latched[1:], strict=False))
+    assert all(abs(b - a) % counts == 0 for a, b in itertools.pairwise(latched))
 
 
 def test_index_lies_at_the_same_count_in_both_directions() -> None:

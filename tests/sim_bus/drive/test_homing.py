@@ -211,7 +211,5 @@ def test_position_mode_uses_the_new_zero() -> None:
 
 
 def test_inputs_show_the_switches() -> None:
-    seen = [
-        rig_at(angle, **LIMITS, **HOME).read(0x60FD) for angle in (-2100.0, 0.0, 400.0, 2700.0)
-    ]
+    seen = [rig_at(angle, **LIMITS, **HOME).read(0x60FD) for angle in (-2100.0, 0.0, 400.0, 2700.0)]
     assert seen == [1, 0, 4, 2]

@@ -31,7 +31,8 @@ def reference(p: Plant, torque_Nm: Any, duration_s: float) -> np.ndarray:
         angle, v, z, current = y
         side = 1 + math.copysign(1.0, v) * f.direction_asymmetry / 2
         g = side * (
-            f.coulomb_Nm + (f.breakaway_Nm - f.coulomb_Nm) * math.exp(-((v / f.stribeck_rad_s) ** 2))
+            f.coulomb_Nm
+            + (f.breakaway_Nm - f.coulomb_Nm) * math.exp(-((v / f.stribeck_rad_s) ** 2))
         )
         dz = v - f.sigma0_Nm_rad * abs(v) / g * z
         friction = f.sigma0_Nm_rad * z + f.sigma1_Nms_rad * dz + f.viscous_Nms_rad * v
@@ -54,7 +55,9 @@ def reference(p: Plant, torque_Nm: Any, duration_s: float) -> np.ndarray:
         ]
 
     start = [math.radians(p.motor.initial_angle_deg), 0.0, 0.0, 0.0]
-    solution = solve_ivp(rate, (0, duration_s), start, "Radau", rtol=1e-8, atol=1e-10, max_step=1e-3)
+    solution = solve_ivp(
+        rate, (0, duration_s), start, "Radau", rtol=1e-8, atol=1e-10, max_step=1e-3
+    )
     return solution.y[:, -1]
 
 
@@ -225,7 +228,9 @@ def test_current_loop_is_a_first_order_lag() -> None:
     motor = Motor(p)
     for t in (1e-3, 2e-3, 3e-3):
         sample = motor.step_torque(1e-3, 3.0)
-        assert sample.motor_Nm == pytest.approx(3 * (1 - math.exp(-2 * math.pi * 100 * t)), rel=1e-6)
+        assert sample.motor_Nm == pytest.approx(
+            3 * (1 - math.exp(-2 * math.pi * 100 * t)), rel=1e-6
+        )
 
 
 def test_warming_scales_cogging_and_friction() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from drive_rig import NODE, Rig, SdoRefused
+from drive_rig import NODE, Rig, SdoRefusedError
 
 SOD, RTSO, SO, OE, QSA, FRA, FAULT = 0x40, 0x21, 0x23, 0x27, 0x07, 0x0F, 0x08
 PATH = {SOD: (), RTSO: (6,), SO: (6, 7), OE: (6, 7, 15), QSA: (6, 7, 15, 2)}
@@ -167,7 +167,7 @@ class TestModes:
             if mode == 0 or (mode > 0 and supported >> (mode - 1) & 1):
                 rig.set_mode(mode)
             else:
-                with pytest.raises(SdoRefused) as refused:
+                with pytest.raises(SdoRefusedError) as refused:
                     rig.write(0x6060, mode)
                 assert refused.value.code == 0x06090030
                 before = rig.read(0x6061)
@@ -197,7 +197,7 @@ class TestModes:
 class TestMisbehaviour:
     def test_refuses_or_ignores_modes(self, rig: Rig) -> None:
         rig.write(0x2F00, 1, 3)
-        with pytest.raises(SdoRefused):
+        with pytest.raises(SdoRefusedError):
             rig.write(0x6060, 10)
         rig.write(0x2F00, 2, 3)
         rig.write(0x6060, 10)
@@ -312,11 +312,11 @@ class TestFixedObjects:
     def test_scaling_cannot_be_changed(self, rig: Rig, index: int, sub: int) -> None:
         value = rig.read(index, sub)
         rig.write(index, value, sub)
-        with pytest.raises(SdoRefused):
+        with pytest.raises(SdoRefusedError):
             rig.write(index, value + 1, sub)
 
     def test_unknown_homing_method_is_refused(self, rig: Rig) -> None:
-        with pytest.raises(SdoRefused):
+        with pytest.raises(SdoRefusedError):
             rig.write(0x6098, 17)
         listed = [rig.read(0x60E3, sub) for sub in range(1, rig.read(0x60E3, 0) + 1)]
         for method in listed:

@@ -6,7 +6,7 @@ import math
 import struct
 
 import pytest
-from drive_rig import NODE, Rig, SdoRefused
+from drive_rig import NODE, Rig, SdoRefusedError
 
 from sim_bus.plant import Plant
 
@@ -69,7 +69,7 @@ def test_edges_are_a_count_apart_and_depend_on_the_direction(turning: Rig) -> No
 
 
 def test_second_probe_by_source_object(turning: Rig) -> None:
-    with pytest.raises(SdoRefused):
+    with pytest.raises(SdoRefusedError):
         turning.write(0x60B8, (ENABLE | 0x08 | POSITIVE) << 8)
     turning.write(0x60D0, 5, 2)
     turning.write(0x60B8, (ENABLE | 0x08 | POSITIVE) << 8)
@@ -80,7 +80,7 @@ def test_second_probe_by_source_object(turning: Rig) -> None:
 
 
 def test_external_input_does_not_exist(turning: Rig) -> None:
-    with pytest.raises(SdoRefused):
+    with pytest.raises(SdoRefusedError):
         turning.write(0x60B8, ENABLE | POSITIVE)
     assert turning.read(0x60B9) == 0
 
