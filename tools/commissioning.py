@@ -53,6 +53,11 @@ class Paths:
         return self.out / "cogging-profile.json"
 
     @property
+    def run(self) -> Path:
+        """Return the file of what the report must know besides the recordings."""
+        return self.out / "run.json"
+
+    @property
     def results(self) -> Path:
         """Return the file of the results."""
         return self.out / "report.json"
@@ -79,11 +84,11 @@ class Measurement:
         rated = session.winch.motor.rated_torque_Nm
         self._limit_Nm = np.full(session.device.n, _TORQUE_SHARE * rated)
 
-    def sweep(self, inertia_kg_m2: float) -> list[Path]:
+    def sweep(self, inertia_kg_m2: float, turns: int) -> list[Path]:
         """Sweep both directions slowly under the proportional controller (Tremblay, 1.3, 1.4)."""
         gain = sweep_gain(inertia_kg_m2, self._session.latency_s)
         controller = Proportional(np.full(self._session.device.n, gain), self._limit_Nm)
-        passes = both_ways(SWEEP_SPEED_RAD_S, SWEEP_LEAD_IN_RAD, SWEEP_TURNS)
+        passes = both_ways(SWEEP_SPEED_RAD_S, SWEEP_LEAD_IN_RAD, turns)
         return self._run("sweep", controller, passes, {"gain_Nm_rad": gain})
 
     def fast_legs(self, design: PidDesign) -> list[Path]:

@@ -28,13 +28,19 @@ from cdpr_rt.identification import (
 from cdpr_rt.measurement import Pass, both_ways
 from cdpr_rt.tuning import PidDesign, TuningError, design_pid
 from profiles import Winch
-from tools.commissioning import METHODS, VALIDATION_SPEED_RAD_S, Measurement, Paths
+from tools.commissioning import (
+    METHODS,
+    SWEEP_TURNS,
+    VALIDATION_SPEED_RAD_S,
+    Measurement,
+    Paths,
+)
 from tools.evaluation import recordings
 from tools.output import Output
 from tools.session import WinchSession
 
 BANDWIDTHS_HZ = (3.0, 5.0, 8.0, 10.0, 15.0, 25.0)
-DEFAULT_BANDWIDTH_HZ = 8.0
+DEFAULT_BANDWIDTH_HZ = 10.0
 
 _LEAD_IN_RAD = math.tau
 _SHORT_LEAD_IN_RAD = math.pi
@@ -58,13 +64,16 @@ def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
 
     Raises RawLogError and IdentificationError.
     """
-    sweep, fast, again = (legs(paths.passes(name)) for name in ("sweep", "fast", "refine"))
-    thesis = identify_thesis(sweep)
+    sweep, fast = (legs(paths.passes(name)) for name in ("sweep", "fast"))
     inertia, pole_pairs = winch.motor.rotor_inertia_kg_m2, winch.motor.poles // 2
     better = identify_better(sweep + fast, inertia, latency_s, pole_pairs)
-    if again:
-        better = refine(better, again)
-    return Identified(thesis, better)
+    return with_second_pass(Identified(identify_thesis(sweep), better), paths)
+
+
+def with_second_pass(found: Identified, paths: Paths) -> Identified:
+    """Return `found` refined by the second pass, where one was recorded."""
+    again = legs(paths.passes("refine"))
+    return dataclasses.replace(found, better=refine(found.better, again)) if again else found
 
 
 def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, paths: Paths) -> None:
@@ -100,39 +109,54 @@ class Commissioning:
         """Do everything on the bus; return what the report has to know of it."""
         session, winch = self._session, self._session.winch
         started = time.monotonic()
-        session.find_index()
-        session.set_mode(winch.drive.mode_torque)
+        self.prepare()
         self.measure()
         found = identify(winch, session.latency_s, self._paths)
         self.measure_again(found, bandwidth_Hz)
-        found = identify(winch, session.latency_s, self._paths)
+        found = with_second_pass(found, self._paths)
         identity = session.drive_identity
         store_profile(winch, identity, found, self._paths)
-        designs = self.validate(bandwidth_Hz, bandwidths_Hz)
+        wanted, designs = self.validate(
+            CoggingProfile.load(self._paths.profile), bandwidth_Hz, bandwidths_Hz
+        )
         status = session.bus_status()
+        device, boot = session.device, session.boot
         return {
+            "winch": winch.profile,
+            "motor": winch.motor.model,
+            "drive": {"name": boot.device_name, **identity.model_dump(), "changed": boot.changed},
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "encoder_counts_per_turn": boot.counts_per_turn,
+            "rated_torque_Nm": boot.rated_torque_Nm,
+            "inertia_kg_m2": found.better.inertia_kg_m2.value,
             "pid": [dataclasses.asdict(design) for design in designs],
             "bandwidth_Hz": bandwidth_Hz,
+            "bandwidths_Hz": wanted,
             "latency_s": session.latency_s,
             "bus": {
                 "url": str(session.url),
-                "period_s": session.device.period_s,
-                "lockstep": session.device.lockstep,
-                "cycles": session.device.feedback.cycle,
-                "missed": session.device.missed,
+                "period_s": device.period_s,
+                "lockstep": device.lockstep,
+                "cycles": device.feedback.cycle,
+                "missed": device.missed,
                 "late": session.executive.lateness.late,
                 "wall_s": time.monotonic() - started,
                 **{key: status[key] for key in ("load", "peak_cycle_load", "overruns") if status},
             },
         }
 
-    def measure(self) -> None:
+    def prepare(self) -> None:
+        """Find the index and put the drive into its torque mode, still without power."""
+        self._session.find_index()
+        self._session.set_mode(self._session.winch.drive.mode_torque)
+
+    def measure(self, turns: int = SWEEP_TURNS) -> None:
         """Record the sweeps and the fast legs."""
         session = self._session
         inertia = session.winch.motor.rotor_inertia_kg_m2
-        self._out.note("sweeping at 3 deg/s, two turns each way")
+        self._out.note(f"sweeping at 3 deg/s, {turns} turns each way")
         session.enable()
-        self._measure.sweep(inertia)
+        self._measure.sweep(inertia, turns)
         design = design_pid(
             inertia, session.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s
         )
@@ -159,20 +183,22 @@ class Commissioning:
         stored = {"thesis": stored_thesis(found.thesis), "better": stored_better(found.better)}
         return {name: method.compensation() for name, method in stored.items()}
 
-    def validate(self, bandwidth_Hz: float, bandwidths_Hz: tuple[float, ...]) -> list[PidDesign]:
+    def validate(
+        self, profile: CoggingProfile, bandwidth_Hz: float, bandwidths_Hz: tuple[float, ...]
+    ) -> tuple[list[float], list[PidDesign]]:
         """Record the ramps of thesis 1.5 without and with each compensation.
 
-        Both ways at the default bandwidth, one way at the others. Returns the loops' designs.
+        Both ways at the default bandwidth, one way at the others. Returns the bandwidths that
+        could be had and the loops' designs.
         """
         session = self._session
-        profile = CoggingProfile.load(self._paths.profile)
         known: dict[str, AxisCompensation | None] = {
             method: profile.compensation(method, session.drive_identity, session.winch.motor.model)
             for method in ("thesis", "better")
         }
         known["none"] = None
         self._out.note("validating on ramps of 22 deg/s")
-        designs = []
+        reached, designs = [], []
         for wanted in (bandwidth_Hz, *(b for b in bandwidths_Hz if b != bandwidth_Hz)):
             try:
                 design = design_pid(
@@ -183,6 +209,7 @@ class Commissioning:
                     raise
                 self._out.note(str(error))
                 continue
+            reached.append(wanted)
             designs.append(design)
             session.enable()
             for method in METHODS:
@@ -190,7 +217,7 @@ class Commissioning:
                 passes = self._ramps(wanted == bandwidth_Hz)
                 self._measure.track(name, design, known[method], passes, {"method": method})
             session.disable()
-        return designs
+        return reached, designs
 
     @staticmethod
     def _ramps(both: bool) -> tuple[Pass, ...]:

@@ -57,8 +57,12 @@ class WinchSession:
     @property
     def latency_s(self) -> float:
         """From the instant an angle was true to the middle of the cycle its torque acts in."""
-        drive = self.winch.drive
-        return drive.feedback_delay_s + drive.torque_delay_s + 1.5 * self.device.period_s
+        return latency_s(self.winch)
+
+    def idle(self, seconds: float) -> None:
+        """Run cycles without torque for a while."""
+        cycles = iter(range(round(seconds / self.device.period_s)))
+        self.executive.step(lambda: next(cycles, None) is None, seconds + 1.0, "the end")
 
     @property
     def drive_identity(self) -> DriveIdentity:
@@ -129,6 +133,12 @@ class WinchSession:
         return query_status(self.url.channel) if self.url.is_simulated else {}
 
 
+def latency_s(winch: Winch) -> float:
+    """Return the nominal time from a true angle to the middle of the cycle its torque acts in."""
+    drive = winch.drive
+    return drive.feedback_delay_s + drive.torque_delay_s + 1.5 * winch.sync_period_s
+
+
 def _fault_of(network: CanNetwork, node_id: int) -> str:
     try:
         code = network.read_int(node_id, 0x603F)
@@ -172,6 +182,33 @@ def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
 
 
 @contextmanager
+def open_network(
+    winch: Winch,
+    url: BusUrl,
+    out: Output,
+    plant: Path | None = None,
+    truth_log: Path | None = None,
+) -> Iterator[CanNetwork]:
+    """Join the bus for acyclic work, with a simulator of its own where `simbus:` has no name.
+
+    Raises BadInputError for a bus that cannot be opened.
+    """
+    with ExitStack() as stack:
+        if url.starts_own_simulator:
+            url = _own_simulator(stack, winch, out, plant, truth_log)
+        elif plant is not None:
+            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+        drive = winch.drive
+        try:
+            network = CanNetwork(url, [winch.node_id], winch.master_node_id, _heartbeat_s(winch))
+        except BusError as error:
+            raise BadInputError(str(error)) from error
+        stack.callback(network.close)
+        network.add_node(winch.node_id, canopen.import_od(str(drive.eds), winch.node_id))
+        yield network
+
+
+@contextmanager
 def open_winch(
     winch: Winch,
     url: BusUrl,
@@ -179,47 +216,19 @@ def open_winch(
     plant: Path | None = None,
     truth_log: Path | None = None,
 ) -> Iterator[WinchSession]:
-    """Boot the winch's drive on `url`, with a simulator of its own where the bus has no name.
+    """Boot the winch's drive on `url` and get ready to run its axis.
 
-    Whatever ends the block, the drive's power stage is off afterwards. Raises BadInputError for
-    a bus that cannot be opened and the drivers' errors for a drive that does not boot.
+    Whatever ends the block, the drive's power stage is off afterwards. Raises what `open_network`
+    raises and the drivers' errors for a drive that does not boot.
     """
     with ExitStack() as stack:
         stop_requested = stack.enter_context(_stop_on_signals())
-        if url.starts_own_simulator:
-            url = _own_simulator(stack, winch, out, plant, truth_log)
-        elif plant is not None:
-            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-        drive = winch.drive
-        try:
-            network = CanNetwork(
-                url, [winch.node_id], winch.master_node_id, drive.heartbeat_consumer_s / 4
-            )
-        except BusError as error:
-            raise BadInputError(str(error)) from error
-        stack.callback(network.close)
-        network.add_node(winch.node_id, canopen.import_od(str(drive.eds), winch.node_id))
-        limit = min(winch.motor.rated_torque_Nm, winch.motor.peak_torque_Nm)
+        network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
+        limit = winch.motor.rated_torque_Nm
         settings = BootSettings(winch.master_node_id, winch.sync_period_s, limit)
-        report = boot(network, winch.node_id, drive, settings)
+        report = boot(network, winch.node_id, winch.drive, settings)
         network.start_heartbeat()
-        device = AxisGroup(
-            url,
-            network,
-            [
-                AxisConfig(
-                    winch.node_id,
-                    drive,
-                    report.rated_torque_Nm,
-                    report.counts_per_turn,
-                    report.supported_modes,
-                    limit,
-                )
-            ],
-            winch.sync_period_s,
-            winch.master_node_id,
-            drive.heartbeat_consumer_s / 4,
-        )
+        device = _axis(winch, network, report, limit)
         stack.callback(device.close)
         if not device.lockstep:
             for notice in stack.enter_context(paced_realtime()):
@@ -227,14 +236,37 @@ def open_winch(
         limits = Limits(limit, _SPEED_SHARE * winch.motor.rated_speed_rad_s, _FOLLOWING_ERROR_RAD)
         supervisor = Supervisor(limits, device.n, device.period_s)
         executive = Executive(device, supervisor, stop_requested)
-        session = WinchSession(winch, url, network, device, executive, report)
         try:
-            yield session
+            yield WinchSession(winch, network.url, network, device, executive, report)
         except TripError as error:
             if device.faulted().any():
                 code = _fault_of(network, winch.node_id)
                 raise DriveFaultError(f"{error}: {code}") from error
             raise
+
+
+def _heartbeat_s(winch: Winch) -> float:
+    """Return how often the master is heard: four times within what the drive tolerates."""
+    return winch.drive.heartbeat_consumer_s / 4
+
+
+def _axis(winch: Winch, network: CanNetwork, report: BootReport, limit_Nm: float) -> AxisGroup:
+    axis = AxisConfig(
+        node_id=winch.node_id,
+        drive=winch.drive,
+        rated_torque_Nm=report.rated_torque_Nm,
+        counts_per_turn=report.counts_per_turn,
+        supported_modes=report.supported_modes,
+        torque_limit_Nm=limit_Nm,
+    )
+    return AxisGroup(
+        network.url,
+        network,
+        [axis],
+        winch.sync_period_s,
+        winch.master_node_id,
+        _heartbeat_s(winch),
+    )
 
 
 def _own_simulator(

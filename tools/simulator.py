@@ -22,10 +22,15 @@ class OwnSimulator:
     """A running `cdpr sim up`; leaves when its standard input closes, so also when we die."""
 
     def __init__(
-        self, winch: str, bus: str, plant: Path | None = None, truth_log: Path | None = None
+        self,
+        winch: str,
+        bus: str,
+        plant: Path | None = None,
+        truth_log: Path | None = None,
+        nodes: int = 1,
     ) -> None:
         command = [sys.executable, "-m", "tools.cli", "sim", "up", winch, "--bus", bus]
-        command += ["--lockstep", "--exit-with-stdin"]
+        command += ["--lockstep", "--exit-with-stdin", "--nodes", str(nodes)]
         if plant is not None:
             command += ["--plant", str(plant)]
         if truth_log is not None:

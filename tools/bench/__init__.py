@@ -1,0 +1,1 @@
+"""Measurements of the project's own cost, each against something that anyone can check it by."""

@@ -1,0 +1,198 @@
+"""`cdpr drive`: look at one drive, enable it, find its index, turn it, read its objects."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from cdpr_rt.controllers.pid import Pid
+from cdpr_rt.trajectory import Leg
+from cdpr_rt.tuning import design_pid
+from drivers.cia402 import fault_text, mode_name, state_of, supported_modes
+from drivers.errors import SdoError
+from profiles import load_winch
+from tools.commands.options import BusOption, JsonOption, PlantOption, WinchArgument, YesOption
+from tools.errors import BadInputError, WorkFailedError
+from tools.output import Output
+from tools.procedure import DEFAULT_BANDWIDTH_HZ
+from tools.session import WinchSession, confirm_motion, open_bus, open_network, open_winch
+
+app = typer.Typer(help="One drive on the bus.", no_args_is_help=True)
+
+_JOG_RAMP_S = 0.5
+_TORQUE_SHARE = 0.25
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the command group."""
+    parent.add_typer(app, name="drive")
+
+
+@app.command()
+def info(
+    winch: WinchArgument, bus: BusOption, plant: PlantOption = None, as_json: JsonOption = False
+) -> None:
+    """Say who the drive is and how it is; reads only."""
+    out = Output(as_json)
+    profile = load_winch(winch)
+    node = profile.node_id
+    with open_network(profile, open_bus(bus), out, plant) as network:
+        try:
+            vendor, product, revision, serial = (
+                network.read_int(node, 0x1018, sub) for sub in (1, 2, 3, 4)
+            )
+        except SdoError as error:
+            raise WorkFailedError(f"node {node} does not answer: {error}") from error
+        told: dict[str, Any] = {
+            "node_id": node,
+            "device_name": str(network.read(node, 0x1008)),
+            "vendor_id": vendor,
+            "product_code": product,
+            "revision": revision,
+            "serial": serial,
+            "state": state_of(network.read_int(node, 0x6041)).label,
+            "error": fault_text(network.read_int(node, 0x603F)),
+            "mode": mode_name(network.read_int(node, 0x6061)),
+            "supported_modes": [
+                mode_name(mode) for mode in supported_modes(network.read_int(node, 0x6502))
+            ],
+            "position_counts": network.read_int(node, 0x6064),
+            "rated_torque_Nm": network.read_int(node, 0x6076) * 1e-3,
+            "encoder_counts_per_turn": network.read_int(node, 0x608F, 1),
+        }
+    wanted = profile.drive
+    told["profile_fits"] = (vendor, product) == (wanted.vendor_id, wanted.product_code)
+    for key, value in told.items():
+        shown = f"{value:08X}h" if key in ("vendor_id", "product_code", "revision") else value
+        out.say(f"{key:24}{shown}")
+    out.result({"ok": True, **told})
+
+
+@app.command()
+def enable(
+    winch: WinchArgument,
+    bus: BusOption,
+    plant: PlantOption = None,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 2.0,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Enable the drive in torque mode without torque for a while, then switch it off."""
+    out = Output(as_json)
+    profile, url = load_winch(winch), open_bus(bus)
+    confirm_motion(url, yes, "the drive's power stage is switched on")
+    with open_winch(profile, url, out, plant) as session:
+        session.set_mode(profile.drive.mode_torque)
+        session.enable()
+        out.say(f"{session.device.states()[0].label}, no torque")
+        session.idle(seconds)
+        session.disable()
+        state = session.device.states()[0].label
+        out.say(state)
+    out.result({"ok": True, "state": state})
+
+
+@app.command()
+def home(
+    winch: WinchArgument,
+    bus: BusOption,
+    plant: PlantOption = None,
+    method: Annotated[
+        int, typer.Option(help="Homing method of CiA 402: 33, 34, 37, 35, 1 to 14.")
+    ] = 34,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Find the encoder index by homing; the motor turns by up to a turn."""
+    out = Output(as_json)
+    profile, url = load_winch(winch), open_bus(bus)
+    confirm_motion(url, yes, "homing turns the motor by up to a turn")
+    with open_winch(profile, url, out, plant) as session:
+        session.find_index(method)
+        position = math.degrees(session.device.feedback.position_rad[0])
+        out.say(f"homed by method {method}; the motor stands {position:.2f} deg from there")
+    out.result({"ok": True, "method": method, "position_deg": position})
+
+
+@app.command()
+def jog(
+    winch: WinchArgument,
+    bus: BusOption,
+    plant: PlantOption = None,
+    speed_deg_s: Annotated[
+        float, typer.Option("--speed-deg-s", help="Motor speed; its sign is the direction.")
+    ] = 22.0,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 3.0,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Turn the motor at a constant speed under the PID, then switch it off."""
+    out = Output(as_json)
+    profile, url = load_winch(winch), open_bus(bus)
+    fastest = 0.1 * math.degrees(profile.motor.rated_speed_rad_s)
+    if not 0.0 < abs(speed_deg_s) <= fastest:
+        raise BadInputError(
+            f"--speed-deg-s {speed_deg_s:g}: allowed are up to {fastest:.0f} deg/s, not 0"
+        )
+    confirm_motion(url, yes, f"the motor turns at {speed_deg_s:g} deg/s for {seconds:g} s")
+    with open_winch(profile, url, out, plant) as session:
+        session.set_mode(profile.drive.mode_torque)
+        session.enable()
+        start = session.device.feedback.position_rad.copy()
+        leg = Leg(start, np.array([math.radians(speed_deg_s)]), seconds, _JOG_RAMP_S)
+        session.executive.run(_jog_controller(session), leg)
+        moved = math.degrees(session.device.feedback.position_rad[0] - start[0])
+        session.disable()
+    out.say(f"turned by {moved:.2f} deg")
+    out.result({"ok": True, "moved_deg": moved})
+
+
+def _jog_controller(session: WinchSession) -> Pid:
+    motor, period = session.winch.motor, session.device.period_s
+    design = design_pid(motor.rotor_inertia_kg_m2, session.latency_s, DEFAULT_BANDWIDTH_HZ, period)
+    return Pid([design.gains], np.array([_TORQUE_SHARE * motor.rated_torque_Nm]), period)
+
+
+@app.command()
+def od(
+    winch: WinchArgument,
+    bus: BusOption,
+    entry: Annotated[str, typer.Argument(help="Object, as 6064 or 1018:1, hexadecimal.")],
+    plant: PlantOption = None,
+    value: Annotated[
+        str | None, typer.Option("--set", help="Write this integer (0x.. for hexadecimal).")
+    ] = None,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Read or write an object of the drive's dictionary."""
+    out = Output(as_json)
+    profile, url = load_winch(winch), open_bus(bus)
+    index, sub = _object(entry)
+    with open_network(profile, url, out, plant) as network:
+        if value is not None:
+            try:
+                number = int(value, 0)
+            except ValueError:
+                raise BadInputError(f"--set {value}: an integer is wanted, as 12 or 0x0C") from None
+            confirm_motion(url, yes, f"object {index:04X}h:{sub} is set to {number}")
+            network.write(profile.node_id, index, sub, number)
+        read = network.read(profile.node_id, index, sub)
+    shown = f"{read} ({read:X}h)" if isinstance(read, int) and read >= 0 else repr(read)
+    out.say(f"{index:04X}h:{sub} = {shown}")
+    plain = read.hex() if isinstance(read, bytes) else read
+    out.result({"ok": True, "index": index, "subindex": sub, "value": plain})
+
+
+def _object(text: str) -> tuple[int, int]:
+    index, _, sub = text.lower().removeprefix("0x").partition(":")
+    try:
+        numbers = int(index, 16), int(sub or "0", 16)
+    except ValueError:
+        numbers = -1, -1
+    if not (0 < numbers[0] <= 0xFFFF and 0 <= numbers[1] <= 0xFF):
+        raise BadInputError(f"object {text!r}: write it as 6064 or 1018:1, hexadecimal")
+    return numbers

@@ -1,0 +1,30 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+WinchArgument = Annotated[
+    str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")
+]
+BusOption = Annotated[
+    str,
+    typer.Option(
+        "--bus",
+        help="simbus: (starts a simulated drive of its own), simbus:NAME, socketcan:can0, ...",
+        metavar="URL",
+    ),
+]
+PlantOption = Annotated[
+    Path | None,
+    typer.Option("--plant", help="Plant file for the simulated drive that `simbus:` starts."),
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="End with one JSON line on standard output.")
+]
+YesOption = Annotated[
+    bool, typer.Option("--yes", help="Do not ask before a real motor is energised.")
+]
