@@ -22,8 +22,6 @@ from tools.session import WinchSession
 
 METHODS = ("none", "thesis", "better")
 
-SWEEP_SPEED_RAD_S = math.radians(3.0)
-SWEEP_TURNS = 2
 # the rotor trails the set-point by friction over gain; both directions' trail fits in here
 SWEEP_LEAD_IN_RAD = math.radians(30.0)
 VALIDATION_SPEED_RAD_S = math.radians(22.0)
@@ -84,11 +82,11 @@ class Measurement:
         rated = session.winch.motor.rated_torque_Nm
         self._limit_Nm = np.full(session.device.n, _TORQUE_SHARE * rated)
 
-    def sweep(self, inertia_kg_m2: float, turns: int) -> list[Path]:
+    def sweep(self, inertia_kg_m2: float, speed_rad_s: float, turns: int) -> list[Path]:
         """Sweep both directions slowly under the proportional controller (Tremblay, 1.3, 1.4)."""
         gain = sweep_gain(inertia_kg_m2, self._session.latency_s)
         controller = Proportional(np.full(self._session.device.n, gain), self._limit_Nm)
-        passes = both_ways(SWEEP_SPEED_RAD_S, SWEEP_LEAD_IN_RAD, turns)
+        passes = both_ways(speed_rad_s, SWEEP_LEAD_IN_RAD, turns)
         return self._run("sweep", controller, passes, {"gain_Nm_rad": gain})
 
     def fast_legs(self, design: PidDesign) -> list[Path]:

@@ -30,7 +30,6 @@ from cdpr_rt.tuning import PidDesign, TuningError, design_pid
 from profiles import Winch
 from tools.commissioning import (
     METHODS,
-    SWEEP_TURNS,
     VALIDATION_SPEED_RAD_S,
     Measurement,
     Paths,
@@ -39,11 +38,29 @@ from tools.evaluation import recordings
 from tools.output import Output
 from tools.session import WinchSession
 
-BANDWIDTHS_HZ = (3.0, 5.0, 8.0, 10.0, 15.0, 25.0)
 DEFAULT_BANDWIDTH_HZ = 10.0
 
 _LEAD_IN_RAD = math.tau
 _SHORT_LEAD_IN_RAD = math.pi
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """How thoroughly a commissioning measures."""
+
+    sweep_speed_rad_s: float = math.radians(3.0)
+    turns: int = 2
+    """Turns of each sweep and of the second pass, in each direction."""
+    both_ways: bool = True
+    """Whether validation ramps at the default bandwidth go both ways."""
+    bandwidths_Hz: tuple[float, ...] = (3.0, 5.0, 8.0, 10.0, 15.0, 25.0)
+    """Bandwidths at which the methods are compared besides the default."""
+
+
+THOROUGH = Plan()
+"""The thesis' procedure (Tremblay, sections 1.4 and 1.5) and the comparison over bandwidths."""
+QUICK = Plan(math.radians(30.0), turns=1, both_ways=False, bandwidths_Hz=())
+"""A look at a motor within two minutes of its time; the sweep is too fast for fine figures."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -99,13 +116,16 @@ def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, path
 class Commissioning:
     """Runs the steps on an open session; each leaves its files in `paths`."""
 
-    def __init__(self, session: WinchSession, out: Output, paths: Paths) -> None:
+    def __init__(
+        self, session: WinchSession, out: Output, paths: Paths, plan: Plan = THOROUGH
+    ) -> None:
         self._session = session
+        self._plan = plan
         self._out = out
         self._paths = paths
         self._measure = Measurement(session, out, paths)
 
-    def run(self, bandwidth_Hz: float, bandwidths_Hz: tuple[float, ...]) -> dict[str, Any]:
+    def run(self, bandwidth_Hz: float) -> dict[str, Any]:
         """Do everything on the bus; return what the report has to know of it."""
         session, winch = self._session, self._session.winch
         started = time.monotonic()
@@ -116,9 +136,7 @@ class Commissioning:
         found = with_second_pass(found, self._paths)
         identity = session.drive_identity
         store_profile(winch, identity, found, self._paths)
-        wanted, designs = self.validate(
-            CoggingProfile.load(self._paths.profile), bandwidth_Hz, bandwidths_Hz
-        )
+        wanted, designs = self.validate(CoggingProfile.load(self._paths.profile), bandwidth_Hz)
         status = session.bus_status()
         device, boot = session.device, session.boot
         return {
@@ -150,13 +168,13 @@ class Commissioning:
         self._session.find_index()
         self._session.set_mode(self._session.winch.drive.mode_torque)
 
-    def measure(self, turns: int = SWEEP_TURNS) -> None:
+    def measure(self) -> None:
         """Record the sweeps and the fast legs."""
-        session = self._session
+        session, plan = self._session, self._plan
         inertia = session.winch.motor.rotor_inertia_kg_m2
-        self._out.note(f"sweeping at 3 deg/s, {turns} turns each way")
+        self._out.note(f"sweeping at {math.degrees(plan.sweep_speed_rad_s):g} deg/s")
         session.enable()
-        self._measure.sweep(inertia, turns)
+        self._measure.sweep(inertia, plan.sweep_speed_rad_s, plan.turns)
         design = design_pid(
             inertia, session.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s
         )
@@ -169,7 +187,7 @@ class Commissioning:
         session = self._session
         self._out.note("second pass at 22 deg/s under compensation")
         session.enable()
-        passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 2)
+        passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, self._plan.turns)
         self._measure.track("refine", self._design(found.better, bandwidth_Hz), known, passes)
         session.disable()
 
@@ -184,7 +202,7 @@ class Commissioning:
         return {name: method.compensation() for name, method in stored.items()}
 
     def validate(
-        self, profile: CoggingProfile, bandwidth_Hz: float, bandwidths_Hz: tuple[float, ...]
+        self, profile: CoggingProfile, bandwidth_Hz: float
     ) -> tuple[list[float], list[PidDesign]]:
         """Record the ramps of thesis 1.5 without and with each compensation.
 
@@ -199,7 +217,8 @@ class Commissioning:
         known["none"] = None
         self._out.note("validating on ramps of 22 deg/s")
         reached, designs = [], []
-        for wanted in (bandwidth_Hz, *(b for b in bandwidths_Hz if b != bandwidth_Hz)):
+        others = [b for b in self._plan.bandwidths_Hz if b != bandwidth_Hz]
+        for wanted in (bandwidth_Hz, *others):
             try:
                 design = design_pid(
                     profile.inertia_kg_m2, session.latency_s, wanted, session.device.period_s
@@ -214,7 +233,7 @@ class Commissioning:
             session.enable()
             for method in METHODS:
                 name = validation_name(method, wanted)
-                passes = self._ramps(wanted == bandwidth_Hz)
+                passes = self._ramps(self._plan.both_ways and wanted == bandwidth_Hz)
                 self._measure.track(name, design, known[method], passes, {"method": method})
             session.disable()
         return reached, designs

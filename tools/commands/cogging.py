@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,7 @@ from tools.output import Output, to_json
 from tools.procedure import (
     DEFAULT_BANDWIDTH_HZ,
     Commissioning,
+    Plan,
     identify,
     store_profile,
     validation_name,
@@ -46,6 +48,9 @@ def sweep(
     out_dir: _OutOption,
     plant: PlantOption = None,
     turns: Annotated[int, typer.Option(min=1, max=20, help="Turns in each direction.")] = 2,
+    speed_deg_s: Annotated[
+        float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
+    ] = 3.0,
     overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
     yes: YesOption = False,
     as_json: JsonOption = False,
@@ -56,9 +61,10 @@ def sweep(
     paths = prepare(out_dir, overwrite)
     confirm_motion(url, yes, "the sweep turns the motor")
     with keeping_raw_data(paths), open_winch(profile, url, out, plant, paths.truth) as session:
-        steps = Commissioning(session, out, paths)
+        plan = Plan(sweep_speed_rad_s=math.radians(speed_deg_s), turns=turns)
+        steps = Commissioning(session, out, paths, plan)
         steps.prepare()
-        steps.measure(turns)
+        steps.measure()
     recorded = [str(p) for name in ("sweep", "fast") for p in paths.passes(name)]
     for path in recorded:
         out.say(f"recorded {path}")
@@ -119,9 +125,10 @@ def validate(
     paths = prepare(out_dir, overwrite)
     confirm_motion(url, yes, "the validation turns the motor")
     with keeping_raw_data(paths), open_winch(profile, url, out, plant, paths.truth) as session:
-        steps = Commissioning(session, out, paths)
+        plan = Plan(bandwidths_Hz=())
+        steps = Commissioning(session, out, paths, plan)
         steps.prepare()
-        steps.validate(learnt, bandwidth_Hz, ())
+        steps.validate(learnt, bandwidth_Hz)
     truth = read_truth(paths.truth) if paths.truth.exists() else None
     runs = {m: paths.passes(validation_name(m, bandwidth_Hz)) for m in METHODS}
     result = compare(runs, truth)

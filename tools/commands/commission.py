@@ -18,7 +18,7 @@ from tools.commands.options import BusOption, JsonOption, PlantOption, WinchArgu
 from tools.commissioning import Paths
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output, to_json
-from tools.procedure import BANDWIDTHS_HZ, DEFAULT_BANDWIDTH_HZ, Commissioning, identify
+from tools.procedure import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH, Commissioning, identify
 from tools.report.page import build
 from tools.results import assemble
 from tools.session import confirm_motion, open_bus, open_winch
@@ -46,7 +46,7 @@ def commission(
         bool, typer.Option("--overwrite", help="Replace an earlier commissioning in --out.")
     ] = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Validate at the one bandwidth only.")
+        bool, typer.Option("--quick", help="A rough look in a tenth of the time.")
     ] = False,
     yes: YesOption = False,
     as_json: JsonOption = False,
@@ -57,10 +57,10 @@ def commission(
     url = open_bus(bus)
     paths = prepare(out_dir or Path("out") / f"commission-{profile.profile}", overwrite)
     confirm_motion(url, yes, "commissioning turns the motor for about 20 minutes")
-    others = () if quick else BANDWIDTHS_HZ
+    plan = QUICK if quick else THOROUGH
     with keeping_raw_data(paths):
         with open_winch(profile, url, out, plant, paths.truth) as session:
-            run = Commissioning(session, out, paths).run(bandwidth_Hz, others)
+            run = Commissioning(session, out, paths, plan).run(bandwidth_Hz)
         write(paths.run, to_json(run, indent=1))
         found = identify(profile, run["latency_s"], paths)
         results = assemble(paths, run, found)
