@@ -23,6 +23,7 @@ def open_python_can(url: BusUrl, filters: Filters | None = None) -> can.BusABC:
     """
     try:
         options: dict[str, Any] = dict(url.options)
+        options.pop("lockstep", None)  # ours, not the interface's
         bus = can.Bus(url.channel, url.interface, ignore_config=True, **options)
         bus.set_filters(_python_can_filters(filters))
     except BusError:

@@ -70,6 +70,11 @@ class BusUrl:
         """Whether no motor of flesh and blood can hang on this bus."""
         return self.interface == "simbus"
 
+    @property
+    def asks_for_lockstep(self) -> bool:
+        """Whether the simulator at the other end of a virtual CAN lets time wait for SYNC."""
+        return self.options.get("lockstep") is True
+
     def __str__(self) -> str:
         if self.interface == "socketcand":
             return f"socketcand://{self.options['host']}:{self.options['port']}/{self.channel}"

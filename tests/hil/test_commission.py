@@ -1,0 +1,106 @@
+"""The main job as a user does it: whole commissionings on the embedded bus."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PLANTS = Path(__file__).parent / "plants"
+
+
+def cdpr(*arguments: str | Path, timeout_s: float = 300.0) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
+
+
+def last_line(result: subprocess.CompletedProcess[str]) -> dict[str, Any]:
+    assert result.returncode == 0, result.stderr[-2000:]
+    return dict(json.loads(result.stdout.splitlines()[-1]))
+
+
+def commission(out: Path, *more: str | Path) -> dict[str, Any]:
+    base: Sequence[str | Path] = ("commission", "winch-mpp0923d", "--bus", "simbus:", "--json")
+    return last_line(cdpr(*base, "--out", out, *more))
+
+
+@pytest.fixture(scope="module")
+def thorough(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    out = tmp_path_factory.mktemp("thorough")
+    return out, commission(out)
+
+
+@pytest.mark.xdist_group("commission")
+def test_default_plant_reaches_the_figures(thorough: tuple[Path, dict[str, Any]]) -> None:
+    _, result = thorough
+    validation = result["validation"]
+    assert validation["judged_on"] == "true angle"
+    better, thesis = validation["better"]["ratios"], validation["thesis"]["ratios"]
+    assert better["rms_position_error"] >= 10
+    assert better["peak_pid_effort"] >= 10
+    assert better["peak_velocity_error"] >= 8
+    assert thesis["rms_position_error"] >= 3
+    assert thesis["peak_pid_effort"] >= 6
+    assert result["bus"]["overruns"] == 0
+    assert result["bus"]["missed"] == 0
+    # the plant file's truth, which nothing but this test compares with: 60 mNm in drive units
+    assert result["identification"]["orders"] == [4]
+    assert result["identification"]["amplitudes_Nm"][0] == pytest.approx(0.06 / 1.04, rel=0.03)
+    bandwidths = [row["bandwidth_Hz"] for row in validation["bandwidths"]]
+    assert bandwidths[0] == 3.0
+    assert bandwidths[-1] == 25.0
+
+
+@pytest.mark.xdist_group("commission")
+def test_report_can_be_made_again_offline(thorough: tuple[Path, dict[str, Any]]) -> None:
+    out, result = thorough
+    (out / "report.html").unlink()
+    again = last_line(cdpr("cogging", "report", out, "--json"))
+    assert (out / "report.html").stat().st_size > 50_000
+    assert again["validation"] == result["validation"]
+
+
+@pytest.mark.xdist_group("commission")
+def test_fit_from_the_raw_data_alone(thorough: tuple[Path, dict[str, Any]]) -> None:
+    out, result = thorough
+    again = last_line(cdpr("cogging", "fit", out, "--json"))
+    assert again["identification"]["orders"] == result["identification"]["orders"]
+    assert again["identification"]["amplitudes_Nm"] == pytest.approx(
+        result["identification"]["amplitudes_Nm"], rel=1e-6
+    )
+
+
+@pytest.mark.xdist_group("commission")
+def test_profile_serves_another_day(thorough: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+    out, _ = thorough
+    profile = out / "cogging-profile.json"
+    arguments = ("cogging", "validate", "winch-mpp0923d", profile, "--bus", "simbus:", "--json")
+    result = last_line(cdpr(*arguments, "--out", tmp_path / "later"))
+    assert result["validation"]["better"]["ratios"]["rms_position_error"] >= 10
+
+
+@pytest.mark.xdist_group("commission")
+def test_a_raw_file_cut_short_is_said_so(
+    thorough: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    out, _ = thorough
+    raw = tmp_path / "raw"
+    raw.mkdir()
+    whole = (out / "raw" / "sweep-0.raw").read_bytes()
+    (raw / "sweep-0.raw").write_bytes(whole[: len(whole) // 50])
+    result = cdpr("cogging", "fit", tmp_path)
+    assert result.returncode == 1
+    assert "sweep-0.raw" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize("plant", sorted(PLANTS.glob("*.toml")), ids=lambda path: path.stem)
+def test_other_plants(plant: Path, tmp_path: Path) -> None:
+    ratios = commission(tmp_path, "--plant", plant, "--quick")["validation"]["better"]["ratios"]
+    assert ratios["rms_position_error"] > 2
+    assert ratios["peak_pid_effort"] > 2
