@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,16 +12,36 @@ from cdpr_rt.compensation import FrictionFeedforward
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.identification import design
 from cdpr_rt.identification.design import Equations, Layout
-from cdpr_rt.identification.estimate import Fit, Prior, best_stribeck_speed, fit
+from cdpr_rt.identification.estimate import Fit, Prior, fit
+from cdpr_rt.identification.friction import FrictionShape, Motion, fit_shape
 from cdpr_rt.identification.result import BetterResult, Estimate, Harmonic, hint
-from cdpr_rt.identification.selection import Choice, choose, noise_weights, solve, total
-from cdpr_rt.identification.sweep import TWO_PI, IdentificationError, SweepData, check_runs
-from cdpr_rt.identification.windows import Windows, contiguous, cut
+from cdpr_rt.identification.selection import (
+    Choice,
+    choose,
+    noise_weights,
+    rows_counted,
+    solve,
+    total,
+)
+from cdpr_rt.identification.sweep import (
+    TWO_PI,
+    IdentificationError,
+    SweepData,
+    check_runs,
+    period_s,
+)
+from cdpr_rt.identification.windows import Windows, contiguous, cut, encoder_step_rad
 
 MAX_ORDER = 200
 _LATENCY_SD_s = 1e-3
 _LAG_SD_rad = np.deg2rad(1.0)
 _CONFIDENCE = 1.96
+_NOISE_GAIN = 2.45
+"""Of a second difference: sqrt(6)."""
+_TOLERATED_Nm = 3e-3
+_FINE_s = (0.005, 0.02)
+_LONGEST_s = 30.0
+_QUICK_rad_s = 3.0
 
 
 def identify_better(
@@ -30,14 +51,11 @@ def identify_better(
 
     `inertia_kg_m2` is kept where no leg is fast enough to measure it; `latency_s` is the nominal
     one (see compensation.AxisCompensation). Raises IdentificationError where the rotor was not
-    seen sliding in both directions.
+    seen moving in both directions.
     """
     check_runs(legs)
-    windows = _windows(legs, latency_s)
-    coarse = design.accumulate(windows, Layout(tuple(range(1, MAX_ORDER + 1))))
-    choice, weight, which = _choose(coarse)
-    speed = coarse.layout.stribeck_rad_s[which] if which is not None else None
-    return _finish(windows, choice, weight, speed, None, inertia_kg_m2, latency_s, pole_pairs)
+    start = _Start(latency_s, pole_pairs, inertia_kg_m2, None)
+    return _identify(legs, start)
 
 
 def refine(better: BetterResult, run_legs: Sequence[SweepData]) -> BetterResult:
@@ -47,117 +65,94 @@ def refine(better: BetterResult, run_legs: Sequence[SweepData]) -> BetterResult:
     cogging is fitted afresh.
     """
     check_runs(run_legs)
-    latency = better.latency_s.value
-    windows = _windows(run_legs, latency)
-    coarse = design.accumulate(windows, Layout(tuple(range(1, MAX_ORDER + 1))))
-    choice, weight, _ = _choose(coarse)
-    return _finish(
-        windows,
-        choice,
-        weight,
-        better.friction.stribeck_speed_rad_s,
-        better,
-        better.inertia_kg_m2.value,
-        latency,
-        better.pole_pairs,
-    )
+    inertia = better.inertia_kg_m2.value
+    start = _Start(better.latency_s.value, better.pole_pairs, inertia, better)
+    return _identify(run_legs, start)
 
 
-def _windows(legs: Sequence[SweepData], latency_s: float) -> list[Windows]:
-    windows = [w for run in contiguous(legs) if (w := cut(run, latency_s)) is not None]
+@dataclass(frozen=True)
+class _Start:
+    """What is known before a fit; `before` is the result that is being refined."""
+
+    latency_s: float
+    pole_pairs: int
+    inertia_kg_m2: float
+    before: BetterResult | None
+
+
+def _identify(legs: Sequence[SweepData], start: _Start) -> BetterResult:
+    """Choose orders, find the friction's shape, fit all together."""
+    runs = contiguous(legs)
+    windows = [w for run in runs if (w := cut(run, start.latency_s)) is not None]
     for sign, word in ((1.0, "increasing"), (-1.0, "decreasing")):
-        if not any(np.any((w.sliding | w.creeping) & (w.direction == sign)) for w in windows):
+        if not any(np.any(w.moving & (w.direction == sign)) for w in windows):
             raise IdentificationError(f"the rotor was never seen moving with {word} angle")
-    return windows
+    shape = start.before.shape if start.before else FrictionShape()
+    every = Layout(tuple(range(1, MAX_ORDER + 1)), shape)
+    equations = design.accumulate(windows, every)
+    choice, beta = _choose(equations)
+    shape = _shape(runs, start, choice, beta, shape)
+    layout = Layout(choice.orders, shape)
+    fast = any(w.fast for w in windows)
+    used = []
+    if any(not w.quasi_static for w in windows):
+        used += [design.INERTIA, design.COULOMB, design.COULOMB + 1]
+    if any(w.quasi_static for w in windows):
+        used += [design.CREEP, design.CREEP + 1]
+    quick = any(w.cruise_rad_s > _QUICK_rad_s for w in windows)
+    used += [design.VISCOUS] if fast or start.before else []
+    used += [design.LATENCY] if fast else []
+    lag = (start.before.lag_rad.value if start.before else 0.0, _LAG_SD_rad)
+    fitted = fit(windows, layout, used, _priors(start.before, quick), lag)
+    return _result(fitted, windows, choice, start, fast)
 
 
-def _fixed(equations: Equations, which: int | None) -> list[int]:
-    """Return the columns besides harmonics that the rows can tell."""
-    parts = [p for p in equations.parts.values() if p.rows]
-    size = np.sum([np.diag(p.xx) for p in parts], axis=0)
-    wanted = [design.INERTIA, design.INERTIA_SLOW, design.COULOMB, design.COULOMB + 1]
-    wanted += [design.VISCOUS] if size[design.INERTIA] > 0.0 else []
-    wanted += [design.CREEP, design.CREEP + 1]
-    wanted += equations.layout.stribeck(which) if which is not None else []
-    return [c for c in wanted if size[c] > 0.0]
-
-
-def _choose(equations: Equations) -> tuple[Choice, FloatArray, int | None]:
-    """Choose orders and Stribeck speed, and weigh the kinds of rows, in two rounds."""
-    which = None
-    weight = np.ones(equations.kinds)
-    for kind in range(equations.kinds):
-        rows = sum(p.rows for key, p in equations.parts.items() if key[1] == kind)
-        weight[kind] = 1.0 if rows >= 20 else 0.0
-    for _ in range(3):
-        fixed = _fixed(equations, which)
+def _choose(equations: Equations) -> tuple[Choice, FloatArray]:
+    """Choose the orders and weigh the kinds of rows, in two rounds; return harmonics' values."""
+    fixed = [design.INERTIA, design.COULOMB, design.COULOMB + 1, design.VISCOUS]
+    fixed += [design.CREEP, design.CREEP + 1]
+    weight = rows_counted(equations)
+    for _ in range(2):
         choice = choose(equations, fixed, weight)
-        harmonics = [c for n in choice.orders for c in equations.layout.order(n - 1)]
-        everything = total(equations.parts, weight)
-        errors = {}
-        for candidate in (None, *range(len(equations.layout.stribeck_rad_s))):
-            columns = _fixed(equations, candidate) + harmonics
-            beta, _ = solve(everything, columns)
-            errors[candidate] = float(everything.yy - beta @ everything.xy[columns])
-        which = min(errors, key=lambda key: errors[key])
-        columns = _fixed(equations, which) + harmonics
-        beta, _ = solve(everything, columns)
+        columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
+        beta, _ = solve(total(equations.parts, weight), columns)
         weight = noise_weights(equations, columns, beta)
-    return choice, weight, which
+    return choice, beta[len(fixed) :]
 
 
-def _priors(better: BetterResult | None, layout: Layout) -> list[Prior]:
+def _shape(
+    runs: list[SweepData], start: _Start, choice: Choice, beta: FloatArray, shape: FrictionShape
+) -> FrictionShape:
+    """Find the friction's shape from short windows, with the cogging found so far taken off."""
+    layout = Layout(choice.orders)
+    motions = []
+    for run in runs:
+        step = encoder_step_rad(run) / math.sqrt(12.0)
+        spacing = math.sqrt(_NOISE_GAIN * step * start.inertia_kg_m2 / _TOLERATED_Nm)
+        spacing = min(max(spacing, _FINE_s[0]), _FINE_s[1])
+        part = SweepData(*(a[-round(_LONGEST_s / period_s(run)) :] for a in vars(run).values()))
+        w = cut(part, start.latency_s, spacing)
+        if w is None or w.quasi_static:
+            continue
+        rows = np.flatnonzero(w.moving)
+        if rows.size:
+            x = design.matrix(w, layout, 0, w.torque_Nm.size)[:, design.FIXED :]
+            motions.append(Motion(w, (w.torque_Nm - x @ beta)[rows], rows))
+    return fit_shape(motions, shape if start.before else None) if motions else shape
+
+
+def _priors(better: BetterResult | None, quick: bool) -> list[Prior]:
     """Return what is known beforehand: the nominal latency, and in a second pass the friction."""
     priors = [Prior(design.LATENCY, 0.0, _LATENCY_SD_s)]
-    if better is None:
+    if better is None or quick:
         return priors
-    f = better.friction
-    forward, backward = layout.stribeck(0)
     known = (
         (design.INERTIA, better.inertia_kg_m2.value, 0.02),
-        (design.COULOMB, f.coulomb_forward_Nm, 0.05),
-        (design.COULOMB + 1, f.coulomb_backward_Nm, 0.05),
-        (design.VISCOUS, f.viscous_Nms_rad, 0.2),
-        (forward, f.stribeck_forward_Nm, 0.3),
-        (backward, f.stribeck_backward_Nm, 0.3),
+        (design.COULOMB, better.coulomb_forward_Nm.value, 0.05),
+        (design.COULOMB + 1, better.coulomb_backward_Nm.value, 0.05),
+        (design.VISCOUS, better.viscous_Nms_rad.value, 0.2),
     )
-    floor = 1e-9
-    return priors + [Prior(c, m, max(floor, abs(m) * share)) for c, m, share in known]
-
-
-def _finish(
-    windows: list[Windows],
-    choice: Choice,
-    weight: FloatArray,
-    speed: float | None,
-    before: BetterResult | None,
-    inertia: float,
-    latency: float,
-    pole_pairs: int,
-) -> BetterResult:
-    """Fit the chosen orders and put the result together."""
-    fast = any(w.fast for w in windows)
-    used = [design.INERTIA] if fast else []
-    used += [design.INERTIA_SLOW] if any(not w.fast for w in windows) else []
-    used += [design.COULOMB, design.COULOMB + 1]
-    used += [design.VISCOUS] if fast or before is not None else []
-    used += [design.CREEP, design.CREEP + 1] if _creeps(windows, weight) else []
-    if speed is not None and before is None:
-        speed = best_stribeck_speed(windows, choice.orders, weight, speed, used)
-    layout = Layout(choice.orders, (speed or 1.0,))
-    if speed is not None:
-        used += layout.stribeck(0)
-    used += [design.LATENCY]
-    lag = (before.lag_rad.value if before else 0.0, _LAG_SD_rad)
-    fitted = fit(windows, layout, weight, used, _priors(before, layout), lag)
-    return _result(fitted, windows, choice, before, inertia, latency, pole_pairs, fast)
-
-
-def _creeps(windows: list[Windows], weight: FloatArray) -> bool:
-    return any(
-        np.any((kind >= 0) & (kind % 2 == 1) & (weight[np.maximum(kind, 0)] > 0.0))
-        for kind in design.kinds(windows)
-    )
+    return priors + [Prior(c, m, max(1e-9, abs(m) * share)) for c, m, share in known]
 
 
 def _estimate(fitted: Fit, column: int) -> Estimate:
@@ -165,45 +160,41 @@ def _estimate(fitted: Fit, column: int) -> Estimate:
 
 
 def _result(
-    fitted: Fit,
-    windows: list[Windows],
-    choice: Choice,
-    before: BetterResult | None,
-    inertia: float,
-    latency: float,
-    pole_pairs: int,
-    fast: bool,
+    fitted: Fit, windows: list[Windows], choice: Choice, start: _Start, fast: bool
 ) -> BetterResult:
-    layout = fitted.layout
-    forward, backward = layout.stribeck(0)
+    """Put the result together."""
+    layout, before = fitted.layout, start.before
     measured = fast
-    rotor = _estimate(fitted, design.INERTIA) if fast else Estimate(inertia, 0.0)
+    rotor = _estimate(fitted, design.INERTIA) if fast else Estimate(start.inertia_kg_m2, 0.0)
     if not fast and before is not None:
         rotor, measured = before.inertia_kg_m2, before.inertia_measured
     delay = _estimate(fitted, design.LATENCY)
     lag_half = _CONFIDENCE * float(np.sqrt(max(fitted.covariance[-1, -1], 0.0)))
-    rows = sum(w.sliding.size for w in windows)
-    lost = sum(int(np.sum(~(w.sliding | w.creeping))) for w in windows)
-    coulomb = [_estimate(fitted, design.COULOMB + i) for i in (0, 1)]
+    rows = sum(w.moving.size for w in windows)
+    lost = sum(int(np.sum(~w.moving)) for w in windows)
+    level = design.COULOMB if design.COULOMB in fitted.used else design.CREEP
+    coulomb = [_estimate(fitted, level + i) for i in (0, 1)]
+    rise = layout.shape.rise if level == design.COULOMB else 0.0
     viscous = _estimate(fitted, design.VISCOUS)
     return BetterResult(
-        harmonics=tuple(_harmonic(fitted, i, pole_pairs) for i in range(len(layout.orders))),
+        harmonics=tuple(_harmonic(fitted, i, start.pole_pairs) for i in range(len(layout.orders))),
         friction=FrictionFeedforward(
             coulomb[0].value,
             coulomb[1].value,
-            fitted.value(forward),
-            fitted.value(backward),
-            layout.stribeck_rad_s[0],
+            coulomb[0].value * rise,
+            coulomb[1].value * rise,
+            layout.shape.speed_rad_s,
             viscous.value,
         ),
+        shape=layout.shape,
         coulomb_forward_Nm=coulomb[0],
         coulomb_backward_Nm=coulomb[1],
         viscous_Nms_rad=viscous,
         inertia_kg_m2=rotor,
         inertia_measured=measured,
-        latency_s=Estimate(latency + delay.value, delay.half_width),
+        latency_s=Estimate(start.latency_s + delay.value, delay.half_width),
         lag_rad=Estimate(fitted.lag_rad, lag_half),
-        pole_pairs=pole_pairs,
+        pole_pairs=start.pole_pairs,
         coverage=_coverage(windows),
         excluded_fraction=lost / rows,
         residual_rms_Nm=float(np.sqrt(np.mean(fitted.residual_Nm**2))),
@@ -240,6 +231,6 @@ def _coverage(windows: list[Windows], bins: int = 360) -> float:
     """Return the share of the turn on which the rotor was seen moving with the ramp."""
     seen = np.zeros(bins, np.bool_)
     for w in windows:
-        turn = w.centre_rad[w.sliding | w.creeping] / TWO_PI
+        turn = w.centre_rad[w.moving] / TWO_PI
         seen[np.floor((turn - np.floor(turn)) * bins).astype(int) % bins] = True
     return float(np.mean(seen))

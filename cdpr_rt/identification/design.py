@@ -8,44 +8,36 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdpr_rt.exchange import FloatArray
+from cdpr_rt.identification.friction import FrictionShape, relative_friction
 from cdpr_rt.identification.sweep import TWO_PI
-from cdpr_rt.identification.windows import Windows
+from cdpr_rt.identification.windows import Windows, average
 from cdpr_rt.jit import jit
 
-STRIBECK_SPEEDS_rad_s = (0.05, 0.1, 0.2, 0.4, 0.8)
 _CHUNK = 1024
+_QUICK_rad_s = 1.0
 
-INERTIA, INERTIA_SLOW, LATENCY = 0, 1, 2
-COULOMB = 3  # forward, backward
-VISCOUS = 5
-CREEP = 6  # forward, backward
-FIXED = 8
+INERTIA, LATENCY = 0, 1
+COULOMB = 2  # forward, backward
+VISCOUS = 4
+CREEP = 5  # forward, backward
+FIXED = 7
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which column is what: the fixed ones, two for each Stribeck speed, two for each order."""
+    """Which column is what: the fixed ones, then cosine and sine of each order."""
 
     orders: tuple[int, ...]
-    stribeck_rad_s: tuple[float, ...] = STRIBECK_SPEEDS_rad_s
+    shape: FrictionShape = FrictionShape()
 
     @property
     def columns(self) -> int:
         """How many columns there are."""
-        return self.first_order + 2 * len(self.orders)
-
-    @property
-    def first_order(self) -> int:
-        """The column of the first order's cosine."""
-        return FIXED + 2 * len(self.stribeck_rad_s)
-
-    def stribeck(self, which: int) -> list[int]:
-        """Return the columns, forward and backward, of one Stribeck speed."""
-        return [FIXED + 2 * which, FIXED + 2 * which + 1]
+        return FIXED + 2 * len(self.orders)
 
     def order(self, which: int) -> list[int]:
         """Return the columns, cosine and sine, of one order."""
-        return [self.first_order + 2 * which, self.first_order + 2 * which + 1]
+        return [FIXED + 2 * which, FIXED + 2 * which + 1]
 
 
 @dataclass
@@ -103,45 +95,37 @@ def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArra
     """Return the regression's columns for windows `first` up to `last`, (last - first, columns)."""
     rows = slice(first, last)
     out = np.zeros((last - first, layout.columns))
-    sliding = windows.sliding[rows].astype(float)
-    creeping = windows.creeping[rows].astype(float)
-    direction = windows.direction[rows]
-    up, down = np.maximum(direction, 0.0), np.minimum(direction, 0.0)
-    out[:, INERTIA if windows.fast else INERTIA_SLOW] = windows.acceleration_rad_s2[rows]
-    out[:, LATENCY] = windows.torque_rate_Nm_s[rows] * sliding
-    out[:, COULOMB], out[:, COULOMB + 1] = up * sliding, down * sliding
-    out[:, CREEP], out[:, CREEP + 1] = up * creeping, down * creeping
-    speeds = [windows.velocity_rad_s]
-    speeds += [np.exp(-((windows.velocity_rad_s / vs) ** 2)) for vs in layout.stribeck_rad_s]
-    averaged = _average(np.column_stack(speeds), windows, first, last)
-    out[:, VISCOUS] = averaged[:, 0] * sliding
-    for i in range(len(layout.stribeck_rad_s)):
-        forward, backward = layout.stribeck(i)
-        out[:, forward] = averaged[:, 1 + i] * up * sliding
-        out[:, backward] = averaged[:, 1 + i] * down * sliding
-    harmonics = np.zeros((last - first, 2 * len(layout.orders)))
-    orders = np.array(layout.orders, float)
-    _harmonics(windows.angle_rad, windows.bump, windows.stride, first, orders, harmonics)
-    out[:, layout.first_order :] = harmonics
-    return out
-
-
-def _average(values: FloatArray, windows: Windows, first: int, last: int) -> FloatArray:
-    """Return the windows' averages of values given at the thinned samples, (rows, columns)."""
-    out = np.zeros((last - first, values.shape[1]))
-    for k, weight in enumerate(windows.bump):
-        place = np.arange(first, last) * windows.stride + k
-        out += weight * values[np.minimum(place, values.shape[0] - 1)]
+    _harmonics(
+        windows.angle_rad,
+        windows.bump,
+        windows.stride,
+        first,
+        np.array(layout.orders, float),
+        out[:, FIXED:],
+    )
+    if windows.quasi_static:
+        out[:, CREEP] = np.maximum(windows.direction[rows], 0.0)
+        out[:, CREEP + 1] = np.minimum(windows.direction[rows], 0.0)
+        return out
+    out[:, INERTIA] = windows.acceleration_rad_s2[rows]
+    out[:, LATENCY] = windows.torque_rate_Nm_s[rows] * (
+        np.abs(windows.speed_rad_s[rows]) > _QUICK_rad_s
+    )
+    friction = relative_friction(
+        windows.angle_rad, windows.velocity_rad_s, windows.play_rad, layout.shape
+    )
+    values = (np.maximum(friction, 0.0), np.minimum(friction, 0.0), windows.velocity_rad_s)
+    out[:, COULOMB : VISCOUS + 1] = average(np.column_stack(values), windows, first, last)
     return out
 
 
 def kinds(windows: Sequence[Windows]) -> list[FloatArray]:
-    """Number the rows of each run by their noise: run class, sliding or not; -1 is left out."""
+    """Number the rows of each run by the run's speed, as noise differs; -1 is left out."""
     speeds = sorted({round(float(np.rad2deg(w.cruise_rad_s)), 1) for w in windows})
     numbered = []
     for w in windows:
-        base = 2 * speeds.index(round(float(np.rad2deg(w.cruise_rad_s)), 1))
-        numbered.append(np.where(w.sliding, base, np.where(w.creeping, base + 1, -1)))
+        kind = speeds.index(round(float(np.rad2deg(w.cruise_rad_s)), 1))
+        numbered.append(np.where(w.moving, kind, -1))
     return numbered
 
 

@@ -11,11 +11,14 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.identification import design
 from cdpr_rt.identification.design import Layout
 from cdpr_rt.identification.sweep import TWO_PI
-from cdpr_rt.identification.windows import Windows
+from cdpr_rt.identification.windows import IntArray, Windows
 
 CLUSTERS_PER_TURN = 24
-_ROUNDS = 4
-_SPEED_SPREAD = np.geomspace(0.5, 2.0, 9)
+_ROUNDS = 5
+_SPREAD_OF_MEDIAN = 1.4826
+_LEAST_SPREAD_Nm = 1e-5
+_TAIL = 2.5
+_FEWEST_ROWS = 20
 
 
 @dataclass(frozen=True)
@@ -29,13 +32,13 @@ class Prior:
 
 @dataclass
 class Rows:
-    """All rows of the fit: columns `x` (r, p), torque `y`, weight, direction and cluster (r,)."""
+    """All rows of the fit: columns `x` (r, p), torque `y` and the rest (r,)."""
 
     x: FloatArray
     y: FloatArray
-    weight: FloatArray
+    kind: IntArray
     direction: FloatArray
-    cluster: FloatArray
+    cluster: IntArray
 
 
 @dataclass(frozen=True)
@@ -61,51 +64,27 @@ class Fit:
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
 
-def gather(windows: Sequence[Windows], layout: Layout, weight: FloatArray) -> Rows:
-    """Collect the rows whose kind has a weight."""
-    xs, ys, ws, ds, cs = [], [], [], [], []
+def gather(windows: Sequence[Windows], layout: Layout) -> Rows:
+    """Collect the rows in which the rotor moves with the ramp."""
+    xs, ys, ks, ds, cs = [], [], [], [], []
     clusters = 0
     for w, kind in zip(windows, design.kinds(windows), strict=True):
-        keep = np.flatnonzero((kind >= 0) & (weight[np.maximum(kind, 0)] > 0.0))
+        keep = np.flatnonzero(kind >= 0)
         place = np.floor(w.centre_rad * (CLUSTERS_PER_TURN / TWO_PI)).astype(int)
         place += clusters - int(place.min())
         clusters = int(place.max()) + 1
         xs.append(design.matrix(w, layout, 0, w.torque_Nm.size)[keep])
         ys.append(w.torque_Nm[keep])
-        ws.append(weight[kind[keep]])
+        ks.append(kind[keep])
         ds.append(w.direction[keep])
         cs.append(place[keep])
-    parts = (np.concatenate(a) for a in (xs, ys, ws, ds, cs))
+    parts = (np.concatenate(a) for a in (xs, ys, ks, ds, cs))
     return Rows(*parts)
-
-
-def best_stribeck_speed(
-    windows: Sequence[Windows],
-    orders: tuple[int, ...],
-    weight: FloatArray,
-    speed: float,
-    used: list[int],
-) -> float:
-    """Return the Stribeck speed near `speed` that leaves the smallest error."""
-    layout = Layout(orders, tuple(float(speed * s) for s in _SPEED_SPREAD))
-    rows = gather(windows, layout, weight)
-    harmonics = list(range(layout.first_order, layout.columns))
-    errors = []
-    for i in range(len(layout.stribeck_rad_s)):
-        columns = [*used, *layout.stribeck(i), *harmonics]
-        root = np.sqrt(rows.weight)
-        x, y = rows.x[:, columns] * root[:, None], rows.y * root
-        a, b = x.T @ x, x.T @ y
-        scale = np.sqrt(np.diag(a))
-        beta = np.linalg.solve(a / np.outer(scale, scale) + 1e-10 * np.eye(len(columns)), b / scale)
-        errors.append(float(y @ y - (b / scale) @ beta))
-    return layout.stribeck_rad_s[int(np.argmin(errors))]
 
 
 def fit(
     windows: Sequence[Windows],
     layout: Layout,
-    weight: FloatArray,
     used: list[int],
     priors: list[Prior],
     lag_prior: tuple[float, float],
@@ -115,8 +94,9 @@ def fit(
     `lag_prior` is mean and standard deviation in rad. The covariance is the sandwich over clusters
     of neighbouring windows, so that errors may depend on one another within a cluster.
     """
-    rows = gather(windows, layout, weight)
-    harmonics = list(range(layout.first_order, layout.columns))
+    rows = gather(windows, layout)
+    weight = np.ones(rows.y.size)
+    harmonics = list(range(design.FIXED, layout.columns))
     columns = [*used, *harmonics]
     orders = np.repeat(np.array(layout.orders, float), 2)
     precision, mean = np.zeros(len(columns) + 1), np.zeros(len(columns) + 1)
@@ -134,16 +114,18 @@ def fit(
         slope = _slope(turned, orders, beta[len(used) : -1])
         x = np.column_stack([x, -rows.direction * slope])
         mean[-1] = lag_prior[0] - lag
-        a = (x * rows.weight[:, None]).T @ x
+        a = (x * weight[:, None]).T @ x
         scale = np.sqrt(np.diag(a) + precision + 1e-300)
         scaled = (a + np.diag(precision)) / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
         inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
-        right = x.T @ (rows.weight * rows.y) + precision * mean
+        right = x.T @ (weight * rows.y) + precision * mean
         beta = inverse @ right
+        residual = rows.y - x @ beta
         if step < _ROUNDS - 1:
             lag += float(beta[-1])
-    residual = rows.y - x @ beta
-    covariance = inverse @ (_meat(x, rows, residual) + np.diag(precision)) @ inverse
+            weight = _weights(rows, residual)
+    meat = _meat(x * (weight * residual)[:, None], rows.cluster)
+    covariance = inverse @ (meat + np.diag(precision)) @ inverse
     return Fit(layout, columns, beta[:-1], covariance, lag + float(beta[-1]), residual)
 
 
@@ -163,11 +145,22 @@ def _slope(harmonics: FloatArray, orders: FloatArray, beta: FloatArray) -> Float
     return np.asarray(harmonics[:, ::2] @ (n * beta[1::2]) - harmonics[:, 1::2] @ (n * beta[::2]))
 
 
-def _meat(x: FloatArray, rows: Rows, residual: FloatArray) -> FloatArray:
+def _weights(rows: Rows, residual: FloatArray) -> FloatArray:
+    """Return each row's weight by Huber's rule, with a spread for each kind; 0 for rare kinds."""
+    weight = np.zeros(rows.kind.size)
+    for kind in np.unique(rows.kind):
+        mine = rows.kind == kind
+        if np.count_nonzero(mine) >= _FEWEST_ROWS:
+            size = np.abs(residual[mine])
+            spread = max(_SPREAD_OF_MEDIAN * float(np.median(size)), _LEAST_SPREAD_Nm)
+            weight[mine] = np.minimum(1.0, _TAIL * spread / np.maximum(size, 1e-12)) / spread**2
+    return weight
+
+
+def _meat(score: FloatArray, cluster: IntArray) -> FloatArray:
     """Return the sum over clusters of the outer product of their score."""
-    score = x * (rows.weight * residual)[:, None]
-    order = np.argsort(rows.cluster, kind="stable")
-    edges = np.flatnonzero(np.diff(rows.cluster[order])) + 1
+    order = np.argsort(cluster, kind="stable")
+    edges = np.flatnonzero(np.diff(cluster[order])) + 1
     sums = np.add.reduceat(score[order], np.concatenate([[0], edges]), axis=0)
     count = sums.shape[0]
-    return np.asarray(sums.T @ sums * (count / max(1, count - x.shape[1] // 8)))
+    return np.asarray(sums.T @ sums * (count / max(1, count - score.shape[1] // 8)))

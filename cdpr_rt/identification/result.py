@@ -8,6 +8,7 @@ import numpy as np
 
 from cdpr_rt.compensation import FrictionFeedforward
 from cdpr_rt.exchange import FloatArray
+from cdpr_rt.identification.friction import FrictionShape
 from cdpr_rt.identification.sweep import TWO_PI
 
 
@@ -39,6 +40,7 @@ class BetterResult:
 
     harmonics: tuple[Harmonic, ...]
     friction: FrictionFeedforward
+    shape: FrictionShape
     coulomb_forward_Nm: Estimate
     coulomb_backward_Nm: Estimate
     viscous_Nms_rad: Estimate

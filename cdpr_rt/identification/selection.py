@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from numpy.typing import NDArray
-
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.identification.design import Equations, Layout, Normal
-
-IntArray = NDArray[np.intp]
+from cdpr_rt.identification.windows import IntArray
 
 _MOST = 40
 _FEWEST_ROWS = 20
@@ -61,6 +58,14 @@ def squared_error(part: Normal, columns: list[int], beta: FloatArray) -> float:
     """Return the sum of squared errors of a prediction over a part's rows."""
     xy, xx = part.xy[columns], part.xx[np.ix_(columns, columns)]
     return max(0.0, float(part.yy - 2.0 * beta @ xy + beta @ xx @ beta))
+
+
+def rows_counted(equations: Equations) -> FloatArray:
+    """Return the weight 1 for each kind of row that is not rare, 0 for the others."""
+    count = np.zeros(equations.kinds)
+    for (_, kind), part in equations.parts.items():
+        count[kind] += part.rows
+    return np.where(count >= _FEWEST_ROWS, 1.0, 0.0)
 
 
 def noise_weights(equations: Equations, columns: list[int], beta: FloatArray) -> FloatArray:

@@ -12,20 +12,27 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
 from cdpr_rt.exchange import BoolArray, FloatArray
 from cdpr_rt.identification.sweep import SweepData, period_s
+
+IntArray = NDArray[np.intp]
 
 _FAST_rad_s = np.deg2rad(30.0)
 _STEP_rad = np.deg2rad(0.2)
 _SHORTEST_s = 0.009
 _LONGEST_s = 0.039
 _FAST_STEP_s = 0.015
+_THIN_s = 0.003
 _SMOOTHING_s = 0.004
 _SMOOTHING_COUNTS = 1.5
 _SMOOTHING_SPEED_rad_s = 0.3
 _STANDING = 0.2
+_SLOWEST_rad_s = 0.03
+_FORGETTING_rad = 0.02
+_PLAY_COUNTS = 0.35
 _QUASI_STATIC_rad_s = np.deg2rad(10.0)
 
 
@@ -46,14 +53,18 @@ class Windows:
     acceleration_rad_s2: FloatArray
     centre_rad: FloatArray
     centre_s: FloatArray
+    speed_rad_s: FloatArray
+    """Mean velocity, signed."""
     direction: FloatArray
-    """Sign of the mean velocity."""
-    sliding: BoolArray
-    """The rotor moves in one direction all through the window."""
-    creeping: BoolArray
-    """It moves with the ramp, but not all the time."""
+    """Its sign."""
+    moving: BoolArray
+    """The rotor slides along with the set-point; in a sweep it may stick at moments."""
+    quasi_static: bool
+    """A sweep: too slow for its friction to follow any curve."""
     fast: bool
-    """Whether the run's set-point is fast enough to tell the inertia."""
+    """Whether the set-point is fast enough to tell inertia and viscous friction."""
+    play_rad: float
+    """Movements of the smoothed angle that may be noise."""
     cruise_rad_s: float
     """The run's highest set-point speed."""
 
@@ -85,48 +96,48 @@ def _odd(x: float) -> int:
     return max(1, 2 * round((x - 1.0) / 2.0) + 1)
 
 
-def cut(run: SweepData, latency_s: float) -> Windows | None:
+def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Windows | None:
     """Cut one contiguous run into windows, None where it is too short for any.
 
     `latency_s` is the time from the instant an angle was true to the mean instant at which the
     torque sent in that cycle acts: an angle belongs to the torque sent one latency earlier.
+    `spacing_s` from window to window is chosen by the run's speed where it is not given.
     """
     period = period_s(run)
     speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))
     fast = speed > _FAST_rad_s
-    thin = 1 if fast else _odd(0.003 / period)
+    thin = 1 if fast or spacing_s else _odd(_THIN_s / period)
     spacing = (
         _FAST_STEP_s if fast else min(max(_STEP_rad / max(speed, 1e-3), _SHORTEST_s), _LONGEST_s)
     )
+    spacing = spacing_s or spacing
     stride = _odd(spacing / period / thin)
     step = stride * thin
     rows = (run.time_s.size - 1) // step - 4
     if rows < 1:
         return None
-    smoothing = _SMOOTHING_COUNTS * encoder_step_rad(run) / min(speed, _SMOOTHING_SPEED_rad_s)
+    smoothing = _SMOOTHING_COUNTS * encoder_step_rad(run) / _SMOOTHING_SPEED_rad_s
     smoothing = min(max(smoothing, _SMOOTHING_s), 4.0 * spacing) / period
-    reading = run.angle_rad - run.angle_rad[0]
     deviation = run.angle_rad - run.setpoint_rad
     angle = run.setpoint_rad + gaussian_filter1d(deviation, smoothing, mode="nearest")
     drift = gaussian_filter1d(deviation, smoothing, order=1, mode="nearest") / period
     velocity = run.setpoint_velocity_rad_s + drift
     cycle = np.arange(run.time_s.size)
     torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
+    torque = gaussian_filter1d(torque, smoothing, mode="nearest")  # both sides of the equation
     centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
-    boxed = uniform_filter1d(uniform_filter1d(reading, step), step)
+    boxed = uniform_filter1d(uniform_filter1d(angle - angle[0], step), step)
     smooth_torque = torque
     for _ in range(4):
         smooth_torque = uniform_filter1d(smooth_torque, step)
     mean = uniform_filter1d(velocity, 2 * step + 1)[centre]
     direction = np.sign(mean)
-    low = _extreme(velocity, rows, step, np.minimum)
-    high = _extreme(velocity, rows, step, np.maximum)
-    least = np.where(direction > 0.0, low, -high)
-    moving = np.abs(mean) > _STANDING * np.abs(run.setpoint_velocity_rad_s[centre])
-    along = direction * run.setpoint_velocity_rad_s[centre] > 0.0
-    sliding = moving & (least > 0.1 * np.abs(mean)) & (direction != 0.0)
-    if speed < _QUASI_STATIC_rad_s:  # it sticks and slips within a window: no friction curve here
-        sliding[:] = False
+    quasi_static = speed < _QUASI_STATIC_rad_s
+    set_speed = run.setpoint_velocity_rad_s[centre]
+    moving = (mean * set_speed > 0.0) & (np.abs(mean) > _STANDING * np.abs(set_speed))
+    if not quasi_static:  # what friction remembers from before the rotor slid is not known
+        moving &= np.abs(mean) > _SLOWEST_rad_s
+        moving &= np.abs(angle[centre] - angle[0]) > _FORGETTING_rad
     return Windows(
         angle_rad=angle[(thin - 1) // 2 :: thin],
         velocity_rad_s=velocity[(thin - 1) // 2 :: thin],
@@ -138,10 +149,12 @@ def cut(run: SweepData, latency_s: float) -> Windows | None:
         / (step * period) ** 2,
         centre_rad=angle[centre],
         centre_s=run.time_s[centre],
+        speed_rad_s=mean,
         direction=direction,
-        sliding=np.asarray(sliding, np.bool_),
-        creeping=np.asarray(~sliding & moving & along, np.bool_),
+        moving=np.asarray(moving, np.bool_),
+        quasi_static=quasi_static,
         fast=fast,
+        play_rad=_PLAY_COUNTS * encoder_step_rad(run),
         cruise_rad_s=speed,
     )
 
@@ -155,8 +168,10 @@ def _bump(stride: int) -> FloatArray:
     return weights
 
 
-def _extreme(values: FloatArray, rows: int, step: int, pick: np.ufunc) -> FloatArray:
-    """Return the least or greatest value in the inner half of each window, (rows,)."""
-    blocks = values[: (rows + 4) * step].reshape(rows + 4, step)
-    block = pick.reduce(blocks, axis=1)
-    return np.asarray(pick(block[1 : rows + 1], block[2 : rows + 2]))
+def average(values: FloatArray, windows: Windows, first: int, last: int) -> FloatArray:
+    """Return the windows' averages of values given at the thinned samples, (rows, columns)."""
+    out = np.zeros((last - first, values.shape[1]))
+    for k, weight in enumerate(windows.bump):
+        place = np.arange(first, last) * windows.stride + k
+        out += weight * values[np.minimum(place, values.shape[0] - 1)]
+    return out
