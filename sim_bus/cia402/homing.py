@@ -81,7 +81,7 @@ class Homing(Mode):
         self._phase = _Phase.IDLE
         self._method = METHODS[33]
         self._direction = 0
-        self._edge = 0
+        self._sought_from = 0
         self._turned = False
         self.homed = False
         """Whether the last homing procedure was completed."""
@@ -141,7 +141,7 @@ class Homing(Mode):
         self.axis.drive(servo.VELOCITY, direction * min(float(speed), self.axis.speed_limit))
 
     def _seek_index(self) -> None:
-        self._edge = self.axis.sample[1]
+        self._sought_from = self.axis.sample[1]
         self._move(_Phase.INDEX, self._method.final, fast=False)
 
     def _fail(self) -> None:
@@ -186,11 +186,9 @@ class Homing(Mode):
     def _find_index(self, flags: int) -> None:
         axis = self.axis
         if flags & rotor.INDEX_ROSE:
-            counts = int(axis.motor["rise_count"][0])
-            if (counts - self._edge) * self._method.final >= 0:
-                self._set_home(counts)
-                return
-        travelled = abs(axis.sample[1] - self._edge)
+            self._set_home(int(axis.motor["rise_count"][0]))
+            return
+        travelled = abs(axis.sample[1] - self._sought_from)
         if travelled > _TURNS_WITHOUT_INDEX * axis.plant.encoder.counts_per_turn:
             self._fail()
 

@@ -36,8 +36,9 @@ _FAULTS = (
     (servo.I2T_TRIP, ErrorCode.LOAD_LEVEL, False),
     (servo.FOLLOWING_ERROR, ErrorCode.FOLLOWING_ERROR, False),
 )
-_CAUSES = servo.OVERCURRENT | servo.OVERSPEED | servo.I2T_TRIP
-_ALWAYS_WATCHED = _CAUSES | servo.FOLLOWING_ERROR | servo.I2T_WARNING
+_LASTING = servo.OVERCURRENT | servo.OVERSPEED | servo.I2T_WARNING
+"""What refuses a fault reset; an overload must have cooled down to below the warning."""
+_ALWAYS_WATCHED = _LASTING | servo.I2T_TRIP | servo.FOLLOWING_ERROR
 _COASTING = (
     State.NOT_READY_TO_SWITCH_ON,
     State.SWITCH_ON_DISABLED,
@@ -300,7 +301,7 @@ class Machine:
             self.command(0x0000 if option == 2 else 0x0002)
 
     def _reset_fault(self) -> None:
-        if self.axis.flags & _CAUSES:
+        if self.axis.flags & _LASTING:
             return
         self._enter(State.SWITCH_ON_DISABLED)
         self._error.value = 0

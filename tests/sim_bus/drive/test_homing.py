@@ -14,7 +14,7 @@ from sim_bus.plant import Plant
 COUNTS = 1000
 INDEX_DEG = 40.0
 LIMITS = {"negative_deg": -2000.0, "positive_deg": 2600.0}
-HOME = {"home_from_deg": 130.0, "home_to_deg": 700.0}
+HOME = {"home_from_deg": 130.0, "home_to_deg": 1000.0}
 
 
 def rig_at(angle_deg: float, **limits: float) -> Rig:
@@ -213,3 +213,15 @@ def test_position_mode_uses_the_new_zero() -> None:
 def test_inputs_show_the_switches() -> None:
     seen = [rig_at(angle, **LIMITS, **HOME).read(0x60FD) for angle in (-2100.0, 0.0, 400.0, 2700.0)]
     assert seen == [1, 0, 4, 2]
+
+
+def test_long_steps_of_bus_time_change_nothing() -> None:
+    rig = rig_at(0.0)
+    rig.write(0x6098, 34)
+    rig.enable(6)
+    rig.write(0x6040, 0x1F)
+    rig.now += 3.0
+    rig.drive.advance(rig.now)
+    assert rig.read(0x6041) & 0x3400 == 0x1400
+    # From standstill the index is 111 counts away at 1000 counts/s.
+    assert math.degrees(rig.truth[0]) == pytest.approx(INDEX_DEG, abs=10)

@@ -51,9 +51,10 @@ def node(request: pytest.FixtureRequest) -> Iterator[BaseNode402]:
 
 def start(node: BaseNode402) -> None:
     """Map the words as the package's documentation does, then go operational with a SYNC."""
+    states: list[int] = []
+    node.nmt.add_heartbeat_callback(states.append)
     node.nmt.send_command(129)
-    node.nmt.wait_for_bootup(timeout=5)
-    node.nmt.state = "PRE-OPERATIONAL"
+    assert wait_for(lambda: 0 in states), "no boot-up message"
     node.sdo[0x1017].raw = 50
     node.nmt.wait_for_heartbeat(timeout=5)
     node.rpdo.read()
