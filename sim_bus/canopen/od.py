@@ -10,6 +10,7 @@ from canopen.objectdictionary import ODVariable
 
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.datatypes import CODECS, DOMAIN, Codec, Value
+from sim_bus.errors import SimulatorError
 
 COMMUNICATION = range(0x1000, 0x2000)
 """Communication profile area: what a reset of communication restores."""
@@ -17,7 +18,7 @@ APPLICATION = range(0x2000, 0xC000)
 """Manufacturer and device profile areas."""
 
 
-class DictionaryError(Exception):
+class DictionaryError(SimulatorError):
     """An EDS that cannot be used, or an object the device needs and the EDS lacks."""
 
 
@@ -116,9 +117,7 @@ class Entry:
             raise SdoAbort(Abort.LENGTH_TOO_HIGH if length > size else Abort.LENGTH_TOO_LOW)
 
     def write_bytes(self, data: bytes) -> None:
-        """Write what an SDO download carried; raises SdoAbort."""
-        if not self.writable:
-            raise SdoAbort(Abort.READ_ONLY)
+        """Write what a permitted SDO download carried; raises SdoAbort."""
         self.check_length(len(data))
         self.write(self.codec.decode(data))
 

@@ -9,11 +9,12 @@ from pathlib import Path
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.datatypes import Value
 from sim_bus.canopen.od import Entry, ObjectDictionary
+from sim_bus.errors import SimulatorError
 
 Hook = Callable[[Value], None]
 
 
-class StoreError(Exception):
+class StoreError(SimulatorError):
     """A parameter file that cannot be read."""
 
 

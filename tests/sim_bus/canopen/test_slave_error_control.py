@@ -69,6 +69,13 @@ def test_resets_restore_what_they_should(bench: Bench) -> None:
     assert ("reset",) in bench.app.events[2:]
 
 
+def test_reset_leaves_to_the_device_what_masters_cannot_write(bench: Bench) -> None:
+    bench.od.set(0x6064, 0, 4711)
+    bench.od.set(0x1018, 4, 77)
+    bench.nmt(129)
+    assert (bench.od.get(0x6064), bench.od.get(0x1018, 4)) == (4711, 77)
+
+
 def test_heartbeat_carries_the_state_at_the_period(bench: Bench) -> None:
     bench.write(0x1017, 0, (250).to_bytes(2, "little"))
     bench.nmt(1)
@@ -156,6 +163,16 @@ def test_consumers_are_checked_and_independent(bench: Bench) -> None:
     assert bench.od.get(0x1001) == 0x11
     beat(bench, node=9)
     assert bench.od.get(0x1001) == 0
+
+
+def test_giving_up_the_watch_takes_the_error_back(bench: Bench) -> None:
+    watch_master(bench, 100)
+    beat(bench)
+    bench.run_to(1.0)
+    bench.write(0x1016, 1, bytes(4))
+    assert bench.od.get(0x1001) == 0
+    assert beat(bench) == []
+    assert bench.run_to(2.0) == []
 
 
 def test_emergencies_are_told_once_kept_in_the_register_and_in_the_history(bench: Bench) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -37,7 +38,7 @@ def wait_for(condition: Callable[[], bool], timeout_s: float = 3.0) -> bool:
 
 @pytest.fixture
 def site(request: pytest.FixtureRequest) -> Iterator[Site]:
-    name = f"slave-{request.node.name}"[:60]
+    name = f"slave-{os.getpid()}-{request.node.name}"[:60]
     od = ObjectDictionary.from_eds(GENERIC_EDS, NODE)
     app = Recorder()
     slave = CanopenSlave(od, NODE, app)
@@ -59,8 +60,10 @@ def site(request: pytest.FixtureRequest) -> Iterator[Site]:
 
 def test_stranger_resets_starts_and_stops_the_node(site: Site) -> None:
     nmt = site.remote.nmt
+    seen: list[bytes] = []
+    site.network.subscribe(0x700 + NODE, lambda _id, data, _time: seen.append(bytes(data)))
     nmt.send_command(129)
-    nmt.wait_for_bootup(timeout=3)
+    assert wait_for(lambda: seen == [b"\0"])
     site.remote.sdo[0x1017].raw = 20
     for state in ("OPERATIONAL", "STOPPED", "PRE-OPERATIONAL"):
         nmt.state = state
@@ -113,8 +116,8 @@ def test_stranger_hears_of_a_lost_heartbeat(site: Site) -> None:
     site.remote.sdo[0x1016][1].raw = MASTER << 16 | 100
     site.remote.nmt.state = "OPERATIONAL"
     site.network.send_message(0x700 + MASTER, b"\x05")
-    emergency = site.remote.emcy.wait(0x8130, timeout=3.0)
-    assert emergency is not None
-    assert emergency.register == 0x11
+    assert wait_for(lambda: bool(site.remote.emcy.active))
+    (emergency,) = site.remote.emcy.active
+    assert (emergency.code, emergency.register) == (0x8130, 0x11)
     assert site.remote.sdo[0x1003][1].raw & 0xFFFF == 0x8130
     assert ("heartbeat_lost", MASTER) in site.app.events

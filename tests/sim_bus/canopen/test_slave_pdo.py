@@ -9,7 +9,9 @@ import canopen
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from slave_bench import NODE, RTR, Bench, Recorder
+from slave_bench import GENERIC_EDS, NODE, RTR, Bench, Recorder
+
+from sim_bus.canopen import DictionaryError
 
 TPDO1, TPDO2, TPDO3 = 0x180 + NODE, 0x280 + NODE, 0x380 + NODE
 RPDO1, RPDO2 = 0x200 + NODE, 0x300 + NODE
@@ -48,6 +50,9 @@ def test_default_map_is_exchanged_at_each_sync(running: Bench) -> None:
     assert od.get(0x6040) == 0
     assert running.sync() == [expected]
     assert (od.get(0x6040), od.get(0x6071)) == (0x0F, -700)
+    running.write(0x6071, 0, b"\0\0")
+    running.sync()
+    assert od.get(0x6071) == 0
 
 
 def test_order_at_a_sync_is_latch_then_rpdo_then_act_then_tpdo(bench: Bench) -> None:
@@ -375,10 +380,6 @@ def test_any_mapping_carries_what_the_objects_hold(
 
 
 def test_impossible_mapping_in_an_eds_is_named(tmp_path: Path) -> None:
-    from slave_bench import GENERIC_EDS  # noqa: PLC0415
-
-    from sim_bus.canopen import DictionaryError  # noqa: PLC0415
-
     eds = tmp_path / "bad.eds"
     eds.write_text(GENERIC_EDS.read_text().replace("0x60640020", "0x60650820"))
     with pytest.raises(DictionaryError, match="1A0"):

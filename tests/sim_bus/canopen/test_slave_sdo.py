@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from slave_bench import NODE, Bench
 
+from sim_bus.canopen import Abort, SdoAbort
 from sim_bus.canopen.sdo_server import TIMEOUT_S
 
 DOMAIN = 0x2F10
@@ -158,6 +159,16 @@ def test_every_type_of_object_keeps_what_was_written(
     assert odd_bench.read(index) == encoded
 
 
+def test_limits_of_an_object_are_kept(bench: Bench) -> None:
+    torque = bench.od.entry(0x6071)
+    torque.low, torque.high = -100, 50
+    assert refused(bench, 0x6071, 0, struct.pack("<h", -101)) == 0x06090032
+    assert refused(bench, 0x6071, 0, struct.pack("<h", 51)) == 0x06090031
+    for value in (-100, 50):
+        bench.write(0x6071, 0, struct.pack("<h", value))
+        assert bench.od.get(0x6071) == value
+
+
 def test_defaults_of_the_eds_are_served(odd_bench: Bench) -> None:
     assert odd_bench.od.get(0x2107) == 0
     assert odd_bench.read(0x2100) == b"\x56\x34\x12"
@@ -172,8 +183,6 @@ def test_expedited_download_without_size_takes_the_objects_own(bench: Bench) -> 
 
 
 def test_device_may_refuse_a_write_and_provide_a_read(bench: Bench) -> None:
-    from sim_bus.canopen import Abort, SdoAbort  # noqa: PLC0415
-
     def refuse(value: object) -> None:
         raise SdoAbort(Abort.LOCAL_CONTROL)
 
