@@ -42,6 +42,7 @@ _TOLERATED_Nm = 3e-3
 _FINE_s = (0.005, 0.02)
 _LONGEST_s = 30.0
 _QUICK_rad_s = 3.0
+_ROUNDS = 2
 
 
 def identify_better(
@@ -91,8 +92,6 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> BetterResult:
     every = Layout(tuple(range(1, MAX_ORDER + 1)), shape)
     equations = design.accumulate(windows, every)
     choice, beta = _choose(equations)
-    shape = _shape(runs, start, choice, beta, shape)
-    layout = Layout(choice.orders, shape)
     fast = any(w.fast for w in windows)
     used = []
     if any(not w.quasi_static for w in windows):
@@ -103,7 +102,12 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> BetterResult:
     used += [design.VISCOUS] if fast or start.before else []
     used += [design.LATENCY] if fast else []
     lag = (start.before.lag_rad.value if start.before else 0.0, _LAG_SD_rad)
-    fitted = fit(windows, layout, used, _priors(start.before, quick), lag)
+    priors = _priors(start.before, quick)
+    for number in range(_ROUNDS):
+        known = start.before.shape if start.before else (shape if number else None)
+        shape = _shape(runs, start, choice.orders, beta, known) or shape
+        fitted = fit(windows, Layout(choice.orders, shape), used, priors, lag)
+        beta = fitted.beta[len(used) :]
     return _result(fitted, windows, choice, start, fast)
 
 
@@ -121,10 +125,14 @@ def _choose(equations: Equations) -> tuple[Choice, FloatArray]:
 
 
 def _shape(
-    runs: list[SweepData], start: _Start, choice: Choice, beta: FloatArray, shape: FrictionShape
-) -> FrictionShape:
+    runs: list[SweepData],
+    start: _Start,
+    orders: tuple[int, ...],
+    beta: FloatArray,
+    known: FrictionShape | None,
+) -> FrictionShape | None:
     """Find the friction's shape from short windows, with the cogging found so far taken off."""
-    layout = Layout(choice.orders)
+    layout = Layout(orders, FrictionShape())
     motions = []
     for run in runs:
         step = encoder_step_rad(run) / math.sqrt(12.0)
@@ -138,7 +146,7 @@ def _shape(
         if rows.size:
             x = design.matrix(w, layout, 0, w.torque_Nm.size)[:, design.FIXED :]
             motions.append(Motion(w, (w.torque_Nm - x @ beta)[rows], rows))
-    return fit_shape(motions, shape if start.before else None) if motions else shape
+    return fit_shape(motions, known) if motions else None
 
 
 def _priors(better: BetterResult | None, quick: bool) -> list[Prior]:

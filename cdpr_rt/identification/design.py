@@ -28,7 +28,7 @@ class Layout:
     """Which column is what: the fixed ones, then cosine and sine of each order."""
 
     orders: tuple[int, ...]
-    shape: FrictionShape = FrictionShape()
+    shape: FrictionShape
 
     @property
     def columns(self) -> int:

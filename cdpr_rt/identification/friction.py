@@ -1,9 +1,9 @@
 """The friction curve's shape: Stribeck speed and height, and the way it takes to develop.
 
 Friction follows its steady curve g(v) = 1 + rise·exp(-(v/speed)²), relative to Coulomb friction,
-only after a short way of sliding, as in the LuGre model (Canudas de Wit et al., 1995): over a way dx
-it moves towards sign(dx)·g by the share 1 - exp(-|dx|/(way·g)). A rotor that sticks and slips is
-thus described as well as one that slides.
+only after a short way of sliding, as in the LuGre model (Canudas de Wit et al., 1995): over a way
+dx it moves towards sign(dx)·g by the share 1 - exp(-|dx|/(way·g)). A rotor that sticks and slips
+is thus described as well as one that slides.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from cdpr_rt.jit import jit
 
 _LOWEST = (0.003, 0.02, 2e-4)
 _HIGHEST = (1.5, 2.0, 2e-2)
-_STARTS = ((0.3, 0.1, 3e-3), (0.3, 0.4, 3e-3))
 _STEPS = 60
-_DEPENDENT = 8.0
-"""Windows that overlap and noise that lasts: so many rows count as one."""
-_TRUST = 0.3
+_SPREAD_OF_MEDIAN = 1.4826
+_LEAST_SPREAD_Nm = 2e-4
+_TAIL = 2.5
 
 
 @dataclass(frozen=True)
@@ -35,6 +34,9 @@ class FrictionShape:
     rise: float = 0.25
     speed_rad_s: float = 0.2
     way_rad: float = 4e-3
+
+
+_STARTS = (FrictionShape(0.3, 0.1, 3e-3), FrictionShape(0.3, 0.4, 3e-3))
 
 
 @jit
@@ -86,51 +88,53 @@ class Motion:
 def fit_shape(motions: Sequence[Motion], start: FrictionShape | None = None) -> FrictionShape:
     """Return the shape whose friction, with inertia and viscosity, leaves the smallest error.
 
-    For every shape tried the linear coefficients are solved for. The error's level is taken for
-    each run by itself. With `start` the search begins there and leaves it only for good reason.
+    For every shape tried the linear coefficients are solved for. Each run has its own level of
+    error, and rows far outside it count little: a run in which the rotor hunts must not decide.
+    With `start` the search begins there.
     """
-    rows = sum(m.rows.size for m in motions)
     low, high = np.log(_LOWEST), np.log(_HIGHEST)
-    level = np.ones(len(motions))
-
-    def errors(point: FloatArray) -> FloatArray:
-        return _errors(motions, level, FrictionShape(*np.exp(np.clip(point, low, high))))
+    first = start or FrictionShape()
+    weights = [_weights(_residuals([m], [np.ones(m.rows.size)], first)[0]) for m in motions]
 
     def objective(point: FloatArray) -> float:
         inside = np.clip(point, low, high)
-        cost = 0.5 * rows / _DEPENDENT * math.log(float(np.sum(errors(point) / level**2)) + 1e-30)
-        if start is not None:
-            cost += 0.5 * float(np.sum(((inside - centre) / _TRUST) ** 2))
-        return cost + 1e3 * float(np.sum((point - inside) ** 2))
+        residuals = _residuals(motions, weights, FrictionShape(*np.exp(inside)))
+        total = sum(float(w @ r**2) for w, r in zip(weights, residuals, strict=True))
+        return math.log(total + 1e-30) + float(np.sum((point - inside) ** 2))
 
-    centre = np.log([start.rise, start.speed_rad_s, start.way_rad]) if start else np.zeros(3)
-    points = [centre] if start else [np.log(s) for s in _STARTS]
+    points = [np.log((s.rise, s.speed_rad_s, s.way_rad)) for s in ([start] if start else _STARTS)]
     for _ in range(2):
         found = [
             minimize(objective, p, method="Nelder-Mead", options={"maxfev": _STEPS, "xatol": 0.02})
             for p in points
         ]
-        best = min(found, key=lambda f: float(f.fun))
-        points = [best.x]
-        counts = np.array([m.rows.size for m in motions])
-        level = np.maximum(np.sqrt(errors(best.x) / counts), 2e-4)
-    return FrictionShape(*(float(v) for v in np.exp(np.clip(best.x, low, high))))
+        points = [min(found, key=lambda f: float(f.fun)).x]
+        shape = FrictionShape(*(float(v) for v in np.exp(np.clip(points[0], low, high))))
+        weights = [_weights(r) for r in _residuals(motions, weights, shape)]
+    return shape
 
 
-def _errors(motions: Sequence[Motion], level: FloatArray, shape: FrictionShape) -> FloatArray:
-    """Return each run's sum of squared errors after solving for the linear coefficients."""
-    xs, ys = [], []
+def _weights(residual: FloatArray) -> FloatArray:
+    """Return Huber's weights over the square of the residuals' own spread."""
+    size = np.abs(residual)
+    spread = max(_SPREAD_OF_MEDIAN * float(np.median(size)), _LEAST_SPREAD_Nm)
+    return np.asarray(np.minimum(1.0, _TAIL * spread / np.maximum(size, 1e-12)) / spread**2)
+
+
+def _residuals(
+    motions: Sequence[Motion], weights: Sequence[FloatArray], shape: FrictionShape
+) -> list[FloatArray]:
+    """Return each run's errors after solving for the linear coefficients."""
+    xs = []
     for motion in motions:
         w = motion.windows
         friction = relative_friction(w.angle_rad, w.velocity_rad_s, w.play_rad, shape)
         values = (np.maximum(friction, 0.0), np.minimum(friction, 0.0), w.velocity_rad_s)
         columns = average(np.column_stack(values), w, 0, w.torque_Nm.size)
-        x = np.column_stack([columns, w.acceleration_rad_s2])[motion.rows]
-        xs.append(x)
-        ys.append(motion.torque_Nm)
-    scaled = [x / s for x, s in zip(xs, level, strict=True)]
-    gram = np.sum([x.T @ x for x in scaled], axis=0)
-    right = np.sum([x.T @ (y / s) for x, y, s in zip(scaled, ys, level, strict=True)], axis=0)
+        xs.append(np.column_stack([columns, w.acceleration_rad_s2])[motion.rows])
+    parts = list(zip(xs, motions, weights, strict=True))
+    gram = np.sum([(x.T * w) @ x for x, _, w in parts], axis=0)
+    right = np.sum([(x.T * w) @ m.torque_Nm for x, m, w in parts], axis=0)
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
     beta = np.linalg.solve(gram / np.outer(size, size) + 1e-9 * np.eye(4), right / size) / size
-    return np.array([float(np.sum((y - x @ beta) ** 2)) for x, y in zip(xs, ys, strict=True)])
+    return [m.torque_Nm - x @ beta for x, m, _ in parts]

@@ -79,7 +79,7 @@ class BetterResult:
 
     def tables(self, m: int) -> FloatArray:
         """Return the cogging on m samples over the turn for both directions, (2, m)."""
-        angle: FloatArray = np.arange(m) * (TWO_PI / m)
+        angle = np.linspace(0.0, TWO_PI, m, endpoint=False)
         lag = self.lag_rad.value
         return np.vstack([self.cogging_Nm(angle - lag), self.cogging_Nm(angle + lag)])
 

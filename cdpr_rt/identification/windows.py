@@ -124,9 +124,8 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     velocity = run.setpoint_velocity_rad_s + drift
     cycle = np.arange(run.time_s.size)
     torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
-    torque = gaussian_filter1d(torque, smoothing, mode="nearest")  # both sides of the equation
     centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
-    boxed = uniform_filter1d(uniform_filter1d(angle - angle[0], step), step)
+    boxed = uniform_filter1d(uniform_filter1d(run.angle_rad - run.angle_rad[0], step), step)
     smooth_torque = torque
     for _ in range(4):
         smooth_torque = uniform_filter1d(smooth_torque, step)
