@@ -131,12 +131,13 @@ class HeartbeatConsumers:
         """React to the loss of a node: EMCY, NMT state by 1029h:01, the application."""
         slave = self._slave
         slave.emergency(emcy.HEARTBEAT, emcy.COMMUNICATION_BIT, bytes([node]))
+        # the application first: it knows the loss for what it is, not for a change of NMT state
+        slave.app.on_heartbeat_lost(node)
         behaviour = slave.od.get_int(0x1029, 1, 0)
         if behaviour == 0 and slave.nmt_state == NmtState.OPERATIONAL:
             slave.set_nmt_state(NmtState.PRE_OPERATIONAL)
         elif behaviour == 2:
             slave.set_nmt_state(NmtState.STOPPED)
-        slave.app.on_heartbeat_lost(node)
 
     def recovered(self) -> None:
         """Take the error back once no node is missing."""
