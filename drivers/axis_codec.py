@@ -1,4 +1,8 @@
-"""Compiled kernels between CAN frames and arrays over axes."""
+"""Compiled kernels between CAN frames and arrays over axes.
+
+The state of a group lies in a few two-dimensional arrays, one row per quantity and one column per
+axis, since every array handed to a kernel costs time in each cycle; the names below are the rows.
+"""
 
 from __future__ import annotations
 
@@ -8,163 +12,287 @@ from numpy.typing import NDArray
 from cdpr_rt.exchange import BoolArray, FloatArray, WordArray
 from cdpr_rt.jit import jit
 
-Bytes2 = NDArray[np.uint8]
+Frames = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 
-FRAME_DATA = 8
-"""Where the data begin in a packed frame."""
+# kinds of frames besides the TPDOs 0, 1, ... of the profile
+EMCY, HEARTBEAT = 100, 101
 
-STATUSWORD, POSITION, TORQUE, MODE_DISPLAY, PROBE_STATUS, PROBE_POSITION = range(6)
-FIELDS = 6
+MAX_FIELDS = 8
 CONTROLWORD, TARGET_TORQUE = 0, 1
 
-# columns of the integer state of an axis
-TARGET, STATE, WAS_ENABLED, FAULTED, MODE_WANTED, MODE_SHOWN, PROBE_ARMED, EXTRA_WORD = range(8)
-STATE_COLUMNS = 8
+# rows of `ints`; the first ones are filled from TPDOs as they come
+(
+    STATUSWORD,
+    RAW_POSITION,
+    TORQUE_UNITS,
+    MODE_SHOWN,
+    PROBE_STATUS,
+    PROBE_POSITION,
+    POSITION,
+    LAST_RAW_POSITION,
+    STATE,
+    TARGET,
+    WAS_ENABLED,
+    FAULTED,
+    MODE_WANTED,
+    PROBE_ARMED,
+    EXTRA_BITS,
+    ACKNOWLEDGE,
+    ALARM,
+    SILENT_CYCLES,
+    SILENCE_LIMIT,
+    HEARTBEAT_AGE,
+    HEARTBEAT_LIMIT,
+    EMERGENCY,
+    NMT_STATE,
+    MISSED,
+) = range(24)
+INT_ROWS = 24
 
-ALARM_NONE, ALARM_FAULT, ALARM_LEFT_ENABLED, ALARM_MODE, ALARM_NOT_FINITE = range(5)
+# rows of `floats`
+(
+    POSITION_RAD,
+    TORQUE_NM,
+    INDEX_RAD,
+    COMMAND_NM,
+    SENT_NM,
+    RAD_PER_COUNT,
+    NM_PER_UNIT,
+    LIMIT_UNITS,
+    RESIDUAL_UNITS,
+) = range(9)
+FLOAT_ROWS = 9
 
-_DISABLED, _ENABLED, _REACTION, _FAULT = 1, 4, 6, 7
+# rows of `flags`
+VALID, INDEX_KNOWN = range(2)
+FLAG_ROWS = 2
+
+# bits of ALARM, latched until they are acknowledged
+FAULT, LEFT_ENABLED, WRONG_MODE, NOT_FINITE, SILENT, NO_HEARTBEAT, RESTARTED, NOT_OPERATIONAL = (
+    1 << bit for bit in range(8)
+)
+EMERGENCY_MESSAGE = 1 << 8
+
+_SWITCH_ON_DISABLED, _SWITCHED_ON, _ENABLED, _REACTION, _FAULT = 1, 3, 4, 6, 7
 _PROBE_LATCHED = 0x02
 _FAULT_RESET = 0x80
+_OPERATIONAL = 5
+_DATA = 8
 
 
 @jit
-def _signed(frame: NDArray[np.uint8], start: int, size: int) -> int:
+def _number(frame: NDArray[np.uint8], start: int, size: int, signed: int) -> int:
     value = np.int64(0)
     for k in range(size):
         value |= np.int64(frame[start + k]) << np.int64(8 * k)
-    if value >> np.int64(8 * size - 1):
+    if signed and value >> np.int64(8 * size - 1):
         value -= np.int64(1) << np.int64(8 * size)
     return int(value)
 
 
 @jit
+def _difference(new: int, old: int) -> int:
+    """Return new − old of two 32-bit counters that wrap round, as the nearest signed number."""
+    return (new - old + 0x80000000) % 0x100000000 - 0x80000000
+
+
+@jit
 def decode(
-    frames: Bytes2,
+    frames: Frames,
     first: int,
     last: int,
     slots: Ints,
-    layout: Ints,
-    scale: FloatArray,
+    fields: Ints,
     state_table: Ints,
-    state: Ints,
-    statusword: WordArray,
-    position: FloatArray,
-    torque: FloatArray,
-    index: FloatArray,
-    index_known: BoolArray,
-    valid: BoolArray,
-    alarm: Ints,
+    ints: Ints,
+    floats: FloatArray,
+    words: WordArray,
+    flags: BoolArray,
 ) -> int:
-    """Decode frames `first` up to `last` (k, 16) into the arrays of n axes.
+    """Take frames `first` up to `last` of `frames` (k, 16) into the state of n axes.
 
-    `slots` (2048,) gives axis·4 + TPDO number for an identifier, -1 for none; `layout`
-    (n, FIELDS, 3) has TPDO, first byte and size of each field, size 0 where it is not mapped;
-    `scale` (n, 2) holds rad per count and Nm per unit. Returns how many more axes have answered.
+    `slots` (2048, 2) and `fields` (n, 8, 5) are those of `GroupLayout`; `state_table` (128,) gives
+    the state by statusword; `ints`, `floats` and `flags` have the rows named above, `words` (1, n)
+    is the statusword. Returns how many more axes have answered.
     """
     answered = 0
     for f in range(first, last):
         frame = frames[f]
+        # byte 3 holds the flags of extended, remote and error frames
         identifier = np.int64(frame[0]) | np.int64(frame[1]) << 8
         if identifier > 0x7FF or frame[2] or frame[3]:
             continue
-        slot = slots[identifier]
-        if slot < 0:
+        i, kind = slots[identifier, 0], slots[identifier, 1]
+        if i < 0:
             continue
-        i, pdo = slot >> 2, slot & 3
-        for field in range(FIELDS):
-            size = layout[i, field, 2]
-            if size == 0 or layout[i, field, 0] != pdo:
-                continue
-            if layout[i, field, 1] + size > frame[4]:
-                continue
-            value = _signed(frame, FRAME_DATA + layout[i, field, 1], size)
-            if field == STATUSWORD:
-                statusword[i] = value & 0xFFFF
-                if not valid[i]:
-                    answered += 1
-                valid[i] = True
-                _follow_state(i, state_table[value & 0x7F], state, alarm)
-            elif field == POSITION:
-                position[i] = value * scale[i, 0]
-            elif field == TORQUE:
-                torque[i] = value * scale[i, 1]
-            elif field == MODE_DISPLAY:
-                state[i, MODE_SHOWN] = value
-            elif field == PROBE_STATUS:
-                if state[i, PROBE_ARMED] and value & _PROBE_LATCHED:
-                    state[i, PROBE_ARMED] = 2
-            elif state[i, PROBE_ARMED] == 2:
-                index[i] = value * scale[i, 0]
-                index_known[i] = True
-                state[i, PROBE_ARMED] = 0
+        if kind == HEARTBEAT:
+            if frame[4]:
+                _take_heartbeat(i, int(frame[_DATA]) & 0x7F, ints, flags)
+        elif kind == EMCY:
+            code = np.int64(frame[_DATA]) | np.int64(frame[_DATA + 1]) << 8
+            if frame[4] == 8 and code >> 8:
+                ints[EMERGENCY, i] = code
+                ints[ALARM, i] |= EMERGENCY_MESSAGE
+        else:
+            answered += _take_tpdo(i, kind, frame, fields, state_table, ints, floats, words, flags)
     return answered
 
 
 @jit
-def _follow_state(i: int, now: int, state: Ints, alarm: Ints) -> None:
-    state[i, STATE] = now
+def _take_heartbeat(i: int, nmt_state: int, ints: Ints, flags: BoolArray) -> None:
+    ints[HEARTBEAT_AGE, i] = 0
+    ints[NMT_STATE, i] = nmt_state
+    if nmt_state == 0:
+        flags[INDEX_KNOWN, i] = False  # a drive that has restarted counts from another origin
+        ints[ALARM, i] |= RESTARTED
+    elif nmt_state != _OPERATIONAL:
+        ints[ALARM, i] |= NOT_OPERATIONAL
+
+
+@jit
+def _take_tpdo(
+    i: int,
+    pdo: int,
+    frame: NDArray[np.uint8],
+    fields: Ints,
+    state_table: Ints,
+    ints: Ints,
+    floats: FloatArray,
+    words: WordArray,
+    flags: BoolArray,
+) -> int:
+    statusword_came = False
+    for k in range(MAX_FIELDS):
+        size = fields[i, k, 3]
+        if size == 0:
+            break
+        start = fields[i, k, 2]
+        if fields[i, k, 0] != pdo or start + size > frame[4]:
+            continue
+        field = fields[i, k, 1]
+        ints[field, i] = _number(frame, _DATA + start, size, fields[i, k, 4])
+        statusword_came = statusword_came or field == STATUSWORD
+    if ints[PROBE_ARMED, i] and ints[PROBE_STATUS, i] & _PROBE_LATCHED:
+        behind = _difference(ints[PROBE_POSITION, i], ints[LAST_RAW_POSITION, i])
+        floats[INDEX_RAD, i] = (ints[POSITION, i] + behind) * floats[RAD_PER_COUNT, i]
+        flags[INDEX_KNOWN, i] = True
+        ints[PROBE_ARMED, i] = 0
+    if not statusword_came:
+        return 0
+    # 6064h has 32 bits: counted on beyond them
+    ints[POSITION, i] += _difference(ints[RAW_POSITION, i], ints[LAST_RAW_POSITION, i])
+    ints[LAST_RAW_POSITION, i] = ints[RAW_POSITION, i]
+    floats[POSITION_RAD, i] = ints[POSITION, i] * floats[RAD_PER_COUNT, i]
+    floats[TORQUE_NM, i] = ints[TORQUE_UNITS, i] * floats[NM_PER_UNIT, i]
+    words[0, i] = ints[STATUSWORD, i]
+    _follow_state(i, state_table[ints[STATUSWORD, i] & 0x7F], ints)
+    if flags[VALID, i]:
+        return 0
+    flags[VALID, i] = True
+    return 1
+
+
+@jit
+def _follow_state(i: int, now: int, ints: Ints) -> None:
+    ints[STATE, i] = now
     if now == _ENABLED:
-        state[i, WAS_ENABLED] = 1
-        if state[i, MODE_SHOWN] != state[i, MODE_WANTED]:
-            alarm[i] = ALARM_MODE
-    elif now in (_FAULT, _REACTION):
-        state[i, WAS_ENABLED] = 0
-        if state[i, EXTRA_WORD] & _FAULT_RESET:
-            return  # it is being acknowledged
-        # a fault takes the request away: only a new one enables again
-        state[i, TARGET] = _DISABLED
-        state[i, FAULTED] = 1
-        alarm[i] = ALARM_FAULT
+        ints[WAS_ENABLED, i] = 1
+        if ints[MODE_SHOWN, i] != ints[MODE_WANTED, i]:
+            ints[ALARM, i] |= WRONG_MODE
+        return
+    left_by_itself = ints[WAS_ENABLED, i] and ints[TARGET, i] == _ENABLED
+    ints[WAS_ENABLED, i] = 0
+    if now in (_REACTION, _FAULT):
+        if not ints[ACKNOWLEDGE, i]:
+            # a fault takes the request away: only a new one enables again
+            ints[TARGET, i] = _SWITCH_ON_DISABLED
+            ints[FAULTED, i] = 1
+            ints[ALARM, i] |= FAULT
     else:
-        if state[i, WAS_ENABLED] and state[i, TARGET] == _ENABLED:
-            state[i, TARGET] = _DISABLED
-            alarm[i] = ALARM_LEFT_ENABLED
-        state[i, WAS_ENABLED] = 0
+        if ints[ACKNOWLEDGE, i]:
+            ints[ACKNOWLEDGE, i] = 0
+            ints[FAULTED, i] = 0
+        if left_by_itself:
+            ints[TARGET, i] = _SWITCH_ON_DISABLED
+            ints[ALARM, i] |= LEFT_ENABLED
 
 
 @jit
 def encode(
-    frames: Bytes2,
-    layout: Ints,
-    words: Ints,
-    state: Ints,
-    scale: FloatArray,
-    limit: FloatArray,
-    residual: FloatArray,
-    wanted: FloatArray,
-    sent: FloatArray,
-    alarm: Ints,
-) -> bool:
+    frames: Frames,
+    answer: Ints,
+    controlwords: Ints,
+    ints: Ints,
+    floats: FloatArray,
+    flags: BoolArray,
+) -> int:
     """Write controlword and target torque of n axes into their RPDOs `frames` (n, 16).
 
-    The torque is rounded to the drive's unit; what rounding left over is carried into the next
-    cycle (first-order error feedback), so that the mean is kept below the unit. `layout` (n, 2)
-    holds the first byte of controlword and target torque, `words` the controlword by target and
-    present state. Returns whether any axis has raised an alarm.
+    `answer` (n, 2) holds the first byte of either, `controlwords` (9, 9) the word by target and
+    present state. Counts silent cycles and heartbeat ages too. Returns the alarm bits of all axes.
     """
-    alarmed = False
-    for i in range(wanted.size):
-        units = 0
-        # in homing and the like the drive makes its own torque; here it must be asked for none
-        if state[i, STATE] == _ENABLED and state[i, TARGET] == _ENABLED:
-            if np.isfinite(wanted[i]):
-                exact = min(max(wanted[i], -limit[i]), limit[i]) / scale[i, 1] + residual[i]
-                units = int(np.rint(exact))
-                residual[i] = exact - units
-            else:
-                alarm[i] = ALARM_NOT_FINITE
-                residual[i] = 0.0
-        else:
-            residual[i] = 0.0
-        sent[i] = units * scale[i, 1]
-        alarmed = alarmed or alarm[i] != ALARM_NONE
-        word = words[state[i, TARGET], state[i, STATE]] | state[i, EXTRA_WORD]
-        at = FRAME_DATA + layout[i, CONTROLWORD]
+    alarms = 0
+    for i in range(ints.shape[1]):
+        _watch(i, ints, flags)
+        units = _torque_units(i, ints, floats)
+        floats[SENT_NM, i] = units * floats[NM_PER_UNIT, i]
+        word = _controlword(i, controlwords, ints)
+        at = _DATA + answer[i, CONTROLWORD]
         frames[i, at] = word & 0xFF
         frames[i, at + 1] = (word >> 8) & 0xFF
-        at = FRAME_DATA + layout[i, TARGET_TORQUE]
+        at = _DATA + answer[i, TARGET_TORQUE]
         frames[i, at] = units & 0xFF
         frames[i, at + 1] = (units >> 8) & 0xFF
-    return alarmed
+        alarms |= ints[ALARM, i]
+    return alarms
+
+
+@jit
+def _watch(i: int, ints: Ints, flags: BoolArray) -> None:
+    if flags[VALID, i]:
+        ints[SILENT_CYCLES, i] = 0
+    else:
+        ints[MISSED, i] += 1
+        ints[SILENT_CYCLES, i] += 1
+        if ints[SILENT_CYCLES, i] >= ints[SILENCE_LIMIT, i]:
+            ints[ALARM, i] |= SILENT
+    ints[HEARTBEAT_AGE, i] += 1
+    if ints[HEARTBEAT_AGE, i] > ints[HEARTBEAT_LIMIT, i]:
+        ints[ALARM, i] |= NO_HEARTBEAT
+
+
+@jit
+def _torque_units(i: int, ints: Ints, floats: FloatArray) -> int:
+    """Return 6071h for an axis.
+
+    What rounding leaves over is carried into the next cycle (first-order error feedback), so that
+    the mean is right to far less than one unit.
+    """
+    wanted = floats[COMMAND_NM, i]
+    if not np.isfinite(wanted):
+        ints[ALARM, i] |= NOT_FINITE
+        wanted = 0.0
+    if ints[STATE, i] != _ENABLED or ints[TARGET, i] != _ENABLED:
+        floats[RESIDUAL_UNITS, i] = 0.0
+        return 0
+    limit = floats[LIMIT_UNITS, i]
+    exact = wanted / floats[NM_PER_UNIT, i] + floats[RESIDUAL_UNITS, i]
+    units = min(max(np.rint(exact), -limit), limit)
+    floats[RESIDUAL_UNITS, i] = min(max(exact - units, -0.5), 0.5)
+    return int(units)
+
+
+@jit
+def _controlword(i: int, controlwords: Ints, ints: Ints) -> int:
+    state, target = ints[STATE, i], ints[TARGET, i]
+    if target == _ENABLED and ints[MODE_SHOWN, i] != ints[MODE_WANTED, i]:
+        target = _SWITCHED_ON  # no torque before the mode is confirmed
+    word = controlwords[target, state]
+    if state == _FAULT and ints[ACKNOWLEDGE, i]:
+        # the words sent in a fault have bit 7 clear, so this is its rising edge
+        word = _FAULT_RESET
+        ints[ACKNOWLEDGE, i] -= 1
+    elif state == _ENABLED:
+        word |= ints[EXTRA_BITS, i]
+    return int(word)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from canopen.objectdictionary import ODVariable
@@ -13,10 +15,11 @@ from profiles import DriveProfile, Pdo
 
 _DEVICE_TYPE, _IDENTITY = 0x1000, 0x1018
 _PROFILE_402 = 402
-_PDO_OFF = 1 << 31
+_PDO_OFF, _NO_RTR, _IDENTIFIER = 1 << 31, 1 << 30, 0x1FFFFFFF
 _BOOT_UP_TIMEOUT_S = 2.0
 _QUICK_STOP = 3
 _SLOW_DOWN_THEN_OFF = 2
+_QUIET_DRIVE_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,8 @@ class BootSettings:
     master_node_id: int
     sync_period_s: float
     torque_limit_Nm: float
+    rated_torque_Nm: float | None = None
+    """What 6076h must hold; None leaves it unchecked."""
 
 
 @dataclass
@@ -43,6 +48,29 @@ class BootReport:
     supported_modes: int = 0
     changed: list[str] = field(default_factory=list)
     """Objects that were written since they differed, as "6072h:0 = 250"."""
+    absent: list[str] = field(default_factory=list)
+    """Objects the master would set, which the drive does not have."""
+
+
+def boot_all(
+    network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]
+) -> dict[int, BootReport]:
+    """Boot several drives at the same time, by node id.
+
+    Raises the BootError of the lowest node id that failed, with the others' as notes, once all
+    have come to an end.
+    """
+    with ThreadPoolExecutor(max_workers=len(drives)) as pool:
+        pending = {
+            node_id: pool.submit(boot, network, node_id, profile, want)
+            for node_id, (profile, want) in sorted(drives.items())
+        }
+    errors = [error for job in pending.values() if (error := job.exception()) is not None]
+    if errors:
+        for other in errors[1:]:
+            errors[0].add_note(str(other))
+        raise errors[0]
+    return {node_id: job.result() for node_id, job in pending.items()}
 
 
 def boot(
@@ -56,15 +84,15 @@ def boot(
     """
     report = BootReport(node_id)
     _refuse_a_driven_node(network, node_id)
-    if not network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S):
-        _read(network, node_id, _DEVICE_TYPE, 0)  # no boot-up message, yet it may answer
+    network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S)  # one that is silent may yet answer
     network.clear_alarm()
     _check_identity(network, node_id, profile, report)
     _configure(network, node_id, profile, want, report)
-    if network.wait_for_heartbeat(node_id, 5.0 * profile.heartbeat_producer_s + 1.0) is None:
+    patience_s = 5.0 * profile.heartbeat_producer_s + _QUIET_DRIVE_S
+    if network.wait_for_heartbeat(node_id, patience_s) is None:
         raise BootError("K", node_id, "no heartbeat came", "check 1017h and the load of the bus")
+    _read_ratings(network, node_id, want, report)
     network.start(node_id)
-    _read_ratings(network, node_id, report)
     return report
 
 
@@ -86,7 +114,7 @@ def _refuse_a_driven_node(network: CanNetwork, node_id: int) -> None:
             "L", node_id, "another master's heartbeat is on the bus", "stop that master first"
         )
     try:
-        state = state_of(network.read_int(node_id, 0x6041))
+        state = state_of(network.read_int(node_id, 0x6041, attempts=1))
     except SdoError:
         return  # whether it is there at all is for the next step to say
     if state == State.OPERATION_ENABLED:
@@ -140,27 +168,49 @@ def _configure(
         watch = want.master_node_id << 16 | round(profile.heartbeat_consumer_s * 1e3)
         objects = (
             (0x1006, 0, round(want.sync_period_s * 1e6)),
-            (0x1016, 1, watch),
+            (0x1016, _heartbeat_entry(network, node_id, want.master_node_id), watch),
             (0x1017, 0, round(profile.heartbeat_producer_s * 1e3)),
-            (0x6007, 0, _QUICK_STOP),  # the master's heartbeat is lost
+            (0x6007, 0, _QUICK_STOP),  # when the master's heartbeat is lost
             (0x605A, 0, _SLOW_DOWN_THEN_OFF),
             (0x6072, 0, round(limit)),
         )
         for index, sub, value in objects:
             _set(network, node_id, index, sub, value, report)
         for pdos, parameters in ((profile.rpdos, 0x1400), (profile.tpdos, 0x1800)):
-            for pdo in pdos:
-                _set_pdo(network, node_id, parameters + pdo.number - 1, pdo, report)
+            ours = {parameters + pdo.number - 1: pdo for pdo in pdos}
+            for index in range(parameters, parameters + 0x200):
+                if index in ours:
+                    _set_pdo(network, node_id, index, ours[index], report)
+                elif index in network.dictionary(node_id):
+                    _switch_off_pdo(network, node_id, index, report)
     except SdoError as error:
         raise BootError(
             "J", node_id, f"its configuration failed: {error}", "check the profile of the drive"
         ) from error
 
 
+def _heartbeat_entry(network: CanNetwork, node_id: int, master_node_id: int) -> int:
+    """Return the entry of 1016h that watches the master already, else the first free one.
+
+    CiA 301 refuses a second entry for one node.
+    """
+    entries = network.read_int(node_id, 0x1016, 0)
+    watched = {
+        sub: network.read_int(node_id, 0x1016, sub) >> 16 & 0x7F for sub in range(1, entries + 1)
+    }
+    for wanted in (master_node_id, 0):
+        for sub, node in watched.items():
+            if node == wanted:
+                return sub
+    return 1
+
+
 def _set(
     network: CanNetwork, node_id: int, index: int, sub: int, value: int, report: BootReport
 ) -> None:
-    if network.read_int(node_id, index, sub) != value:
+    if index not in network.dictionary(node_id):
+        report.absent.append(f"{index:04X}h:{sub}")
+    elif network.read_int(node_id, index, sub) != value:
         network.write(node_id, index, sub, value)
         report.changed.append(f"{index:04X}h:{sub} = {value}")
 
@@ -169,43 +219,43 @@ def _set_pdo(
     network: CanNetwork, node_id: int, parameters: int, pdo: Pdo, report: BootReport
 ) -> None:
     mapping = parameters + 0x200
-    cob_id = pdo.cob_id(node_id)
-    sub: dict[int, int] = {1: cob_id, 2: pdo.transmission_type}
-    if parameters >= 0x1800:
-        sub |= {3: round(pdo.inhibit_time_s * 1e4), 5: round(pdo.event_timer_s * 1e3)}
-    elif pdo.event_timer_s:
-        sub |= {5: round(pdo.event_timer_s * 1e3)}
-    wanted = {(parameters, number): value for number, value in sub.items()}
-    wanted[mapping, 0] = len(pdo.entries)
+    settings = {2: pdo.transmission_type}
+    inhibit, timer = round(pdo.inhibit_time_s * 1e4), round(pdo.event_timer_s * 1e3)
+    entry = network.dictionary(node_id)[parameters]
+    for sub, value in ((3, inhibit), (5, timer)):
+        if not isinstance(entry, ODVariable) and sub in entry:
+            settings[sub] = value
+    wanted = {(parameters, sub): value for sub, value in settings.items()}
     wanted |= {(mapping, i): entry.mapping for i, entry in enumerate(pdo.entries, 1)}
-    known = {key: value for key, value in wanted.items() if _exists(network, node_id, *key)}
-    # the identifier's reserved bits differ between drives: only those of the standard count
-    significant = _PDO_OFF | 0x3FFFFFFF
-    found = {key: network.read_int(node_id, *key) for key in known}
-    found[parameters, 1] &= significant
-    if found == known:
+    cob_id = network.read_int(node_id, parameters, 1)
+    as_it_is = network.read_int(node_id, mapping, 0) == len(pdo.entries) and all(
+        network.read_int(node_id, *key) == value for key, value in wanted.items()
+    )
+    if as_it_is and cob_id & (_PDO_OFF | _IDENTIFIER) == pdo.cob_id(node_id):
         return
-    # CiA 301: switched off first, the map emptied, filled and counted, then switched on
-    network.write(node_id, parameters, 1, cob_id | _PDO_OFF)
+    # CiA 301: switched off first, the map emptied, filled and counted, then switched on; whether
+    # it may be asked for by a remote frame is the drive's affair
+    enabled = pdo.cob_id(node_id) | cob_id & _NO_RTR
+    network.write(node_id, parameters, 1, enabled | _PDO_OFF)
     network.write(node_id, mapping, 0, 0)
-    for (index, number), value in known.items():
-        if number and (index, number) != (parameters, 1):
-            network.write(node_id, index, number, value)
+    for (index, sub), value in wanted.items():
+        network.write(node_id, index, sub, value)
     network.write(node_id, mapping, 0, len(pdo.entries))
-    network.write(node_id, parameters, 1, cob_id)
+    network.write(node_id, parameters, 1, enabled)
     report.changed.append(f"{parameters:04X}h and {mapping:04X}h")
 
 
-def _exists(network: CanNetwork, node_id: int, index: int, sub: int) -> bool:
-    """Return whether the EDS has the object; drives leave out what they do not support."""
-    dictionary = network.dictionary(node_id)
-    if index not in dictionary:
-        raise SdoError(f"object {index:04X}h is not in the drive's EDS")
-    entry = dictionary[index]
-    return sub == 0 if isinstance(entry, ODVariable) else sub in entry
+def _switch_off_pdo(network: CanNetwork, node_id: int, parameters: int, report: BootReport) -> None:
+    """Switch off a PDO that the profile does not have: the bus was not laid out for it."""
+    cob_id = network.read_int(node_id, parameters, 1)
+    if not cob_id & _PDO_OFF:
+        network.write(node_id, parameters, 1, cob_id | _PDO_OFF)
+        report.changed.append(f"{parameters:04X}h switched off")
 
 
-def _read_ratings(network: CanNetwork, node_id: int, report: BootReport) -> None:
+def _read_ratings(
+    network: CanNetwork, node_id: int, want: BootSettings, report: BootReport
+) -> None:
     try:
         report.device_name = str(network.read(node_id, 0x1008))
         report.rated_torque_Nm = network.read_int(node_id, 0x6076) * 1e-3
@@ -224,3 +274,13 @@ def _read_ratings(network: CanNetwork, node_id: int, report: BootReport) -> None
             "set the drive's motor data first",
         )
     report.counts_per_turn = increments // turns
+    rated = want.rated_torque_Nm
+    if rated is not None and abs(report.rated_torque_Nm - rated) > 0.5e-3 + 1e-3 * rated:
+        raise BootError(
+            "J",
+            node_id,
+            f"its rated torque (6076h) is {report.rated_torque_Nm:g} Nm, the motor's profile has "
+            f"{rated:g} Nm",
+            "every torque would be off by this ratio: set the drive's motor data, or choose the "
+            "motor that is mounted",
+        )

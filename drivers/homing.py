@@ -6,86 +6,110 @@ import math
 from enum import Enum, auto
 
 from drivers.axis_group import AxisGroup
-from drivers.cia402 import START_HOMING
+from drivers.cia402 import HALT, START_HOMING
 from drivers.errors import DriveFaultError
 
-_ATTAINED, _REACHED, _ERROR = 1 << 12, 1 << 10, 1 << 13
+_REACHED, _ATTAINED, _ERROR = 1 << 10, 1 << 12, 1 << 13
 _SPEED_RAD_S = math.radians(30.0)
 _ACCELERATION_RAD_S2 = math.radians(360.0)
-# the start bit is read with the next SYNC, its answer comes one later
-_ANSWER_CYCLES = 4
+# by then a drive has seen the start bit, so that what it says is about this homing
+_ANSWER_S = 0.02
+_MIRRORED = {33: 34, 34: 33, 1: 2, 2: 1} | {k: k + 4 for k in range(3, 7)}
+_MIRRORED |= {k: k + 4 for k in range(7, 11)} | {k: k - 4 for k in range(11, 15)}
+_FINDING_INDEX = (*range(1, 15), 33, 34)
 
 
-class _Step(Enum):
-    START = auto()
+class HomingStep(Enum):
+    """Where a homing procedure stands."""
+
+    READY = auto()
     RUNNING = auto()
     DONE = auto()
+    FAILED = auto()
 
 
 class Homing:
     """The homing mode's handshake: start bit, then statusword bits 13, 12 and 10.
 
-    The axis must be enabled in homing mode when `update` is called first. Methods 33 and 34 turn
-    the motor to its index in negative or positive direction, by a turn at most.
+    `configure` before cycles run; then, with the axis enabled in homing mode, `update` in every
+    cycle. Methods 33 and 34 turn the motor to its index in negative or positive direction, by a
+    turn at most. Raises DriveFaultError for a method that is not in the drive's profile.
     """
 
-    def __init__(self, group: AxisGroup, axis: int, method: int) -> None:
+    def __init__(self, group: AxisGroup, axis: int, method: int, timeout_s: float = 30.0) -> None:
         drive = group.axes[axis].drive
         if method not in drive.homing_methods:
             raise DriveFaultError(
                 f"drive profile {drive.name!r}: homing method {method} is not among "
                 f"{list(drive.homing_methods)}"
             )
+        self.step = HomingStep.READY
         self._group = group
         self._axis = axis
+        self._node_id = group.axes[axis].node_id
         self._method = method
-        self._step = _Step.START
-        self._waited = 0
+        self._timeout_s = timeout_s
+        self._started_s = 0.0
+        self._seen_running = False
 
     def configure(self) -> None:
-        """Write method, speeds and offset by SDO, before cycles run; raises SdoError."""
+        """Write method, speeds and offset by SDO; raises SdoError."""
         config = self._group.axes[self._axis]
         counts_per_rad = config.counts_per_turn / math.tau
         speed = max(1, round(_SPEED_RAD_S * counts_per_rad))
         acceleration = max(1, round(_ACCELERATION_RAD_S2 * counts_per_rad))
         write = self._group.network.write
-        write(config.node_id, 0x6098, 0, self._wire_method())
+        write(self._node_id, 0x6098, 0, self._drives_method())
         for sub in (1, 2):
-            write(config.node_id, 0x6099, sub, speed)
-        write(config.node_id, 0x609A, 0, acceleration)
-        write(config.node_id, 0x607C, 0, 0)
+            write(self._node_id, 0x6099, sub, speed)
+        write(self._node_id, 0x609A, 0, acceleration)
+        write(self._node_id, 0x607C, 0, 0)
 
-    def _wire_method(self) -> int:
+    def _drives_method(self) -> int:
         """Return the method as this drive counts directions."""
-        mirrored = {33: 34, 34: 33}
-        if self._group.axes[self._axis].drive.homing_sign < 0:
-            return mirrored.get(self._method, self._method)
-        return self._method
+        if self._group.axes[self._axis].drive.homing_sign > 0:
+            return self._method
+        return _MIRRORED.get(self._method, self._method)
 
     def update(self) -> bool:
-        """Advance by one cycle; return whether the axis has found its index.
+        """Advance by one cycle, after its `receive`; return whether homing is done.
 
-        Raises DriveFaultError when the drive reports a homing error.
+        Raises DriveFaultError when the drive reports a homing error or takes longer than the
+        time-out of bus time; the motion has then been halted.
         """
-        word = int(self._group.feedback.statusword[self._axis])
-        if self._step is _Step.START:
+        now = self._group.feedback.time_s
+        if self.step is HomingStep.READY:
+            self._started_s = now
             self._group.set_extra_bits(self._axis, START_HOMING)
-            self._step = _Step.RUNNING
-            return False
-        self._waited += 1
-        if self._step is _Step.RUNNING and self._waited > _ANSWER_CYCLES:
-            if word & _ERROR:
-                self.abort()
-                raise DriveFaultError(
-                    f"node {self._group.axes[self._axis].node_id}: homing failed: the drive "
-                    f"reports a homing error (statusword {word:04X}h)"
-                )
-            if word & _ATTAINED and word & _REACHED:
-                self.abort()
+            self.step = HomingStep.RUNNING
+        elif self.step is HomingStep.RUNNING:
+            self._look(int(self._group.feedback.statusword[self._axis]), now - self._started_s)
+        return self.step is HomingStep.DONE
+
+    def _look(self, word: int, elapsed_s: float) -> None:
+        bits = word & (_ERROR | _ATTAINED | _REACHED)
+        self._seen_running |= bits == 0
+        # before that, the bits may tell of an earlier homing
+        current = self._seen_running or elapsed_s > _ANSWER_S
+        if bits & _ERROR and current:
+            self._fail(f"the drive reports a homing error (statusword {word:04X}h)")
+        if bits == _ATTAINED | _REACHED and current:
+            self._group.set_extra_bits(self._axis, 0)
+            if self._method in _FINDING_INDEX:
                 self._group.set_index(self._axis, 0.0)
-                self._step = _Step.DONE
-        return self._step is _Step.DONE
+            self.step = HomingStep.DONE
+        elif elapsed_s > self._timeout_s:
+            self._fail(f"not done within {self._timeout_s:g} s (statusword {word:04X}h)")
+
+    def _fail(self, problem: str) -> None:
+        self.abort()
+        raise DriveFaultError(
+            f"node {self._node_id}: homing method {self._method} failed: {problem}; the encoder "
+            "index is not known"
+        )
 
     def abort(self) -> None:
-        """Take the start bit back, which ends the homing motion."""
-        self._group.set_extra_bits(self._axis, 0)
+        """Take the start bit back and halt the motion; the caller disables the drive."""
+        if self.step is not HomingStep.DONE:
+            self.step = HomingStep.FAILED
+            self._group.set_extra_bits(self._axis, HALT)

@@ -7,25 +7,34 @@ import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import can
 import canopen
-from canopen.objectdictionary import ObjectDictionary
+from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+from canopen.sdo.exceptions import SdoError as CanopenSdoError
 
 from drivers.bus import BusUrl, open_python_can
+from drivers.bus.packed import EFF_FLAG, RTR_FLAG
 from drivers.cia402 import fault_text
-from drivers.errors import BusError, SdoError
+from drivers.errors import BusError, DriverError, SdoError
 
 _EMCY, _SDO_ANSWER, _HEARTBEAT, _LSS_ANSWER = 0x080, 0x580, 0x700, 0x7E4
-_EXACT = 0x7FF
+_FUNCTION, _NODE = 0x780, 0x07F
+_EXACT = 0x7FF | EFF_FLAG | RTR_FLAG
+_EMCY_LAYOUT = struct.Struct("<HB5s")
 _KEPT_EMERGENCIES = 256
+_RPDO_TIMEOUT = 0x8250
 _BOOT_UP = 0
-_OPERATIONAL_STATE = 5
+_START, _ENTER_PRE_OPERATIONAL, _RESET_NODE, _RESET_COMMUNICATION = 1, 128, 129, 130
+_OPERATIONAL = 5
 _SDO_TIMEOUT_S = 0.5
+_ATTEMPTS = 2
+_LOOK_S = 0.1
+"""How often the receiving thread looks whether it is to end."""
 
 # the library logs what is raised here as errors of our own
 logging.getLogger("canopen").setLevel(logging.CRITICAL)
@@ -46,6 +55,23 @@ class Emergency:
         return f"node {self.node_id}: {fault_text(self.code)} (error register {self.register:02X}h)"
 
 
+class _Peer:
+    """What is known of one node from its error control messages."""
+
+    def __init__(self, node_id: int, node: canopen.RemoteNode) -> None:
+        self.node_id = node_id
+        self.node = node
+        self.lock = threading.Lock()
+        """One SDO transfer at a time: the library's client has no lock."""
+        self.boot_ups = 0
+        self.heartbeats = 0
+        self.nmt_state: int | None = None
+        self.expects_boot_up = False
+        self.started = False
+        """Whether it has been seen operational since it was started."""
+        self.starting = False
+
+
 class CanNetwork:
     """CANopen master's acyclic work on one bus.
 
@@ -62,52 +88,101 @@ class CanNetwork:
         self.alarm_text = ""
         """Why the drives must not go on being driven; latched until `clear_alarm`."""
         self.cycling = False
-        self.lost_index = threading.Event()
-        """Set by an unexpected boot-up: encoder positions are void."""
-        self._expect_boot_up = False
+        self.restarted: set[int] = set()
+        """Nodes that booted unasked: their configuration and encoder positions are void."""
         ids = list(node_ids)
         filters = [(base + node, _EXACT) for node in ids for base in (_EMCY, _SDO_ANSWER)]
         filters += [(_HEARTBEAT + node, _EXACT) for node in (*ids, master_node_id)]
         filters.append((_LSS_ANSWER, _EXACT))
         self._bus = open_python_can(url, filters)
         self._canopen = canopen.Network(self._bus)
-        self._canopen.connect()
-        self._nodes: dict[int, canopen.RemoteNode] = {}
-        self._lock = threading.Lock()
+        self._peers: dict[int, _Peer] = {}
+        self._news = threading.Condition()
         self._heartbeat_s = heartbeat_s
-        self._heartbeat = can.Message(
-            arbitration_id=_HEARTBEAT + master_node_id,
-            data=[_OPERATIONAL_STATE],
-            is_extended_id=False,
-        )
+        self._master_heartbeat = _HEARTBEAT + master_node_id
         self.foreign_master = threading.Event()
-        """Set when somebody else produces the master's heartbeat."""
-        self._canopen.subscribe(_HEARTBEAT + master_node_id, lambda *_: self.foreign_master.set())
+        """Set when somebody else has produced the master's heartbeat."""
+        self._lost: Exception | None = None
         self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._threads = [threading.Thread(target=self._receive, name="canopen", daemon=True)]
+        self._threads[0].start()
 
     def add_node(self, node_id: int, dictionary: ObjectDictionary) -> None:
         """Make a node known, with the object dictionary its EDS describes."""
-        node = self._nodes[node_id] = self._canopen.add_node(node_id, dictionary)
+        node = self._canopen.add_node(node_id, dictionary)
         node.sdo.RESPONSE_TIMEOUT = _SDO_TIMEOUT_S
-        node.emcy.add_callback(lambda error: self._on_emergency(node_id, error))
-        node.nmt.add_heartbeat_callback(lambda state: self._on_heartbeat(node_id, state))
+        self._peers[node_id] = _Peer(node_id, node)
 
     def dictionary(self, node_id: int) -> ObjectDictionary:
         """Return the node's object dictionary."""
-        return self._nodes[node_id].object_dictionary
+        return self._peers[node_id].node.object_dictionary
 
-    def _on_emergency(self, node_id: int, error: canopen.emcy.EmcyError) -> None:
-        emergency = Emergency(node_id, error.code, error.register, error.data, time.monotonic())
+    # -- what comes in; one thread of its own, since python-can's prints the end of a bus
+
+    def _receive(self) -> None:
+        while not self._stop.is_set():
+            try:
+                message = self._bus.recv(_LOOK_S)
+            except (can.CanError, OSError) as error:
+                if not self._stop.is_set():
+                    self._lost = error
+                    self.raise_alarm(f"{self.url}: the bus has gone away")
+                return
+            if message is not None:
+                self._dispatch(message)
+
+    def _dispatch(self, message: can.Message) -> None:
+        """Hand a frame on; one that no CANopen device sends is noise."""
+        identifier, data = message.arbitration_id, bytes(message.data)
+        if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+            return
+        if len(data) == 8 and (identifier & _FUNCTION == _SDO_ANSWER or identifier == _LSS_ANSWER):
+            self._canopen.notify(identifier, bytearray(data), message.timestamp)
+            return
+        peer = self._peers.get(identifier & _NODE)
+        if identifier == self._master_heartbeat:
+            self.foreign_master.set()
+        elif peer is None:
+            return
+        elif identifier & _FUNCTION == _EMCY and len(data) == 8:
+            self._on_emergency(
+                Emergency(peer.node_id, *_EMCY_LAYOUT.unpack(data), time.monotonic())
+            )
+        elif identifier & _FUNCTION == _HEARTBEAT and len(data) == 1:
+            with self._news:
+                self._on_heartbeat(peer, data[0] & 0x7F)
+                self._news.notify_all()
+
+    def _on_emergency(self, emergency: Emergency) -> None:
         self.emergencies.append(emergency)
-        if error.code >> 8 and not self.alarm_text:
-            self.alarm_text = f"emergency message: {emergency}"
+        if emergency.code == _RPDO_TIMEOUT and not self.cycling:
+            return  # commands are missing because none are sent between cycles
+        if emergency.code >> 8:
+            self.raise_alarm(f"emergency message: {emergency}")
 
-    def _on_heartbeat(self, node_id: int, state: int) -> None:
-        if state == _BOOT_UP and not self._expect_boot_up:
-            self.lost_index.set()
-            if not self.alarm_text:
-                self.alarm_text = f"node {node_id} has restarted (unexpected boot-up message)"
+    def _on_heartbeat(self, peer: _Peer, state: int) -> None:
+        name = f"node {peer.node_id}"
+        peer.nmt_state = state
+        if state == _BOOT_UP:
+            peer.boot_ups += 1
+            if not peer.expects_boot_up:
+                self.restarted.add(peer.node_id)
+                self.raise_alarm(f"{name} has restarted (unexpected boot-up message)")
+            peer.expects_boot_up = peer.started = peer.starting = False
+            return
+        peer.heartbeats += 1
+        if state == _OPERATIONAL:
+            peer.started = peer.started or peer.starting
+        elif peer.started:
+            self.raise_alarm(f"{name} is not operational any more (NMT state {state})")
+
+    def heartbeats(self, node_id: int) -> int:
+        """Return how many heartbeats of the node have come."""
+        return self._peers[node_id].heartbeats
+
+    def raise_alarm(self, text: str) -> None:
+        """Latch why the drives must not go on being driven; the first reason stands."""
+        self.alarm_text = self.alarm_text or text
 
     def clear_alarm(self) -> None:
         """Forget the latched alarm, after its cause has been dealt with."""
@@ -115,102 +190,174 @@ class CanNetwork:
 
     # -- objects
 
-    def read(self, node_id: int, index: int, sub: int = 0) -> int | str | bytes:
-        """Return an object's value, decoded by its type; raises SdoError."""
+    def read(
+        self, node_id: int, index: int, sub: int = 0, *, attempts: int = _ATTEMPTS
+    ) -> int | str | bytes:
+        """Return an object's value, decoded by its type; raises SdoError, BusError.
+
+        A request without an answer is repeated up to `attempts` in all.
+        """
         variable = self._variable(node_id, index, sub)
-        with self._lock:
-            try:
-                value: Any = variable.raw
-            except (SdoAbortedError, SdoCommunicationError, can.CanError, OSError) as error:
-                raise self._sdo_error(node_id, index, sub, "read", error) from error
+
+        def transfer() -> Any:
+            return variable.raw
+
+        value = self._transfer(node_id, index, sub, "read", transfer, attempts)
         return value if isinstance(value, int | str) else bytes(value)
 
-    def read_int(self, node_id: int, index: int, sub: int = 0) -> int:
-        """Return an integer object's value; raises SdoError."""
-        value = self.read(node_id, index, sub)
+    def read_int(self, node_id: int, index: int, sub: int = 0, *, attempts: int = _ATTEMPTS) -> int:
+        """Return an integer object's value; raises SdoError, BusError."""
+        value = self.read(node_id, index, sub, attempts=attempts)
         if not isinstance(value, int):
             raise SdoError(f"node {node_id}: object {index:04X}h:{sub} is no integer: {value!r}")
         return value
 
     def write(self, node_id: int, index: int, sub: int, value: int) -> None:
-        """Write an integer object; raises SdoError."""
+        """Write an integer object; raises SdoError, BusError."""
         variable = self._variable(node_id, index, sub)
-        with self._lock:
-            try:
-                variable.raw = value
-            except (SdoAbortedError, SdoCommunicationError, can.CanError, OSError) as error:
-                raise self._sdo_error(node_id, index, sub, f"set to {value}", error) from error
-            except struct.error as error:
-                raise SdoError(
-                    f"node {node_id}: object {index:04X}h:{sub} cannot hold {value}"
-                ) from error
+
+        def transfer() -> None:
+            variable.raw = value
+
+        self._transfer(node_id, index, sub, f"set to {value}", transfer, _ATTEMPTS)
+
+    def _transfer(
+        self,
+        node_id: int,
+        index: int,
+        sub: int,
+        what: str,
+        transfer: Callable[[], Any],
+        attempts: int,
+    ) -> Any:
+        with self._peers[node_id].lock:
+            while True:
+                attempts -= 1
+                try:
+                    return transfer()
+                except SdoCommunicationError as error:
+                    if not attempts or self._lost is not None:
+                        raise self._explain(node_id, index, sub, what, error) from error
+                except Exception as error:
+                    raise self._explain(node_id, index, sub, what, error) from error
 
     def _variable(self, node_id: int, index: int, sub: int) -> Any:
         try:
-            entry: Any = self._nodes[node_id].sdo[index]
+            entry: Any = self._peers[node_id].node.sdo[index]
             return entry if not hasattr(entry, "values") else entry[sub]
         except KeyError:
             raise SdoError(
                 f"node {node_id}: object {index:04X}h:{sub} is not in the drive's EDS"
             ) from None
 
-    @staticmethod
-    def _sdo_error(node_id: int, index: int, sub: int, what: str, error: Exception) -> SdoError:
+    def _explain(
+        self, node_id: int, index: int, sub: int, what: str, error: Exception
+    ) -> DriverError:
+        """Return the error to raise for one that the library raised in a transfer."""
+        if self._lost is not None or isinstance(error, can.CanError | OSError):
+            return BusError(f"{self.url}: the bus has gone away ({self._lost or error})")
         if isinstance(error, SdoAbortedError):
             reason = f"{SdoAbortedError.CODES.get(error.code, 'refused')} ({error.code:08X}h)"
-        else:
+        elif isinstance(error, struct.error | ObjectDictionaryError | UnicodeError):
+            reason = f"its value does not fit the type that the EDS gives it ({error})"
+        elif isinstance(error, CanopenSdoError):
             reason = str(error) or type(error).__name__
+        else:
+            raise error
         return SdoError(f"node {node_id}: object {index:04X}h:{sub} cannot be {what}: {reason}")
 
     # -- network management
 
     def reset_communication(self, node_id: int, timeout_s: float) -> bool:
-        """Reset the node's communication; return whether its boot-up message came in time."""
-        nmt = self._nodes[node_id].nmt
-        self._expect_boot_up = True
-        try:
-            nmt.send_command(130)
-            nmt.wait_for_bootup(timeout_s)
-        except canopen.nmt.NmtError:
-            return False
-        except (can.CanError, OSError) as error:
-            raise BusError(f"{self.url}: cannot send: {error}") from error
-        finally:
-            self._expect_boot_up = False
-        return True
+        """Reset the node's communication; return whether its boot-up message came in time.
+
+        Raises BusError.
+        """
+        peer = self._peers[node_id]
+        with self._news:
+            before = peer.boot_ups
+            peer.expects_boot_up = True
+            peer.started = peer.starting = False
+            self.restarted.discard(node_id)
+        self._command(_RESET_COMMUNICATION, node_id)
+        with self._news:
+            return self._news.wait_for(lambda: peer.boot_ups > before, timeout_s)
 
     def start(self, node_id: int) -> None:
-        """Command the node to operational."""
-        self._nodes[node_id].nmt.send_command(1)
+        """Command the node to operational, and watch from now on that it stays so; BusError."""
+        self._peers[node_id].starting = True
+        self._command(_START, node_id)
+
+    def stop_process_data(self, node_id: int) -> None:
+        """Command the node to pre-operational, where it takes and sends no PDOs; BusError."""
+        peer = self._peers[node_id]
+        peer.started = peer.starting = False
+        self._command(_ENTER_PRE_OPERATIONAL, node_id)
+
+    def reset(self, node_id: int) -> None:
+        """Reset the whole node, as the last resort to take its power away; BusError."""
+        self._peers[node_id].expects_boot_up = True
+        self._command(_RESET_NODE, node_id)
+
+    def release(self, node_id: int) -> None:
+        """Leave a node that has no power alone: it need not watch our heartbeat any more.
+
+        Best effort; without it the node would report the missing heartbeat to whoever comes next.
+        """
+        try:
+            self.write(node_id, 0x1016, 1, 0)
+            self.stop_process_data(node_id)
+        except DriverError:
+            return
+
+    def _command(self, command: int, node_id: int) -> None:
+        try:
+            self._canopen.send_message(0, bytes([command, node_id]))
+        except (can.CanError, OSError) as error:
+            raise BusError(f"{self.url}: cannot send: {error}") from error
 
     def wait_for_heartbeat(self, node_id: int, timeout_s: float) -> int | None:
         """Return the NMT state of the node's next heartbeat, None when none came."""
-        nmt = self._nodes[node_id].nmt
-        try:
-            nmt.wait_for_heartbeat(timeout_s)
-        except canopen.nmt.NmtError:
-            return None
-        return int(nmt._state)
+        peer = self._peers[node_id]
+        with self._news:
+            before = peer.heartbeats
+            came = self._news.wait_for(lambda: peer.heartbeats > before, timeout_s)
+            return peer.nmt_state if came else None
 
     # -- heartbeat of the master
 
+    def claim_cycle(self) -> None:
+        """Hand the master's heartbeat to the cycle: from now on a hung cycle is a silent master."""
+        self.cycling = True
+
+    def release_cycle(self) -> None:
+        """Take the master's heartbeat back from the cycle."""
+        self.cycling = False
+
     def start_heartbeat(self) -> None:
-        """Begin to produce the master's heartbeat."""
-        self._thread = threading.Thread(target=self._produce, name="heartbeat", daemon=True)
-        self._thread.start()
+        """Begin to produce the master's heartbeat; the drives watch it from the first one on."""
+        self._send_heartbeat()
+        thread = threading.Thread(target=self._produce, name="heartbeat", daemon=True)
+        self._threads.append(thread)
+        thread.start()
 
     def _produce(self) -> None:
         while not self._stop.wait(self._heartbeat_s):
-            if self.cycling:
-                continue
-            try:
-                self._bus.send(self._heartbeat)
-            except (can.CanError, OSError):
-                return
+            if not self.cycling:
+                self._send_heartbeat()
+
+    def _send_heartbeat(self) -> None:
+        try:
+            self._canopen.send_message(self._master_heartbeat, bytes([_OPERATIONAL]))
+        except (can.CanError, OSError):
+            return  # should the bus not come back, the drives stop by themselves
 
     def close(self) -> None:
-        """Leave the bus."""
+        """Leave the bus; a bus that is lost is no error here."""
         self._stop.set()
-        if self._thread is not None:
-            self._thread.join()
-        self._canopen.disconnect()
+        for thread in self._threads:
+            thread.join()
+        try:
+            self._canopen.disconnect()
+        except (can.CanError, OSError):
+            return

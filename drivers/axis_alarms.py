@@ -1,0 +1,45 @@
+"""What an alarm of a group of axes means, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivers import axis_codec as codec
+from drivers.axis_codec import Ints
+from drivers.axis_layout import AxisConfig
+from drivers.cia402 import State, fault_text, mode_name
+
+
+def alarm_text(axes: Sequence[AxisConfig], ints: Ints) -> str:
+    """Return the alarms of all axes in words, the likeliest cause of each axis' first."""
+    raised = [int(i) for i in np.flatnonzero(ints[codec.ALARM])]
+    return "; ".join(f"node {axes[i].node_id}: {_of_axis(axes[i], ints[:, i])}" for i in raised)
+
+
+def _of_axis(axis: AxisConfig, column: Ints) -> str:
+    bits = int(column[codec.ALARM])
+    shown, wanted = int(column[codec.MODE_SHOWN]), int(column[codec.MODE_WANTED])
+    texts = (
+        (codec.RESTARTED, "the drive has restarted (unexpected boot-up message)"),
+        (codec.EMERGENCY_MESSAGE, f"EMCY {fault_text(int(column[codec.EMERGENCY]))}"),
+        (codec.FAULT, "the drive is in fault"),
+        (codec.WRONG_MODE, f"the drive reports mode {mode_name(shown)}, not {mode_name(wanted)}"),
+        (
+            codec.LEFT_ENABLED,
+            "the drive left operation enabled by itself and is "
+            f"{State(int(column[codec.STATE])).label}",
+        ),
+        (codec.SILENT, f"no answer to SYNC for {column[codec.SILENT_CYCLES]} cycles"),
+        (
+            codec.NO_HEARTBEAT,
+            f"no heartbeat, expected every {axis.drive.heartbeat_producer_s * 1e3:.0f} ms",
+        ),
+        (
+            codec.NOT_OPERATIONAL,
+            f"the drive left the NMT state operational (state {column[codec.NMT_STATE]})",
+        ),
+        (codec.NOT_FINITE, "a torque that is not a finite number was asked for; 0 was sent"),
+    )
+    return ", ".join(text for bit, text in texts if bits & bit)

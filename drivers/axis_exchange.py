@@ -1,0 +1,232 @@
+"""The cyclic exchange of n axes on one bus: SYNC out, feedback in, commands out."""
+
+from __future__ import annotations
+
+import select
+import time
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers import axis_codec as codec
+from drivers.axis_alarms import alarm_text
+from drivers.axis_layout import AxisConfig, GroupLayout
+from drivers.axis_state import GroupState
+from drivers.bus import BusUrl, FrameBuffer, FramePort, open_port
+from drivers.bus.packed import FRAME
+from drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE
+from drivers.network import CanNetwork
+
+_SYNC_ID, _HEARTBEAT_ID = 0x080, 0x700
+_OPERATIONAL_STATE = 5
+_LOCKSTEP_PATIENCE_S = 2.0
+_PACED_SHARE = 0.6
+_FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
+
+
+class AxisExchange:
+    """What happens every cycle; nothing here allocates, waits for a lock or logs.
+
+    Raises BusError when the bus cannot be opened or goes away.
+    """
+
+    def __init__(
+        self,
+        url: BusUrl,
+        network: CanNetwork,
+        axes: Sequence[AxisConfig],
+        period_s: float,
+        master_node_id: int,
+        heartbeat_s: float,
+    ) -> None:
+        self.axes = tuple(axes)
+        self.n = len(self.axes)
+        self.period_s = period_s
+        self.network = network
+        self._layout = GroupLayout(self.axes)
+        self._tx_bytes = _as_bytes(self._layout.rpdos)
+        self._rx = FrameBuffer(_FRAMES_PER_AXIS * self.n + _SPARE_FRAMES)
+        self._rx_bytes = _as_bytes(self._rx)
+        self._sync_frame = FRAME.pack(_SYNC_ID, 0, bytes(8))
+        operational = bytes([_OPERATIONAL_STATE]) + bytes(7)
+        self._heartbeat_frame = FRAME.pack(_HEARTBEAT_ID + master_node_id, 1, operational)
+        self._heartbeat_cycles = max(1, round(heartbeat_s / period_s))
+        self._port = open_port(url, [(i, 0x7FF) for i in self._layout.identifiers])
+        self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
+        self._pollable = _pollable(self._port)
+        self._port.settimeout(_LOCKSTEP_PATIENCE_S if self.lockstep else 0.0)
+        self._cycling = False
+        self._late = False
+        self._alarms = 0
+        state = GroupState(self.axes, period_s, self.lockstep)
+        self._ints, self._floats = state.ints, state.floats
+        self._words, self._flags = state.words, state.flags
+        self.feedback, self.command = state.feedback, state.command
+        self._valid = state.feedback.valid
+
+    def sync(self) -> None:
+        """Send the SYNC that opens the cycle."""
+        if not self._cycling:
+            self._begin_cycling()
+        if self._late:
+            self._take_late()
+        feedback = self.feedback
+        feedback.cycle += 1
+        feedback.time_s = feedback.cycle * self.period_s
+        self._valid.fill(False)
+        try:
+            self._port.send(self._sync_frame)
+        except OSError as error:
+            raise self._port.lost(error) from error
+
+    def receive(self) -> int:
+        """Wait for the answers to this SYNC and decode them; return how many axes answered.
+
+        In lockstep a silent axis is waited for up to 2 s of wall time; otherwise the wait ends at
+        the share of the period which is left for computing and sending.
+        """
+        if not self.lockstep:
+            return self._receive_paced()
+        recv_into, rows = self._port.recv_into, self._rx.rows
+        missing, last = self.n, 0
+        try:
+            while missing:
+                last = 0
+                for row in rows[:missing]:
+                    if not recv_into(row):
+                        raise self._port.lost()
+                    last += 1
+                missing -= self._decode(0, last)
+        except BlockingIOError:
+            missing -= self._decode(0, last)
+            self._late = True
+        except OSError as error:
+            raise self._port.lost(error) from error
+        return self.n - missing
+
+    def _receive_paced(self) -> int:
+        """Take in what has come; wait for more only while an axis has not answered."""
+        recv_into, rows = self._port.recv_into, self._rx.rows
+        deadline = time.monotonic() + _PACED_SHARE * self.period_s
+        missing = self.n
+        while missing:
+            last = 0
+            try:
+                for row in rows:
+                    if not recv_into(row):
+                        raise self._port.lost()
+                    last += 1
+            except BlockingIOError:
+                pass
+            except OSError as error:
+                raise self._port.lost(error) from error
+            if last:
+                missing -= self._decode(0, last)
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                self._late = missing > 0
+                break
+            if missing:
+                self._wait(left)
+        return self.n - missing
+
+    def _wait(self, seconds: float) -> None:
+        """Wait for a frame; the kernel's own receive time-out is too coarse for a cycle."""
+        if self._pollable:
+            select.select([self._port], [], [], seconds)
+        else:
+            self._port.settimeout(seconds)
+
+    def _take_late(self) -> None:
+        """Decode what came after its cycle, so that it is not taken for the next one's answer."""
+        self._late = False
+        rows, last = self._rx.rows, 0
+        self._port.settimeout(0.0)
+        try:
+            for row in rows:
+                if not self._port.recv_into(row):
+                    raise self._port.lost()
+                last += 1
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            raise self._port.lost(error) from error
+        finally:
+            self._port.settimeout(_LOCKSTEP_PATIENCE_S if self.lockstep else 0.0)
+        self._decode(0, last)
+
+    def _decode(self, first: int, last: int) -> int:
+        layout = self._layout
+        return codec.decode(
+            self._rx_bytes,
+            first,
+            last,
+            layout.slots,
+            layout.fields,
+            STATE_TABLE,
+            self._ints,
+            self._floats,
+            self._words,
+            self._flags,
+        )
+
+    def transmit(self) -> None:
+        """Send controlwords and torques, to act from the next SYNC on.
+
+        A torque that is not a finite number goes out as zero and raises the alarm.
+        """
+        layout = self._layout
+        self._alarms = codec.encode(
+            self._tx_bytes,
+            layout.answer,
+            CONTROLWORD_TABLE,
+            self._ints,
+            self._floats,
+            self._flags,
+        )
+        send = self._port.send
+        try:
+            for row in layout.rpdos.rows:
+                send(row)
+            if self.feedback.cycle % self._heartbeat_cycles == 0:
+                send(self._heartbeat_frame)
+        except OSError as error:
+            raise self._port.lost(error) from error
+
+    def alarm(self) -> str:
+        """Return why the drives must not go on being driven, or an empty text."""
+        if self._alarms:
+            return alarm_text(self.axes, self._ints)
+        return self.network.alarm_text
+
+    @property
+    def missed(self) -> int:
+        """Answers that did not come in time since the beginning, over all axes."""
+        return int(self._ints[codec.MISSED].sum())
+
+    def _begin_cycling(self) -> None:
+        """Take over the master's heartbeat and forget what came while no cycles ran."""
+        self.network.claim_cycle()
+        for axis in self.axes:
+            if has_deadline(axis):
+                self.network.start(axis.node_id)
+        self._port.drain()
+        self._ints[codec.HEARTBEAT_AGE] = 0
+        self._cycling = True
+
+
+def _as_bytes(buffer: FrameBuffer) -> NDArray[np.uint8]:
+    return buffer.array.view(np.uint8).reshape(-1, 16)
+
+
+def has_deadline(axis: AxisConfig) -> bool:
+    """Return whether the drive watches for RPDOs that are late (1400h:05)."""
+    return any(pdo.event_timer_s > 0.0 for pdo in axis.drive.rpdos)
+
+
+def _pollable(port: FramePort) -> bool:
+    try:
+        return port.fileno() >= 0
+    except NotImplementedError:  # python-can's interfaces without a descriptor
+        return False
