@@ -53,14 +53,18 @@ def one_core(*others: int) -> Iterator[None]:
     """Keep this process and those with the identifiers `others` on one core in the block.
 
     In lockstep the controller and the simulator take turns: a wake-up across cores costs more
-    than the work of a cycle. Which core depends on the process, so that two commands at once
-    seldom share one.
+    than the work of a cycle. They run as batch processes, which do not interrupt each other:
+    the answers of several drives are taken in one turn, not in one each. Which core depends on
+    the process, so that two commands at once seldom share one.
     """
     before = os.sched_getaffinity(0)
+    policy = os.sched_getscheduler(0), os.sched_getparam(0)
     core = {sorted(before)[os.getpid() % len(before)]}
     for pid in (0, *others):
         os.sched_setaffinity(pid, core)
+        os.sched_setscheduler(pid, os.SCHED_BATCH, os.sched_param(0))
     try:
         yield
     finally:
         os.sched_setaffinity(0, before)
+        os.sched_setscheduler(0, *policy)

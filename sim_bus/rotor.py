@@ -44,6 +44,8 @@ def step_rotor(m: Any, h: float, demand: float, energised: bool) -> None:
             offset += m.amplitude[k] * math.sin(m.order[k] * m.angle + m.phase[k])
     # The loop drives what its sensors show to the demand: the true current lacks their offset.
     m.current += (1.0 - math.exp(-m.current_rate * h)) * (demand - offset - m.current)
+    if abs(m.current) < 1e-30:
+        m.current = 0.0  # numbers near the smallest there are make every step twice as dear
     m.sensed = m.current + offset
     torque = m.torque_gain * m.current - cogging
 
