@@ -258,7 +258,7 @@ class CanNetwork:
             return BusError(f"{self.url}: the bus has gone away ({self._lost or error})")
         if isinstance(error, SdoAbortedError):
             reason = f"{SdoAbortedError.CODES.get(error.code, 'refused')} ({error.code:08X}h)"
-        elif isinstance(error, struct.error | ObjectDictionaryError | UnicodeError):
+        elif isinstance(error, struct.error | ObjectDictionaryError | ValueError):
             reason = f"its value does not fit the type that the EDS gives it ({error})"
         elif isinstance(error, CanopenSdoError):
             reason = str(error) or type(error).__name__

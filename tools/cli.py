@@ -26,6 +26,11 @@ _COMMANDS = ("bench", "cogging", "commission", "doctor", "drive", "profiles", "s
 _INTERRUPTED = 130
 
 
+@app.callback()
+def _group() -> None:
+    """Commission, run and simulate the winches of cable-driven parallel robots."""
+
+
 def _register(arguments: list[str]) -> None:
     """Load the commands; only the one that is asked for, since each brings libraries along."""
     asked = [name for name in _COMMANDS if arguments and arguments[0] == name]

@@ -109,6 +109,11 @@ def home(
     """Find the encoder index by homing; the motor turns by up to a turn."""
     out = Output(as_json)
     profile, url = load_winch(winch), open_bus(bus)
+    known = profile.drive.homing_methods
+    if method not in known:
+        raise BadInputError(
+            f"--method {method}: {profile.drive.name} has {', '.join(map(str, known))}"
+        )
     confirm_motion(url, yes, "homing turns the motor by up to a turn")
     with open_winch(profile, url, out, plant) as session:
         session.find_index(method)
