@@ -41,7 +41,6 @@ _NOISE_GAIN = 2.45
 _TOLERATED_Nm = 3e-3
 _FINE_s = (0.005, 0.02)
 _LONGEST_s = 30.0
-_QUICK_rad_s = 3.0
 _ROUNDS = 2
 
 
@@ -91,28 +90,33 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> BetterResult:
     shape = start.before.shape if start.before else FrictionShape()
     every = Layout(tuple(range(1, MAX_ORDER + 1)), shape)
     equations = design.accumulate(windows, every)
-    choice, beta = _choose(equations)
+    choice, beta, inertia = _choose(equations)
+    inertia = inertia or start.inertia_kg_m2
     fast = any(w.fast for w in windows)
-    used = []
+    quick = any(w.quick for w in windows)
+    used = [design.INERTIA] if quick else []
     if any(not w.quasi_static for w in windows):
-        used += [design.INERTIA, design.COULOMB, design.COULOMB + 1]
+        used += [design.COULOMB, design.COULOMB + 1]
     if any(w.quasi_static for w in windows):
         used += [design.CREEP, design.CREEP + 1]
-    quick = any(w.cruise_rad_s > _QUICK_rad_s for w in windows)
     used += [design.VISCOUS] if fast or start.before else []
     used += [design.LATENCY] if fast else []
     lag = (start.before.lag_rad.value if start.before else 0.0, _LAG_SD_rad)
     priors = _priors(start.before, quick)
     for number in range(_ROUNDS):
         known = start.before.shape if start.before else (shape if number else None)
-        shape = _shape(runs, start, choice.orders, beta, known) or shape
-        fitted = fit(windows, Layout(choice.orders, shape), used, priors, lag)
+        shape = _shape(runs, start, choice.orders, beta, inertia, known) or shape
+        fitted = fit(windows, Layout(choice.orders, shape), used, priors, lag, inertia)
         beta = fitted.beta[len(used) :]
-    return _result(fitted, windows, choice, start, fast)
+        inertia = fitted.value(design.INERTIA) if quick else inertia
+    return _result(fitted, windows, choice, start, quick)
 
 
-def _choose(equations: Equations) -> tuple[Choice, FloatArray]:
-    """Choose the orders and weigh the kinds of rows, in two rounds; return harmonics' values."""
+def _choose(equations: Equations) -> tuple[Choice, FloatArray, float]:
+    """Choose the orders and weigh the kinds of rows, in two rounds.
+
+    Return with them the harmonics' values and the inertia, 0 where no run tells it.
+    """
     fixed = [design.INERTIA, design.COULOMB, design.COULOMB + 1, design.VISCOUS]
     fixed += [design.CREEP, design.CREEP + 1]
     weight = rows_counted(equations)
@@ -121,7 +125,7 @@ def _choose(equations: Equations) -> tuple[Choice, FloatArray]:
         columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
         beta, _ = solve(total(equations.parts, weight), columns)
         weight = noise_weights(equations, columns, beta)
-    return choice, beta[len(fixed) :]
+    return choice, beta[len(fixed) :], float(beta[0])
 
 
 def _shape(
@@ -129,6 +133,7 @@ def _shape(
     start: _Start,
     orders: tuple[int, ...],
     beta: FloatArray,
+    inertia: float,
     known: FrictionShape | None,
 ) -> FrictionShape | None:
     """Find the friction's shape from short windows, with the cogging found so far taken off."""
@@ -145,7 +150,8 @@ def _shape(
         rows = np.flatnonzero(w.moving)
         if rows.size:
             x = design.matrix(w, layout, 0, w.torque_Nm.size)[:, design.FIXED :]
-            motions.append(Motion(w, (w.torque_Nm - x @ beta)[rows], rows))
+            rest = w.torque_Nm - x @ beta - inertia * w.acceleration_rad_s2
+            motions.append(Motion(w, rest[rows], rows))
     return fit_shape(motions, known) if motions else None
 
 
@@ -168,13 +174,13 @@ def _estimate(fitted: Fit, column: int) -> Estimate:
 
 
 def _result(
-    fitted: Fit, windows: list[Windows], choice: Choice, start: _Start, fast: bool
+    fitted: Fit, windows: list[Windows], choice: Choice, start: _Start, quick: bool
 ) -> BetterResult:
     """Put the result together."""
     layout, before = fitted.layout, start.before
-    measured = fast
-    rotor = _estimate(fitted, design.INERTIA) if fast else Estimate(start.inertia_kg_m2, 0.0)
-    if not fast and before is not None:
+    measured = quick
+    rotor = _estimate(fitted, design.INERTIA) if quick else Estimate(start.inertia_kg_m2, 0.0)
+    if not quick and before is not None:
         rotor, measured = before.inertia_kg_m2, before.inertia_measured
     delay = _estimate(fitted, design.LATENCY)
     lag_half = _CONFIDENCE * float(np.sqrt(max(fitted.covariance[-1, -1], 0.0)))

@@ -107,7 +107,8 @@ def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArra
         out[:, CREEP] = np.maximum(windows.direction[rows], 0.0)
         out[:, CREEP + 1] = np.minimum(windows.direction[rows], 0.0)
         return out
-    out[:, INERTIA] = windows.acceleration_rad_s2[rows]
+    if windows.quick:
+        out[:, INERTIA] = windows.acceleration_rad_s2[rows]
     out[:, LATENCY] = windows.torque_rate_Nm_s[rows] * (
         np.abs(windows.speed_rad_s[rows]) > _QUICK_rad_s
     )

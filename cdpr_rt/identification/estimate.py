@@ -36,6 +36,8 @@ class Rows:
 
     x: FloatArray
     y: FloatArray
+    acceleration: FloatArray
+    """rad/s² where the inertia is not to be estimated, 0 elsewhere."""
     kind: IntArray
     direction: FloatArray
     cluster: IntArray
@@ -66,7 +68,7 @@ class Fit:
 
 def gather(windows: Sequence[Windows], layout: Layout) -> Rows:
     """Collect the rows in which the rotor moves with the ramp."""
-    xs, ys, ks, ds, cs = [], [], [], [], []
+    xs, ys, accelerations, ks, ds, cs = [], [], [], [], [], []
     clusters = 0
     for w, kind in zip(windows, design.kinds(windows), strict=True):
         keep = np.flatnonzero(kind >= 0)
@@ -75,10 +77,11 @@ def gather(windows: Sequence[Windows], layout: Layout) -> Rows:
         clusters = int(place.max()) + 1
         xs.append(design.matrix(w, layout, 0, w.torque_Nm.size)[keep])
         ys.append(w.torque_Nm[keep])
+        accelerations.append(w.acceleration_rad_s2[keep] * (not w.quick))
         ks.append(kind[keep])
         ds.append(w.direction[keep])
         cs.append(place[keep])
-    parts = (np.concatenate(a) for a in (xs, ys, ks, ds, cs))
+    parts = (np.concatenate(a) for a in (xs, ys, accelerations, ks, ds, cs))
     return Rows(*parts)
 
 
@@ -88,14 +91,17 @@ def fit(
     used: list[int],
     priors: list[Prior],
     lag_prior: tuple[float, float],
+    inertia_kg_m2: float,
 ) -> Fit:
     """Fit the used columns, all harmonics and the static lag by Gauss-Newton steps.
 
-    `lag_prior` is mean and standard deviation in rad. The covariance is the sandwich over clusters
+    `lag_prior` is mean and standard deviation in rad. In slow runs the noise of the acceleration
+    would pull the inertia down, so there it takes the value found from the others, or the one
+    handed in where there are none. The covariance is the sandwich over clusters
     of neighbouring windows, so that errors may depend on one another within a cluster.
     """
     rows = gather(windows, layout)
-    weight = np.ones(rows.y.size)
+    weight, inertia = np.ones(rows.y.size), inertia_kg_m2
     harmonics = list(range(design.FIXED, layout.columns))
     columns = [*used, *harmonics]
     orders = np.repeat(np.array(layout.orders, float), 2)
@@ -118,12 +124,14 @@ def fit(
         scale = np.sqrt(np.diag(a) + precision + 1e-300)
         scaled = (a + np.diag(precision)) / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
         inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
-        right = x.T @ (weight * rows.y) + precision * mean
+        y = rows.y - inertia * rows.acceleration
+        right = x.T @ (weight * y) + precision * mean
         beta = inverse @ right
-        residual = rows.y - x @ beta
+        residual = y - x @ beta
         if step < _ROUNDS - 1:
             lag += float(beta[-1])
             weight = _weights(rows, residual)
+            inertia = float(beta[0]) if used[0] == design.INERTIA else inertia
     meat = _meat(x * (weight * residual)[:, None], rows.cluster)
     covariance = inverse @ (meat + np.diag(precision)) @ inverse
     return Fit(layout, columns, beta[:-1], covariance, lag + float(beta[-1]), residual)

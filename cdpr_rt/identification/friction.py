@@ -21,7 +21,7 @@ from cdpr_rt.jit import jit
 
 _LOWEST = (0.003, 0.02, 2e-4)
 _HIGHEST = (1.5, 2.0, 2e-2)
-_STEPS = 60
+_STEPS = 50
 _SPREAD_OF_MEDIAN = 1.4826
 _LEAST_SPREAD_Nm = 2e-4
 _TAIL = 2.5
@@ -78,7 +78,7 @@ def relative_friction(
 
 @dataclass(frozen=True)
 class Motion:
-    """What the search for the shape sees of one run: windows, with the cogging taken off."""
+    """What the search for the shape sees of one run: windows, cogging and inertia taken off."""
 
     windows: Windows
     torque_Nm: FloatArray
@@ -86,12 +86,13 @@ class Motion:
 
 
 def fit_shape(motions: Sequence[Motion], start: FrictionShape | None = None) -> FrictionShape:
-    """Return the shape whose friction, with inertia and viscosity, leaves the smallest error.
+    """Return the shape whose friction, with viscosity, leaves the smallest error.
 
     For every shape tried the linear coefficients are solved for. Each run has its own level of
     error, and rows far outside it count little: a run in which the rotor hunts must not decide.
-    With `start` the search begins there.
+    The search begins at `start` too.
     """
+    starts = [start, *_STARTS] if start else list(_STARTS)
     low, high = np.log(_LOWEST), np.log(_HIGHEST)
     first = start or FrictionShape()
     weights = [_weights(_residuals([m], [np.ones(m.rows.size)], first)[0]) for m in motions]
@@ -102,7 +103,7 @@ def fit_shape(motions: Sequence[Motion], start: FrictionShape | None = None) -> 
         total = sum(float(w @ r**2) for w, r in zip(weights, residuals, strict=True))
         return math.log(total + 1e-30) + float(np.sum((point - inside) ** 2))
 
-    points = [np.log((s.rise, s.speed_rad_s, s.way_rad)) for s in ([start] if start else _STARTS)]
+    points = [np.log((s.rise, s.speed_rad_s, s.way_rad)) for s in starts]
     for _ in range(2):
         found = [
             minimize(objective, p, method="Nelder-Mead", options={"maxfev": _STEPS, "xatol": 0.02})
@@ -130,11 +131,10 @@ def _residuals(
         w = motion.windows
         friction = relative_friction(w.angle_rad, w.velocity_rad_s, w.play_rad, shape)
         values = (np.maximum(friction, 0.0), np.minimum(friction, 0.0), w.velocity_rad_s)
-        columns = average(np.column_stack(values), w, 0, w.torque_Nm.size)
-        xs.append(np.column_stack([columns, w.acceleration_rad_s2])[motion.rows])
+        xs.append(average(np.column_stack(values), w, 0, w.torque_Nm.size)[motion.rows])
     parts = list(zip(xs, motions, weights, strict=True))
     gram = np.sum([(x.T * w) @ x for x, _, w in parts], axis=0)
     right = np.sum([(x.T * w) @ m.torque_Nm for x, m, w in parts], axis=0)
     size = np.sqrt(np.maximum(np.diag(gram), 1e-30))
-    beta = np.linalg.solve(gram / np.outer(size, size) + 1e-9 * np.eye(4), right / size) / size
+    beta = np.linalg.solve(gram / np.outer(size, size) + 1e-9 * np.eye(3), right / size) / size
     return [m.torque_Nm - x @ beta for x, m, _ in parts]

@@ -21,10 +21,12 @@ from cdpr_rt.identification.sweep import SweepData, period_s
 IntArray = NDArray[np.intp]
 
 _FAST_rad_s = np.deg2rad(30.0)
+_QUICK_rad_s = 3.0
 _STEP_rad = np.deg2rad(0.2)
 _SHORTEST_s = 0.009
 _LONGEST_s = 0.039
 _FAST_STEP_s = 0.015
+_QUICK_STEP_s = 0.006
 _THIN_s = 0.003
 _SMOOTHING_s = 0.004
 _SMOOTHING_COUNTS = 1.5
@@ -62,7 +64,9 @@ class Windows:
     quasi_static: bool
     """A sweep: too slow for its friction to follow any curve."""
     fast: bool
-    """Whether the set-point is fast enough to tell inertia and viscous friction."""
+    """Whether the set-point is fast enough to tell viscous friction."""
+    quick: bool
+    """Whether it is fast enough to tell the inertia in spite of the encoder's noise."""
     play_rad: float
     """Movements of the smoothed angle that may be noise."""
     cruise_rad_s: float
@@ -92,6 +96,15 @@ def encoder_step_rad(run: SweepData) -> float:
     return float(steps.min()) if steps.size else 1e-6
 
 
+def _spacing(speed_rad_s: float) -> float:
+    """Return the spacing of windows: short against the cogging's periods, long against noise."""
+    if speed_rad_s > _QUICK_rad_s:
+        return _QUICK_STEP_s
+    if speed_rad_s > _FAST_rad_s:
+        return _FAST_STEP_s
+    return min(max(_STEP_rad / max(speed_rad_s, 1e-3), _SHORTEST_s), _LONGEST_s)
+
+
 def _odd(x: float) -> int:
     return max(1, 2 * round((x - 1.0) / 2.0) + 1)
 
@@ -105,19 +118,17 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     """
     period = period_s(run)
     speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))
-    fast = speed > _FAST_rad_s
+    fast, quick = speed > _FAST_rad_s, speed > _QUICK_rad_s
     thin = 1 if fast or spacing_s else _odd(_THIN_s / period)
-    spacing = (
-        _FAST_STEP_s if fast else min(max(_STEP_rad / max(speed, 1e-3), _SHORTEST_s), _LONGEST_s)
-    )
-    spacing = spacing_s or spacing
+    spacing = spacing_s or _spacing(speed)
     stride = _odd(spacing / period / thin)
     step = stride * thin
     rows = (run.time_s.size - 1) // step - 4
     if rows < 1:
         return None
-    smoothing = _SMOOTHING_COUNTS * encoder_step_rad(run) / _SMOOTHING_SPEED_rad_s
-    smoothing = min(max(smoothing, _SMOOTHING_s), 4.0 * spacing) / period
+    counted = _SMOOTHING_COUNTS * encoder_step_rad(run)
+    smoothing = counted / speed if quick else max(counted / _SMOOTHING_SPEED_rad_s, _SMOOTHING_s)
+    smoothing = min(max(smoothing, period), 4.0 * spacing) / period
     deviation = run.angle_rad - run.setpoint_rad
     angle = run.setpoint_rad + gaussian_filter1d(deviation, smoothing, mode="nearest")
     drift = gaussian_filter1d(deviation, smoothing, order=1, mode="nearest") / period
@@ -153,6 +164,7 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
         moving=np.asarray(moving, np.bool_),
         quasi_static=quasi_static,
         fast=fast,
+        quick=quick,
         play_rad=_PLAY_COUNTS * encoder_step_rad(run),
         cruise_rad_s=speed,
     )
