@@ -30,7 +30,7 @@ from cdpr_rt.identification.sweep import (
     check_runs,
     period_s,
 )
-from cdpr_rt.identification.windows import Windows, contiguous, cut, encoder_step_rad
+from cdpr_rt.identification.windows import Windows, contiguous, cut, reading_noise_rad
 
 MAX_ORDER = 200
 _LATENCY_SD_s = 1e-3
@@ -140,8 +140,8 @@ def _shape(
     layout = Layout(orders, FrictionShape())
     motions = []
     for run in runs:
-        step = encoder_step_rad(run) / math.sqrt(12.0)
-        spacing = math.sqrt(_NOISE_GAIN * step * start.inertia_kg_m2 / _TOLERATED_Nm)
+        noise = reading_noise_rad(run)
+        spacing = math.sqrt(_NOISE_GAIN * noise * start.inertia_kg_m2 / _TOLERATED_Nm)
         spacing = min(max(spacing, _FINE_s[0]), _FINE_s[1])
         part = SweepData(*(a[-round(_LONGEST_s / period_s(run)) :] for a in vars(run).values()))
         w = cut(part, start.latency_s, spacing)

@@ -18,6 +18,7 @@ _ROUNDS = 5
 _SPREAD_OF_MEDIAN = 1.4826
 _LEAST_SPREAD_Nm = 1e-5
 _TAIL = 2.5
+_EMPTY = 1e-20
 _FEWEST_ROWS = 20
 
 
@@ -121,7 +122,9 @@ def fit(
         x = np.column_stack([x, -rows.direction * slope])
         mean[-1] = lag_prior[0] - lag
         a = (x * weight[:, None]).T @ x
-        scale = np.sqrt(np.diag(a) + precision + 1e-300)
+        size = np.diag(a) + precision
+        # a column that no row tells gets the coefficient zero
+        scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
         scaled = (a + np.diag(precision)) / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
         inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
         y = rows.y - inertia * rows.acceleration

@@ -7,6 +7,7 @@ that the encoder's reading is never differentiated.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -29,12 +30,16 @@ _FAST_STEP_s = 0.015
 _QUICK_STEP_s = 0.006
 _THIN_s = 0.003
 _SMOOTHING_s = 0.004
-_SMOOTHING_COUNTS = 1.5
+_SMOOTHING = 3.6
+_LEAST_NOISE_rad = 1e-6
 _SMOOTHING_SPEED_rad_s = 0.3
+_GAUSSIAN_WIDTH = 3.54
+"""Independent values that a Gaussian filter averages, by its standard deviation: 2·sqrt(pi)."""
 _STANDING = 0.2
+_RUNAWAY = 3.0
 _SLOWEST_rad_s = 0.03
 _FORGETTING_rad = 0.02
-_PLAY_COUNTS = 0.35
+_PLAY = 3.0
 _QUASI_STATIC_rad_s = np.deg2rad(10.0)
 
 
@@ -89,11 +94,12 @@ def contiguous(runs: Sequence[SweepData]) -> list[SweepData]:
     return pieces
 
 
-def encoder_step_rad(run: SweepData) -> float:
-    """Return the encoder's resolution as the record shows it."""
-    steps = np.abs(np.diff(run.angle_rad))
-    steps = steps[steps > 1e-9]
-    return float(steps.min()) if steps.size else 1e-6
+def reading_noise_rad(run: SweepData) -> float:
+    """Return the standard deviation of the encoder's reading, rounding included.
+
+    Third differences hardly contain motion: their variance is 20 times that of white noise.
+    """
+    return max(float(np.std(np.diff(run.angle_rad, 3))) / math.sqrt(20.0), _LEAST_NOISE_rad)
 
 
 def _spacing(speed_rad_s: float) -> float:
@@ -102,7 +108,7 @@ def _spacing(speed_rad_s: float) -> float:
         return _QUICK_STEP_s
     if speed_rad_s > _FAST_rad_s:
         return _FAST_STEP_s
-    return min(max(_STEP_rad / max(speed_rad_s, 1e-3), _SHORTEST_s), _LONGEST_s)
+    return float(min(max(_STEP_rad / max(speed_rad_s, 1e-3), _SHORTEST_s), _LONGEST_s))
 
 
 def _odd(x: float) -> int:
@@ -126,11 +132,11 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     rows = (run.time_s.size - 1) // step - 4
     if rows < 1:
         return None
-    counted = _SMOOTHING_COUNTS * encoder_step_rad(run)
-    smoothing = counted / speed if quick else max(counted / _SMOOTHING_SPEED_rad_s, _SMOOTHING_s)
-    smoothing = min(max(smoothing, period), 4.0 * spacing) / period
+    noise = reading_noise_rad(run)
+    smoothing = _SMOOTHING * noise / (speed if quick else _SMOOTHING_SPEED_rad_s)
+    smoothing = min(max(smoothing, period if quick else _SMOOTHING_s), 4.0 * spacing) / period
     deviation = run.angle_rad - run.setpoint_rad
-    angle = run.setpoint_rad + gaussian_filter1d(deviation, smoothing, mode="nearest")
+    angle = run.setpoint_rad + gaussian_filter1d(deviation, 0.5 * smoothing, mode="nearest")
     drift = gaussian_filter1d(deviation, smoothing, order=1, mode="nearest") / period
     velocity = run.setpoint_velocity_rad_s + drift
     cycle = np.arange(run.time_s.size)
@@ -145,7 +151,9 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     quasi_static = speed < _QUASI_STATIC_rad_s
     set_speed = run.setpoint_velocity_rad_s[centre]
     moving = (mean * set_speed > 0.0) & (np.abs(mean) > _STANDING * np.abs(set_speed))
-    if not quasi_static:  # what friction remembers from before the rotor slid is not known
+    if quasi_static:
+        moving &= np.abs(mean) < _RUNAWAY * np.abs(set_speed)
+    else:  # what friction remembers from before the rotor slid is not known
         moving &= np.abs(mean) > _SLOWEST_rad_s
         moving &= np.abs(angle[centre] - angle[0]) > _FORGETTING_rad
     return Windows(
@@ -165,7 +173,7 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
         quasi_static=quasi_static,
         fast=fast,
         quick=quick,
-        play_rad=_PLAY_COUNTS * encoder_step_rad(run),
+        play_rad=_PLAY * noise / math.sqrt(max(1.0, 0.5 * smoothing * _GAUSSIAN_WIDTH)),
         cruise_rad_s=speed,
     )
 
