@@ -40,8 +40,8 @@ class Exchange(Protocol):
     def close(self) -> None:
         """Leave the bus."""
 
-    def positions_rad(self) -> list[float]:
-        """Return the motor angles of the last cycle."""
+    def statuswords(self) -> list[int]:
+        """Return the statusword of each axis in the last cycle."""
 
 
 class OwnExchange:
@@ -52,7 +52,7 @@ class OwnExchange:
     def __init__(self, join: Callable[[], AxisGroup]) -> None:
         self._join = join
         self._group: AxisGroup | None = None
-        self._positions_rad: list[float] = []
+        self._statuswords: list[int] = []
 
     def open(self) -> None:
         """Join the bus."""
@@ -70,13 +70,13 @@ class OwnExchange:
     def close(self) -> None:
         """Leave the bus."""
         if self._group is not None:
-            self._positions_rad = self._group.feedback.position_rad.tolist()
+            self._statuswords = self._group.feedback.statusword.tolist()
             self._group.close()
             self._group = None
 
-    def positions_rad(self) -> list[float]:
-        """Return the motor angles of the last cycle."""
-        return self._positions_rad
+    def statuswords(self) -> list[int]:
+        """Return the statusword of each axis in the last cycle."""
+        return self._statuswords
 
 
 class LibraryExchange:
@@ -88,12 +88,9 @@ class LibraryExchange:
 
     name = "canopen"
 
-    def __init__(
-        self, channel: str, dictionaries: Mapping[int, ObjectDictionary], rad_per_count: float
-    ) -> None:
+    def __init__(self, channel: str, dictionaries: Mapping[int, ObjectDictionary]) -> None:
         """Read the PDO configuration of the nodes, keyed by node id, from the nodes."""
         self._channel = channel
-        self._rad_per_count = rad_per_count
         self._network = canopen.Network()
         # stopping the library takes up to one of its cycles, which are 1 s unless told otherwise
         self._network.NOTIFIER_CYCLE = _NOTIFIER_CYCLE_S
@@ -108,7 +105,7 @@ class LibraryExchange:
         finally:
             self.close()
 
-    def _add(self, i: int, node: canopen.RemoteNode) -> None:
+    def _add(self, i: int, node: Any) -> None:
         node.tpdo.read()
         node.rpdo.read()
         answer, order = node.tpdo[1], node.rpdo[1]
@@ -144,9 +141,9 @@ class LibraryExchange:
         """Leave the bus."""
         self._network.disconnect()
 
-    def positions_rad(self) -> list[float]:
-        """Return the motor angles of the last cycle."""
-        return [counts * self._rad_per_count for _, counts, _ in self._feedback]
+    def statuswords(self) -> list[int]:
+        """Return the statusword of each axis in the last cycle."""
+        return [statusword for statusword, _, _ in self._feedback]
 
 
 class FloorExchange:
@@ -154,9 +151,8 @@ class FloorExchange:
 
     name = "floor"
 
-    def __init__(self, channel: str, node_ids: Sequence[int], rad_per_count: float) -> None:
+    def __init__(self, channel: str, node_ids: Sequence[int]) -> None:
         self._channel = channel
-        self._rad_per_count = rad_per_count
         self._axis_of = {_TPDO1 + node: i for i, node in enumerate(node_ids)}
         self._rpdo_ids = [_RPDO1 + node for node in node_ids]
         self._sync = struct.pack("=IB3x8x", _SYNC_ID, 0)
@@ -190,6 +186,6 @@ class FloorExchange:
         """Leave the bus."""
         self._sock.close()
 
-    def positions_rad(self) -> list[float]:
-        """Return the motor angles of the last cycle."""
-        return [counts * self._rad_per_count for _, counts, _ in self._feedback]
+    def statuswords(self) -> list[int]:
+        """Return the statusword of each axis in the last cycle."""
+        return [statusword for statusword, _, _ in self._feedback]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import math
 import os
 import time
 from collections.abc import Iterator, Sequence
@@ -49,12 +48,12 @@ def measure(cycles: int, out: Output) -> dict[str, Any]:
     with _contenders(out) as (bus, ways):
         times: dict[str, list[tuple[Times, Times]]] = {way.name: [] for way in ways}
         frames = {way.name: [0, 0] for way in ways}
-        with out.progress("exchanging", len(blocks)) as advance:
-            for i, block in enumerate(blocks):
-                for way in ways:
-                    times[way.name].append(_run(way, block, bus, frames[way.name]))
-                advance(i + 1)
-        positions = {way.name: way.positions_rad() for way in ways}
+        # no progress bar: the thread that draws it would be measured with them
+        out.note(f"{cycles} exchanges of each of {len(ways)} ways, some seconds per 10000 ...")
+        for block in blocks:
+            for way in ways:
+                times[way.name].append(_run(way, block, bus, frames[way.name]))
+        statuswords = {way.name: way.statuswords() for way in ways}
     own_cost = _clock_cost_ns()
     cpu = {name: np.concatenate([t[0] for t in of]) - own_cost for name, of in times.items()}
     wall = {name: np.concatenate([t[1] for t in of]) for name, of in times.items()}
@@ -66,7 +65,7 @@ def measure(cycles: int, out: Output) -> dict[str, Any]:
         "cpu_us": cpu_us,
         "wall_us": {name: _percentiles(values) for name, values in wall.items()},
         "frames_per_cycle": {name: round(f / s, 2) for name, (f, s) in frames.items()},
-        "positions_rad": positions,
+        "statuswords": statuswords,
         **_judge(cpu_us),
     }
 
@@ -141,8 +140,8 @@ def _contenders(out: Output) -> Iterator[tuple[str, Sequence[Exchange]]]:
         for node, dictionary in dictionaries.items():
             network.add_node(node, dictionary)
             reports.append(_boot(network, node, winch))
-        axes = [_axis(winch, report) for report in reports]
-        scale = math.tau / reports[0].counts_per_turn
+        limit = winch.motor.rated_torque_Nm
+        axes = [AxisConfig.from_boot(winch.drive, report, limit) for report in reports]
 
         def join() -> AxisGroup:
             return AxisGroup(url, network, axes, PERIOD_S, winch.master_node_id, heartbeat_s)
@@ -151,8 +150,8 @@ def _contenders(out: Output) -> Iterator[tuple[str, Sequence[Exchange]]]:
             bus,
             (
                 OwnExchange(join),
-                LibraryExchange(bus, dictionaries, scale),
-                FloorExchange(bus, nodes, scale),
+                LibraryExchange(bus, dictionaries),
+                FloorExchange(bus, nodes),
             ),
         )
 
@@ -164,14 +163,3 @@ def _boot(network: CanNetwork, node: int, winch: Winch) -> BootReport:
     network.write(node, 0x1016, 1, 0)
     network.write(node, 0x1017, 0, 0)
     return report
-
-
-def _axis(winch: Winch, report: BootReport) -> AxisConfig:
-    return AxisConfig(
-        node_id=report.node_id,
-        drive=winch.drive,
-        rated_torque_Nm=report.rated_torque_Nm,
-        counts_per_turn=report.counts_per_turn,
-        supported_modes=report.supported_modes,
-        torque_limit_Nm=winch.motor.rated_torque_Nm,
-    )
