@@ -6,41 +6,74 @@ import base64
 import io
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "better": "#d1681f", "floor": "#3b8f5a"}
+from cdpr_rt.exchange import FloatArray
+
+COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "better": "#d1581a", "floor": "#3b8f5a"}
 LABELS = {
     "none": "no compensation",
     "thesis": "thesis' method",
     "better": "harmonic model",
-    "floor": "floor: encoder and torque step",
+    "floor": "floor: encoder and torque steps",
 }
 FORWARD, BACKWARD = "#7a3fa0", "#1f8a8a"
+REPAIRED = "#f3c623"
+WAYS = ("increasing angle", "decreasing angle")
+
+_POINTS = 4000
 
 mpl.rcParams.update(
     {
-        "figure.dpi": 110,
-        "font.size": 9,
+        "savefig.dpi": 130,
+        "font.size": 9.5,
+        "axes.titlesize": 10,
+        "axes.titlelocation": "left",
         "axes.spines.top": False,
         "axes.spines.right": False,
+        "axes.edgecolor": "#777777",
         "axes.grid": True,
         "grid.alpha": 0.25,
         "legend.frameon": False,
+        "legend.fontsize": 8.5,
         "lines.linewidth": 1.1,
+        "axes.formatter.useoffset": False,
     }
 )
 
 
-def canvas(rows: int = 1, columns: int = 1, height: float = 3.2) -> tuple[Figure, list[Axes]]:
-    """Return a figure of the report's width and its axes, row by row."""
-    figure = Figure(figsize=(9.0, height * rows), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False)
+def canvas(
+    rows: int = 1, columns: int = 1, height: float = 3.0, sharex: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of the report's width and its axes, row by row; `height` in inch a row."""
+    figure = Figure(figsize=(7.4, height * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=sharex)
     return figure, [ax for row in axes for ax in row]
+
+
+def legend_above(figure: Figure, ax: Axes, columns: int = 4) -> None:
+    """Name the curves of `ax` above the whole figure, where they hide nothing."""
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns)
 
 
 def embedded(figure: Figure) -> str:
     """Return the figure as the text of an image source that needs no file beside the page."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
+    figure.clear()
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a curve (k,) with few enough points to draw, both extremes of each stretch kept."""
+    step = -(-2 * y.size // _POINTS)
+    if step <= 2:
+        return x, y
+    whole = y.size // step * step
+    blocks = y[:whole].reshape(-1, step)
+    place = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)], axis=1), axis=1)
+    keep = (place + np.arange(0, whole, step)[:, None]).ravel()
+    return x[keep], y[keep]

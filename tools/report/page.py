@@ -1,0 +1,284 @@
+"""Puts the report together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.rawlog import read_raw_log
+from profiles import Winch
+from tools.commissioning import METHODS, Paths
+from tools.errors import BadInputError
+from tools.output import to_json
+from tools.procedure import Identified, identify, validation_name
+from tools.report import curves, figures, tables, words
+from tools.report.curves import Ramp
+from tools.report.figures import Deviation
+from tools.report.save import check, save
+from tools.report.text import number, page, paragraph, picture, plain, section
+from tools.truth import read_truth
+
+_ORDERS_SHOWN = 100
+
+
+def build(
+    paths: Paths, winch: Winch, results: dict[str, Any], found: Identified | None = None
+) -> None:
+    """Write the report's page and the results beside it.
+
+    `found` spares identifying anew. Raises WorkFailedError where a file cannot be written,
+    BadInputError for incomplete results or a missing simulator's log, RawLogError and
+    IdentificationError for recordings that are missing or of no use.
+    """
+    check(results, paths.results)
+    save(paths.results, to_json(results, indent=1) + "\n")
+    found = found or identify(winch, results["latency_s"], paths)
+    save(paths.page, _Report(paths, winch, results, found).html())
+
+
+class _Report:
+    """One report while it is put together."""
+
+    def __init__(
+        self, paths: Paths, winch: Winch, results: dict[str, Any], found: Identified
+    ) -> None:
+        self._paths = paths
+        self._winch = winch
+        self._results = results
+        self._found = found
+        self._validation: dict[str, Any] = results["validation"]
+        self._true = self._validation["judged_on"] == "true angle"
+        self._pictures = 0
+
+    def html(self) -> str:
+        """Return the page."""
+        title = f"Commissioning of {self._winch.name}"
+        ramps = self._ramps()
+        judged = words.judged_on(self._validation, len(self._passes("better")))
+        parts = [
+            f"<h1>{escape(title)}</h1>",
+            paragraph(self._whose(), small=True),
+            self._verdict(),
+            tables.summary(self._validation, self._results["bandwidth_Hz"]),
+            paragraph(judged, small=True),
+            section("Torque over a turn", *self._torque()),
+            section("What was identified", *self._identified()),
+            section("Validation on a ramp of 22 deg/s", *self._ramp(ramps)),
+            section("The thesis’ method beside the harmonic model", *self._methods(ramps)),
+            section("Softer and stiffer loops", *self._bandwidths()),
+            section("What is left", *self._left()),
+            section("Bus and files", tables.bus(self._results["bus"]), self._files()),
+        ]
+        return page(title, "\n".join(parts))
+
+    def _picture(self, source: str, what: str, caption: str) -> str:
+        self._pictures += 1
+        return picture(source, self._pictures, what, caption)
+
+    def _recorded(self, name: str) -> list[Path]:
+        found = self._paths.passes(name)
+        if not found:
+            raise BadInputError(f"{self._paths.raw(name + '-0')}: the recording is missing")
+        return found
+
+    def _passes(self, method: str) -> list[Path]:
+        return self._recorded(validation_name(method, self._results["bandwidth_Hz"]))
+
+    def _ramps(self) -> dict[str, Ramp]:
+        truth = read_truth(self._paths.truth) if self._true else None
+        return {method: curves.read_ramp(self._passes(method)[0], truth) for method in METHODS}
+
+    def _whose(self) -> str:
+        motor, drive = self._winch.motor, self._results["drive"]
+        if isinstance(drive, Mapping):
+            shown = ("vendor_id", "product_code", "revision", "serial")
+            ids = ", ".join(f"{key.replace('_', ' ')} {drive.get(key, '?')}" for key in shown)
+            drive = f"{drive.get('name', '')} ({ids})"
+        return (
+            f"{self._results['winch']} · motor {motor.manufacturer} {motor.model} "
+            f"({motor.poles} poles, {number(motor.rated_torque_Nm)} Nm, "
+            f"{number(motor.torque_constant_Nm_per_Arms)} Nm/A) · drive {drive} · encoder "
+            f"{self._results['encoder_counts_per_turn']} counts a turn · bus "
+            f"{self._results['bus'].get('url', '?')} · {self._results['date']}"
+        )
+
+    def _verdict(self) -> str:
+        good = not words.missed(self._validation, "better")
+        lines = "".join(
+            f"<p><b>{who}</b>{escape(words.verdict(self._validation, method))}</p>"
+            for method, who in (("better", "The harmonic model"), ("thesis", "The thesis’ method"))
+        )
+        return f'<div class="verdict{"" if good else " missed"}">{lines}</div>'
+
+    def _torque(self) -> list[str]:
+        thesis, better = self._found.thesis, self._found.better
+        speed = abs(read_raw_log(self._recorded("sweep")[0]).header["speed_rad_s"])
+        order = curves.strongest(better)
+        shift = curves.shift_deg(thesis.raw_Nm, order)
+        means = " and ".join(number(1e3 * one) for one in thesis.mean_Nm)
+        frictions = " and ".join(number(1e3 * one) for one in curves.friction_Nm(better, speed))
+        share = f"{number(100 * thesis.repaired_fraction, 2)} % of the curves, in which the rotor "
+        return [
+            paragraph(
+                f"The motor was swept at {number(math.degrees(speed))} deg/s over "
+                f"{thesis.turns[0]} turn(s) with increasing and {thesis.turns[1]} with decreasing "
+                "angle under a stiff proportional controller, without load. The torque this took "
+                "is averaged at equal angles. The gap between the two directions is friction; "
+                "what they have in common is cogging."
+            ),
+            self._picture(
+                figures.raw_curves(thesis.raw_Nm),
+                "Torque over one turn in both directions",
+                "Torque commanded over one turn from the encoder index, averaged (thesis, figure "
+                "1.4). Sudden steps towards zero are places where the rotor broke loose.",
+            ),
+            self._picture(
+                figures.overlay(thesis.raw_Nm, order),
+                "Both directions over one period of the strongest order",
+                f"Both directions about their means over one period of order {order} (thesis, "
+                f"figure 1.5). In that order the two are {number(abs(shift), 2)} deg apart, each "
+                f"{words.late(shift / 2)} in the sense of its motion.",
+            ),
+            self._picture(
+                figures.tables(
+                    thesis.raw_Nm,
+                    thesis.curve_Nm,
+                    better.tables(thesis.raw_Nm.shape[1]) + thesis.mean_Nm[:, None],
+                    thesis.repaired,
+                ),
+                "Measured torque with the curves of both methods, for each direction",
+                "Measured torque, the thesis’ curve (average, filter of degree 2 over 5 deg, "
+                "repair) and the harmonic model (thesis, figures 1.6 and 1.7). "
+                + (
+                    f"Shaded: {share}ran away and the other direction’s curve was used. "
+                    if thesis.repaired.any()
+                    else "Nowhere did the rotor run away, so nothing was repaired. "
+                )
+                + f"The model is drawn about the measured means, {means} mNm; its own friction at "
+                f"this speed is {frictions} mNm.",
+            ),
+        ]
+
+    def _identified(self) -> list[str]:
+        facts = self._results["identification"]
+        orders = facts["orders"]
+        amplitudes, widths, held_back = (
+            np.asarray(facts[key], float)
+            for key in ("amplitudes_Nm", "confidence_Nm", "held_back_error_Nm")
+        )
+        return [
+            paragraph(
+                "The harmonic model is one least-squares fit of cogging, friction of each "
+                "direction, inertia and delay to the recorded runs, made anew from a second pass "
+                "under compensation. Orders are ranked by significance, and as many are taken as "
+                "help to predict turns that were held back from the fit."
+            ),
+            self._picture(
+                figures.spectrum(orders, amplitudes, widths, held_back),
+                "Amplitude of each order, and the choice of their number",
+                f"Left: {_orders(len(orders))}, with 95 % confidence intervals. Right: the error "
+                "on held-back turns with ever more orders, and how many were taken: the fewest "
+                "that are as good as the best within one standard error.",
+            ),
+            tables.harmonics(facts),
+            tables.estimates(self._found.better),
+            tables.quality(facts),
+        ]
+
+    def _ramp(self, ramps: dict[str, Ramp]) -> list[str]:
+        floor = self._validation["floor"]
+        time_s = max((ramp.time_s for ramp in ramps.values()), key=len)
+        of = "true angle" if self._true else "angle on the encoder"
+        drawn = (
+            ("position_error_deg", "position error (deg)", "rms_position_error_deg", "floor (rms)",
+             f"Deviation of the {of} from the ramp, increasing angle (thesis, figure 1.9)."),
+            ("effort_Nm", "PID effort (Nm)", "peak_pid_effort_Nm", "floor (peak)",
+             "What the PID had to do beside the compensation, about its mean (thesis, 1.9)."),
+            ("velocity_error_deg_s", "velocity error (deg/s)", "peak_velocity_error_deg_s",
+             "floor (peak)",
+             f"Deviation of the velocity of the {of} from 22 deg/s, through a 50 Hz low-pass "
+             "(thesis, figure 1.10)."),
+        )  # fmt: skip
+        pictures = [
+            self._picture(
+                figures.deviations(
+                    time_s,
+                    {method: getattr(ramp, key) for method, ramp in ramps.items()},
+                    Deviation(label, floor[figure], floor_label),
+                ),
+                f"Time course of the {label} without and with compensation",
+                caption,
+            )
+            for key, label, figure, floor_label, caption in drawn
+        ]
+        encoder_deg = 360.0 / self._results["encoder_counts_per_turn"]
+        return [
+            paragraph(words.loop_words(self._results["pid"][0])),
+            paragraph(words.standing_words(ramps)),
+            *pictures,
+            *map(paragraph, words.floor_words(self._validation, encoder_deg, self._torque_step())),
+            *([tables.on_encoder(self._validation["encoder"])] if self._true else []),
+        ]
+
+    def _torque_step(self) -> float:
+        return float(self._results["rated_torque_Nm"]) / 1000.0
+
+    def _methods(self, ramps: dict[str, Ramp]) -> list[str]:
+        found = self._found
+        told = words.method_words(self._validation, found.thesis, found.better, ramps)
+        return [paragraph(one) for one in told]
+
+    def _bandwidths(self) -> list[str]:
+        rows, default = self._validation["bandwidths"], self._results["bandwidth_Hz"]
+        told = paragraph(
+            "How much compensation gains depends on the loop it helps: a soft loop leaves much to "
+            "win, a stiff one little, and every stiff loop ends at the floor. "
+            + (
+                "So the same runs were made with loops of other bandwidths, all tuned by the same "
+                "margins."
+                if len(rows) > 1
+                else "This commissioning was made at one bandwidth only."
+            )
+        )
+        loops = tables.loops(rows, self._results["bandwidths_Hz"], self._results["pid"])
+        if len(rows) == 1:
+            return [told, loops]
+        drawn = self._picture(
+            figures.bandwidths(rows, default, self._validation["targets"]),
+            "The three figures and their ratios over the bandwidth of the loop",
+            "Left: what each method leaves; right: how many times smaller that is than without. "
+            f"The short bars at {plain(default)} Hz are what was asked there.",
+        )
+        return [told, drawn, loops]
+
+    def _left(self) -> list[str]:
+        left = curves.read_left_over(self._passes("better"), _ORDERS_SHOWN)
+        facts = self._results["identification"]
+        told = words.left_words(left, facts["residual_rms_Nm"], self._torque_step())
+        return [
+            *map(paragraph, told),
+            self._picture(
+                figures.left_over(left, facts["orders"]),
+                "PID effort under the harmonic model over the turn, and its orders",
+                "PID effort under the harmonic model over the turn about its mean, and its "
+                "orders; shaded: the orders that the model has.",
+            ),
+        ]
+
+    def _files(self) -> str:
+        return paragraph(
+            f"Beside this page: {self._paths.results.name} (these figures), "
+            f"{self._paths.profile.name} (what the controller uses) and raw/ (every run as "
+            "recorded, from which all of this can be made again).",
+            small=True,
+        )
+
+
+def _orders(count: int) -> str:
+    """Say how many orders were found."""
+    return {0: "no order was found", 1: "the one order found"}.get(count, f"the {count} orders")
