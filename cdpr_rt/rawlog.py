@@ -104,9 +104,10 @@ def read_raw_log(path: Path) -> RawLog:
         known, columns = False, []
     if not known or len(data) < _HEADER_BYTES:
         raise RawLogError(f"{path}: not a raw log of version {_VERSION}, or cut within its header")
-    body = data[_HEADER_BYTES:]
-    samples = len(body) // (8 * len(columns))
+    samples = (len(data) - _HEADER_BYTES) // (8 * len(columns))
     if samples == 0:
         raise RawLogError(f"{path}: holds no whole row of measurements")
-    rows = np.frombuffer(body, "<f8", samples * len(columns)).reshape(samples, len(columns))
+    # in place: a sweep's file is large, and so is what is computed from it
+    values = np.frombuffer(data, "<f8", samples * len(columns), offset=_HEADER_BYTES)
+    rows = values.reshape(samples, len(columns))
     return RawLog(path, header, rows, complete=header.get("rows") == samples)

@@ -13,6 +13,8 @@ from tools.errors import BadInputError
 
 _HEADER_BYTES = 1024
 _FORMAT = "cdpr-rt truth log 1"
+_WANTED = (("sync_index", "i8"), ("angle_from_index_rad", "f8"), ("temperature_rise_K", "f8"))
+_PIECE = 65536
 
 
 @dataclass(frozen=True)
@@ -35,19 +37,18 @@ class Truth:
 
 
 def read_truth(path: Path) -> Truth:
-    """Read the log; raises BadInputError when it is none."""
+    """Read the log piece by piece, since it may be long; raises BadInputError when it is none."""
     try:
-        data = path.read_bytes()
-        header = json.loads(data[:_HEADER_BYTES])
-        dtype = np.dtype([(name, kind) for name, kind in header["fields"]])
-        if header["format"] != _FORMAT or header["record_bytes"] != dtype.itemsize:
-            raise ValueError(header["format"])
+        with path.open("rb") as file:
+            header = json.loads(file.read(_HEADER_BYTES))
+            dtype = np.dtype([(name, kind) for name, kind in header["fields"]])
+            if header["format"] != _FORMAT or header["record_bytes"] != dtype.itemsize:
+                raise ValueError(header["format"])
+            pieces = []
+            while (records := np.fromfile(file, dtype, _PIECE)).size:
+                pieces.append([records[name].astype(kind) for name, kind in _WANTED])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
-    body = data[_HEADER_BYTES:]
-    records = np.frombuffer(body, dtype, len(body) // dtype.itemsize)
-    return Truth(
-        records["sync_index"].astype(np.int64),
-        records["angle_from_index_rad"].astype(float),
-        records["temperature_rise_K"].astype(float),
-    )
+    if not pieces:
+        raise BadInputError(f"{path}: holds no whole record")
+    return Truth(*(np.concatenate(column) for column in zip(*pieces, strict=True)))
