@@ -18,7 +18,8 @@ from cdpr_rt.errors import TripError
 from cdpr_rt.executive import Executive
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.supervisor import Limits, Supervisor
-from drivers.axis_group import AxisConfig, AxisGroup
+from drivers.axis_group import AxisGroup
+from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootSettings, boot
 from drivers.bus import BusUrl, query_status
 from drivers.cia402 import Mode, State, fault_text
@@ -113,12 +114,14 @@ class WinchSession:
 
     def find_index(self, method: int = 34) -> None:
         """Find the encoder index by homing, which turns the motor by up to a turn."""
-        homing = Homing(self.device, 0, method)
+        homing = Homing(self.device, 0, method, _INDEX_TIMEOUT_S)
         homing.configure()
         self.set_mode(Mode.HOMING)
         self.enable()
         try:
-            self.executive.step(homing.update, _INDEX_TIMEOUT_S, "the encoder index (homing)")
+            # the procedure keeps its own time; the executive's is there for a drive gone deaf
+            what = "the encoder index (homing)"
+            self.executive.step(homing.update, 2.0 * _INDEX_TIMEOUT_S, what)
         except BaseException:
             homing.abort()
             raise
@@ -228,8 +231,8 @@ def open_winch(
         settings = BootSettings(winch.master_node_id, winch.sync_period_s, limit)
         report = boot(network, winch.node_id, winch.drive, settings)
         network.start_heartbeat()
-        device = _axis(winch, network, report, limit)
-        stack.callback(device.close)
+        stack.callback(network.release, winch.node_id)
+        device = stack.enter_context(_axis(winch, network, report, limit))
         if not device.lockstep:
             for notice in stack.enter_context(paced_realtime()):
                 out.note(notice)
@@ -251,14 +254,7 @@ def _heartbeat_s(winch: Winch) -> float:
 
 
 def _axis(winch: Winch, network: CanNetwork, report: BootReport, limit_Nm: float) -> AxisGroup:
-    axis = AxisConfig(
-        node_id=winch.node_id,
-        drive=winch.drive,
-        rated_torque_Nm=report.rated_torque_Nm,
-        counts_per_turn=report.counts_per_turn,
-        supported_modes=report.supported_modes,
-        torque_limit_Nm=limit_Nm,
-    )
+    axis = AxisConfig.from_boot(winch.drive, report, limit_Nm)
     return AxisGroup(
         network.url,
         network,
