@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_rt.cogging_profile import CoggingProfile, DriveIdentity
+from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError, DriveIdentity
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import read_raw_log
 from profiles import Winch, load_winch
@@ -121,10 +121,17 @@ def validate(
     """Follow ramps without and with the profile's compensation, under one PID."""
     out = Output(as_json)
     profile, url = load_winch(winch), open_bus(bus)
-    learnt = CoggingProfile.load(cogging_profile)
+    try:
+        learnt = CoggingProfile.load(cogging_profile)
+    except CoggingProfileError as error:
+        raise BadInputError(str(error)) from error
     paths = prepare(out_dir, overwrite)
     confirm_motion(url, yes, "the validation turns the motor")
     with keeping_raw_data(paths), open_winch(profile, url, out, plant, paths.truth) as session:
+        try:  # before the motor moves
+            learnt.compensation("better", session.drive_identity, profile.motor.model)
+        except CoggingProfileError as error:
+            raise BadInputError(f"{cogging_profile}: {error}") from error
         plan = Plan(bandwidths_Hz=())
         steps = Commissioning(session, out, paths, plan)
         steps.prepare()
@@ -150,6 +157,6 @@ def report(
     profile: Winch = load_winch(run["winch"])
     found = identify(profile, run["latency_s"], paths)
     results = assemble(paths, run, found)
-    build(paths, profile, results)
+    build(paths, profile, results, found)
     out.say(f"report: {paths.page}")
     out.result(results)

@@ -64,7 +64,7 @@ def commission(
         write(paths.run, to_json(run, indent=1))
         found = identify(profile, run["latency_s"], paths)
         results = assemble(paths, run, found)
-        build(paths, profile, results)
+        build(paths, profile, results, found)
     summary.show(out, results)
     out.result(results)
 
