@@ -157,9 +157,9 @@ def deviations(time_s: FloatArray, curves: Mapping[str, FloatArray], what: Devia
     figure, (whole, near) = canvas(rows=2, height=2.3, sharex=True)
     for method, curve in curves.items():
         x, y = thinned(time_s[: curve.size], curve)
-        whole.plot(x, y, color=COLOURS[method], lw=0.9)
+        whole.plot(x, y, color=COLOURS[method], label=LABELS[method], lw=0.9)
         faint = 1.0 if method == "better" else 0.6
-        near.plot(x, y, color=COLOURS[method], label=LABELS[method], lw=0.7, alpha=faint)
+        near.plot(x, y, color=COLOURS[method], lw=0.7, alpha=faint)
     near.axhspan(
         -what.floor, what.floor, color=COLOURS["floor"], alpha=0.25, lw=0, label=what.floor_label
     )
@@ -167,7 +167,7 @@ def deviations(time_s: FloatArray, curves: Mapping[str, FloatArray], what: Devia
     near.set(ylim=(-limit, limit), xlabel="time (s)", title="the same, enlarged")
     whole.set_xlim(0.0, time_s[-1])
     figure.supylabel(what.label, fontsize=9.5)
-    legend_above(figure, near)
+    legend_above(figure, whole, near)
     return embedded(figure)
 
 

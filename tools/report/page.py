@@ -125,11 +125,11 @@ class _Report:
         share = f"{number(100 * thesis.repaired_fraction, 2)} % of the curves, in which the rotor "
         return [
             paragraph(
-                f"The motor was swept at {number(math.degrees(speed))} deg/s over "
-                f"{thesis.turns[0]} turn(s) with increasing and {thesis.turns[1]} with decreasing "
-                "angle under a stiff proportional controller, without load. The torque this took "
-                "is averaged at equal angles. The gap between the two directions is friction; "
-                "what they have in common is cogging."
+                f"The motor was swept at {number(math.degrees(speed), 2)} deg/s over "
+                f"{_turns(thesis.turns[0])} with increasing and {_turns(thesis.turns[1])} with "
+                "decreasing angle under a stiff proportional controller, without load. The torque "
+                "this took is averaged at equal angles. The gap between the two directions is "
+                "friction; what they have in common is cogging."
             ),
             self._picture(
                 figures.raw_curves(thesis.raw_Nm),
@@ -259,7 +259,7 @@ class _Report:
     def _left(self) -> list[str]:
         left = curves.read_left_over(self._passes("better"), _ORDERS_SHOWN)
         facts = self._results["identification"]
-        told = words.left_words(left, facts["residual_rms_Nm"], self._torque_step())
+        told = words.left_words(left, facts["residual_rms_Nm"])
         return [
             *map(paragraph, told),
             self._picture(
@@ -277,6 +277,10 @@ class _Report:
             "recorded, from which all of this can be made again).",
             small=True,
         )
+
+
+def _turns(count: int) -> str:
+    return "one turn" if count == 1 else f"{count} turns"
 
 
 def _orders(count: int) -> str:

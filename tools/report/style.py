@@ -53,10 +53,11 @@ def canvas(
     return figure, [ax for row in axes for ax in row]
 
 
-def legend_above(figure: Figure, ax: Axes, columns: int = 4) -> None:
-    """Name the curves of `ax` above the whole figure, where they hide nothing."""
-    handles, labels = ax.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=columns)
+def legend_above(figure: Figure, *axes: Axes) -> None:
+    """Name what is labelled in `axes` above the whole figure, where it hides nothing."""
+    named = [pair for ax in axes for pair in zip(*ax.get_legend_handles_labels(), strict=True)]
+    handles, labels = zip(*named, strict=True)
+    figure.legend(handles, labels, loc="outside upper left", ncols=4)
 
 
 def embedded(figure: Figure) -> str:

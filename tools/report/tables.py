@@ -77,7 +77,7 @@ def estimates(better: BetterResult) -> str:
     f = better.friction
 
     def row(name: str, one: Estimate, factor: float = 1.0) -> list[str]:
-        known = number(abs(factor) * one.half_width, 2) if one.half_width > 0.0 else "not measured"
+        known = number(abs(factor) * one.half_width, 2) if one.half_width > 0.0 else "assumed"
         return [name, data(factor * one.value), known]
 
     rise = f"{number(1e3 * f.stribeck_forward_Nm)} / {number(1e3 * f.stribeck_backward_Nm)}"

@@ -30,7 +30,7 @@ th, td { text-align: left; vertical-align: top; padding: .38rem .6rem .38rem 0;
   border-bottom: 1px solid #e4e7ea; font-variant-numeric: tabular-nums; }
 thead th { border-bottom: 1.5px solid #7d858e; font-weight: 600; vertical-align: bottom; }
 tbody th { font-weight: 500; }
-td .small { display: block; }
+tbody .small { display: block; }
 .together { white-space: nowrap; }
 .good { color: #2a7145; } .bad { color: #a85d00; }
 figure { margin: 1.2rem 0 1.5rem; }
@@ -54,7 +54,7 @@ def number(value: float | None, digits: int = 3) -> str:
     places = digits - 1 - math.floor(math.log10(abs(value)))
     if places > digits + 3:
         return f"{value:.{digits - 1}e}"
-    return f"{value:,.{max(places, 0)}f}".replace(",", " ").replace("-", "−")
+    return f"{value:,.{max(places, 0)}f}".replace(",", "\u202f").replace("-", "−")
 
 
 def plain(value: float) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,6 @@ from tools.report.text import number, plain
 _NEAR_FLOOR = 2.0
 _SEEN = 0.005
 _FLAT = 0.98
-_EXPLAINED = 1.5
 
 
 @dataclass(frozen=True)
@@ -69,12 +67,11 @@ def verdict(validation: Mapping[str, Any], method: str) -> str:
 
 def judged_on(validation: Mapping[str, Any], passes: int) -> str:
     """Say what the figures are measured with."""
+    which = "is the worse of the two directions" if passes > 1 else "is of increasing angle"
     how = (
-        "Over one motor turn at 22 deg/s; the velocity goes through a 50 Hz low-pass, the effort "
-        "is taken about its mean."
+        f"Each figure {which}, over one motor turn at 22 deg/s; the velocity goes through a 50 Hz "
+        "low-pass, and the effort is taken about its mean."
     )
-    if passes > 1:
-        how = f"Each figure is the worse one of the two directions. {how}"
     if validation["judged_on"] == "true angle":
         return (
             "Judged on the rotor’s true angle, from the simulator’s own log, which nothing but "
@@ -104,7 +101,7 @@ def floor_words(validation: Mapping[str, Any], encoder_deg: float, torque_Nm: fl
     if len(close) < len(above):
         words.append(
             "What lies above the floor is friction that differs from its model, and the cogging "
-            "that was not found; the section on what is left tells the two apart."
+            "that was not found; the section on what is left tells what of it repeats."
         )
     return words
 
@@ -170,7 +167,9 @@ def method_words(
         f"{_error(errors[1])} for decreasing angle, where the cogging itself reaches "
         f"{number(1e3 * float(abs(better.tables(3600)).max()))} mNm."
     )
-    words.append(_cost(validation, max(one.peak_Nm for one in errors), ramps["thesis"].standing))
+    words.append(
+        _cost(validation, better, max(one.peak_Nm for one in errors), ramps["thesis"].standing)
+    )
     if better.harmonics:
         words.append(
             f"In the strongest order, {strongest(better)}, they have {number(errors[0].gain)} and "
@@ -181,7 +180,9 @@ def method_words(
     return words + _method_limits(thesis, better)
 
 
-def _cost(validation: Mapping[str, Any], table_error_Nm: float, standing: float) -> str:
+def _cost(
+    validation: Mapping[str, Any], better: BetterResult, table_error_Nm: float, standing: float
+) -> str:
     """Say what the PID has to do for the table's error."""
     effort = validation["thesis"]["peak_pid_effort_Nm"]
     words = (
@@ -189,12 +190,20 @@ def _cost(validation: Mapping[str, Any], table_error_Nm: float, standing: float)
         f"{number(1e3 * effort)} mNm, {number(effort / table_error_Nm, 2)} times the largest "
         "difference."
     )
-    if effort > _EXPLAINED * table_error_Nm and standing >= _SEEN:
-        words += (
-            " The rest comes from sticking and slipping: each time the rotor stops, the PID must "
-            "build up the torque that breaks it loose, and it overshoots afterwards."
-        )
-    return words
+    if standing < _SEEN:
+        return words
+    f = better.friction
+    rise = max(f.stribeck_forward_Nm, f.stribeck_backward_Nm)
+    higher = (
+        f", which the model finds up to {number(1e3 * rise)} mNm higher at standstill than at speed"
+        if rise > 0.0
+        else ""
+    )
+    return (
+        f"{words} The rotor also sticks and slips on that table: whenever it stops, the PID must "
+        f"build up torque until friction{higher}, gives way, and the peak velocity error is the "
+        "speed at which it then slips."
+    )
 
 
 def _method_limits(thesis: ThesisResult, better: BetterResult) -> list[str]:
@@ -226,7 +235,7 @@ def _error(error: TableError) -> str:
     )
 
 
-def left_words(left: LeftOver, residual_rms_Nm: float, torque_step_Nm: float) -> list[str]:
+def left_words(left: LeftOver, residual_rms_Nm: float) -> list[str]:
     """Say what could not be explained, and what of it repeats."""
     order = int(left.amplitudes_Nm.max(axis=0).argmax())
     largest = float(left.amplitudes_Nm[:, order].max())
@@ -240,10 +249,8 @@ def left_words(left: LeftOver, residual_rms_Nm: float, torque_step_Nm: float) ->
             f" {number(1e3 * left.repeating_rms_Nm, 2)} mNm rms come back at the same angle in the "
             "next turn and could still be learnt; the rest changes from turn to turn."
         )
-    steps = torque_step_Nm / math.sqrt(12.0)
     return [
         words,
-        "In the identification itself the fit leaves a torque of "
-        f"{number(1e3 * residual_rms_Nm)} mNm rms unexplained; rounding to the drive’s torque "
-        f"steps alone is {number(1e3 * steps, 2)} mNm rms.",
+        f"In the identification itself the fit leaves {number(1e3 * residual_rms_Nm)} mNm rms of "
+        "torque unexplained, as averaged over its short windows.",
     ]
