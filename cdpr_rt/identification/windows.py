@@ -35,6 +35,10 @@ _LEAST_NOISE_rad = 1e-6
 _SMOOTHING_SPEED_rad_s = 0.3
 _GAUSSIAN_WIDTH = 3.54
 """Independent values that a Gaussian filter averages, by its standard deviation: 2·sqrt(pi)."""
+_SAMPLED = np.array([1.0, 10.0, 1.0]) / 12.0
+_HELD = np.array([1.0, 6.0, 1.0]) / 8.0
+"""What averages over samples lack against the second difference's averages over time: two boxes of
+a cycle for what is sampled, a third for the torque, which is held over a cycle."""
 _STANDING = 0.2
 _RUNAWAY = 3.0
 _SLOWEST_rad_s = 0.03
@@ -125,7 +129,8 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     period = period_s(run)
     speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))
     fast, quick = speed > _FAST_rad_s, speed > _QUICK_rad_s
-    thin = 1 if fast or spacing_s else _odd(_THIN_s / period)
+    # thinning widens or narrows a window by its rounding: harmless where the motion is slow
+    thin = _odd(_THIN_s / period) if speed < _QUASI_STATIC_rad_s and not spacing_s else 1
     spacing = spacing_s or _spacing(speed)
     stride = _odd(spacing / period / thin)
     step = stride * thin
@@ -143,7 +148,7 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
     centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
     boxed = uniform_filter1d(uniform_filter1d(run.angle_rad - run.angle_rad[0], step), step)
-    smooth_torque = torque
+    smooth_torque = np.convolve(torque, _HELD, mode="same")
     for _ in range(4):
         smooth_torque = uniform_filter1d(smooth_torque, step)
     mean = uniform_filter1d(velocity, 2 * step + 1)[centre]
@@ -159,7 +164,7 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     return Windows(
         angle_rad=angle[(thin - 1) // 2 :: thin],
         velocity_rad_s=velocity[(thin - 1) // 2 :: thin],
-        bump=_bump(stride),
+        bump=_bump(stride, thin),
         stride=stride,
         torque_Nm=smooth_torque[centre],
         torque_rate_Nm_s=(smooth_torque[centre + 1] - smooth_torque[centre - 1]) / (2.0 * period),
@@ -178,13 +183,13 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     )
 
 
-def _bump(stride: int) -> FloatArray:
+def _bump(stride: int, thin: int) -> FloatArray:
     """Return the weights of a window on thinned samples, (4·stride + 1,), centred at 2·stride."""
     box = np.ones(stride) / stride
     four = np.convolve(np.convolve(box, box), np.convolve(box, box))
     weights = np.zeros(4 * stride + 1)
     weights[2:-2] = four
-    return weights
+    return np.convolve(weights, _SAMPLED, mode="same") if thin == 1 else weights
 
 
 def average(values: FloatArray, windows: Windows, first: int, last: int) -> FloatArray:
