@@ -10,7 +10,7 @@ import typer
 from cdpr_rt.errors import ControlError
 from drivers.errors import DriverError
 from profiles.errors import ProfileError
-from sim_bus.errors import SimulatorError
+from sim_bus.errors import BusSetupError, SimulatorError
 from tools.errors import BAD_INPUT, DONE, FAILED, CommandError
 from tools.output import to_json
 
@@ -41,7 +41,7 @@ def _register(arguments: list[str]) -> None:
 def _exit_status(error: BaseException) -> int:
     if isinstance(error, CommandError):
         return error.exit_status
-    return BAD_INPUT if isinstance(error, ProfileError) else FAILED
+    return BAD_INPUT if isinstance(error, ProfileError | BusSetupError) else FAILED
 
 
 def main() -> None:

@@ -180,8 +180,12 @@ def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
     """Ask before a real motor is energised; raises BadInputError when nobody agrees."""
     if url.is_simulated or yes:
         return
-    if not typer.confirm(f"{what} on {url}: the motor will turn. Go on?", err=True):
-        raise BadInputError("not confirmed; nothing was energised")
+    try:
+        agreed = typer.confirm(f"{what} on {url}: the motor will turn. Go on?", err=True)
+    except typer.Abort:  # nobody there to answer
+        agreed = False
+    if not agreed:
+        raise BadInputError("not confirmed (--yes does it beforehand); nothing was energised")
 
 
 @contextmanager
