@@ -42,6 +42,8 @@ _TOLERATED_Nm = 3e-3
 _FINE_s = (0.005, 0.02)
 _LONGEST_s = 30.0
 _ROUNDS = 2
+_INERTIA_SHARE = 0.01
+"""What the model leaves out, such as the current loop's lag, may move the inertia by this."""
 
 
 def identify_better(
@@ -107,7 +109,7 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> BetterResult:
         known = start.before.shape if start.before else (shape if number else None)
         shape = _shape(runs, start, choice.orders, beta, inertia, known) or shape
         fitted = fit(windows, Layout(choice.orders, shape), used, priors, lag, inertia)
-        beta = fitted.beta[len(used) :]
+        beta = fitted.beta[len(used) : len(fitted.used)]
         inertia = fitted.value(design.INERTIA) if quick else inertia
     return _result(fitted, windows, choice, start, quick)
 
@@ -182,8 +184,9 @@ def _result(
     rotor = _estimate(fitted, design.INERTIA) if quick else Estimate(start.inertia_kg_m2, 0.0)
     if not quick and before is not None:
         rotor, measured = before.inertia_kg_m2, before.inertia_measured
+    rotor = Estimate(rotor.value, math.hypot(rotor.half_width, _INERTIA_SHARE * rotor.value))
     delay = _estimate(fitted, design.LATENCY)
-    lag_half = _CONFIDENCE * float(np.sqrt(max(fitted.covariance[-1, -1], 0.0)))
+    lag_half = _CONFIDENCE * fitted.lag_deviation_rad
     rows = sum(w.moving.size for w in windows)
     lost = sum(int(np.sum(~w.moving)) for w in windows)
     level = design.COULOMB if design.COULOMB in fitted.used else design.CREEP
@@ -210,6 +213,7 @@ def _result(
         lag_rad=Estimate(fitted.lag_rad, lag_half),
         pole_pairs=start.pole_pairs,
         coverage=_coverage(windows),
+        cogging_trend_1_s=fitted.cogging_trend_1_s,
         excluded_fraction=lost / rows,
         residual_rms_Nm=float(np.sqrt(np.mean(fitted.residual_Nm**2))),
         held_back_error_Nm=choice.error_Nm,

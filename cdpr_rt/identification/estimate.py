@@ -19,6 +19,10 @@ _SPREAD_OF_MEDIAN = 1.4826
 _LEAST_SPREAD_Nm = 1e-5
 _TAIL = 2.5
 _EMPTY = 1e-20
+_EXTRA = 3
+"""Columns behind the harmonics: static lag, trend of the cogging, trend of the friction."""
+_TREND_SD_1_s = 3e-4
+_DRY = (design.COULOMB, design.COULOMB + 1, design.CREEP, design.CREEP + 1)
 _FEWEST_ROWS = 20
 
 
@@ -41,12 +45,13 @@ class Rows:
     """rad/s² where the inertia is not to be estimated, 0 elsewhere."""
     kind: IntArray
     direction: FloatArray
+    time: FloatArray
     cluster: IntArray
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Coefficients of the used columns and of the static lag (last), with their covariance."""
+    """Coefficients of the used columns and the extra ones behind, with their covariance."""
 
     layout: Layout
     used: list[int]
@@ -54,6 +59,16 @@ class Fit:
     covariance: FloatArray
     lag_rad: float
     residual_Nm: FloatArray
+
+    @property
+    def lag_deviation_rad(self) -> float:
+        """Standard error of the static lag."""
+        return float(np.sqrt(max(self.covariance[-_EXTRA, -_EXTRA], 0.0)))
+
+    @property
+    def cogging_trend_1_s(self) -> float:
+        """Relative change of the cogging in a second."""
+        return float(self.beta[-_EXTRA + 1])
 
     def value(self, column: int) -> float:
         """Return a column's coefficient, 0 where it was not used."""
@@ -69,7 +84,7 @@ class Fit:
 
 def gather(windows: Sequence[Windows], layout: Layout) -> Rows:
     """Collect the rows in which the rotor moves with the ramp."""
-    xs, ys, accelerations, ks, ds, cs = [], [], [], [], [], []
+    xs, ys, accelerations, ks, ds, ts, cs = [], [], [], [], [], [], []
     clusters = 0
     for w, kind in zip(windows, design.kinds(windows), strict=True):
         keep = np.flatnonzero(kind >= 0)
@@ -81,8 +96,9 @@ def gather(windows: Sequence[Windows], layout: Layout) -> Rows:
         accelerations.append(w.acceleration_rad_s2[keep] * (not w.quick))
         ks.append(kind[keep])
         ds.append(w.direction[keep])
+        ts.append(w.centre_s[keep])
         cs.append(place[keep])
-    parts = (np.concatenate(a) for a in (xs, ys, accelerations, ks, ds, cs))
+    parts = (np.concatenate(a) for a in (xs, ys, accelerations, ks, ds, ts, cs))
     return Rows(*parts)
 
 
@@ -102,42 +118,67 @@ def fit(
     of neighbouring windows, so that errors may depend on one another within a cluster.
     """
     rows = gather(windows, layout)
-    weight, inertia = np.ones(rows.y.size), inertia_kg_m2
-    harmonics = list(range(design.FIXED, layout.columns))
-    columns = [*used, *harmonics]
-    orders = np.repeat(np.array(layout.orders, float), 2)
-    precision, mean = np.zeros(len(columns) + 1), np.zeros(len(columns) + 1)
-    for p in priors:
-        if p.column in columns:
-            i = columns.index(p.column)
-            precision[i], mean[i] = p.deviation**-2, p.mean
-    precision[-1] = lag_prior[1] ** -2
-    lag = lag_prior[0]
-    beta = np.zeros(len(columns) + 1)
+    columns = [*used, *range(design.FIXED, layout.columns)]
+    precision, mean = _prior_arrays(columns, priors)
+    precision[-_EXTRA:] = lag_prior[1] ** -2, _TREND_SD_1_s**-2, _TREND_SD_1_s**-2
+    weight, inertia, lag = np.ones(rows.y.size), inertia_kg_m2, lag_prior[0]
+    beta = np.zeros(len(columns) + _EXTRA)
     for step in range(_ROUNDS):
-        x = rows.x[:, columns].copy()
-        turned = _turned(x[:, len(used) :], orders, rows.direction * lag)
-        x[:, len(used) :] = turned
-        slope = _slope(turned, orders, beta[len(used) : -1])
-        x = np.column_stack([x, -rows.direction * slope])
-        mean[-1] = lag_prior[0] - lag
-        a = (x * weight[:, None]).T @ x
-        size = np.diag(a) + precision
-        # a column that no row tells gets the coefficient zero
-        scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
-        scaled = (a + np.diag(precision)) / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
-        inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
+        x = _linearised(rows, layout, columns, beta, lag)
+        mean[-_EXTRA] = lag_prior[0] - lag
+        inverse = _inverse((x * weight[:, None]).T @ x + np.diag(precision))
         y = rows.y - inertia * rows.acceleration
-        right = x.T @ (weight * y) + precision * mean
-        beta = inverse @ right
+        beta = inverse @ (x.T @ (weight * y) + precision * mean)
         residual = y - x @ beta
         if step < _ROUNDS - 1:
-            lag += float(beta[-1])
+            lag += float(beta[-_EXTRA])
             weight = _weights(rows, residual)
             inertia = float(beta[0]) if used[0] == design.INERTIA else inertia
     meat = _meat(x * (weight * residual)[:, None], rows.cluster)
     covariance = inverse @ (meat + np.diag(precision)) @ inverse
-    return Fit(layout, columns, beta[:-1], covariance, lag + float(beta[-1]), residual)
+    return Fit(layout, columns, beta, covariance, lag + float(beta[-_EXTRA]), residual)
+
+
+def _prior_arrays(columns: list[int], priors: list[Prior]) -> tuple[FloatArray, FloatArray]:
+    """Return precision and mean of what is known beforehand, for columns and extra ones."""
+    precision, mean = np.zeros(len(columns) + _EXTRA), np.zeros(len(columns) + _EXTRA)
+    for p in priors:
+        if p.column in columns:
+            i = columns.index(p.column)
+            precision[i], mean[i] = p.deviation**-2, p.mean
+    return precision, mean
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse; a column that no row tells is left out, its coefficient zero."""
+    size = np.diag(matrix)
+    scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
+    scaled = matrix / np.outer(scale, scale) + 1e-12 * np.eye(scale.size)
+    return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale))
+
+
+def _linearised(
+    rows: Rows, layout: Layout, columns: list[int], beta: FloatArray, lag: float
+) -> FloatArray:
+    """Return the used columns, harmonics shifted by the lag so far, and the extra columns.
+
+    These are the derivatives by a further lag, and by the relative change of cogging and of
+    friction per second: the motor warms up, and the coefficients hold for the end of the runs.
+    """
+    x = rows.x[:, columns]
+    orders = np.repeat(np.array(layout.orders, float), 2)
+    first = len(columns) - orders.size
+    harmonics = _turned(x[:, first:], orders, rows.direction * lag)
+    x[:, first:] = harmonics
+    value = beta[first:-_EXTRA]
+    since = rows.time - rows.time.max()
+    dry = [i for i, c in enumerate(columns) if c in _DRY]
+    extra = (
+        -rows.direction * _slope(harmonics, orders, value),
+        since * (harmonics @ value),
+        since * (x[:, dry] @ beta[dry]),
+    )
+    return np.column_stack([x, *extra])
 
 
 def _turned(harmonics: FloatArray, orders: FloatArray, by: FloatArray) -> FloatArray:

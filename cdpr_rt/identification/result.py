@@ -53,6 +53,8 @@ class BetterResult:
     pole_pairs: int
     coverage: float
     """Share of the turn on which the rotor was seen sliding."""
+    cogging_trend_1_s: float
+    """Relative change of the cogging in a second, as the motor warms up."""
     excluded_fraction: float
     """Share of the windows in which it stood still or turned against the ramp."""
     residual_rms_Nm: float
