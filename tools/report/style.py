@@ -73,8 +73,7 @@ def thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     step = -(-2 * y.size // _POINTS)
     if step <= 2:
         return x, y
-    whole = y.size // step * step
-    blocks = y[:whole].reshape(-1, step)
-    place = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)], axis=1), axis=1)
-    keep = (place + np.arange(0, whole, step)[:, None]).ravel()
+    blocks = np.pad(y, (0, -y.size % step), mode="edge").reshape(-1, step)
+    extremes = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)], axis=1), axis=1)
+    keep = (extremes + step * np.arange(len(blocks))[:, None]).ravel().clip(max=y.size - 1)
     return x[keep], y[keep]

@@ -80,6 +80,7 @@ def estimates(better: BetterResult) -> str:
         known = number(abs(factor) * one.half_width, 2) if one.half_width > 0.0 else "assumed"
         return [name, data(factor * one.value), known]
 
+    drift = 100.0 * 60.0 * better.cogging_trend_1_s
     rise = f"{number(1e3 * f.stribeck_forward_Nm)} / {number(1e3 * f.stribeck_backward_Nm)}"
     rows = [
         row("Coulomb friction, increasing angle (mNm)", better.coulomb_forward_Nm, 1e3),
@@ -90,6 +91,7 @@ def estimates(better: BetterResult) -> str:
         row("Rotor inertia (kg mm²)", better.inertia_kg_m2, 1e6),
         row("Delay from angle to torque (ms)", better.latency_s, 1e3),
         row("Static lag of each direction (deg)", better.lag_rad, math.degrees(1.0)),
+        ["Change of the cogging with warmth (% a minute)", number(drift), "–"],
     ]
     return table(["", "Value", "± (95 %)"], rows)
 
@@ -141,7 +143,7 @@ def _gains(ratios: Mapping[str, float]) -> str:
 def bus(facts: Mapping[str, Any]) -> str:
     """Return how the bus was used; what is not known of it is left out."""
     names = {
-        "url": "Bus", "period_s": "Cycle (s)", "cycles": "Cycles", "missed": "Answers missed",
+        "url": "Bus", "cycles": "Cycles", "missed": "Answers missed",
         "late": "Cycles late", "wall_s": "Time taken (s)", "load": "Bus load, mean",
         "peak_cycle_load": "Bus load, fullest cycle", "overruns": "Overruns",
     }  # fmt: skip
@@ -150,6 +152,8 @@ def bus(facts: Mapping[str, Any]) -> str:
         for key, name in names.items()
         if facts.get(key) is not None
     ]
+    if facts.get("period_s"):
+        rows.insert(1, ["Cycle (ms)", plain(1e3 * facts["period_s"])])
     if facts.get("wall_s") and facts.get("cycles"):
         rows.append(
             ["Times real time", number(facts["cycles"] * facts["period_s"] / facts["wall_s"])]

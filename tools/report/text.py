@@ -41,6 +41,7 @@ figcaption { font-size: .86rem; color: #414850; line-height: 1.45; margin-top: .
   figure .scroll img { width: 36rem; max-width: none; } }
 @media print {
   body { font-size: 10pt; } main { max-width: none; padding: 0; }
+  figure img { max-width: 14.5cm; margin: 0 auto; }
   figure, table, .verdict { break-inside: avoid; } h2 { break-after: avoid; } }
 """
 
