@@ -20,7 +20,8 @@ from drivers.network import CanNetwork
 
 _SYNC_ID, _HEARTBEAT_ID = 0x080, 0x700
 _OPERATIONAL_STATE = 5
-_LOCKSTEP_PATIENCE_S = 2.0
+# for an axis that answered before, and for one that has not answered last time
+_PATIENCE_S, _SHORT_PATIENCE_S = 2.0, 0.02
 _PACED_SHARE = 0.6
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
 
@@ -55,9 +56,10 @@ class AxisExchange:
         self._port = open_port(url, [(i, 0x7FF) for i in self._layout.identifiers])
         self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
         self._pollable = _pollable(self._port)
-        self._port.settimeout(_LOCKSTEP_PATIENCE_S if self.lockstep else 0.0)
-        self._cycling = False
-        self._late = False
+        self._patience_s = _PATIENCE_S
+        self._port.settimeout(self._patience_s if self.lockstep else 0.0)
+        self._cycling = self._closed = False
+        self._late = self._impatient = False
         self._alarms = 0
         state = GroupState(self.axes, period_s, self.lockstep)
         self._ints, self._floats = state.ints, state.floats
@@ -71,6 +73,8 @@ class AxisExchange:
             self._begin_cycling()
         if self._late:
             self._take_late()
+        elif self._impatient:
+            self._be_patient(True)
         feedback = self.feedback
         feedback.cycle += 1
         feedback.time_s = feedback.cycle * self.period_s
@@ -83,13 +87,13 @@ class AxisExchange:
     def receive(self) -> int:
         """Wait for the answers to this SYNC and decode them; return how many axes answered.
 
-        In lockstep a silent axis is waited for up to 2 s of wall time; otherwise the wait ends at
-        the share of the period which is left for computing and sending.
+        In lockstep an axis that falls silent is waited for up to 2 s of wall time; otherwise the
+        wait ends so that a share of the period is left for computing and sending.
         """
         if not self.lockstep:
             return self._receive_paced()
         recv_into, rows = self._port.recv_into, self._rx.rows
-        missing, last = self.n, 0
+        missing, last, deadline = self.n, 0, 0.0
         try:
             while missing:
                 last = 0
@@ -98,6 +102,13 @@ class AxisExchange:
                         raise self._port.lost()
                     last += 1
                 missing -= self._decode(0, last)
+                if missing:
+                    # heartbeats go on when answers do not: each of them ends a wait of the port
+                    now = time.monotonic()
+                    deadline = deadline or now + self._patience_s
+                    if now > deadline:
+                        self._late = True
+                        break
         except BlockingIOError:
             missing -= self._decode(0, last)
             self._late = True
@@ -153,8 +164,14 @@ class AxisExchange:
         except OSError as error:
             raise self._port.lost(error) from error
         finally:
-            self._port.settimeout(_LOCKSTEP_PATIENCE_S if self.lockstep else 0.0)
+            self._be_patient(False)
         self._decode(0, last)
+
+    def _be_patient(self, patient: bool) -> None:
+        if self.lockstep:
+            self._impatient = not patient
+            self._patience_s = _PATIENCE_S if patient else _SHORT_PATIENCE_S
+            self._port.settimeout(self._patience_s)
 
     def _decode(self, first: int, last: int) -> int:
         layout = self._layout
@@ -212,6 +229,11 @@ class AxisExchange:
             if has_deadline(axis):
                 self.network.start(axis.node_id)
         self._port.drain()
+        for i, axis in enumerate(self.axes):
+            if axis.node_id in self.network.restarted:
+                # while no cycles ran, and for good: only a new boot makes it usable again
+                self._flags[codec.INDEX_KNOWN, i] = False
+                self._ints[codec.ALARM, i] |= codec.RESTARTED
         self._ints[codec.HEARTBEAT_AGE] = 0
         self._cycling = True
 

@@ -179,11 +179,14 @@ class AxisGroup(AxisExchange):
     # -- the end
 
     def close(self) -> str:
-        """Take torque and power from the drives and leave the bus.
+        """Take torque and power from the drives and leave the bus; a second time does nothing.
 
         Returns what could not be made sure of, empty when every drive has told that its power
         stage is off.
         """
+        if self._closed:
+            return ""
+        self._closed = True
         try:
             return switch_off(self)
         finally:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from drivers.cia402 import DISABLE_VOLTAGE, State, state_of
+from drivers.cia402 import DISABLE_VOLTAGE, POWER_OFF, State, state_of
 from drivers.errors import BusError, SdoError
 
 if TYPE_CHECKING:
     from drivers.axis_group import AxisGroup
 
 _TIMEOUT_S = 1.0
-_POWER_OFF = (State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT)
 
 
 def switch_off(group: AxisGroup) -> str:
@@ -48,7 +47,7 @@ def _by_cycles(group: AxisGroup) -> bool:
         group.sync()
         answered = group.receive()
         group.transmit()
-        if answered == group.n and all(state in _POWER_OFF for state in group.states()):
+        if answered == group.n and all(state in POWER_OFF for state in group.states()):
             return True
         if not group.lockstep:
             time.sleep(group.period_s)
@@ -59,7 +58,7 @@ def _by_sdo(group: AxisGroup, node_id: int) -> bool:
     network = group.network
     try:
         network.write(node_id, 0x6040, 0, DISABLE_VOLTAGE)
-        if state_of(network.read_int(node_id, 0x6041)) in _POWER_OFF:
+        if state_of(network.read_int(node_id, 0x6041)) in POWER_OFF:
             return True
     except SdoError:
         pass  # it does not listen to SDO either

@@ -81,6 +81,9 @@ def state_of(statusword: int) -> State:
     return State(int(STATE_TABLE[statusword & 0x7F]))
 
 
+POWER_OFF: Final = (State.NOT_READY, State.SWITCH_ON_DISABLED, State.READY, State.FAULT)
+"""States in which the power stage is off; in switched on it may have voltage."""
+
 TARGETS: Final = (
     State.SWITCH_ON_DISABLED,
     State.READY,

@@ -19,7 +19,7 @@ from canopen.sdo.exceptions import SdoError as CanopenSdoError
 
 from drivers.bus import BusUrl, open_python_can
 from drivers.bus.packed import EFF_FLAG, RTR_FLAG
-from drivers.cia402 import fault_text
+from drivers.cia402 import POWER_OFF, fault_text, state_of
 from drivers.errors import BusError, DriverError, SdoError
 
 _EMCY, _SDO_ANSWER, _HEARTBEAT, _LSS_ANSWER = 0x080, 0x580, 0x700, 0x7E4
@@ -99,7 +99,7 @@ class CanNetwork:
         self._peers: dict[int, _Peer] = {}
         self._news = threading.Condition()
         self._heartbeat_s = heartbeat_s
-        self._master_heartbeat = _HEARTBEAT + master_node_id
+        self._master_node_id = master_node_id
         self.foreign_master = threading.Event()
         """Set when somebody else has produced the master's heartbeat."""
         self._lost: Exception | None = None
@@ -140,14 +140,13 @@ class CanNetwork:
             self._canopen.notify(identifier, bytearray(data), message.timestamp)
             return
         peer = self._peers.get(identifier & _NODE)
-        if identifier == self._master_heartbeat:
+        if identifier == _HEARTBEAT + self._master_node_id:
             self.foreign_master.set()
         elif peer is None:
             return
         elif identifier & _FUNCTION == _EMCY and len(data) == 8:
-            self._on_emergency(
-                Emergency(peer.node_id, *_EMCY_LAYOUT.unpack(data), time.monotonic())
-            )
+            code, register, vendor = _EMCY_LAYOUT.unpack(data)
+            self._on_emergency(Emergency(peer.node_id, code, register, vendor, time.monotonic()))
         elif identifier & _FUNCTION == _HEARTBEAT and len(data) == 1:
             with self._news:
                 self._on_heartbeat(peer, data[0] & 0x7F)
@@ -175,10 +174,6 @@ class CanNetwork:
             peer.started = peer.started or peer.starting
         elif peer.started:
             self.raise_alarm(f"{name} is not operational any more (NMT state {state})")
-
-    def heartbeats(self, node_id: int) -> int:
-        """Return how many heartbeats of the node have come."""
-        return self._peers[node_id].heartbeats
 
     def raise_alarm(self, text: str) -> None:
         """Latch why the drives must not go on being driven; the first reason stands."""
@@ -300,12 +295,17 @@ class CanNetwork:
         self._command(_RESET_NODE, node_id)
 
     def release(self, node_id: int) -> None:
-        """Leave a node that has no power alone: it need not watch our heartbeat any more.
+        """Leave a node alone: without power it need not watch the master's heartbeat any more.
 
-        Best effort; without it the node would report the missing heartbeat to whoever comes next.
+        Otherwise it would report the missing heartbeat to whoever comes next. Best effort; a node
+        that may still have power goes on watching, so that it stops by itself.
         """
         try:
-            self.write(node_id, 0x1016, 1, 0)
+            if state_of(self.read_int(node_id, 0x6041, attempts=1)) not in POWER_OFF:
+                return
+            for sub in range(1, self.read_int(node_id, 0x1016) + 1):
+                if self.read_int(node_id, 0x1016, sub) >> 16 & _NODE == self._master_node_id:
+                    self.write(node_id, 0x1016, sub, 0)
             self.stop_process_data(node_id)
         except DriverError:
             return
@@ -348,7 +348,7 @@ class CanNetwork:
 
     def _send_heartbeat(self) -> None:
         try:
-            self._canopen.send_message(self._master_heartbeat, bytes([_OPERATIONAL]))
+            self._canopen.send_message(_HEARTBEAT + self._master_node_id, bytes([_OPERATIONAL]))
         except (can.CanError, OSError):
             return  # should the bus not come back, the drives stop by themselves
 
