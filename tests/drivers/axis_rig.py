@@ -1,0 +1,117 @@
+"""A master beside simulated drives that run in a process of their own."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+import canopen
+
+from drivers.axis_group import AxisGroup
+from drivers.axis_layout import AxisConfig
+from drivers.boot import BootReport, BootSettings, boot_all
+from drivers.bus import BusUrl
+from drivers.cia402 import Mode, State
+from drivers.network import CanNetwork
+from profiles import DriveProfile, load_drive
+from tools.simulator import OwnSimulator
+
+MASTER = 127
+PERIOD_S = 1e-3
+HEARTBEAT_S = 0.1
+DRIVE = load_drive("generic-cia402")
+SETTINGS = BootSettings(MASTER, PERIOD_S, 3.0, 3.0)
+
+
+def start_simulator(nodes: int = 1) -> OwnSimulator:
+    bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    return OwnSimulator("winch-mpp0923d", bus, nodes=nodes)
+
+
+def dictionary(node_id: int) -> canopen.ObjectDictionary:
+    return canopen.import_od(str(DRIVE.eds), node_id)
+
+
+@contextmanager
+def open_network(bus: str, nodes: list[int]) -> Iterator[CanNetwork]:
+    network = CanNetwork(BusUrl.parse(bus), nodes, MASTER, HEARTBEAT_S)
+    try:
+        for node in nodes:
+            network.add_node(node, dictionary(node))
+        yield network
+    finally:
+        network.close()
+
+
+class Rig:
+    """Booted drives and their group; `run` makes cycles."""
+
+    def __init__(
+        self, bus: str, network: CanNetwork, drive: DriveProfile, nodes: list[int]
+    ) -> None:
+        self.bus = bus
+        self.network = network
+        self.nodes = nodes
+        self.reports: dict[int, BootReport] = boot_all(
+            network, dict.fromkeys(nodes, (drive, SETTINGS))
+        )
+        network.start_heartbeat()
+        axes = [AxisConfig.from_boot(drive, self.reports[node], 3.0) for node in nodes]
+        self.group = AxisGroup(network.url, network, axes, PERIOD_S, MASTER, HEARTBEAT_S)
+
+    def cycle(self) -> None:
+        self.group.sync()
+        self.group.receive()
+        self.group.transmit()
+
+    def run(
+        self, seconds: float, until: Callable[[], bool] = lambda: False, alarms: bool = False
+    ) -> float:
+        """Run cycles for `seconds` of bus time or until `until`; return the bus time it took."""
+        begin = self.group.feedback.time_s
+        for _ in range(round(seconds / PERIOD_S)):
+            self.group.sync()
+            self.group.receive()
+            done = until()
+            self.group.transmit()
+            if not alarms:
+                assert self.group.alarm() == ""
+            if done:
+                break
+        return self.group.feedback.time_s - begin
+
+    def reach(self, state: State) -> None:
+        self.group.request(state)
+        self.run(1.0, lambda: self.group.reached(state))
+        assert self.group.reached(state)
+
+    def set_mode(self, mode: int = Mode.CYCLIC_TORQUE) -> None:
+        self.group.ask_mode(mode)
+        self.run(1.0, self.group.mode_confirmed)
+        assert self.group.mode_confirmed()
+
+    def enable(self, mode: int = Mode.CYCLIC_TORQUE) -> None:
+        self.set_mode(mode)
+        self.reach(State.OPERATION_ENABLED)
+
+    def until_alarm(self, seconds: float) -> tuple[str, float]:
+        """Run until the group raises an alarm; return its text and the bus time it took."""
+        elapsed = self.run(seconds, lambda: bool(self.group.alarm()), alarms=True)
+        return self.group.alarm(), elapsed
+
+    def misbehave(self, sub: int, value: int, node: int = 1) -> None:
+        self.network.write(node, 0x2F00, sub, value)
+
+
+@contextmanager
+def open_rig(
+    bus: str, nodes: list[int] | None = None, drive: DriveProfile = DRIVE
+) -> Iterator[Rig]:
+    nodes = nodes or [1]
+    with ExitStack() as stack:
+        network = stack.enter_context(open_network(bus, nodes))
+        rig = Rig(bus, network, drive, nodes)
+        stack.enter_context(rig.group)
+        yield rig
