@@ -106,6 +106,7 @@ def test_page_needs_nothing_beside_itself(page: Page) -> None:
 
 def test_table_holds_the_figures_of_the_json(commissioned: Commissioned, page: Page) -> None:
     stored = json.loads(commissioned.paths.results.read_text())["validation"]
+    assert not list(commissioned.paths.out.glob("*.part"))
     wanted = []
     for key in FIGURES:
         ratio = key.rsplit("_deg", 1)[0].removesuffix("_Nm")

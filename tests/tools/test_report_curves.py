@@ -114,7 +114,8 @@ def test_what_repeats_is_told_from_what_does_not(tmp_path: Path) -> None:
         # the second order turns its sign from one turn to the next, so it does not repeat
         sign = np.sign(np.sin(0.5 * x + 1e-9))
         noise = 1e-4 * rng.standard_normal(x.size)
-        return np.asarray(0.003 * np.sin(4 * x) + 0.002 * sign * np.sin(10 * x) + noise)
+        settling = 0.05 * np.exp(-np.abs(x) / 0.2)
+        return np.asarray(0.003 * np.sin(4 * x) + 0.002 * sign * np.sin(10 * x) + noise + settling)
 
     paths = []
     for number, speed in enumerate((RAMP.speed_rad_s, -RAMP.speed_rad_s)):
