@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,11 @@ from tools.truth import Truth
 FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
 
 
-def recordings(paths: Sequence[Path]) -> list[tuple[RawLog, Recording]]:
-    """Read recorded passes; raises RawLogError."""
-    logs = [read_raw_log(path) for path in paths]
-    return [(log, recording(log)) for log in logs]
+def recordings(paths: Sequence[Path]) -> Iterator[tuple[RawLog, Recording]]:
+    """Read recorded passes one after the other, since each is large; raises RawLogError."""
+    for path in paths:
+        log = read_raw_log(path)
+        yield log, recording(log)
 
 
 def judge(paths: Sequence[Path], truth: Truth | None) -> Metrics:

@@ -11,7 +11,7 @@ from tools.commissioning import METHODS, Paths
 from tools.errors import BadInputError
 from tools.evaluation import compare, lowest
 from tools.procedure import Identified, validation_name
-from tools.truth import Truth, read_truth
+from tools.truth import Truth
 
 TARGETS = {
     "thesis": {"rms_position_error": 3.0, "peak_pid_effort": 6.0, "peak_velocity_error": 5.0},
@@ -33,7 +33,7 @@ def read_run(paths: Paths) -> dict[str, Any]:
 
 def assemble(paths: Paths, run: dict[str, Any], found: Identified) -> dict[str, Any]:
     """Return everything the report tells; raises RawLogError and BadInputError."""
-    truth = read_truth(paths.truth) if paths.truth.exists() else None
+    truth = Truth(paths.truth) if paths.truth.exists() else None
     return {
         "ok": True,
         **run,

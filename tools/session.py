@@ -17,6 +17,7 @@ from cdpr_rt.cogging_profile import DriveIdentity
 from cdpr_rt.errors import TripError
 from cdpr_rt.executive import Executive
 from cdpr_rt.realtime import one_core, paced_realtime
+from cdpr_rt.rehearsal import rehearse
 from cdpr_rt.supervisor import Limits, Supervisor
 from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
@@ -233,10 +234,11 @@ def open_winch(
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
         limit = winch.motor.rated_torque_Nm
         settings = BootSettings(winch.master_node_id, winch.sync_period_s, limit)
+        rehearse(1, winch.sync_period_s)
         report = boot(network, winch.node_id, winch.drive, settings)
-        network.start_heartbeat()
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
+        network.start_heartbeat()
         if not device.lockstep:
             for notice in stack.enter_context(paced_realtime()):
                 out.note(notice)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,42 +13,39 @@ from tools.errors import BadInputError
 
 _HEADER_BYTES = 1024
 _FORMAT = "cdpr-rt truth log 1"
-_WANTED = (("sync_index", "i8"), ("angle_from_index_rad", "f8"), ("temperature_rise_K", "f8"))
-_PIECE = 65536
 
 
-@dataclass(frozen=True)
 class Truth:
-    """True angle from the index at each SYNC the simulator saw, and the temperature rise."""
+    """The log of the true motion, read where it is asked for, since it may be long.
 
-    sync_index: np.ndarray[tuple[int], np.dtype[np.int64]]
-    angle_rad: FloatArray
-    rise_K: FloatArray
+    Raises BadInputError when `path` is no such log.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            with path.open("rb") as file:
+                header = json.loads(file.read(_HEADER_BYTES))
+            self._dtype: np.dtype[Any] = np.dtype([(n, kind) for n, kind in header["fields"]])
+            if header["format"] != _FORMAT or header["record_bytes"] != self._dtype.itemsize:
+                raise ValueError(header["format"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
 
     def angle_at(self, sync_index: FloatArray) -> FloatArray:
-        """Return the true angle at given SYNCs, (k,); raises BadInputError where one is missing."""
-        place = np.searchsorted(self.sync_index, sync_index)
-        if place.size and (
-            place[-1] >= self.sync_index.size
-            or not np.array_equal(self.sync_index[place], sync_index)
+        """Return the true angle from the index at given SYNCs, rising, (k,).
+
+        Raises BadInputError where one is missing.
+        """
+        first, last = int(sync_index[0]), int(sync_index[-1])
+        # one record a SYNC, counted from zero
+        offset = _HEADER_BYTES + max(first, 0) * self._dtype.itemsize
+        records = np.fromfile(self._path, self._dtype, last - first + 1, offset=offset)
+        place = sync_index.astype(np.int64) - first
+        if records.size != last - first + 1 or not np.array_equal(
+            records["sync_index"][place], sync_index
         ):
-            raise BadInputError("the simulator's log does not hold all SYNCs of the recording")
-        return self.angle_rad[place]
-
-
-def read_truth(path: Path) -> Truth:
-    """Read the log piece by piece, since it may be long; raises BadInputError when it is none."""
-    try:
-        with path.open("rb") as file:
-            header = json.loads(file.read(_HEADER_BYTES))
-            dtype = np.dtype([(name, kind) for name, kind in header["fields"]])
-            if header["format"] != _FORMAT or header["record_bytes"] != dtype.itemsize:
-                raise ValueError(header["format"])
-            pieces = []
-            while (records := np.fromfile(file, dtype, _PIECE)).size:
-                pieces.append([records[name].astype(kind) for name, kind in _WANTED])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
-    if not pieces:
-        raise BadInputError(f"{path}: holds no whole record")
-    return Truth(*(np.concatenate(column) for column in zip(*pieces, strict=True)))
+            raise BadInputError(
+                f"{self._path}: does not hold the SYNCs {first} to {last} of a recording"
+            )
+        return np.asarray(records["angle_from_index_rad"][place], float)

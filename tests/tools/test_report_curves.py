@@ -17,7 +17,7 @@ from cdpr_rt.identification import ThesisResult
 from cdpr_rt.measurement import Pass
 from tools.report import curves
 from tools.report.style import thinned
-from tools.truth import read_truth
+from tools.truth import Truth
 
 GRID = 3600
 ANGLE = np.arange(GRID) * (math.tau / GRID)
@@ -87,7 +87,7 @@ def test_ramp_is_read_as_it_was_recorded(tmp_path: Path) -> None:
         lambda x: 0.3 + 0.01 * np.cos(x),
     )
     made.write_truth()
-    ramp = curves.read_ramp(path, read_truth(made.paths.truth))
+    ramp = curves.read_ramp(path, Truth(made.paths.truth))
     assert ramp.time_s.size * 2e-3 == pytest.approx(360.0 / 22.0, abs=0.01)
     assert np.abs(ramp.position_error_deg).max() == pytest.approx(0.5, rel=1e-3)
     assert np.abs(ramp.effort_Nm).max() == pytest.approx(0.01, rel=1e-2)

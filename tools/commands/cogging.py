@@ -29,7 +29,7 @@ from tools.procedure import (
 from tools.report.page import build
 from tools.results import assemble, identification, read_run
 from tools.session import confirm_motion, latency_s, open_bus, open_winch
-from tools.truth import read_truth
+from tools.truth import Truth
 
 app = typer.Typer(help="Cogging: sweep, fit, validate, report.", no_args_is_help=True)
 
@@ -136,7 +136,7 @@ def validate(
         steps = Commissioning(session, out, paths, plan)
         steps.prepare()
         steps.validate(learnt, bandwidth_Hz)
-    truth = read_truth(paths.truth) if paths.truth.exists() else None
+    truth = Truth(paths.truth) if paths.truth.exists() else None
     runs = {m: paths.passes(validation_name(m, bandwidth_Hz)) for m in METHODS}
     result = compare(runs, truth)
     for method, figures in result.items():

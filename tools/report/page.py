@@ -21,7 +21,7 @@ from tools.report.curves import Ramp
 from tools.report.figures import Deviation
 from tools.report.save import check, save
 from tools.report.text import number, page, paragraph, picture, plain, section
-from tools.truth import read_truth
+from tools.truth import Truth
 
 _ORDERS_SHOWN = 100
 
@@ -90,7 +90,7 @@ class _Report:
         return self._recorded(validation_name(method, self._results["bandwidth_Hz"]))
 
     def _ramps(self) -> dict[str, Ramp]:
-        truth = read_truth(self._paths.truth) if self._true else None
+        truth = Truth(self._paths.truth) if self._true else None
         return {method: curves.read_ramp(self._passes(method)[0], truth) for method in METHODS}
 
     def _whose(self) -> str:
