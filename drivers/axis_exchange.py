@@ -53,6 +53,7 @@ class AxisExchange:
         operational = bytes([_OPERATIONAL_STATE]) + bytes(7)
         self._heartbeat_frame = FRAME.pack(_HEARTBEAT_ID + master_node_id, 1, operational)
         self._heartbeat_cycles = max(1, round(heartbeat_s / period_s))
+        self._rehearse()
         self._port = open_port(url, [(i, 0x7FF) for i in self._layout.identifiers])
         self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
         self._pollable = _pollable(self._port)
@@ -66,6 +67,16 @@ class AxisExchange:
         self._words, self._flags = state.words, state.flags
         self.feedback, self.command = state.feedback, state.command
         self._valid = state.feedback.valid
+
+    def _rehearse(self) -> None:
+        """Have the kernels compiled now: a first cycle of seconds would be a silent master."""
+        state, layout = GroupState(self.axes, self.period_s, False), self._layout
+        arrays = state.ints, state.floats
+        codec.decode(
+            *(self._rx_bytes, 0, 0, layout.slots, layout.fields, STATE_TABLE),
+            *(*arrays, state.words, state.flags),
+        )
+        codec.encode(self._tx_bytes, layout.answer, CONTROLWORD_TABLE, *arrays, state.flags)
 
     def sync(self) -> None:
         """Send the SYNC that opens the cycle."""

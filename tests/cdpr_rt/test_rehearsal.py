@@ -1,0 +1,60 @@
+"""After a rehearsal nothing of the cycle is left to be compiled."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+from cdpr_rt.compensation import AxisCompensation, Compensation
+from cdpr_rt.controllers.pid import Pid, PidGains
+from cdpr_rt.controllers.proportional import Proportional
+from cdpr_rt.exchange import AxisFeedback, Setpoint
+from cdpr_rt.recorder import Recorder
+from cdpr_rt.rehearsal import rehearse
+from cdpr_rt.supervisor import Limits, Supervisor
+from cdpr_rt.trajectory import Leg
+
+CYCLE = (
+    *("compensation", "controllers.pid", "controllers.proportional"),
+    *("recorder", "supervisor", "trajectory"),
+)
+
+
+def compiled() -> dict[str, int]:
+    """Return how many variants of each kernel of the cycle are compiled."""
+    return {
+        f"{name}.{key}": len(value.signatures)
+        for name in CYCLE
+        for key, value in vars(sys.modules[f"cdpr_rt.{name}"]).items()
+        if isinstance(value, Dispatcher)
+    }
+
+
+@pytest.mark.parametrize("n", [1, 8])
+def test_the_cycle_compiles_nothing_after_it(n: int) -> None:
+    rehearse(n, 1e-3)
+    before = compiled()
+    assert before
+    assert min(before.values()) > 0
+
+    # as a device has them: rows of larger arrays
+    rows, flags = np.zeros((5, n)), np.ones((2, n), bool)
+    feedback, setpoint = AxisFeedback(n), Setpoint(n)
+    feedback.position_rad, feedback.torque_Nm, feedback.index_rad = rows[0], rows[1], rows[2]
+    feedback.valid, feedback.index_known = flags[0], flags[1]
+    feedback.statusword = np.zeros((1, n), np.uint16)[0]
+    torque = rows[3]
+    known = AxisCompensation(np.zeros((2, 720)), look_ahead_s=1e-3)
+    limit = np.full(n, 0.75)
+    pid = Pid([PidGains(1.0, 1.0, 0.1, 1e-3)] * n, limit, 1e-3, Compensation([known] * n, 1e-3))
+    supervisor = Supervisor(Limits(3.0, 100.0, 6.0), n, 1e-3)
+    for controller in (Proportional(np.full(n, 2.0), limit), pid):
+        controller.reset()
+        Leg(rows[0], np.full(n, 0.05), 3.0, 0.5).fill(0.7, setpoint)
+        controller.update(feedback, setpoint, torque)
+        assert supervisor.check(feedback, setpoint, torque) == ""
+    assert Recorder(n).pending() == 0
+    assert compiled() == before
