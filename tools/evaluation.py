@@ -31,7 +31,7 @@ def judge(paths: Sequence[Path], truth: Truth | None) -> Metrics:
         sweep = run.sweep
         angle = sweep.angle_rad
         if truth is not None:
-            angle = truth.angle_at(run.cycle + log.header["sync_offset"] - 1)
+            angle = truth.angle_at(run.cycle + log.header["sync_offset"] - 1, angle)
         figures.append(
             evaluate(
                 angle,

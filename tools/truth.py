@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +33,12 @@ class Truth:
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
 
-    def angle_at(self, sync_index: FloatArray) -> FloatArray:
+    def angle_at(self, sync_index: FloatArray, measured_rad: FloatArray) -> FloatArray:
         """Return the true angle from the index at given SYNCs, rising, (k,).
 
-        Raises BadInputError where one is missing.
+        The index comes once a turn, and the drive may have latched another one than the simulator
+        counts from: whole turns are chosen so that the angle lies at the measured one, (k,).
+        Raises BadInputError where a SYNC is missing.
         """
         first, last = int(sync_index[0]), int(sync_index[-1])
         # one record a SYNC, counted from zero
@@ -48,4 +51,6 @@ class Truth:
             raise BadInputError(
                 f"{self._path}: does not hold the SYNCs {first} to {last} of a recording"
             )
-        return np.asarray(records["angle_from_index_rad"][place], float)
+        angle = np.asarray(records["angle_from_index_rad"][place], float)
+        turns = round(float(np.median(measured_rad - angle)) / math.tau)
+        return angle + turns * math.tau

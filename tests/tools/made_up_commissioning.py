@@ -88,9 +88,11 @@ class MadeUp:
         fields = [["sync_index", "<u8"], ["angle_from_index_rad", "<f8"]]
         fields += [["temperature_rise_K", "<f4"]]
         dtype = np.dtype([(name, kind) for name, kind in fields])
-        records = np.zeros(len(self._truth), dtype)
-        records["sync_index"] = [sync for sync, _ in self._truth]
-        records["angle_from_index_rad"] = [angle for _, angle in self._truth]
+        records = np.zeros(self._truth[-1][0] + 1, dtype)
+        records["sync_index"] = np.arange(records.size)
+        # the simulator counts from another of the index's turns than the drive happened to latch
+        for sync, angle in self._truth:
+            records["angle_from_index_rad"][sync] = angle - math.tau
         header = {"format": "cdpr-rt truth log 1", "record_bytes": dtype.itemsize, "fields": fields}
         head = json.dumps(header).encode().ljust(1024)
         self.paths.truth.write_bytes(head + records.tobytes())

@@ -46,7 +46,7 @@ def read_ramp(path: Path, truth: Truth | None) -> Ramp:
     sweep, judged = run.sweep, run.judged
     angle = sweep.angle_rad
     if truth is not None:
-        angle = truth.angle_at(run.cycle + log.header["sync_offset"] - 1)
+        angle = truth.angle_at(run.cycle + log.header["sync_offset"] - 1, angle)
     velocity = low_pass_velocity(angle, run.period_s)[judged]
     wanted = sweep.setpoint_velocity_rad_s[judged]
     effort = run.effort_Nm[judged]
