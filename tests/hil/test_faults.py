@@ -1,0 +1,336 @@
+"""What a user sees when something fails: one message, the status, power off, raw data kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import canopen
+import numpy as np
+import pytest
+
+from cdpr_rt.rawlog import read_raw_log
+from profiles import load_winch
+
+WINCH = "winch-mpp0923d"
+PROFILES = Path(sys.modules[load_winch.__module__].__file__ or "").parent
+EDS = load_winch(WINCH).drive.eds
+Command = subprocess.Popen[str]
+
+FAILED, BAD_INPUT = 1, 2
+OFF, ENABLED, FAULT = 0x40, 0x27, 0x08
+
+
+class Lab:
+    """A simulated drive on a bus of its own, and a stranger's master who only looks and spoils."""
+
+    def __init__(self, *options: str | Path) -> None:
+        self.bus = f"simbus:lab-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+        self.process = subprocess.Popen(
+            [*_cdpr("sim", "up", WINCH, "--bus", self.bus, "--exit-with-stdin", *options)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        assert self.process.stdout is not None
+        assert b"ready" in self.process.stdout.readline()
+        self._network = canopen.Network()
+        self._network.NOTIFIER_CYCLE = 0.05
+        self._network.connect(interface="simbus", channel=self.bus.partition(":")[2])
+        self.node = self._network.add_node(1, str(EDS))
+        self.node.sdo.RESPONSE_TIMEOUT = 1.0
+
+    def reset(self) -> None:
+        """Switch the drive off and on."""
+        self.node.nmt.send_command(129)
+        self.node.emcy.reset()
+        # bus time stands still for half a second after the last SYNC
+        deadline = time.monotonic() + 3.0
+        while self.state() != OFF:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+    def state(self) -> int:
+        word = self.node.sdo[0x6041].raw
+        return int(word & (0x6F if word & 0x20 else 0x4F))
+
+    def misbehave(self, sub: int, value: int) -> None:
+        self.node.sdo[0x2F00][sub].raw = value
+
+    def leave(self) -> None:
+        """Take the stranger away, whose receiving thread would print the end of the bus."""
+        self._network.disconnect()
+
+    def close(self) -> None:
+        with suppress(Exception):
+            self.leave()
+        self.process.communicate(b"", timeout=10)
+
+
+@pytest.fixture(scope="module")
+def shared_lab() -> Iterator[Lab]:
+    lab = Lab()
+    yield lab
+    lab.close()
+
+
+@pytest.fixture
+def lab(shared_lab: Lab) -> Lab:
+    shared_lab.reset()
+    return shared_lab
+
+
+def _cdpr(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+
+
+def begin(*arguments: str | Path) -> Command:
+    return subprocess.Popen(
+        _cdpr(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def complaint(command: Command, status: int, timeout_s: float = 60.0) -> str:
+    """Wait for a command that has to fail; return its one message, the same in text and JSON."""
+    out, errors = command.communicate(timeout=timeout_s)
+    assert "Traceback" not in errors + out, errors
+    assert command.returncode == status, errors
+    lines = [line for line in errors.splitlines() if line.startswith("cdpr: ")]
+    assert len(lines) == 1, errors
+    told = lines[0].removeprefix("cdpr: ")
+    if "--json" in command.args:  # type: ignore[operator]
+        last = json.loads(out.splitlines()[-1])
+        assert last == {"ok": False, "error": told, "exit_status": status}
+    return told
+
+
+def fails(*arguments: str | Path, status: int = FAILED) -> str:
+    return complaint(begin(*arguments, "--json"), status)
+
+
+def rows_of(out: Path) -> int:
+    """Return how many cycles of the first pass were kept, after looking at them."""
+    log = read_raw_log(out / "raw" / "sweep-0.raw")
+    cycles = log.column("cycle")
+    assert np.all(np.diff(cycles) == 1)
+    assert np.all(np.isfinite(log.rows))
+    return len(cycles)
+
+
+@contextmanager
+def sweeping(lab: Lab, out: Path, *more: str) -> Iterator[Command]:
+    """Have a sweep under way: recording for some seconds of bus time, the drive energised."""
+    command = begin("cogging", "sweep", WINCH, "--bus", lab.bus, "--out", out, *more)
+    try:
+        file = out / "raw" / "sweep-0.raw"
+        deadline = time.monotonic() + 30.0
+        while not (file.exists() and file.stat().st_size > 300_000):
+            assert time.monotonic() < deadline
+            if command.poll() is not None:
+                break
+            time.sleep(0.01)
+        yield command
+    finally:
+        if command.poll() is None:
+            command.kill()
+        command.communicate()
+
+
+# -- a drive that is not there, not the one meant, or in a bad way before anything moves
+
+
+def own_profiles(folder: Path, winch: dict[str, str], drive: dict[str, str]) -> Path:
+    """Write winch and drive profiles that differ from the shipped ones in single lines."""
+    for kind, name, changes in (
+        ("winches", WINCH, {"drive": '"my-drive"', **winch}),
+        ("drives", "generic-cia402", {"eds": f'"{EDS}"', **drive}),
+    ):
+        text = (PROFILES / kind / f"{name}.toml").read_text()
+        for key, value in changes.items():
+            text, count = re.subn(rf"(?m)^{key} = .*$", f"{key} = {value}", text, count=1)
+            assert count == 1
+        stem = "my-winch" if kind == "winches" else "my-drive"
+        (folder / f"{stem}.toml").write_text(text)
+    return folder / "my-winch.toml"
+
+
+def test_no_node_answers(lab: Lab, tmp_path: Path) -> None:
+    winch = own_profiles(tmp_path, {"node_id": "9"}, {})
+    told = fails("drive", "enable", winch, "--bus", lab.bus)
+    assert "node 9" in told
+    assert "step B" in told
+    assert "power, wiring" in told
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "letter", "found"),
+    [
+        ("vendor_id", "0x00000ABC", "D", "00CD9A01h"),
+        ("product_code", "0x00000403", "M", "00000402h"),
+        ("revision", "0x00020000", "N", "00010000h"),
+    ],
+)
+def test_another_drive_than_the_profile_says(
+    lab: Lab, tmp_path: Path, key: str, value: str, letter: str, found: str
+) -> None:
+    winch = own_profiles(tmp_path, {}, {key: value})
+    told = fails("drive", "home", winch, "--bus", lab.bus)
+    assert f"step {letter}" in told
+    assert found in told
+    assert f"{int(value, 16):08X}h" in told
+    assert lab.state() == OFF
+
+
+def test_a_node_in_fault_is_told_in_words(lab: Lab) -> None:
+    lab.misbehave(1, 0x3210)
+    told = fails("drive", "enable", WINCH, "--bus", lab.bus)
+    assert "node 1" in told
+    assert "3210h DC link over-voltage" in told
+    assert lab.state() == FAULT
+
+
+def test_a_drive_that_refuses_the_mode(lab: Lab) -> None:
+    lab.misbehave(3, 1)
+    told = fails("drive", "enable", WINCH, "--bus", lab.bus)
+    assert "10 (cyclic torque) was refused" in told
+    assert lab.state() == OFF
+
+
+@pytest.mark.parametrize(("sub", "value", "shown"), [(3, 2, "0 (no mode)"), (4, 8, "8 (cyclic")])
+def test_a_drive_in_another_mode_than_asked_is_not_enabled(
+    lab: Lab, sub: int, value: int, shown: str
+) -> None:
+    lab.misbehave(sub, value)
+    told = fails("drive", "enable", WINCH, "--bus", lab.bus)
+    assert "asked for mode 10 (cyclic torque)" in told
+    assert f"reports {shown}" in told
+    assert lab.state() == OFF
+
+
+def test_a_drive_without_heartbeat(lab: Lab) -> None:
+    lab.misbehave(5, 1)
+    told = fails("drive", "enable", WINCH, "--bus", lab.bus)
+    assert "step K" in told
+    assert lab.state() == OFF
+
+
+def test_an_index_that_never_comes(tmp_path: Path) -> None:
+    plant = tmp_path / "plant.toml"
+    plant.write_text("[encoder]\nindex_present = false\n")
+    lab = Lab("--plant", plant)
+    try:
+        told = fails("commission", WINCH, "--bus", lab.bus, "--out", tmp_path / "out")
+        assert "homing" in told
+        assert "index" in told
+        assert lab.state() == OFF
+    finally:
+        lab.close()
+
+
+# -- in mid-sweep
+
+
+def test_an_emergency_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+    with sweeping(lab, tmp_path, "--json") as command:
+        assert lab.state() == ENABLED
+        lab.misbehave(1, 0x7305)
+        told = complaint(command, FAILED)
+    assert "7305h incremental encoder 1" in told
+    assert str(tmp_path / "raw") in told
+    assert lab.state() == FAULT
+    assert rows_of(tmp_path) > 2000
+
+
+def test_a_drive_that_changes_its_mode_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+    with sweeping(lab, tmp_path) as command:
+        lab.misbehave(4, 9)
+        told = complaint(command, FAILED)
+    assert "reports mode 9 (cyclic velocity)" in told
+    assert lab.state() == OFF
+    assert rows_of(tmp_path) > 2000
+
+
+def test_a_drive_that_restarts_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+    with sweeping(lab, tmp_path) as command:
+        lab.node.nmt.send_command(129)
+        told = complaint(command, FAILED)
+    assert "restarted" in told
+    assert lab.state() == OFF
+    assert rows_of(tmp_path) > 2000
+
+
+def test_a_simulator_killed_in_mid_sweep(tmp_path: Path) -> None:
+    lab = Lab()
+    lab.leave()
+    with sweeping(lab, tmp_path) as command:
+        lab.process.kill()
+        killed_at = time.monotonic()
+        told = complaint(command, FAILED)
+        assert time.monotonic() - killed_at < 5.0
+    lab.close()
+    assert f"{lab.bus}: the bus has gone away" in told
+    assert rows_of(tmp_path) > 2000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_in_mid_sweep(lab: Lab, tmp_path: Path, number: signal.Signals) -> None:
+    with sweeping(lab, tmp_path) as command:
+        before = lab.node.sdo[0x6064].raw
+        command.send_signal(number)
+        told = complaint(command, FAILED)
+    assert "stopped on request" in told
+    assert lab.state() == OFF
+    # braked, not dropped: at 3 deg/s it stands within a degree
+    assert abs(lab.node.sdo[0x6064].raw - before) < 8192 * 3 / 360
+    assert rows_of(tmp_path) > 2000
+
+
+def test_a_second_master_is_kept_out(lab: Lab, tmp_path: Path) -> None:
+    with sweeping(lab, tmp_path) as command:
+        told = fails("drive", "enable", WINCH, "--bus", lab.bus)
+        assert "step L" in told
+        assert command.poll() is None
+        assert lab.state() == ENABLED
+        command.send_signal(signal.SIGINT)
+        complaint(command, FAILED)
+
+
+def test_a_full_disk_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
+    with sweeping(lab, tmp_path) as command:
+        resource.prlimit(command.pid, resource.RLIMIT_FSIZE, (500_000, 500_000))
+        told = complaint(command, FAILED)
+    assert "sweep-0.raw: cannot record" in told
+    assert lab.state() == OFF
+    assert rows_of(tmp_path) > 2000
+
+
+def test_a_killed_master_leaves_no_power(lab: Lab, tmp_path: Path) -> None:
+    with sweeping(lab, tmp_path) as command:
+        assert lab.state() == ENABLED
+        command.kill()
+        command.wait()
+        # half a second until bus time runs by itself, half a second until the heartbeat is missed
+        deadline = time.monotonic() + 3.0
+        while lab.state() == ENABLED:
+            assert time.monotonic() < deadline
+    assert lab.state() == OFF
+    assert rows_of(tmp_path) > 1000
+
+
+def test_the_next_command_finds_the_drive_well(lab: Lab) -> None:
+    for _ in range(2):
+        command = begin("drive", "enable", WINCH, "--bus", lab.bus, "--seconds", "0.2")
+        _, errors = command.communicate(timeout=60)
+        assert command.returncode == 0, errors
+    time.sleep(1.5)  # longer than a drive waits for a heartbeat
+    assert lab.node.sdo[0x1001].raw == 0
+    assert lab.node.emcy.active == []
