@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from cdpr_rt.controllers.pid import PidGains
 from cdpr_rt.errors import ControlError
@@ -38,11 +37,16 @@ class Ratios:
 
 
 def low_pass_velocity(angle_rad: FloatArray, period_s: float) -> FloatArray:
-    """Return the velocity of angles (k,) through the zero-phase 50 Hz low-pass, rad/s."""
-    sections = butter(2, VELOCITY_LOW_PASS_Hz, fs=1.0 / period_s, output="sos")
-    ramp = np.linspace(angle_rad[0], angle_rad[-1], angle_rad.size)
-    slope = (angle_rad[-1] - angle_rad[0]) / (angle_rad.size - 1) / period_s
-    return np.asarray(sosfiltfilt(sections, np.gradient(angle_rad - ramp, period_s)) + slope)
+    """Return the velocity of angles (k,) through the zero-phase 50 Hz low-pass, rad/s.
+
+    A Butterworth filter of second order, run forward and backward: 1/(1 + (f/50 Hz)⁴). It is
+    applied to the spectrum of the velocity and its mirror image, so that the ends stay put.
+    """
+    velocity = np.gradient(angle_rad, period_s)
+    both = np.concatenate([velocity, velocity[::-1]])
+    frequency = np.fft.rfftfreq(both.size, period_s)
+    spectrum = np.fft.rfft(both) / (1.0 + (frequency / VELOCITY_LOW_PASS_Hz) ** 4)
+    return np.asarray(np.fft.irfft(spectrum, both.size)[: velocity.size])
 
 
 def evaluate(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.ndimage import convolve1d
 
 from cdpr_rt.compensation import FrictionFeedforward
 from cdpr_rt.exchange import BoolArray, FloatArray
@@ -86,7 +86,7 @@ def identify_thesis(legs: Sequence[SweepData]) -> ThesisResult:
         [_repair(raw[i], raw[1 - i], repaired[i], ~(both[0] | both[1])) for i in (0, 1)]
     )
     size = 2 * round(0.5 * WINDOW_deg / 360.0 * GRID) + 1
-    filtered = savgol_filter(curves, size, _DEGREE, axis=1, mode="wrap")
+    filtered = savitzky_golay(curves, size)
     return ThesisResult(
         raw_Nm=np.vstack(raw),
         curve_Nm=np.asarray(filtered),
@@ -94,6 +94,17 @@ def identify_thesis(legs: Sequence[SweepData]) -> ThesisResult:
         repaired=repaired,
         turns=(turns[0], turns[1]),
     )
+
+
+def savitzky_golay(curves: FloatArray, size: int) -> FloatArray:
+    """Return periodic curves (k, m) filtered by Savitzky and Golay's method over `size` samples.
+
+    `size` is odd. The library's own function would bring all of its signal processing into
+    memory for these three lines.
+    """
+    place = np.arange(size) - size // 2
+    weights = np.linalg.pinv(np.vander(place, _DEGREE + 1, increasing=True).astype(float))[0]
+    return np.asarray(convolve1d(curves, weights[::-1], axis=1, mode="wrap"))
 
 
 def _average(parts: list[Stretch]) -> tuple[FloatArray, BoolArray]:
