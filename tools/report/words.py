@@ -92,6 +92,14 @@ def floor_words(validation: Mapping[str, Any], encoder_deg: float, torque_Nm: fl
         "any cogging or friction. The harmonic model comes down to this many times the floor: "
         f"{times}."
     ]
+    without = validation["none"]
+    most = {q.name: without[q.key] / floor[q.key] for q in QUANTITIES if floor[q.key] > 0.0}
+    told = joined([f"{number(ratio, 2)} in the {name}" for name, ratio in most.items()])
+    words.append(f"With nothing but the floor left, the gains in this loop would be {told}.")
+    short = missed(validation, "better")
+    if short:
+        told = joined([q.name for q in short])
+        words.append(f"The harmonic model does not reach what was asked in the {told}.")
     close = [name for name, ratio in above.items() if ratio <= _NEAR_FLOOR]
     if close:
         words.append(
