@@ -96,15 +96,19 @@ def identify_thesis(legs: Sequence[SweepData]) -> ThesisResult:
     )
 
 
-def savitzky_golay(curves: FloatArray, size: int) -> FloatArray:
-    """Return periodic curves (k, m) filtered by Savitzky and Golay's method over `size` samples.
+def filter_weights(size: int) -> FloatArray:
+    """Return the weights of Savitzky and Golay's filter of degree 2, (size,); `size` is odd.
 
-    `size` is odd. The library's own function would bring all of its signal processing into
-    memory for these three lines.
+    The library's own function would bring all of its signal processing into memory.
     """
     place = np.arange(size) - size // 2
-    weights = np.linalg.pinv(np.vander(place, _DEGREE + 1, increasing=True).astype(float))[0]
-    return np.asarray(convolve1d(curves, weights[::-1], axis=1, mode="wrap"))
+    powers = np.vander(place, _DEGREE + 1, increasing=True).astype(float)
+    return np.asarray(np.linalg.pinv(powers)[0])
+
+
+def savitzky_golay(curves: FloatArray, size: int) -> FloatArray:
+    """Return periodic curves (k, m) filtered over `size` samples, an odd number."""
+    return np.asarray(convolve1d(curves, filter_weights(size), axis=1, mode="wrap"))
 
 
 def _average(parts: list[Stretch]) -> tuple[FloatArray, BoolArray]:

@@ -26,7 +26,7 @@ from tools.procedure import (
     store_profile,
     validation_name,
 )
-from tools.report.page import build
+from tools.report import build
 from tools.results import assemble, identification, read_run
 from tools.session import confirm_motion, latency_s, open_bus, open_winch
 from tools.truth import Truth

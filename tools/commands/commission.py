@@ -19,7 +19,7 @@ from tools.commissioning import Paths
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output, to_json
 from tools.procedure import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH, Commissioning, identify
-from tools.report.page import build
+from tools.report import build
 from tools.results import assemble
 from tools.session import confirm_motion, open_bus, open_winch
 

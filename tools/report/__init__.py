@@ -1,1 +1,20 @@
 """The commissioning report: one HTML file with pictures, made from the files of a commissioning."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from profiles import Winch
+from tools.commissioning import Paths
+from tools.procedure import Identified
+
+
+def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified) -> None:
+    """Write the report and its figures; see `tools.report.page.build`.
+
+    The drawing library is loaded here and not before: while the motor turns, and while it is
+    identified, its memory is better used.
+    """
+    from tools.report import page  # noqa: PLC0415
+
+    page.build(paths, winch, results, found)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import savgol_coeffs
 
 from cdpr_rt.exchange import BoolArray, FloatArray
 from cdpr_rt.identification import BetterResult, ThesisResult
-from cdpr_rt.identification.thesis import GRID, WINDOW_deg
+from cdpr_rt.identification.thesis import GRID, WINDOW_deg, filter_weights
 from cdpr_rt.measurement import Recording, recording
 from cdpr_rt.rawlog import read_raw_log
 from cdpr_rt.validation import low_pass_velocity
@@ -181,7 +180,7 @@ def strongest(better: BetterResult) -> int:
 def filter_gain(order: int) -> float:
     """Return which share of an order the thesis' filter leaves: degree 2 over 5 deg."""
     half = round(0.5 * WINDOW_deg / 360.0 * GRID)
-    weights = savgol_coeffs(2 * half + 1, 2)
+    weights = filter_weights(2 * half + 1)
     return float(weights @ np.cos(math.tau * order * np.arange(-half, half + 1) / GRID))
 
 
