@@ -16,7 +16,7 @@ from cdpr_rt.controllers.base import Controller
 from cdpr_rt.controllers.pid import Pid
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.measurement import Pass, both_ways, run_pass
-from cdpr_rt.tuning import PidDesign, sweep_gain
+from cdpr_rt.tuning import PidDesign
 from tools.output import Output
 from tools.session import WinchSession
 
@@ -82,12 +82,11 @@ class Measurement:
         rated = session.winch.motor.rated_torque_Nm
         self._limit_Nm = np.full(session.device.n, _TORQUE_SHARE * rated)
 
-    def sweep(self, inertia_kg_m2: float, speed_rad_s: float, turns: int) -> list[Path]:
+    def sweep(self, gain_Nm_rad: float, speed_rad_s: float, turns: int) -> list[Path]:
         """Sweep both directions slowly under the proportional controller (Tremblay, 1.3, 1.4)."""
-        gain = sweep_gain(inertia_kg_m2, self._session.latency_s)
-        controller = Proportional(np.full(self._session.device.n, gain), self._limit_Nm)
+        controller = Proportional(np.full(self._session.device.n, gain_Nm_rad), self._limit_Nm)
         passes = both_ways(speed_rad_s, SWEEP_LEAD_IN_RAD, turns)
-        return self._run("sweep", controller, passes, {"gain_Nm_rad": gain})
+        return self._run("sweep", controller, passes, {"gain_Nm_rad": gain_Nm_rad})
 
     def fast_legs(self, design: PidDesign) -> list[Path]:
         """Turn back and forth at higher speeds, which tells inertia and viscous friction."""

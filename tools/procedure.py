@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from cdpr_rt.cogging_profile import (
     stored_thesis,
 )
 from cdpr_rt.compensation import AxisCompensation
+from cdpr_rt.errors import TripError
 from cdpr_rt.identification import (
     BetterResult,
     SweepData,
@@ -26,7 +28,7 @@ from cdpr_rt.identification import (
     refine,
 )
 from cdpr_rt.measurement import Pass, both_ways
-from cdpr_rt.tuning import PidDesign, TuningError, design_pid
+from cdpr_rt.tuning import PidDesign, TuningError, design_pid, sweep_gain
 from profiles import Winch
 from tools.commissioning import (
     METHODS,
@@ -41,6 +43,8 @@ from tools.session import WinchSession
 DEFAULT_BANDWIDTH_HZ = 10.0
 
 _LEAD_IN_RAD = math.tau
+_SWEEP_ATTEMPTS = 4
+_SETTLE_S = 2.0
 _SHORT_LEAD_IN_RAD = math.pi
 
 
@@ -142,7 +146,12 @@ class Commissioning:
         return {
             "winch": winch.profile,
             "motor": winch.motor.model,
-            "drive": {"name": boot.device_name, **identity.model_dump(), "changed": boot.changed},
+            "drive": {
+                "name": boot.device_name,
+                **identity.model_dump(),
+                "changed": boot.changed,
+                "absent": boot.absent,
+            },
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
             "encoder_counts_per_turn": boot.counts_per_turn,
             "rated_torque_Nm": boot.rated_torque_Nm,
@@ -174,12 +183,37 @@ class Commissioning:
         inertia = session.winch.motor.rotor_inertia_kg_m2
         self._out.note(f"sweeping at {math.degrees(plan.sweep_speed_rad_s):g} deg/s")
         session.enable()
-        self._measure.sweep(inertia, plan.sweep_speed_rad_s, plan.turns)
+        self._sweep(sweep_gain(inertia, session.latency_s))
         design = design_pid(
             inertia, session.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s
         )
         self._measure.fast_legs(design)
         session.disable()
+
+    def _sweep(self, gain_Nm_rad: float) -> None:
+        """Sweep both ways; where friction cannot hold the rotor, with less and less gain.
+
+        The loop's latency feeds an oscillation with the square of its amplitude, friction damps
+        it with the first power: a rotor that snaps far enough runs away under too high a gain.
+        """
+        plan = self._plan
+        for attempt in range(_SWEEP_ATTEMPTS):
+            try:
+                self._measure.sweep(gain_Nm_rad, plan.sweep_speed_rad_s, plan.turns)
+            except TripError as error:
+                if self._session.device.alarm() or attempt == _SWEEP_ATTEMPTS - 1:
+                    raise
+                gain_Nm_rad /= 2.0
+                self._out.note(f"{error}; sweeping again with {gain_Nm_rad:.2g} Nm/rad")
+                self._settle()
+            else:
+                return
+
+    def _settle(self) -> None:
+        """Let the rotor come to rest without power after a motion was given up."""
+        self._session.disable()
+        self._session.idle(_SETTLE_S)
+        self._session.enable()
 
     def measure_again(self, found: Identified, bandwidth_Hz: float) -> None:
         """Record a second pass under compensation, from which the residual is identified."""
@@ -228,15 +262,34 @@ class Commissioning:
                     raise
                 self._out.note(str(error))
                 continue
-            reached.append(wanted)
-            designs.append(design)
             session.enable()
-            for method in METHODS:
-                name = validation_name(method, wanted)
-                passes = self._ramps(self._plan.both_ways and wanted == bandwidth_Hz)
-                self._measure.track(name, design, known[method], passes, {"method": method})
+            try:
+                self._compare(
+                    design, wanted, known, self._plan.both_ways and wanted == bandwidth_Hz
+                )
+            except TripError as error:
+                if session.device.alarm() or wanted == bandwidth_Hz:
+                    raise
+                self._out.note(f"{wanted:g} Hz is left out of the comparison: {error}")
+                self._settle()
+            else:
+                reached.append(wanted)
+                designs.append(design)
             session.disable()
         return reached, designs
+
+    def _compare(
+        self,
+        design: PidDesign,
+        wanted_Hz: float,
+        known: Mapping[str, AxisCompensation | None],
+        both_ways: bool,
+    ) -> None:
+        """Record the ramps of one bandwidth, method by method."""
+        for method in METHODS:
+            name = validation_name(method, wanted_Hz)
+            passes = self._ramps(both_ways)
+            self._measure.track(name, design, known[method], passes, {"method": method})
 
     @staticmethod
     def _ramps(both: bool) -> tuple[Pass, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -33,7 +34,8 @@ from tools.output import Output
 from tools.simulator import OwnSimulator
 
 _SPEED_SHARE = 0.2
-_FOLLOWING_ERROR_RAD = 6.0
+# a bare rotor may swing by turns without doing harm; its speed is what is limited
+_FOLLOWING_ERROR_RAD = 4.0 * math.tau
 _INDEX_TIMEOUT_S = 30.0
 
 
@@ -238,6 +240,11 @@ def open_winch(
         report = boot(network, winch.node_id, winch.drive, settings)
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
+        if report.absent:
+            out.note(
+                f"node {winch.node_id} lacks {', '.join(report.absent)}: check what stops it "
+                "when its master falls silent"
+            )
         network.start_heartbeat()
         if not device.lockstep:
             for notice in stack.enter_context(paced_realtime()):

@@ -130,7 +130,8 @@ def _average(parts: list[Stretch]) -> tuple[FloatArray, BoolArray]:
     def spread(values: FloatArray) -> FloatArray:
         known = values[seen] / count[seen]
         known = np.concatenate([known[-1:], known, known[:1]])
-        return np.asarray(np.interp(np.arange(GRID), around, known))
+        # a bin's mean belongs to the bin's middle
+        return np.asarray(np.interp(np.arange(GRID), around + 0.5, known))
 
     return spread(total), np.asarray(spread(lost) > _RUNAWAY_SHARE, np.bool_)
 
