@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from cdpr_rt.measurement import Recording, recording
-from cdpr_rt.rawlog import RawLog, read_raw_log
+from cdpr_rt.measurement import recording
+from cdpr_rt.rawlog import read_raw_log
 from cdpr_rt.tuning import PidDesign
 from cdpr_rt.validation import Metrics, evaluate, floor, ratios, worst
 from tools.truth import Truth
@@ -17,17 +17,12 @@ from tools.truth import Truth
 FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
 
 
-def recordings(paths: Sequence[Path]) -> Iterator[tuple[RawLog, Recording]]:
-    """Read recorded passes one after the other, since each is large; raises RawLogError."""
-    for path in paths:
-        log = read_raw_log(path)
-        yield log, recording(log)
-
-
 def judge(paths: Sequence[Path], truth: Truth | None) -> Metrics:
     """Return the figures of the passes, the worst of each; on the true angle with `truth`."""
     figures = []
-    for log, run in recordings(paths):
+    for path in paths:
+        log = read_raw_log(path)
+        run = recording(log)
         sweep = run.sweep
         angle = sweep.angle_rad
         if truth is not None:

@@ -27,7 +27,8 @@ from cdpr_rt.identification import (
     identify_thesis,
     refine,
 )
-from cdpr_rt.measurement import Pass, both_ways
+from cdpr_rt.measurement import Pass, both_ways, recording
+from cdpr_rt.rawlog import read_raw_log
 from cdpr_rt.tuning import PidDesign, TuningError, design_pid, sweep_gain
 from profiles import Winch
 from tools.commissioning import (
@@ -36,7 +37,6 @@ from tools.commissioning import (
     Measurement,
     Paths,
 )
-from tools.evaluation import recordings
 from tools.output import Output
 from tools.session import WinchSession
 
@@ -77,7 +77,8 @@ class Identified:
 
 def legs(paths: list[Path]) -> list[SweepData]:
     """Return recorded passes as the identification takes them; raises RawLogError."""
-    return [run.sweep for _, run in recordings(paths)]
+    # nothing but the sweep stays in memory: a recording is large
+    return [recording(read_raw_log(path)).sweep for path in paths]
 
 
 def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
