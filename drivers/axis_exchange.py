@@ -53,7 +53,6 @@ class AxisExchange:
         operational = bytes([_OPERATIONAL_STATE]) + bytes(7)
         self._heartbeat_frame = FRAME.pack(_HEARTBEAT_ID + master_node_id, 1, operational)
         self._heartbeat_cycles = max(1, round(heartbeat_s / period_s))
-        self._rehearse()
         self._port = open_port(url, [(i, 0x7FF) for i in self._layout.identifiers])
         self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
         self._pollable = _pollable(self._port)
@@ -67,16 +66,19 @@ class AxisExchange:
         self._words, self._flags = state.words, state.flags
         self.feedback, self.command = state.feedback, state.command
         self._valid = state.feedback.valid
+        self._compile()
 
-    def _rehearse(self) -> None:
+    def _compile(self) -> None:
         """Have the kernels compiled now: a first cycle of seconds would be a silent master."""
-        state, layout = GroupState(self.axes, self.period_s, False), self._layout
-        arrays = state.ints, state.floats
+        layout = self._layout
+        spare = GroupState(self.axes, self.period_s, self.lockstep)
+        arrays = spare.ints, spare.floats
         codec.decode(
-            *(self._rx_bytes, 0, 0, layout.slots, layout.fields, STATE_TABLE),
-            *(*arrays, state.words, state.flags),
-        )
-        codec.encode(self._tx_bytes, layout.answer, CONTROLWORD_TABLE, *arrays, state.flags)
+            self._rx_bytes, 0, 0, layout.slots, layout.fields, STATE_TABLE,
+            *arrays, spare.words, spare.flags,
+        )  # fmt: skip
+        frames = np.zeros_like(self._tx_bytes)
+        codec.encode(frames, layout.answer, CONTROLWORD_TABLE, *arrays, spare.flags)
 
     def sync(self) -> None:
         """Send the SYNC that opens the cycle."""

@@ -83,7 +83,8 @@ def boot(
     standard's letter for the step that failed.
     """
     report = BootReport(node_id)
-    _refuse_a_driven_node(network, node_id)
+    # a master of our kind is heard four times within what its drives tolerate
+    _refuse_a_driven_node(network, node_id, 0.5 * profile.heartbeat_consumer_s)
     network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S)  # one that is silent may yet answer
     network.clear_alarm()
     _check_identity(network, node_id, profile, report)
@@ -108,8 +109,8 @@ def _read(network: CanNetwork, node_id: int, index: int, sub: int) -> int:
         ) from error
 
 
-def _refuse_a_driven_node(network: CanNetwork, node_id: int) -> None:
-    if network.foreign_master.is_set():
+def _refuse_a_driven_node(network: CanNetwork, node_id: int, listen_s: float) -> None:
+    if network.foreign_master.wait(listen_s):
         raise BootError(
             "L", node_id, "another master's heartbeat is on the bus", "stop that master first"
         )
@@ -173,6 +174,7 @@ def _configure(
             (0x6007, 0, _QUICK_STOP),  # when the master's heartbeat is lost
             (0x605A, 0, _SLOW_DOWN_THEN_OFF),
             (0x6072, 0, round(limit)),
+            (0x60B2, 0, 0),  # a torque offset left behind would be added to every torque
         )
         for index, sub, value in objects:
             _set(network, node_id, index, sub, value, report)

@@ -101,7 +101,8 @@ class CanNetwork:
         self._heartbeat_s = heartbeat_s
         self._master_node_id = master_node_id
         self.foreign_master = threading.Event()
-        """Set when somebody else has produced the master's heartbeat."""
+        """Set when somebody else has produced the master's heartbeat, before our cycles ran."""
+        self._has_cycled = False
         self._lost: Exception | None = None
         self._stop = threading.Event()
         self._threads = [threading.Thread(target=self._receive, name="canopen", daemon=True)]
@@ -141,7 +142,8 @@ class CanNetwork:
             return
         peer = self._peers.get(identifier & _NODE)
         if identifier == _HEARTBEAT + self._master_node_id:
-            self.foreign_master.set()
+            if not self._has_cycled:  # the cycle's own heartbeats come back to us as well
+                self.foreign_master.set()
         elif peer is None:
             return
         elif identifier & _FUNCTION == _EMCY and len(data) == 8:
@@ -328,7 +330,7 @@ class CanNetwork:
 
     def claim_cycle(self) -> None:
         """Hand the master's heartbeat to the cycle: from now on a hung cycle is a silent master."""
-        self.cycling = True
+        self.cycling = self._has_cycled = True
 
     def release_cycle(self) -> None:
         """Take the master's heartbeat back from the cycle."""

@@ -135,8 +135,7 @@ def sweeping(lab: Lab, out: Path, *more: str) -> Iterator[Command]:
         deadline = time.monotonic() + 30.0
         while not (file.exists() and file.stat().st_size > 300_000):
             assert time.monotonic() < deadline
-            if command.poll() is not None:
-                break
+            assert command.poll() is None, command.communicate()[1]
             time.sleep(0.01)
         yield command
     finally:
