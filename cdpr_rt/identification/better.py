@@ -13,7 +13,7 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.identification import design
 from cdpr_rt.identification.design import Equations, Layout
 from cdpr_rt.identification.estimate import Fit, Prior, fit
-from cdpr_rt.identification.friction import FrictionShape, Motion, fit_shape
+from cdpr_rt.identification.friction import STARTS, FrictionShape, Motion, fit_shape
 from cdpr_rt.identification.result import BetterResult, Estimate, Harmonic, hint
 from cdpr_rt.identification.selection import (
     Choice,
@@ -105,9 +105,10 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> BetterResult:
     used += [design.LATENCY] if fast else []
     lag = (start.before.lag_rad.value if start.before else 0.0, _LAG_SD_rad)
     priors = _priors(start.before, quick)
-    for number in range(_ROUNDS):
-        known = start.before.shape if start.before else (shape if number else None)
-        shape = _shape(runs, start, choice.orders, beta, inertia, known) or shape
+    starts = [start.before.shape, *STARTS] if start.before else list(STARTS)
+    for _ in range(_ROUNDS):
+        shape = _shape(runs, start, choice.orders, beta, inertia, starts) or shape
+        starts = [shape]
         fitted = fit(windows, Layout(choice.orders, shape), used, priors, lag, inertia)
         beta = fitted.beta[len(used) : len(fitted.used)]
         inertia = fitted.value(design.INERTIA) if quick else inertia
@@ -136,7 +137,7 @@ def _shape(
     orders: tuple[int, ...],
     beta: FloatArray,
     inertia: float,
-    known: FrictionShape | None,
+    starts: list[FrictionShape],
 ) -> FrictionShape | None:
     """Find the friction's shape from short windows, with the cogging found so far taken off."""
     layout = Layout(orders, FrictionShape())
@@ -154,7 +155,7 @@ def _shape(
             x = design.matrix(w, layout, 0, w.torque_Nm.size)[:, design.FIXED :]
             rest = w.torque_Nm - x @ beta - inertia * w.acceleration_rad_s2
             motions.append(Motion(w, rest[rows], rows))
-    return fit_shape(motions, known) if motions else None
+    return fit_shape(motions, starts) if motions else None
 
 
 def _priors(better: BetterResult | None, quick: bool) -> list[Prior]:

@@ -36,7 +36,7 @@ class FrictionShape:
     way_rad: float = 4e-3
 
 
-_STARTS = (FrictionShape(0.3, 0.1, 3e-3), FrictionShape(0.3, 0.4, 3e-3))
+STARTS = (FrictionShape(0.3, 0.1, 3e-3), FrictionShape(0.3, 0.4, 3e-3))
 
 
 @jit
@@ -85,17 +85,18 @@ class Motion:
     rows: IntArray
 
 
-def fit_shape(motions: Sequence[Motion], start: FrictionShape | None = None) -> FrictionShape:
+def fit_shape(motions: Sequence[Motion], starts: Sequence[FrictionShape] = STARTS) -> FrictionShape:
     """Return the shape whose friction, with viscosity, leaves the smallest error.
 
     For every shape tried the linear coefficients are solved for. Each run has its own level of
     error, and rows far outside it count little: a run in which the rotor hunts must not decide.
-    The search begins at `start` too.
+    The search begins at each of `starts`.
     """
-    starts = [start, *_STARTS] if start else list(_STARTS)
     low, high = np.log(_LOWEST), np.log(_HIGHEST)
-    first = start or FrictionShape()
-    weights = [_weights(_residuals([m], [np.ones(m.rows.size)], first)[0]) for m in motions]
+    equal = [np.ones(m.rows.size) for m in motions]
+    weights = [
+        _weights(_residuals([m], [w], starts[0])[0]) for m, w in zip(motions, equal, strict=True)
+    ]
 
     def objective(point: FloatArray) -> float:
         inside = np.clip(point, low, high)

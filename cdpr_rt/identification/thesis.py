@@ -113,27 +113,33 @@ def savitzky_golay(curves: FloatArray, size: int) -> FloatArray:
 
 def _average(parts: list[Stretch]) -> tuple[FloatArray, BoolArray]:
     """Return torque over angle, averaged in bins over all turns, and where the rotor ran away."""
-    total, lost, count = np.zeros(GRID), np.zeros(GRID), np.zeros(GRID)
+    total, lost, astray, count = (np.zeros(GRID) for _ in range(4))
     for part in parts:
         cut = slice(part.start, part.stop)
         turn = part.run.angle_rad[cut] / TWO_PI
         place = np.floor((turn - np.floor(turn)) * GRID).astype(np.int64) % GRID
+        away = runaway(part).astype(float)
         total += np.bincount(place, part.run.torque_Nm[cut], GRID)
-        lost += np.bincount(place, runaway(part).astype(float), GRID)
+        lost += np.bincount(place, away, GRID)
+        astray += np.bincount(place, away * part.run.torque_Nm[cut], GRID)
         count += np.bincount(place, minlength=GRID)
     seen = count > 0
+    share = lost / np.maximum(count, 1.0)
+    sound = lost < count  # where some samples are sound, these alone are averaged
+    total, count = np.where(sound, total - astray, total), np.where(sound, count - lost, count)
     if not seen.any():
         raise IdentificationError("the sweep holds no samples")
     where = np.flatnonzero(seen)
     around = np.concatenate([where[-1:] - GRID, where, where[:1] + GRID])
 
     def spread(values: FloatArray) -> FloatArray:
-        known = values[seen] / count[seen]
+        known = values[seen]
         known = np.concatenate([known[-1:], known, known[:1]])
         # a bin's mean belongs to the bin's middle
         return np.asarray(np.interp(np.arange(GRID), around + 0.5, known))
 
-    return spread(total), np.asarray(spread(lost) > _RUNAWAY_SHARE, np.bool_)
+    mean = total / np.maximum(count, 1.0)
+    return spread(mean), np.asarray(spread(share) > _RUNAWAY_SHARE, np.bool_)
 
 
 def _repair(own: FloatArray, other: FloatArray, at: BoolArray, shared: BoolArray) -> FloatArray:
