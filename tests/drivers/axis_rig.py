@@ -6,6 +6,7 @@ import os
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import canopen
 
@@ -25,9 +26,9 @@ DRIVE = load_drive("generic-cia402")
 SETTINGS = BootSettings(MASTER, PERIOD_S, 3.0, 3.0)
 
 
-def start_simulator(nodes: int = 1) -> OwnSimulator:
+def start_simulator(nodes: int = 1, plant: Path | None = None) -> OwnSimulator:
     bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
-    return OwnSimulator("winch-mpp0923d", bus, nodes=nodes)
+    return OwnSimulator("winch-mpp0923d", bus, plant, nodes=nodes)
 
 
 def dictionary(node_id: int) -> canopen.ObjectDictionary:

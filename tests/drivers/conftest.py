@@ -13,8 +13,8 @@ from axis_rig import Rig, open_network, open_rig, start_simulator
 
 
 @pytest.fixture(scope="module")
-def bus() -> Iterator[str]:
-    """A bus with the drives 1 and 2, which each test must leave or find in a state of its own."""
+def simulated_bus() -> Iterator[str]:
+    """A bus with the drives 1 and 2."""
     simulator = start_simulator(nodes=2)
     try:
         yield simulator.bus
@@ -23,11 +23,17 @@ def bus() -> Iterator[str]:
 
 
 @pytest.fixture
-def rig(bus: str) -> Iterator[Rig]:
-    """Drive 1 on `bus`, freshly switched on."""
-    with open_network(bus, [1, 2]) as network:
+def bus(simulated_bus: str) -> str:
+    """A bus with the drives 1 and 2, freshly switched on."""
+    with open_network(simulated_bus, [1, 2]) as network:
         for node in (1, 2):
             network.reset(node)
-            assert network.wait_for_heartbeat(node, 0.0) is None
+            assert network.read_int(node, 0x1001) == 0  # it is there again
+    return simulated_bus
+
+
+@pytest.fixture
+def rig(bus: str) -> Iterator[Rig]:
+    """Drive 1 on `bus`, booted."""
     with open_rig(bus) as opened:
         yield opened

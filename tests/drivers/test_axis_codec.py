@@ -191,6 +191,33 @@ def test_an_unconfirmed_mode_stops_at_switched_on() -> None:
     assert struct.unpack("<Hh", group.give()[0][1])[0] == 0x0F
 
 
+def test_a_fault_reset_is_one_edge_and_a_fault_that_stays_is_told_again() -> None:
+    group = Group(1)
+    group.enable()
+    ints = group.state.ints
+    words, alarms = [], []
+    for cycle in range(8):
+        if cycle == 2:
+            ints[codec.ACKNOWLEDGE, 0], ints[codec.ALARM, 0] = 3, 0
+        group.take((0x181, TPDO1.pack(0x08, 0, 0)))
+        words.append(struct.unpack("<Hh", group.give()[0][1])[0])
+        alarms.append(bool(group.alarms & codec.FAULT))
+    assert words == [0, 0, 0x80, 0x80, 0x80, 0, 0, 0]
+    assert alarms == [True, True, False, False, False, True, True, True]
+
+
+def test_a_fault_reset_that_works_leaves_the_drive_disabled() -> None:
+    group = Group(1)
+    group.enable()
+    group.take((0x181, TPDO1.pack(0x08, 0, 0)))
+    group.state.ints[codec.ACKNOWLEDGE, 0], group.state.ints[codec.ALARM, 0] = 100, 0
+    group.give()
+    group.take((0x181, TPDO1.pack(0x40, 0, 0)))
+    assert struct.unpack("<Hh", group.give()[0][1])[0] == 0
+    assert group.alarms == 0
+    assert group.state.ints[codec.FAULTED, 0] == 0
+
+
 def test_two_axes_with_one_node_id_are_refused() -> None:
     axis = AxisConfig(1, DRIVE, 3.0, 8192, 0x3AD, 2.0)
     with pytest.raises(DriverError, match="081h"):
