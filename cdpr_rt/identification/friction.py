@@ -13,15 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from cdpr_rt.exchange import FloatArray
+from cdpr_rt.identification.simplex import minimise
 from cdpr_rt.identification.windows import IntArray, Windows, average
 from cdpr_rt.jit import jit
 
 _LOWEST = (0.003, 0.02, 2e-4)
 _HIGHEST = (1.5, 2.0, 2e-2)
 _STEPS = 50
+_FIRST_STEP = 0.3
 _SPREAD_OF_MEDIAN = 1.4826
 _LEAST_SPREAD_Nm = 2e-4
 _TAIL = 2.5
@@ -106,11 +107,8 @@ def fit_shape(motions: Sequence[Motion], starts: Sequence[FrictionShape] = START
 
     points = [np.log((s.rise, s.speed_rad_s, s.way_rad)) for s in starts]
     for _ in range(2):
-        found = [
-            minimize(objective, p, method="Nelder-Mead", options={"maxfev": _STEPS, "xatol": 0.02})
-            for p in points
-        ]
-        points = [min(found, key=lambda f: float(f.fun)).x]
+        found = [minimise(objective, p, _FIRST_STEP, _STEPS) for p in points]
+        points = [min(found, key=lambda f: f[1])[0]]
         shape = FrictionShape(*(float(v) for v in np.exp(np.clip(points[0], low, high))))
         weights = [_weights(r) for r in _residuals(motions, weights, shape)]
     return shape
