@@ -6,6 +6,7 @@ import os
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import canopen
@@ -50,17 +51,22 @@ class Rig:
     """Booted drives and their group; `run` makes cycles."""
 
     def __init__(
-        self, bus: str, network: CanNetwork, drive: DriveProfile, nodes: list[int]
+        self,
+        bus: str,
+        network: CanNetwork,
+        drive: DriveProfile,
+        nodes: list[int],
+        period_s: float = PERIOD_S,
     ) -> None:
         self.bus = bus
         self.network = network
         self.nodes = nodes
         self.reports: dict[int, BootReport] = boot_all(
-            network, dict.fromkeys(nodes, (drive, SETTINGS))
+            network, dict.fromkeys(nodes, (drive, replace(SETTINGS, sync_period_s=period_s)))
         )
         network.start_heartbeat()
         axes = [AxisConfig.from_boot(drive, self.reports[node], 3.0) for node in nodes]
-        self.group = AxisGroup(network.url, network, axes, PERIOD_S, MASTER, HEARTBEAT_S)
+        self.group = AxisGroup(network.url, network, axes, period_s, MASTER, HEARTBEAT_S)
 
     def cycle(self) -> None:
         self.group.sync()
