@@ -235,7 +235,12 @@ def open_winch(
         stop_requested = stack.enter_context(_stop_on_signals())
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
         limit = winch.motor.rated_torque_Nm
-        settings = BootSettings(winch.master_node_id, winch.sync_period_s, limit)
+        settings = BootSettings(
+            winch.master_node_id,
+            winch.sync_period_s,
+            limit,
+            rated_torque_Nm=winch.motor.rated_torque_Nm,
+        )
         rehearse(1, winch.sync_period_s)
         report = boot(network, winch.node_id, winch.drive, settings)
         stack.callback(network.release, winch.node_id)

@@ -11,6 +11,9 @@ from typing import Any
 
 import pytest
 
+# one process for all: the thorough commissioning is made once
+pytestmark = pytest.mark.xdist_group("commission")
+
 PLANTS = Path(__file__).parent / "plants"
 
 
@@ -35,7 +38,6 @@ def thorough(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, 
     return out, commission(out)
 
 
-@pytest.mark.xdist_group("commission")
 def test_default_plant_reaches_the_figures(thorough: tuple[Path, dict[str, Any]]) -> None:
     _, result = thorough
     validation = result["validation"]
@@ -56,7 +58,6 @@ def test_default_plant_reaches_the_figures(thorough: tuple[Path, dict[str, Any]]
     assert bandwidths[-1] == 25.0
 
 
-@pytest.mark.xdist_group("commission")
 def test_report_can_be_made_again_offline(thorough: tuple[Path, dict[str, Any]]) -> None:
     out, result = thorough
     (out / "report.html").unlink()
@@ -65,7 +66,6 @@ def test_report_can_be_made_again_offline(thorough: tuple[Path, dict[str, Any]])
     assert again["validation"] == result["validation"]
 
 
-@pytest.mark.xdist_group("commission")
 def test_fit_from_the_raw_data_alone(thorough: tuple[Path, dict[str, Any]]) -> None:
     out, result = thorough
     again = last_line(cdpr("cogging", "fit", out, "--json"))
@@ -75,7 +75,6 @@ def test_fit_from_the_raw_data_alone(thorough: tuple[Path, dict[str, Any]]) -> N
     )
 
 
-@pytest.mark.xdist_group("commission")
 def test_profile_serves_another_day(thorough: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     out, _ = thorough
     profile = out / "cogging-profile.json"
@@ -84,7 +83,6 @@ def test_profile_serves_another_day(thorough: tuple[Path, dict[str, Any]], tmp_p
     assert result["validation"]["better"]["ratios"]["rms_position_error"] >= 10
 
 
-@pytest.mark.xdist_group("commission")
 def test_a_raw_file_cut_short_is_said_so(
     thorough: tuple[Path, dict[str, Any]], tmp_path: Path
 ) -> None:
