@@ -8,7 +8,7 @@ JOBS ?= 2
 .PHONY: demo test check lint lock clean
 
 demo: $(STAMP)  ## commission one simulated winch on the embedded bus
-	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo
+	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo --overwrite
 
 test: $(STAMP) check  ## every test; needs nothing but Python
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadgroup

@@ -72,6 +72,7 @@ class Executive:
         Raises TripError when the supervisor or the device ends the motion, and
         InterruptedMotionError after a requested stop.
         """
+        self._refuse_when_stopped("the motion")
         controller.reset()
         self.supervisor.reset()
         self._recorder.clear()
@@ -79,9 +80,11 @@ class Executive:
         try:
             self._follow(controller, motion)
         finally:
-            self._release()
-            self._drain()
-            self._log = None
+            try:
+                self._release()
+            finally:  # a bus that is gone takes no zero torque, yet the rows are to be kept
+                self._drain()
+                self._log = None
 
     def step(self, each_cycle: Callable[[], bool], timeout_s: float, what: str) -> None:
         """Run cycles without torque, calling `each_cycle` after each exchange, until it is true.
@@ -90,6 +93,7 @@ class Executive:
         after `timeout_s` of bus time, or when the device raises an alarm, and
         InterruptedMotionError on request.
         """
+        self._refuse_when_stopped(what)
         period = self.device.period_s
         for _ in range(max(1, round(timeout_s / period))):
             self._exchange()
@@ -100,9 +104,12 @@ class Executive:
             self._look_for_alarm()
             if done:
                 return
-            if self._stop_requested():
-                raise InterruptedMotionError(f"stopped on request while waiting for {what}")
+            self._refuse_when_stopped(what)
         raise TripError(f"{what}: not within {timeout_s:g} s")
+
+    def _refuse_when_stopped(self, what: str) -> None:
+        if self._stop_requested():
+            raise InterruptedMotionError(f"stopped on request before {what}")
 
     def _follow(self, controller: Controller, motion: Motion) -> None:
         device, setpoint, recorder = self.device, self.setpoint, self._recorder

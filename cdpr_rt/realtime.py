@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import gc
 import os
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -54,17 +55,32 @@ def one_core(*others: int) -> Iterator[None]:
 
     In lockstep the controller and the simulator take turns: a wake-up across cores costs more
     than the work of a cycle. They run as batch processes, which do not interrupt each other:
-    the answers of several drives are taken in one turn, not in one each. Which core depends on
-    the process, so that two commands at once seldom share one.
+    the answers of several drives are taken in one turn, not in one each. A core serves one such
+    block on this machine at a time; where all are taken, the processes stay where they are.
     """
     before = os.sched_getaffinity(0)
     policy = os.sched_getscheduler(0), os.sched_getparam(0)
-    core = {sorted(before)[os.getpid() % len(before)]}
-    for pid in (0, *others):
-        os.sched_setaffinity(pid, core)
-        os.sched_setscheduler(pid, os.SCHED_BATCH, os.sched_param(0))
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
-        os.sched_setscheduler(0, *policy)
+    with _free_core(before) as core:
+        for pid in (0, *others):
+            if core is not None:
+                os.sched_setaffinity(pid, {core})
+            os.sched_setscheduler(pid, os.SCHED_BATCH, os.sched_param(0))
+        try:
+            yield
+        finally:
+            os.sched_setaffinity(0, before)
+            os.sched_setscheduler(0, *policy)
+
+
+@contextmanager
+def _free_core(usable: set[int]) -> Iterator[int | None]:
+    """Hold a core that nobody else holds, None where there is none; the kernel frees it for us."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
+        for core in sorted(usable, reverse=True):
+            try:
+                claim.bind(f"\0cdpr-rt/core/{core}")
+            except OSError:
+                continue
+            yield core
+            return
+        yield None

@@ -36,6 +36,9 @@ def _check(
 ) -> tuple[int, int, float]:
     # state columns: last position, low-passed speed, consecutive misses, started
     for i in range(torque.size):
+        if not np.isfinite(torque[i]):
+            return _NOT_FINITE, i, torque[i]
+        torque[i] = min(max(torque[i], -limits[0]), limits[0])
         if not valid[i]:
             state[i, 2] += 1.0
             if state[i, 2] > limits[3]:
@@ -55,9 +58,6 @@ def _check(
         error = reference[i] - position[i]
         if abs(error) > limits[2]:
             return _FOLLOWING, i, error
-        if not np.isfinite(torque[i]):
-            return _NOT_FINITE, i, torque[i]
-        torque[i] = min(max(torque[i], -limits[0]), limits[0])
     return _OK, 0, 0.0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from typing import NoReturn
 
 import typer
 
@@ -50,15 +51,20 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
-        print(f"cdpr: {error}", file=sys.stderr)
-        status = _exit_status(error)
-        if "--json" in sys.argv:
-            print(to_json({"ok": False, "error": str(error), "exit_status": status}))
-        sys.exit(status)
-    except KeyboardInterrupt:
-        print("cdpr: interrupted", file=sys.stderr)
-        sys.exit(_INTERRUPTED)
+        _end(str(error), _exit_status(error))
+    except SystemExit as end:
+        # how the command line library passes an interrupt on
+        if end.code == _INTERRUPTED:
+            _end("interrupted", FAILED)
+        raise
     sys.exit(DONE)
+
+
+def _end(message: str, status: int) -> NoReturn:
+    print(f"cdpr: {message}", file=sys.stderr)
+    if "--json" in sys.argv:
+        print(to_json({"ok": False, "error": message, "exit_status": status}))
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from cdpr_rt.cogging_profile import (
     CoggingProfile,
@@ -45,6 +45,10 @@ DEFAULT_BANDWIDTH_HZ = 10.0
 _LEAD_IN_RAD = math.tau
 _SWEEP_ATTEMPTS = 4
 _SETTLE_S = 2.0
+# the set-point starts ahead of a rotor that has to break away first
+_PROBE_TURNS = 1.2
+
+Index = Literal["homing", "probe"]
 _SHORT_LEAD_IN_RAD = math.pi
 
 
@@ -130,11 +134,11 @@ class Commissioning:
         self._paths = paths
         self._measure = Measurement(session, out, paths)
 
-    def run(self, bandwidth_Hz: float) -> dict[str, Any]:
+    def run(self, bandwidth_Hz: float, index: Index = "homing") -> dict[str, Any]:
         """Do everything on the bus; return what the report has to know of it."""
         session, winch = self._session, self._session.winch
         started = time.monotonic()
-        self.prepare()
+        self.prepare(index)
         self.measure()
         found = identify(winch, session.latency_s, self._paths)
         self.measure_again(found, bandwidth_Hz)
@@ -173,10 +177,32 @@ class Commissioning:
             },
         }
 
-    def prepare(self) -> None:
-        """Find the index and put the drive into its torque mode, still without power."""
-        self._session.find_index()
-        self._session.set_mode(self._session.winch.drive.mode_torque)
+    def prepare(self, index: Index = "homing") -> None:
+        """Find the index and put the drive into its torque mode; it has no power afterwards.
+
+        By homing, or by the touch probe during a turn under the PID. Raises TripError when no
+        index was seen.
+        """
+        session = self._session
+        mode = session.winch.drive.mode_torque
+        if index == "homing":
+            session.find_index()
+            session.set_mode(mode)
+            return
+        session.set_mode(mode)
+        session.expect_index()
+        session.enable()
+        turn = Pass(VALIDATION_SPEED_RAD_S, 0.0, _PROBE_TURNS * math.tau)
+        self._measure.track("index", self._first_design(), None, [turn])
+        session.disable()
+        if not session.device.feedback.index_known.all():
+            raise TripError(f"no encoder index was seen in {_PROBE_TURNS:g} turns")
+
+    def _first_design(self) -> PidDesign:
+        """Return a loop for the motor as its data sheet has it."""
+        session = self._session
+        inertia = session.winch.motor.rotor_inertia_kg_m2
+        return design_pid(inertia, session.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s)
 
     def measure(self) -> None:
         """Record the sweeps and the fast legs."""
@@ -185,10 +211,7 @@ class Commissioning:
         self._out.note(f"sweeping at {math.degrees(plan.sweep_speed_rad_s):g} deg/s")
         session.enable()
         self._sweep(sweep_gain(inertia, session.latency_s))
-        design = design_pid(
-            inertia, session.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s
-        )
-        self._measure.fast_legs(design)
+        self._measure.fast_legs(self._first_design())
         session.disable()
 
     def _sweep(self, gain_Nm_rad: float) -> None:
@@ -202,8 +225,9 @@ class Commissioning:
             try:
                 self._measure.sweep(gain_Nm_rad, plan.sweep_speed_rad_s, plan.turns)
             except TripError as error:
-                if self._session.device.alarm() or attempt == _SWEEP_ATTEMPTS - 1:
-                    raise
+                last = attempt == _SWEEP_ATTEMPTS - 1
+                if self._session.device.alarm() or last or not self._session.url.is_simulated:
+                    raise  # beside a real motor a person decides whether it turns again
                 gain_Nm_rad /= 2.0
                 self._out.note(f"{error}; sweeping again with {gain_Nm_rad:.2g} Nm/rad")
                 self._settle()

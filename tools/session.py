@@ -20,6 +20,7 @@ from cdpr_rt.executive import Executive
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.rehearsal import rehearse
 from cdpr_rt.supervisor import Limits, Supervisor
+from drivers import touch_probe
 from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootSettings, boot
@@ -57,11 +58,16 @@ class WinchSession:
         self.device = device
         self.executive = executive
         self.boot = report
+        self._paused_watch: list[tuple[int, int]] = []
 
     @property
     def latency_s(self) -> float:
         """From the instant an angle was true to the middle of the cycle its torque acts in."""
         return latency_s(self.winch)
+
+    def expect_index(self) -> None:
+        """Have the drive latch its index in the ordinary motion that follows (touch probe)."""
+        touch_probe.arm(self.device, 0)
 
     def idle(self, seconds: float) -> None:
         """Run cycles without torque for a while."""
@@ -102,12 +108,15 @@ class WinchSession:
 
     def enable(self) -> None:
         """Switch the power stage on; the torque is zero until a controller runs."""
+        self.network.resume_watch(self.winch.node_id, self._paused_watch)
+        self._paused_watch = []
         self._lead_to(State.OPERATION_ENABLED)
 
     def disable(self) -> None:
         """Switch the power stage off, so that computation may take its time."""
         self._lead_to(State.SWITCH_ON_DISABLED)
         self.device.stop_cycling()
+        self._paused_watch = self.network.pause_watch(self.winch.node_id) or []
 
     def _lead_to(self, state: State) -> None:
         self.device.request(state)

@@ -150,6 +150,34 @@ def test_a_requested_stop_brakes_along_the_set_point(tmp_path: Path) -> None:
     assert np.all(device.pending == 0.0)
 
 
+def test_a_lost_bus_costs_no_row_that_was_measured(tmp_path: Path) -> None:
+    class Cut(Inertias):
+        def sync(self) -> None:
+            super().sync()
+            if self.feedback.cycle > 500:
+                raise ConnectionError("the bus has gone away")
+
+        def transmit(self) -> None:
+            super().transmit()
+            if self.feedback.cycle > 500:
+                raise ConnectionError("the bus has gone away")
+
+    writer = log(tmp_path / "a.raw")
+    with pytest.raises(ConnectionError):
+        executive(Cut()).run(controller(), leg(), writer)
+    writer.close()
+    assert len(read_raw_log(tmp_path / "a.raw").rows) == 500
+
+
+def test_a_stop_asked_for_beforehand_begins_nothing() -> None:
+    device = Inertias()
+    with pytest.raises(InterruptedMotionError):
+        executive(device, lambda: True).run(controller(), leg())
+    with pytest.raises(InterruptedMotionError):
+        executive(device, lambda: True).step(lambda: False, 1.0, "anything")
+    assert device.feedback.cycle == 0
+
+
 def test_a_full_disk_ends_the_motion_without_torque() -> None:
     class Full:
         def write(self, rows: np.ndarray) -> None:

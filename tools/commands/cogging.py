@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -13,7 +13,14 @@ from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import read_raw_log
 from profiles import Winch, load_winch
 from tools.commands.commission import keeping_raw_data, prepare
-from tools.commands.options import BusOption, JsonOption, PlantOption, WinchArgument, YesOption
+from tools.commands.options import (
+    BusOption,
+    IndexOption,
+    JsonOption,
+    PlantOption,
+    WinchArgument,
+    YesOption,
+)
 from tools.commissioning import METHODS, Paths
 from tools.errors import BadInputError
 from tools.evaluation import compare
@@ -52,6 +59,7 @@ def sweep(
         float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
     ] = 3.0,
     overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
+    index: IndexOption = "homing",
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -63,7 +71,7 @@ def sweep(
     with keeping_raw_data(paths), open_winch(profile, url, out, plant, paths.truth) as session:
         plan = Plan(sweep_speed_rad_s=math.radians(speed_deg_s), turns=turns)
         steps = Commissioning(session, out, paths, plan)
-        steps.prepare()
+        steps.prepare(index)
         steps.measure()
     recorded = [str(p) for name in ("sweep", "fast") for p in paths.passes(name)]
     for path in recorded:
@@ -82,11 +90,10 @@ def fit(
     """Identify from recorded data and write the cogging profile into the folder."""
     out = Output(as_json)
     paths = Paths(folder)
-    whose = _recorded_identity(paths)
-    profile = load_winch(winch or whose.pop("winch"))
+    recorded_winch, identity = _recorded_identity(paths)
+    profile = load_winch(winch or recorded_winch)
     found = identify(profile, latency_s(profile), paths)
-    identity = {k: whose[k] for k in DriveIdentity.model_fields}
-    store_profile(profile, DriveIdentity(**identity), found, paths)
+    store_profile(profile, identity, found, paths)
     result = identification(found)
     for key in ("orders", "amplitudes_Nm", "residual_rms_Nm", "repaired_fraction", "coverage"):
         out.say(f"{key}: {result[key]}")
@@ -94,13 +101,15 @@ def fit(
     out.result({"ok": True, "identification": result, "profile": str(paths.profile)})
 
 
-def _recorded_identity(paths: Paths) -> dict[str, Any]:
+def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity]:
     sweeps = paths.passes("sweep")
     if not sweeps:
         raise BadInputError(f"{paths.out}: holds no recorded sweep (raw/sweep-0.raw, ...)")
     try:
-        return dict(read_raw_log(sweeps[0]).header["identity"])
-    except KeyError as error:
+        whose = read_raw_log(sweeps[0]).header["identity"]
+        identity = DriveIdentity(**{key: whose[key] for key in DriveIdentity.model_fields})
+        return str(whose["winch"]), identity
+    except (KeyError, TypeError, ValueError) as error:
         raise RawLogError(f"{sweeps[0]}: does not say which drive it is of") from error
 
 
@@ -115,6 +124,7 @@ def validate(
         float, typer.Option("--bandwidth-hz", min=1.0, max=100.0)
     ] = DEFAULT_BANDWIDTH_HZ,
     overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
+    index: IndexOption = "homing",
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -134,7 +144,7 @@ def validate(
             raise BadInputError(f"{cogging_profile}: {error}") from error
         plan = Plan(bandwidths_Hz=())
         steps = Commissioning(session, out, paths, plan)
-        steps.prepare()
+        steps.prepare(index)
         steps.validate(learnt, bandwidth_Hz)
     truth = Truth(paths.truth) if paths.truth.exists() else None
     runs = {m: paths.passes(validation_name(m, bandwidth_Hz)) for m in METHODS}

@@ -14,7 +14,14 @@ from cdpr_rt.errors import ControlError
 from drivers.errors import DriverError
 from profiles import load_winch
 from tools import summary
-from tools.commands.options import BusOption, JsonOption, PlantOption, WinchArgument, YesOption
+from tools.commands.options import (
+    BusOption,
+    IndexOption,
+    JsonOption,
+    PlantOption,
+    WinchArgument,
+    YesOption,
+)
 from tools.commissioning import Paths
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output, to_json
@@ -48,6 +55,7 @@ def commission(
     quick: Annotated[
         bool, typer.Option("--quick", help="A rough look in a tenth of the time.")
     ] = False,
+    index: IndexOption = "homing",
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -60,7 +68,7 @@ def commission(
     plan = QUICK if quick else THOROUGH
     with keeping_raw_data(paths):
         with open_winch(profile, url, out, plant, paths.truth) as session:
-            run = Commissioning(session, out, paths, plan).run(bandwidth_Hz)
+            run = Commissioning(session, out, paths, plan).run(bandwidth_Hz, index)
         write(paths.run, to_json(run, indent=1))
         found = identify(profile, run["latency_s"], paths)
         results = assemble(paths, run, found)

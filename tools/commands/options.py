@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from tools.procedure import Index
+
 WinchArgument = Annotated[
     str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")
 ]
@@ -27,4 +29,12 @@ JsonOption = Annotated[
 ]
 YesOption = Annotated[
     bool, typer.Option("--yes", help="Do not ask before a real motor is energised.")
+]
+
+IndexOption = Annotated[
+    Index,
+    typer.Option(
+        "--index",
+        help="Find the encoder index by homing, or by the touch probe in ordinary motion.",
+    ),
 ]
