@@ -102,7 +102,13 @@ def test_configuration_is_written_only_where_it_differs(bus: str) -> None:
         again = boot(network, 1, DRIVE, SETTINGS)
         # 6072h is no communication object: the reset keeps it
         assert "6072h:0" not in " ".join(again.changed)
-        assert {c.split(":")[0] for c in again.changed} == {"1006h", "1016h", "1017h"}
+        assert {c.split(":")[0] for c in again.changed} == {
+            "1006h",
+            "1016h",
+            "1017h",
+            "1400h and 1600h",
+            "1801h and 1A01h",
+        }
         assert network.read_int(1, 0x1006) == 1000
         assert network.read_int(1, 0x1016, 1) == MASTER << 16 | 500
         assert network.read_int(1, 0x1017) == 100

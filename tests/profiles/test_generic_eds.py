@@ -51,7 +51,6 @@ def test_default_pdos_are_the_profiles(od):
         for pdo in pdos:
             communication, mapping = od[base + pdo.number - 1], od[base + 0x1FF + pdo.number]
             assert communication[1].default == pdo.cob_id(NODE_ID)
-            assert communication[2].default == pdo.transmission_type
             count = mapping[0].default
             assert [mapping[i].default for i in range(1, count + 1)] == [
                 e.mapping for e in pdo.entries

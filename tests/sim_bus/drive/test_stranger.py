@@ -135,13 +135,29 @@ def test_moves_a_profile_position(node: BaseNode402) -> None:
 
 
 def test_lost_heartbeat_is_a_fault(node: BaseNode402) -> None:
-    node.sdo[0x1016][1].raw = 127 << 16 | 100
+    node.sdo[0x1016][1].raw = 127 << 16 | 500  # ten times the gap: a busy machine is no fault
     node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
     node.state = "OPERATION ENABLED"
     for _ in range(10):
         node.network.send_message(0x77F, b"\x05")
         time.sleep(0.05)
     assert node.sdo[0x6041].raw & 0x6F == 0x27
-    time.sleep(0.4)
     assert wait_for(lambda: node.sdo[0x6041].raw & 0x4F == 0x08)
     assert node.sdo[0x603F].raw == 0x8130
+
+
+def test_serves_a_master_that_changes_no_mapping(node: BaseNode402) -> None:
+    """As it is shipped: no PDO is remapped, the library's own set-up is all there is."""
+    node.network.sync.stop()
+    boot_ups: list[int] = []
+    node.nmt.add_heartbeat_callback(boot_ups.append)
+    node.nmt.send_command(129)
+    assert wait_for(lambda: 0 in boot_ups)
+    node.setup_402_state_machine()
+    node.nmt.state = "OPERATIONAL"
+    node.network.sync.start(0.01)
+    node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
+    assert node.op_mode == "CYCLIC SYNCHRONOUS TORQUE"
+    node.state = "OPERATION ENABLED"
+    assert node.state == "OPERATION ENABLED"
+    node.state = "SWITCH ON DISABLED"
