@@ -2,6 +2,7 @@
 
 from cdpr_rt.identification.better import identify_better, refine
 from cdpr_rt.identification.result import BetterResult, Estimate, Harmonic
+from cdpr_rt.identification.second_pass import SecondPass
 from cdpr_rt.identification.sweep import IdentificationError, SweepData
 from cdpr_rt.identification.thesis import ThesisResult, identify_thesis
 
@@ -10,6 +11,7 @@ __all__ = [
     "Estimate",
     "Harmonic",
     "IdentificationError",
+    "SecondPass",
     "SweepData",
     "ThesisResult",
     "identify_better",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from cdpr_rt.identification.windows import Windows, contiguous, cut, reading_noi
 
 MAX_ORDER = 200
 _LATENCY_SD_s = 1e-3
+_LATENCY_SD_AGAIN_s = 2e-4
 _LAG_SD_rad = np.deg2rad(1.0)
 _CONFIDENCE = 1.96
 _NOISE_GAIN = 2.45
@@ -42,6 +43,8 @@ _TOLERATED_Nm = 3e-3
 _FINE_s = (0.005, 0.02)
 _LONGEST_s = 30.0
 _ROUNDS = 2
+_LEAST_SHARE = 2.5e-3
+_INERTIA_CHANGE = 0.05
 _INERTIA_SHARE = 0.01
 """What the model leaves out, such as the current loop's lag, may move the inertia by this."""
 
@@ -111,8 +114,16 @@ def _identify(legs: Sequence[SweepData], start: _Start) -> BetterResult:
         starts = [shape]
         fitted = fit(windows, Layout(choice.orders, shape), used, priors, lag, inertia)
         beta = fitted.beta[len(used) : len(fitted.used)]
-        inertia = fitted.value(design.INERTIA) if quick else inertia
+        quick = quick and _believable(fitted.value(design.INERTIA), start)
+        used = [c for c in used if c != design.INERTIA or quick]
+        inertia = fitted.value(design.INERTIA) if quick else start.inertia_kg_m2
     return _result(fitted, windows, choice, start, quick)
+
+
+def _believable(inertia: float, start: _Start) -> bool:
+    """Return whether a second pass may change the inertia to this: hunting can pull it away."""
+    before = start.inertia_kg_m2
+    return start.before is None or abs(inertia - before) < _INERTIA_CHANGE * before
 
 
 def _choose(equations: Equations) -> tuple[Choice, FloatArray, float]:
@@ -125,10 +136,25 @@ def _choose(equations: Equations) -> tuple[Choice, FloatArray, float]:
     weight = rows_counted(equations)
     for _ in range(2):
         choice = choose(equations, fixed, weight)
-        columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
-        beta, _ = solve(total(equations.parts, weight), columns)
+        everything = total(equations.parts, weight)
+        for step in range(2):
+            columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
+            beta, _ = solve(everything, columns)
+            if step == 0:
+                choice = replace(choice, orders=_matter(choice.orders, beta, len(fixed)))
         weight = noise_weights(equations, columns, beta)
     return choice, beta[len(fixed) :], float(beta[0])
+
+
+def _matter(orders: tuple[int, ...], beta: FloatArray, first: int) -> tuple[int, ...]:
+    """Return the orders that are not small against the largest and against Coulomb friction.
+
+    A rotor that hunts does so in step with the cogging, which predicts held-back turns too.
+    """
+    amplitude = np.hypot(beta[first::2], beta[first + 1 :: 2])
+    coulomb = np.abs(beta[1:3]).max()
+    least = _LEAST_SHARE * max(float(amplitude.max(initial=0.0)), float(coulomb))
+    return tuple(n for n, a in zip(orders, amplitude, strict=True) if a >= least)
 
 
 def _shape(
@@ -159,16 +185,23 @@ def _shape(
 
 
 def _priors(better: BetterResult | None, quick: bool) -> list[Prior]:
-    """Return what is known beforehand: the nominal latency, and in a second pass the friction."""
-    priors = [Prior(design.LATENCY, 0.0, _LATENCY_SD_s)]
-    if better is None or quick:
-        return priors
-    known = (
+    """Return what is known beforehand: the nominal latency, and in a second pass the rotor.
+
+    Where the rotor hunts, a fit could trade these against each other. Friction's level is only
+    kept where the legs that tell it are missing: it changes as the motor warms up.
+    """
+    if better is None:
+        return [Prior(design.LATENCY, 0.0, _LATENCY_SD_s)]
+    priors = [Prior(design.LATENCY, 0.0, _LATENCY_SD_AGAIN_s)]
+    known = [
         (design.INERTIA, better.inertia_kg_m2.value, 0.02),
-        (design.COULOMB, better.coulomb_forward_Nm.value, 0.05),
-        (design.COULOMB + 1, better.coulomb_backward_Nm.value, 0.05),
         (design.VISCOUS, better.viscous_Nms_rad.value, 0.2),
-    )
+    ]
+    if not quick:
+        known += [
+            (design.COULOMB, better.coulomb_forward_Nm.value, 0.05),
+            (design.COULOMB + 1, better.coulomb_backward_Nm.value, 0.05),
+        ]
     return priors + [Prior(c, m, max(1e-9, abs(m) * share)) for c, m, share in known]
 
 

@@ -15,12 +15,11 @@ from cdpr_rt.compensation import AxisCompensation, Compensation, FrictionFeedfor
 from cdpr_rt.compensation import _torque as compensate
 from cdpr_rt.controllers.pid import _update as pid_update
 from cdpr_rt.identification import (
-    BetterResult,
+    SecondPass,
     SweepData,
     ThesisResult,
     identify_better,
     identify_thesis,
-    refine,
 )
 from cdpr_rt.tuning import design_pid, sweep_gain
 from cdpr_rt.validation import Metrics, evaluate, judged_turns, worst
@@ -296,9 +295,11 @@ RAMP_SPEED = 22.0
 class Commissioned:
     bench: Bench
     thesis: ThesisResult
-    first: BetterResult
-    better: BetterResult
-    fast: list[SweepData]
+    second: SecondPass
+
+    @property
+    def better(self):
+        return self.second.best
 
 
 def fast_legs(bench):
@@ -314,23 +315,24 @@ def compensation(better):
     return AxisCompensation(better.tables(4096), better.friction, look_ahead, OBSERVER)
 
 
-def commission(plant, rounds=3):
-    """Sweep, fast legs, then rounds of a ramp under compensation and a refinement."""
+def commission(plant):
+    """Sweep, fast legs, then ramps under compensation until they run smoothly."""
     bench = Bench(plant)
     gain = sweep_gain(NOMINAL_INERTIA, LATENCY)
     sweeps = [bench.ramp(v, 2, lead=0.05, kp=gain)[0] for v in (3, -3)]
     fast = fast_legs(bench)
-    first = better = identify_better(sweeps + fast, NOMINAL_INERTIA, LATENCY, 4)
-    runs = []
-    for _ in range(rounds):
-        gains = design_pid(better.inertia_kg_m2.value, LATENCY, BANDWIDTH).gains
-        known = compensation(better)
-        runs += [
-            bench.ramp(v, 1, lead=0.1, ramp_s=0.5, gains=gains, comp=known)[0]
-            for v in (RAMP_SPEED, -RAMP_SPEED)
-        ]
-        better = refine(better, fast + runs)
-    return Commissioned(bench, identify_thesis(sweeps), first, better, fast)
+    first = identify_better(sweeps + fast, NOMINAL_INERTIA, LATENCY, 4)
+    second = SecondPass(first, fast)
+    while not second.done:
+        gains = design_pid(second.current.inertia_kg_m2.value, LATENCY, BANDWIDTH).gains
+        known = compensation(second.current)
+        second.add(
+            [
+                bench.ramp(v, 1, lead=0.1, ramp_s=0.5, gains=gains, comp=known)[0]
+                for v in (RAMP_SPEED, -RAMP_SPEED)
+            ]
+        )
+    return Commissioned(bench, identify_thesis(sweeps), second)
 
 
 def validate(done: Commissioned) -> dict[str, Metrics]:

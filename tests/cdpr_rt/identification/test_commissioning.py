@@ -24,7 +24,7 @@ def assert_near_oracle(figures):
 
 @pytest.fixture(scope="module")
 def default():
-    return commission(TruePlant(), rounds=1)
+    return commission(TruePlant())
 
 
 def test_default_motor_is_identified(default):
@@ -85,7 +85,7 @@ def test_low_friction_and_offset_ripple():
         asymmetry=0.5,
         seed=3,
     )
-    done = commission(plant, rounds=2)
+    done = commission(plant)
     assert done.better.orders[0] == 4
     assert done.better.amplitudes_Nm[0] == pytest.approx(0.08, rel=5e-3)
     assert "current sensor" in done.better.harmonics[0].hint
