@@ -25,8 +25,14 @@ METHODS = ("none", "thesis", "better")
 # the rotor trails the set-point by friction over gain; both directions' trail fits in here
 SWEEP_LEAD_IN_RAD = math.radians(30.0)
 VALIDATION_SPEED_RAD_S = math.radians(22.0)
-_FAST_SPEEDS_RAD_S = (math.radians(90.0), math.radians(270.0))
-_FAST_RAMP_S = 0.25
+# speed, angle at that speed and ramp: quick turns for inertia and viscous friction, a slow rise
+# through all speeds for the friction curve, a creep for its low end
+_FAST_LEGS = (
+    (math.radians(300.0), 3.0 * math.tau, 0.1),
+    (math.radians(600.0), 3.0 * math.tau, 0.1),
+    (math.radians(90.0), 0.0, 4.0),
+    (math.radians(12.0), 0.25 * math.tau, 0.3),
+)
 _TORQUE_SHARE = 0.25
 
 
@@ -89,11 +95,11 @@ class Measurement:
         return self._run("sweep", controller, passes, {"gain_Nm_rad": gain_Nm_rad})
 
     def fast_legs(self, design: PidDesign) -> list[Path]:
-        """Turn back and forth at higher speeds, which tells inertia and viscous friction."""
+        """Turn back and forth at other speeds, which tells inertia and the friction curve."""
         passes = [
-            dataclasses.replace(one, ramp_s=_FAST_RAMP_S, with_ramps=True)
-            for speed in _FAST_SPEEDS_RAD_S
-            for one in both_ways(speed, 0.0, 1.0)
+            Pass(sign * speed, 0.0, distance, ramp, with_ramps=True)
+            for speed, distance, ramp in _FAST_LEGS
+            for sign in (1.0, -1.0)
         ]
         return self.track("fast", design, None, passes)
 

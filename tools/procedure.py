@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import time
@@ -20,19 +21,19 @@ from cdpr_rt.cogging_profile import (
 from cdpr_rt.compensation import AxisCompensation
 from cdpr_rt.errors import TripError
 from cdpr_rt.identification import (
+    MOST_ROUNDS,
     BetterResult,
+    SecondPass,
     SweepData,
     ThesisResult,
     identify_better,
     identify_thesis,
-    refine,
 )
 from cdpr_rt.measurement import Pass, both_ways, recording
 from cdpr_rt.rawlog import read_raw_log
 from cdpr_rt.tuning import PidDesign, TuningError, design_pid, sweep_gain
 from profiles import Winch
 from tools.commissioning import (
-    METHODS,
     VALIDATION_SPEED_RAD_S,
     Measurement,
     Paths,
@@ -40,11 +41,12 @@ from tools.commissioning import (
 from tools.output import Output
 from tools.session import WinchSession
 
-DEFAULT_BANDWIDTH_HZ = 10.0
+DEFAULT_BANDWIDTH_HZ = 12.0
 
 _LEAD_IN_RAD = math.tau
 _SWEEP_ATTEMPTS = 4
 _SETTLE_S = 2.0
+_STIFF_HZ = (30.0, 25.0, 20.0, 15.0)
 # the set-point starts ahead of a rotor that has to break away first
 _PROBE_TURNS = 1.2
 
@@ -58,16 +60,18 @@ class Plan:
 
     sweep_speed_rad_s: float = math.radians(3.0)
     turns: int = 2
-    """Turns of each sweep and of the second pass, in each direction."""
+    """Turns of each sweep, in each direction."""
+    rounds: int = MOST_ROUNDS
+    """Rounds of the second pass at the most."""
     both_ways: bool = True
     """Whether validation ramps at the default bandwidth go both ways."""
-    bandwidths_Hz: tuple[float, ...] = (3.0, 5.0, 8.0, 10.0, 15.0, 25.0)
+    bandwidths_Hz: tuple[float, ...] = (3.0, 5.0, 8.0, 15.0, 25.0)
     """Bandwidths at which the methods are compared besides the default."""
 
 
 THOROUGH = Plan()
 """The thesis' procedure (Tremblay, sections 1.4 and 1.5) and the comparison over bandwidths."""
-QUICK = Plan(math.radians(30.0), turns=1, both_ways=False, bandwidths_Hz=())
+QUICK = Plan(math.radians(30.0), turns=1, rounds=2, both_ways=False, bandwidths_Hz=())
 """A look at a motor within two minutes of its time; the sweep is too fast for fine figures."""
 
 
@@ -86,26 +90,38 @@ def legs(paths: list[Path]) -> list[SweepData]:
 
 
 def identify(winch: Winch, latency_s: float, paths: Paths) -> Identified:
-    """Identify from the recorded passes in `paths`, the second pass included where there is one.
+    """Identify from the recorded passes in `paths`, all rounds of the second pass included.
 
     Raises RawLogError and IdentificationError.
     """
+    found = identify_first(winch, latency_s, paths)
+    second = SecondPass(found.better, legs(paths.passes("fast")))
+    for number in range(MOST_ROUNDS):
+        recorded = paths.passes(round_name(number))
+        if not recorded or second.done:
+            break
+        second.add(legs(recorded))
+    return dataclasses.replace(found, better=second.best)
+
+
+def identify_first(winch: Winch, latency_s: float, paths: Paths) -> Identified:
+    """Identify from the sweeps and the fast legs alone."""
     sweep, fast = (legs(paths.passes(name)) for name in ("sweep", "fast"))
     inertia, pole_pairs = winch.motor.rotor_inertia_kg_m2, winch.motor.poles // 2
     better = identify_better(sweep + fast, inertia, latency_s, pole_pairs)
-    return with_second_pass(Identified(identify_thesis(sweep), better), paths)
+    return Identified(identify_thesis(sweep), better)
 
 
-def with_second_pass(found: Identified, paths: Paths) -> Identified:
-    """Return `found` refined by the second pass, where one was recorded."""
-    again = legs(paths.passes("refine"))
-    return dataclasses.replace(found, better=refine(found.better, again)) if again else found
+def round_name(number: int) -> str:
+    """Return the name under which a round of the second pass is recorded."""
+    return f"round{number}"
 
 
 def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, paths: Paths) -> None:
     """Write the cogging profile."""
     better = found.better
-    raw = [p.name for name in ("sweep", "fast", "refine") for p in paths.passes(name)]
+    names = ("sweep", "fast", *(round_name(number) for number in range(MOST_ROUNDS)))
+    raw = [path.name for name in names for path in paths.passes(name)]
     CoggingProfile(
         motor=winch.motor.model,
         drive=winch.drive.name,
@@ -140,9 +156,8 @@ class Commissioning:
         started = time.monotonic()
         self.prepare(index)
         self.measure()
-        found = identify(winch, session.latency_s, self._paths)
-        self.measure_again(found, bandwidth_Hz)
-        found = with_second_pass(found, self._paths)
+        found = identify_first(winch, session.latency_s, self._paths)
+        found = self.measure_again(found, bandwidth_Hz)
         identity = session.drive_identity
         store_profile(winch, identity, found, self._paths)
         wanted, designs = self.validate(CoggingProfile.load(self._paths.profile), bandwidth_Hz)
@@ -198,6 +213,15 @@ class Commissioning:
         if not session.device.feedback.index_known.all():
             raise TripError(f"no encoder index was seen in {_PROBE_TURNS:g} turns")
 
+    def _stiffest_design(self) -> PidDesign:
+        """Return the stiffest of some loops that its latency allows, for legs at speed."""
+        session = self._session
+        inertia = session.winch.motor.rotor_inertia_kg_m2
+        for bandwidth in _STIFF_HZ:
+            with contextlib.suppress(TuningError):
+                return design_pid(inertia, session.latency_s, bandwidth, session.device.period_s)
+        return self._first_design()
+
     def _first_design(self) -> PidDesign:
         """Return a loop for the motor as its data sheet has it."""
         session = self._session
@@ -211,7 +235,7 @@ class Commissioning:
         self._out.note(f"sweeping at {math.degrees(plan.sweep_speed_rad_s):g} deg/s")
         session.enable()
         self._sweep(sweep_gain(inertia, session.latency_s))
-        self._measure.fast_legs(self._first_design())
+        self._measure.fast_legs(self._stiffest_design())
         session.disable()
 
     def _sweep(self, gain_Nm_rad: float) -> None:
@@ -240,25 +264,27 @@ class Commissioning:
         self._session.idle(_SETTLE_S)
         self._session.enable()
 
-    def measure_again(self, found: Identified, bandwidth_Hz: float) -> None:
-        """Record a second pass under compensation, from which the residual is identified."""
-        known = self._compensations(found)["better"]
+    def measure_again(self, found: Identified, bandwidth_Hz: float) -> Identified:
+        """Record ramps under compensation and refine, until they do not get smoother."""
         session = self._session
-        self._out.note("second pass at 22 deg/s under compensation")
-        session.enable()
-        passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, self._plan.turns)
-        self._measure.track("refine", self._design(found.better, bandwidth_Hz), known, passes)
-        session.disable()
+        second = SecondPass(found.better, legs(self._paths.passes("fast")))
+        passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 1)
+        for number in range(self._plan.rounds):
+            if second.done:
+                break
+            self._out.note(f"second pass at 22 deg/s under compensation, round {number + 1}")
+            session.enable()
+            design = self._design(second.current, bandwidth_Hz)
+            known = stored_better(second.current).compensation()
+            recorded = self._measure.track(round_name(number), design, known, passes)
+            session.disable()
+            second.add(legs(recorded))
+        return dataclasses.replace(found, better=second.best)
 
     def _design(self, better: BetterResult, bandwidth_Hz: float) -> PidDesign:
         session = self._session
         inertia = better.inertia_kg_m2.value
         return design_pid(inertia, session.latency_s, bandwidth_Hz, session.device.period_s)
-
-    @staticmethod
-    def _compensations(found: Identified) -> dict[str, AxisCompensation]:
-        stored = {"thesis": stored_thesis(found.thesis), "better": stored_better(found.better)}
-        return {name: method.compensation() for name, method in stored.items()}
 
     def validate(
         self, profile: CoggingProfile, bandwidth_Hz: float
@@ -311,7 +337,8 @@ class Commissioning:
         both_ways: bool,
     ) -> None:
         """Record the ramps of one bandwidth, method by method."""
-        for method in METHODS:
+        # what was just learnt comes first: a motor that warms up is soon another one
+        for method in ("better", "none", "thesis"):
             name = validation_name(method, wanted_Hz)
             passes = self._ramps(both_ways)
             self._measure.track(name, design, known[method], passes, {"method": method})
