@@ -82,6 +82,7 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
         )
     return Winch(
         profile=path.stem,
+        path=path.resolve(),
         motor=_referred(path, "motor", load_motor, file.motor, folder),
         drive=_referred(path, "drive", load_drive, file.drive, folder),
         cable=_referred(path, "cable", load_cable, file.cable, folder),

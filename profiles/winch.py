@@ -1,6 +1,7 @@
 """Winches: a motor, its drive, a gear, a drum and a cable."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
@@ -41,6 +42,7 @@ class Winch:
     """
 
     profile: str
+    path: Path
     name: str
     motor: Motor
     drive: DriveProfile
@@ -54,6 +56,12 @@ class Winch:
     bitrate_bit_s: int
     sync_period_s: float
     notes: tuple[str, ...] = ()
+
+    @property
+    def reference(self) -> str:
+        """What `load_winch` finds this winch by from anywhere: its name, or its file's path."""
+        shipped = self.path.parent == Path(__file__).parent / "winches"
+        return self.profile if shipped else str(self.path)
 
     @property
     def cable_m_per_motor_rad(self) -> float:

@@ -164,7 +164,7 @@ class Commissioning:
         status = session.bus_status()
         device, boot = session.device, session.boot
         return {
-            "winch": winch.profile,
+            "winch": winch.reference,
             "motor": winch.motor.model,
             "drive": {
                 "name": boot.device_name,

@@ -69,6 +69,22 @@ class WinchSession:
         """Have the drive latch its index in the ordinary motion that follows (touch probe)."""
         touch_probe.arm(self.device, 0)
 
+    def restrict(self, speed_rad_s: float, following_error_rad: float) -> None:
+        """Tolerate less speed and following error than a bare rotor under test may have."""
+        usual = self.executive.supervisor.limits
+        limits = Limits(usual.torque_Nm, speed_rad_s, following_error_rad)
+        self.executive.supervisor = Supervisor(limits, self.device.n, self.device.period_s)
+
+    def reset_fault(self) -> None:
+        """Acknowledge the drive's fault; it is left without power. Raises TripError if it stays."""
+        device = self.device
+        device.sync()
+        device.receive()
+        device.transmit()
+        device.acknowledge_fault()
+        self._lead_to(State.SWITCH_ON_DISABLED)
+        device.stop_cycling()
+
     def idle(self, seconds: float) -> None:
         """Run cycles without torque for a while."""
         cycles = iter(range(round(seconds / self.device.period_s)))
@@ -89,7 +105,7 @@ class WinchSession:
     @property
     def identity(self) -> dict[str, Any]:
         """What raw data keep of where they come from."""
-        whose = {"winch": self.winch.profile, "motor": self.winch.motor.model}
+        whose = {"winch": self.winch.reference, "motor": self.winch.motor.model}
         return whose | self.drive_identity.model_dump()
 
     def set_mode(self, mode: int) -> None:
@@ -297,7 +313,7 @@ def _own_simulator(
 ) -> BusUrl:
     url = open_bus(f"simbus:own-{os.getpid()}")
     out.note("starting the simulated drive ...")
-    simulator = OwnSimulator(winch.profile, str(url), plant, truth_log)
+    simulator = OwnSimulator(winch.reference, str(url), plant, truth_log)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return url

@@ -24,6 +24,9 @@ app = typer.Typer(help="One drive on the bus.", no_args_is_help=True)
 
 _JOG_RAMP_S = 0.5
 _TORQUE_SHARE = 0.25
+# a motor that turns the wrong way is to be stopped before half a turn
+_JOG_ERROR_RAD = 2.5
+_JOG_SPEEDS, _JOG_LEAST_RAD_S = 4.0, 40.0
 
 
 def register(parent: typer.Typer) -> None:
@@ -96,6 +99,20 @@ def enable(
 
 
 @app.command()
+def reset(
+    winch: WinchArgument, bus: BusOption, plant: PlantOption = None, as_json: JsonOption = False
+) -> None:
+    """Acknowledge the drive's fault; nothing is enabled by it."""
+    out = Output(as_json)
+    profile = load_winch(winch)
+    with open_winch(profile, open_bus(bus), out, plant) as session:
+        session.reset_fault()
+        state = session.device.states()[0].label
+    out.say(state)
+    out.result({"ok": True, "state": state})
+
+
+@app.command()
 def home(
     winch: WinchArgument,
     bus: BusOption,
@@ -145,9 +162,11 @@ def jog(
     confirm_motion(url, yes, f"the motor turns at {speed_deg_s:g} deg/s for {seconds:g} s")
     with open_winch(profile, url, out, plant) as session:
         session.set_mode(profile.drive.mode_torque)
+        speed = math.radians(speed_deg_s)
+        session.restrict(max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S), _JOG_ERROR_RAD)
         session.enable()
         start = session.device.feedback.position_rad.copy()
-        leg = Leg(start, np.array([math.radians(speed_deg_s)]), seconds, _JOG_RAMP_S)
+        leg = Leg(start, np.array([speed]), seconds, _JOG_RAMP_S)
         session.executive.run(_jog_controller(session), leg)
         moved = math.degrees(session.device.feedback.position_rad[0] - start[0])
         session.disable()

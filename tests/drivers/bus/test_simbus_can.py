@@ -82,7 +82,7 @@ def test_notifier_and_periodic_sending(simulator: Any) -> None:
 def test_the_stock_logger_in_another_process(simulator: Any, tmp_path: Path) -> None:
     log = tmp_path / "bus.asc"
     logger = subprocess.Popen(
-        [sys.executable, "-m", "can.logger", "-i", "simbus", "-c", simulator.name, "-f", log],
+        [sys.executable, "-u", "-m", "can.logger", "-i", "simbus", "-c", simulator.name, "-f", log],
         stdout=subprocess.PIPE,
     )
     try:
