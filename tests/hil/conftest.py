@@ -12,14 +12,6 @@ import vcan_guest
 import vcan_replay
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks for groups
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep the tests that share vcan0 in one process."""
-    for item in items:
-        if item.get_closest_marker("vcan"):
-            item.add_marker(pytest.mark.xdist_group(vcan_replay.GROUP))
-
-
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
     """Replay what a `vcan` test did in the guest; every other test runs as usual."""
@@ -28,7 +20,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
     stash = item.session.stash
     if _OUTCOME not in stash:
         wanted = [i for i in item.session.items if i.get_closest_marker("vcan")]
-        stash[_OUTCOME] = vcan_replay.run_in_guest([vcan_replay.plain_name(i) for i in wanted])
+        stash[_OUTCOME] = vcan_replay.run_in_guest([i.nodeid for i in wanted])
     item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     for report in vcan_replay.replay(item, stash[_OUTCOME]):
         item.ihook.pytest_runtest_logreport(report=report)

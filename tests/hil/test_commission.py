@@ -11,9 +11,6 @@ from typing import Any
 
 import pytest
 
-# one process for all: the thorough commissioning is made once
-pytestmark = pytest.mark.xdist_group("commission")
-
 PLANTS = Path(__file__).parent / "plants"
 
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 import vcan_guest
 from vcan_guest import NoGuestError
-from vcan_replay import Outcome, parse, plain_name, replay
+from vcan_replay import Outcome, parse, replay
 
 
 def _phase(item: pytest.Item, when: str, outcome: str, longrepr: object = None) -> str:
     return json.dumps(
         {
-            "nodeid": plain_name(item),
+            "nodeid": item.nodeid,
             "location": list(item.location),
             "keywords": {},
             "outcome": outcome,

@@ -16,7 +16,6 @@ from vcan_guest import NoGuestError
 REPOSITORY = Path(__file__).parents[2]
 GUEST_CACHE = REPOSITORY / "build" / "vcan-guest"
 REPORTS_VARIABLE = "CDPR_VCAN_REPORTS"
-GROUP = "vcan"
 
 
 @dataclass(frozen=True)
@@ -69,17 +68,12 @@ def replay(item: pytest.Item, outcome: Outcome) -> Iterator[pytest.TestReport]:
         reason = f"Skipped: no vcan0 here and no guest kernel: {outcome.no_guest}"
         yield _report(item, "skipped", (str(item.path), None, reason))
         return
-    phases = outcome.reports.get(plain_name(item), [])
+    phases = outcome.reports.get(item.nodeid, [])
     for phase in phases:
         yield _restored(item, phase)
     if not any(phase["when"] == "teardown" for phase in phases):
         words = f"did not end in the guest, whose last words were:\n{outcome.output}"
         yield _report(item, "failed", words)
-
-
-def plain_name(item: pytest.Item) -> str:
-    """Return a test's name without the group that pytest-xdist puts behind it."""
-    return item.nodeid.removesuffix(f"@{GROUP}")
 
 
 def _restored(item: pytest.Item, data: dict[str, Any]) -> pytest.TestReport:

@@ -1,0 +1,21 @@
+"""How the tests are shared out between processes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from xdist.scheduler import LoadScopeScheduling
+
+
+class _ByFile(LoadScopeScheduling):
+    """One process for each file, and one for all that run in the guest kernel's single boot."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.split("::", 1)[0]
+        return "vcan" if "/test_vcan_" in file else file
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
+    """Keep files together: some make one long commissioning for all of their tests."""
+    return _ByFile(config, log)
