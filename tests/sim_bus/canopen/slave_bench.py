@@ -90,6 +90,9 @@ class Bench:
         app: SlaveApplication | None = None,
     ) -> None:
         self.od = ObjectDictionary.from_eds(eds, node_id)
+        # the drive ships with types that any master can use; these are a synchronous master's
+        self.od.set_default(0x1400, 2, 1)
+        self.od.set_default(0x1801, 2, 0)
         self.app = Recorder() if app is None else app
         self.slave = CanopenSlave(self.od, node_id, self.app, store=store)
         self.now = 0.0
