@@ -24,13 +24,11 @@ def _plain(value: Any) -> Any:
         return [_plain(v) for v in value]
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
-    if isinstance(value, Path):
-        return str(value)
     if isinstance(value, np.bool_ | np.integer):
         return value.item()
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
-    return value
+    return str(value) if isinstance(value, Path) else value
 
 
 def to_json(result: dict[str, Any], indent: int | None = None) -> str:
