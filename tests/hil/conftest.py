@@ -13,7 +13,7 @@ import vcan_replay
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
     """Replay what a `vcan` test did in the guest; every other test runs as usual."""
     if not item.get_closest_marker("vcan") or _runs_here():
         return None
@@ -25,6 +25,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> bool | None:
     for report in vcan_replay.replay(item, stash[_OUTCOME]):
         item.ihook.pytest_runtest_logreport(report=report)
     item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    # what the test before left set up for this one's sake
+    item.session._setupstate.teardown_exact(nextitem)
     return True
 
 
