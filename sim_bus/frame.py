@@ -62,11 +62,6 @@ def arbitration_key(can_id: int) -> int:
     return (can_id & SFF_MASK) << 21 | remote << 19
 
 
-def frame_key(frame: bytes) -> int:
-    """Return `arbitration_key` of a packed frame."""
-    return arbitration_key(int.from_bytes(frame[:4], "little"))
-
-
 def base_id(can_id: int) -> int:
     """Return the 11 leading bits of an identifier, standard or extended."""
     return (can_id & EFF_MASK) >> 18 if can_id & EFF_FLAG else can_id & SFF_MASK
