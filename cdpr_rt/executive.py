@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -29,6 +29,19 @@ class Motion(Protocol):
         """Return the motion that stops from the state at `time_s`."""
 
 
+class Watch(Protocol):
+    """Something beside the axes that may end their motion, such as safety I/O.
+
+    Both are asked every cycle and cost next to nothing while all is well.
+    """
+
+    def alarm(self) -> str:
+        """Return why the torque must go at once, or an empty text."""
+
+    def stop_reason(self) -> str:
+        """Return why the motion must be braked to its end, or an empty text."""
+
+
 @dataclass
 class Lateness:
     """How the paced loop kept its deadlines."""
@@ -43,8 +56,9 @@ class Executive:
     """Runs controllers on a device, one cycle after the other.
 
     On a lockstep device the next SYNC goes out as soon as a cycle is done; otherwise each SYNC
-    has an absolute deadline. `stop_requested` is looked at once a cycle: what it ends, it ends
-    by a braking set-point under the same controller.
+    has an absolute deadline. `stop_requested` and `watches` are looked at once a cycle: what a
+    request or a watch's `stop_reason` ends, it ends by a braking set-point under the same
+    controller; a watch's `alarm` takes the torque at once.
     """
 
     def __init__(
@@ -52,6 +66,7 @@ class Executive:
         device: AxisDevice,
         supervisor: Supervisor,
         stop_requested: Callable[[], bool],
+        watches: Sequence[Watch] = (),
     ) -> None:
         self.device = device
         self.supervisor = supervisor
@@ -62,6 +77,7 @@ class Executive:
         self._recorder = Recorder(device.n)
         self._log: RawLogWriter | None = None
         self._stop_requested = stop_requested
+        self._watches = tuple(watches)
         self._idle = Idle(device.n)
         self._deadline = 0.0
 
@@ -69,7 +85,7 @@ class Executive:
         """Run `controller` along `motion` to its end, recording into `log`.
 
         However it ends, the last torque sent is zero and what was recorded is in the file.
-        Raises TripError when the supervisor or the device ends the motion, and
+        Raises TripError when the supervisor, the device or a watch ends the motion, and
         InterruptedMotionError after a requested stop.
         """
         self._refuse_when_stopped("the motion")
@@ -102,6 +118,9 @@ class Executive:
             done = each_cycle()
             self.device.transmit()
             self._look_for_alarm()
+            reason = self._stop_reason()
+            if reason:
+                self._trip(reason)
             if done:
                 return
             self._refuse_when_stopped(what)
@@ -116,7 +135,7 @@ class Executive:
         feedback, command = device.feedback, device.command
         period = device.period_s
         cycles = round(motion.duration_s / period)
-        stopping = False
+        stopping, why = False, ""
         k = 0
         while k <= cycles:
             self._exchange()
@@ -132,13 +151,17 @@ class Executive:
                 self._drain()
                 if self.on_progress is not None:
                     self.on_progress(k * period)
-            if not stopping and self._stop_requested():
-                stopping = True
-                motion = motion.brake(k * period)
-                # the braking motion is entered where its ramp-up would end
-                k = round(0.5 * motion.duration_s / period)
-                cycles = round(motion.duration_s / period)
+            if not stopping:
+                why = self._stop_reason()
+                stopping = bool(why) or self._stop_requested()
+                if stopping:
+                    motion = motion.brake(k * period)
+                    # the braking motion is entered where its ramp-up would end
+                    k = round(0.5 * motion.duration_s / period)
+                    cycles = round(motion.duration_s / period)
             k += 1
+        if why:
+            raise TripError(why)
         if stopping:
             raise InterruptedMotionError("stopped on request")
 
@@ -165,6 +188,17 @@ class Executive:
         alarm = self.device.alarm()
         if alarm:
             self._trip(alarm)
+        for watch in self._watches:
+            alarm = watch.alarm()
+            if alarm:
+                self._trip(alarm)
+
+    def _stop_reason(self) -> str:
+        for watch in self._watches:
+            reason = watch.stop_reason()
+            if reason:
+                return reason
+        return ""
 
     def _trip(self, reason: str) -> None:
         self._release()
