@@ -13,6 +13,15 @@ Unsigned16 = Annotated[int, Field(ge=0, le=0xFFFF)]
 Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFFFFFF)]
 Mode = Annotated[int, Field(ge=-128, le=127)]
 
+TorqueUnit = Literal["per_mille_of_rated", "percent_of_rated", "mNm", "cNm"]
+"""Unit of 6071h, 6072h, 6077h, 60B2h and, per second, of 6087h; rated torque is 6076h in mNm."""
+VelocityUnit = Literal["counts_per_s", "rpm"]
+"""Unit of 6099h and the other velocities."""
+AccelerationUnit = Literal["counts_per_s2", "rpm_per_s"]
+"""Unit of 609Ah and the other accelerations."""
+
+_PROFILE_TORQUE = 4
+
 
 class PdoEntry(Profile):
     """One object in a PDO."""
@@ -50,10 +59,16 @@ class Pdo(Profile):
 
 
 class Quirks(Profile):
-    """Where a drive departs from the standard."""
+    """Where a drive departs from the standard's state machine.
+
+    The mode of an enabled drive is never changed, so that no key is needed for drives which
+    refuse that.
+    """
 
     halt_before_mode_change: bool = False
-    disable_before_mode_change: bool = False
+    """6060h is taken only while bit 8 of the controlword (halt) is set."""
+    homing_done_by_bit_12_alone: bool = False
+    """Bit 10 of the statusword tells nothing in homing mode; bit 12 comes once at rest."""
 
 
 class Verification(Profile):
@@ -66,9 +81,20 @@ class Verification(Profile):
 class DriveProfile(Profile):
     """One CiA 402 drive type.
 
-    `eds` is the path of its electronic data sheet; signs turn the drive's counting and torque into
-    the motor's; `torque_delay_s` is the nominal lag of its current loop and `feedback_delay_s` the
-    nominal age of the position it reports.
+    `eds` is the path of its electronic data sheet. Objects that the EDS lacks are not asked for:
+    without 6076h the motor's rated torque holds, without 608Fh the winch's encoder resolution and
+    without 6502h `supported_modes`.
+
+    `torque_unit`, `velocity_unit` and `acceleration_unit` tell what one unit of the drive's
+    objects is. The signs turn the drive's directions into the motor's, each for itself:
+    `position_sign` is -1 where 6064h falls while the motor turns forward, `torque_sign` where a
+    positive 6071h drives it backward, `homing_sign` where method 34 seeks the index backward.
+
+    `torque_slope_Nm_s` is written to 6087h, which modes with a torque ramp (PT, 4) need: as steep
+    as the drive takes it, since a ramp is a lag in the loop. `torque_delay_s` is the nominal lag of
+    its current loop, `feedback_delay_s` the nominal age of the position it reports. `rpdos` must
+    carry 6040h and 6071h, in one PDO or in two; `tpdos` 6041h, 6064h and 6077h, in any number of
+    PDOs that answer every SYNC (transmission type 1).
     """
 
     name: str = Field(min_length=1)
@@ -80,7 +106,10 @@ class DriveProfile(Profile):
     supported_modes: tuple[Mode, ...] = Field(min_length=1)
     mode_torque: Mode = 10
     homing_methods: tuple[Mode, ...] = ()
-    torque_unit: Literal["per_mille_of_rated"] = "per_mille_of_rated"
+    torque_unit: TorqueUnit = "per_mille_of_rated"
+    torque_slope_Nm_s: float | None = Field(default=None, gt=0)
+    velocity_unit: VelocityUnit = "counts_per_s"
+    acceleration_unit: AccelerationUnit = "counts_per_s2"
     position_sign: Sign = 1
     torque_sign: Sign = 1
     homing_sign: Sign = 1
@@ -100,6 +129,11 @@ class DriveProfile(Profile):
         if self.mode_torque not in self.supported_modes:
             raise ValueError(
                 f"mode_torque: value {self.mode_torque}; allowed: one of supported_modes"
+            )
+        if self.mode_torque == _PROFILE_TORQUE and self.torque_slope_Nm_s is None:
+            raise ValueError(
+                "torque_slope_Nm_s: is missing; allowed: above 0, which mode_torque = 4 (PT) needs "
+                "for 6087h"
             )
         for kind, pdos in (("rpdos", self.rpdos), ("tpdos", self.tpdos)):
             for key in ("number", "cob_id_offset"):

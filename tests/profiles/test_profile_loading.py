@@ -200,6 +200,10 @@ def test_every_fault_of_a_file_is_told(tmp_path: Path):
         ({"verified": {"colour": {"status": "assumed", "how": "x"}}}, r"verified\.colour"),
         ({"torque_sign": True}, "torque_sign: value True; allowed: a valid integer"),
         ({"torque_sign": 2}, "torque_sign: value 2; allowed: -1 or 1"),
+        ({"torque_unit": "Nm"}, "torque_unit: value 'Nm'; allowed: .*'cNm'"),
+        ({"velocity_unit": "deg/s"}, "velocity_unit: value 'deg/s'; allowed: .*'rpm'"),
+        ({"mode_torque": 4}, "torque_slope_Nm_s: is missing; allowed: above 0"),
+        ({"torque_slope_Nm_s": 0.0}, "torque_slope_Nm_s: value 0.0; allowed: greater than 0"),
         ({"quirks": {"halt_befor_mode_change": True}}, "did you mean 'halt_before_mode_change'"),
     ],
 )
