@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drivers import axis_codec as codec
 from drivers.axis_alarms import alarm_text
 from drivers.axis_layout import AxisConfig, GroupLayout
-from drivers.axis_state import GroupState
+from drivers.axis_state import GroupState, StateArrays
 from drivers.bus import BusUrl, FrameBuffer, FramePort, open_port
 from drivers.bus.packed import FRAME
 from drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE
@@ -29,6 +29,7 @@ _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
 class AxisExchange:
     """What happens every cycle; nothing here allocates, waits for a lock or logs.
 
+    `room` is where the state lies when these axes are part of a larger device.
     Raises BusError when the bus cannot be opened or goes away.
     """
 
@@ -40,10 +41,12 @@ class AxisExchange:
         period_s: float,
         master_node_id: int,
         heartbeat_s: float,
+        room: StateArrays | None = None,
     ) -> None:
         self.axes = tuple(axes)
         self.n = len(self.axes)
         self.period_s = period_s
+        self.paced_wait_s = _PACED_SHARE * period_s
         self.network = network
         self._layout = GroupLayout(self.axes)
         self._tx_bytes = _as_bytes(self._layout.rpdos)
@@ -61,17 +64,17 @@ class AxisExchange:
         self._cycling = self._closed = False
         self._late = self._impatient = False
         self._alarms = 0
-        state = GroupState(self.axes, period_s, self.lockstep)
+        state = GroupState(self.axes, period_s, self.lockstep, room)
         self._ints, self._floats = state.ints, state.floats
         self._words, self._flags = state.words, state.flags
         self.feedback, self.command = state.feedback, state.command
         self._valid = state.feedback.valid
-        self._compile()
+        self._compile(None if room is None else room.spare())
 
-    def _compile(self) -> None:
+    def _compile(self, room: StateArrays | None) -> None:
         """Have the kernels compiled now: a first cycle of seconds would be a silent master."""
         layout = self._layout
-        spare = GroupState(self.axes, self.period_s, self.lockstep)
+        spare = GroupState(self.axes, self.period_s, self.lockstep, room)
         arrays = spare.ints, spare.floats
         codec.decode(
             self._rx_bytes, 0, 0, layout.slots, layout.fields, STATE_TABLE,
@@ -97,14 +100,15 @@ class AxisExchange:
         except OSError as error:
             raise self._port.lost(error) from error
 
-    def receive(self) -> int:
+    def receive(self, deadline_s: float = 0.0) -> int:
         """Wait for the answers to this SYNC and decode them; return how many axes answered.
 
         In lockstep an axis that falls silent is waited for up to 2 s of wall time; otherwise the
-        wait ends so that a share of the period is left for computing and sending.
+        wait ends at `deadline_s` (monotonic), by default so that a share of the period is left
+        for computing and sending.
         """
         if not self.lockstep:
-            return self._receive_paced()
+            return self._receive_paced(deadline_s or time.monotonic() + self.paced_wait_s)
         recv_into, rows = self._port.recv_into, self._rx.rows
         missing, last, deadline = self.n, 0, 0.0
         try:
@@ -129,10 +133,9 @@ class AxisExchange:
             raise self._port.lost(error) from error
         return self.n - missing
 
-    def _receive_paced(self) -> int:
+    def _receive_paced(self, deadline: float) -> int:
         """Take in what has come; wait for more only while an axis has not answered."""
         recv_into, rows = self._port.recv_into, self._rx.rows
-        deadline = time.monotonic() + _PACED_SHARE * self.period_s
         missing = self.n
         while missing:
             last = 0

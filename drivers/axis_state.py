@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_rt.exchange import AxisCommand, AxisFeedback
+from cdpr_rt.exchange import AxisCommand, AxisFeedback, BoolArray, FloatArray, WordArray
 from drivers import axis_codec as codec
+from drivers.axis_codec import Ints
 from drivers.axis_layout import AxisConfig
 from drivers.cia402 import State
 
@@ -19,25 +20,67 @@ _PACED_SILENT_CYCLES = 3
 _HEARTBEAT_PATIENCE = 1.75
 
 
-class GroupState:
-    """State of n axes; `feedback` and `command` are views into the arrays of the kernels."""
+class StateArrays:
+    """Room for the state of n axes: the rows named in `axis_codec`, one column per axis."""
 
-    def __init__(self, axes: Sequence[AxisConfig], period_s: float, lockstep: bool) -> None:
-        n = len(axes)
-        self.ints = ints = np.zeros((codec.INT_ROWS, n), np.int64)
-        self.floats = floats = np.zeros((codec.FLOAT_ROWS, n))
-        self.flags = flags = np.zeros((codec.FLAG_ROWS, n), np.bool_)
-        self.words = np.zeros((1, n), np.uint16)
-        self.feedback = AxisFeedback(n)
-        self.feedback.position_rad = floats[codec.POSITION_RAD]
-        self.feedback.torque_Nm = floats[codec.TORQUE_NM]
-        self.feedback.index_rad = floats[codec.INDEX_RAD]
-        self.feedback.valid = flags[codec.VALID]
-        self.feedback.index_known = flags[codec.INDEX_KNOWN]
-        self.feedback.statusword = self.words[0]
-        self.command = AxisCommand(n)
-        self.command.torque_Nm = floats[codec.COMMAND_NM]
-        self.command.sent_torque_Nm = floats[codec.SENT_NM]
+    def __init__(self, n: int) -> None:
+        self.ints: Ints = np.zeros((codec.INT_ROWS, n), np.int64)
+        self.floats: FloatArray = np.zeros((codec.FLOAT_ROWS, n))
+        self.flags: BoolArray = np.zeros((codec.FLAG_ROWS, n), np.bool_)
+        self.words: WordArray = np.zeros((1, n), np.uint16)
+        self.columns = slice(0, n)
+        self.width = n
+
+    def part(self, first: int, last: int) -> StateArrays:
+        """Return the axes `first` up to `last` as views into the same arrays."""
+        part = StateArrays(0)
+        part.ints, part.floats = self.ints[:, first:last], self.floats[:, first:last]
+        part.flags, part.words = self.flags[:, first:last], self.words[:, first:last]
+        part.columns = slice(first, last)
+        part.width = self.width
+        return part
+
+    def spare(self) -> StateArrays:
+        """Return other room that lies in memory as this does, so that kernels serve both."""
+        return StateArrays(self.width).part(self.columns.start, self.columns.stop)
+
+    def feedback(self) -> AxisFeedback:
+        """Return the feedback whose arrays are rows of these."""
+        feedback = AxisFeedback(self.ints.shape[1])
+        feedback.position_rad = self.floats[codec.POSITION_RAD]
+        feedback.torque_Nm = self.floats[codec.TORQUE_NM]
+        feedback.index_rad = self.floats[codec.INDEX_RAD]
+        feedback.valid = self.flags[codec.VALID]
+        feedback.index_known = self.flags[codec.INDEX_KNOWN]
+        feedback.statusword = self.words[0]
+        return feedback
+
+    def command(self) -> AxisCommand:
+        """Return the command whose arrays are rows of these."""
+        command = AxisCommand(self.ints.shape[1])
+        command.torque_Nm = self.floats[codec.COMMAND_NM]
+        command.sent_torque_Nm = self.floats[codec.SENT_NM]
+        return command
+
+
+class GroupState:
+    """State of n axes; `feedback` and `command` are views into the arrays of the kernels.
+
+    `room` holds them, where the axes are part of a larger device.
+    """
+
+    def __init__(
+        self,
+        axes: Sequence[AxisConfig],
+        period_s: float,
+        lockstep: bool,
+        room: StateArrays | None = None,
+    ) -> None:
+        room = room or StateArrays(len(axes))
+        self.ints = ints = room.ints
+        self.floats = floats = room.floats
+        self.words, self.flags = room.words, room.flags
+        self.feedback, self.command = room.feedback(), room.command()
         ints[codec.TARGET] = State.SWITCH_ON_DISABLED
         ints[codec.STATE] = State.UNKNOWN
         ints[codec.MODE_WANTED] = NO_MODE

@@ -149,20 +149,32 @@ class Hub:
             SimulatorError: an essential client has gone.
         """
         while not self._stopping:
-            events = self._poller.poll(self._wait_s(), _EVENTS)
-            self._just_synced = False
-            if len(events) == 1:
-                self._handlers[events[0][0]]()
-            elif events:
-                self._serve_all(events)
-            if not self.clock.held:
-                self._tick()
-            elif not events:
-                self._advance(self.clock.now(time.monotonic()))
-            if self._leftover:
-                self._flush()
+            self.turn(self.wait_s())
         if self._failure is not None:
             raise SimulatorError(self._failure)
+
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when a turn has something to do."""
+        return self._poller.fileno()
+
+    def turn(self, wait_s: float | None) -> None:
+        """Wait up to `wait_s` for something to do (None: for ever), then do it."""
+        if wait_s and wait_s < _FINE_WAIT_S:
+            # epoll counts whole milliseconds, which is too coarse for timers of the bus
+            select.select([self._poller], [], [], wait_s)
+            wait_s = 0.0
+        events = self._poller.poll(wait_s, _EVENTS)
+        self._just_synced = False
+        if len(events) == 1:
+            self._handlers[events[0][0]]()
+        elif events:
+            self._serve_all(events)
+        if not self.clock.held:
+            self._tick()
+        elif not events:
+            self._advance(self.clock.now(time.monotonic()))
+        if self._leftover:
+            self._flush()
 
     def close(self) -> None:
         """Close the nodes and every socket."""
@@ -176,20 +188,15 @@ class Hub:
         self._poller.close()
         os.close(self._wake)
 
-    def _wait_s(self) -> float | None:
+    def wait_s(self) -> float | None:
+        """Return for how long the next turn may wait, None for ever."""
         if self._leftover:
             return 0.0
         if self._just_synced:
             return HOLD_S
         event_s = min((node.next_event() for node in self.nodes), default=math.inf)
         wait_s = self.clock.wall_wait(time.monotonic(), event_s)
-        if wait_s == math.inf:
-            return None
-        if wait_s < _FINE_WAIT_S:
-            # epoll counts whole milliseconds, which is too coarse for timers of the bus
-            select.select([self._poller], [], [], wait_s)
-            return 0.0
-        return wait_s
+        return None if wait_s == math.inf else wait_s
 
     def _tick(self) -> None:
         """Let the nodes' timers run when one is due."""
