@@ -1,0 +1,1 @@
+"""Devices on Modbus: load-cell amplifiers, remote I/O, position axes."""
