@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 from canopen.objectdictionary import ODVariable
 
-from drivers.cia402 import State, state_of
+from drivers.cia402 import State, mode_bits, state_of
+from drivers.drive_units import torque_settings
 from drivers.errors import BootError, SdoError
 from drivers.network import CanNetwork
 from profiles import DriveProfile, Pdo
@@ -30,7 +31,9 @@ class BootSettings:
     sync_period_s: float
     torque_limit_Nm: float
     rated_torque_Nm: float | None = None
-    """What 6076h must hold; None leaves it unchecked."""
+    """What 6076h must hold, and what holds without it; None leaves it unchecked."""
+    counts_per_turn: int | None = None
+    """Encoder resolution of a drive that has no 608Fh."""
 
 
 @dataclass
@@ -92,7 +95,7 @@ def boot(
     patience_s = 5.0 * profile.heartbeat_producer_s + _QUIET_DRIVE_S
     if network.wait_for_heartbeat(node_id, patience_s) is None:
         raise BootError("K", node_id, "no heartbeat came", "check 1017h and the load of the bus")
-    _read_ratings(network, node_id, want, report)
+    _read_ratings(network, node_id, profile, want, report)
     network.start(node_id)
     return report
 
@@ -164,8 +167,7 @@ def _configure(
     report: BootReport,
 ) -> None:
     try:
-        rated_Nm = network.read_int(node_id, 0x6076) * 1e-3
-        limit = min(1000 * want.torque_limit_Nm / rated_Nm, 0xFFFF) if rated_Nm > 0.0 else 0
+        rated_Nm = _rated_torque_Nm(network, node_id, want)
         watch = want.master_node_id << 16 | round(profile.heartbeat_consumer_s * 1e3)
         objects = (
             (0x1006, 0, round(want.sync_period_s * 1e6)),
@@ -173,7 +175,7 @@ def _configure(
             (0x1017, 0, round(profile.heartbeat_producer_s * 1e3)),
             (0x6007, 0, _QUICK_STOP),  # when the master's heartbeat is lost
             (0x605A, 0, _SLOW_DOWN_THEN_OFF),
-            (0x6072, 0, round(limit)),
+            *((i, 0, v) for i, v in torque_settings(profile, rated_Nm, want.torque_limit_Nm)),
             (0x60B2, 0, 0),  # a torque offset left behind would be added to every torque
         )
         for index, sub, value in objects:
@@ -189,6 +191,20 @@ def _configure(
         raise BootError(
             "J", node_id, f"its configuration failed: {error}", "check the profile of the drive"
         ) from error
+
+
+def _rated_torque_Nm(network: CanNetwork, node_id: int, want: BootSettings) -> float:
+    """Return what the drive holds for the motor's rated torque, else what the master does."""
+    if 0x6076 in network.dictionary(node_id):
+        return network.read_int(node_id, 0x6076) * 1e-3
+    return want.rated_torque_Nm or 0.0
+
+
+def _counts_per_turn(network: CanNetwork, node_id: int, want: BootSettings) -> tuple[int, int]:
+    """Return encoder increments and motor turns, as 608Fh has them."""
+    if 0x608F in network.dictionary(node_id):
+        return network.read_int(node_id, 0x608F, 1), network.read_int(node_id, 0x608F, 2)
+    return want.counts_per_turn or 0, 1
 
 
 def _heartbeat_entry(network: CanNetwork, node_id: int, master_node_id: int) -> int:
@@ -256,13 +272,20 @@ def _switch_off_pdo(network: CanNetwork, node_id: int, parameters: int, report: 
 
 
 def _read_ratings(
-    network: CanNetwork, node_id: int, want: BootSettings, report: BootReport
+    network: CanNetwork,
+    node_id: int,
+    profile: DriveProfile,
+    want: BootSettings,
+    report: BootReport,
 ) -> None:
     try:
         report.device_name = str(network.read(node_id, 0x1008))
-        report.rated_torque_Nm = network.read_int(node_id, 0x6076) * 1e-3
-        increments, turns = (network.read_int(node_id, 0x608F, sub) for sub in (1, 2))
-        report.supported_modes = network.read_int(node_id, 0x6502)
+        report.rated_torque_Nm = _rated_torque_Nm(network, node_id, want)
+        increments, turns = _counts_per_turn(network, node_id, want)
+        if 0x6502 in network.dictionary(node_id):
+            report.supported_modes = network.read_int(node_id, 0x6502)
+        else:
+            report.supported_modes = mode_bits(profile.supported_modes)
     except SdoError as error:
         raise BootError(
             "J", node_id, f"its ratings cannot be read: {error}", "check the drive's EDS"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import IntEnum
 from typing import Final
 
@@ -153,6 +154,11 @@ def supports(supported_drive_modes: int, mode: int) -> bool:
         return True
     bit = _SUPPORTED_BITS.get(mode)
     return bit is not None and bool(supported_drive_modes >> bit & 1)
+
+
+def mode_bits(modes: Iterable[int]) -> int:
+    """Return 6502h of a drive that has these modes of operation."""
+    return sum(1 << _SUPPORTED_BITS[mode] for mode in set(modes) if mode in _SUPPORTED_BITS)
 
 
 def supported_modes(supported_drive_modes: int) -> list[int]:

@@ -265,6 +265,7 @@ def open_winch(
             winch.sync_period_s,
             limit,
             rated_torque_Nm=winch.motor.rated_torque_Nm,
+            counts_per_turn=winch.encoder_counts_per_turn,
         )
         rehearse(1, winch.sync_period_s)
         report = boot(network, winch.node_id, winch.drive, settings)

@@ -1,0 +1,39 @@
+"""What one unit of a drive's torque, velocity and acceleration objects is, in SI."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from profiles import DriveProfile
+
+_OF_RATED = {"per_mille_of_rated": 1e-3, "percent_of_rated": 1e-2}
+_ABSOLUTE_Nm = {"mNm": 1e-3, "cNm": 1e-2}
+_RAD_S_PER_RPM = math.tau / 60.0
+
+
+def torque_unit_Nm(drive: DriveProfile, rated_torque_Nm: float) -> float:
+    """Return the torque of one unit of 6071h, 6072h, 6077h and, per second, of 6087h."""
+    share = _OF_RATED.get(drive.torque_unit)
+    return _ABSOLUTE_Nm[drive.torque_unit] if share is None else share * rated_torque_Nm
+
+
+def velocity_unit_rad_s(drive: DriveProfile, counts_per_turn: int) -> float:
+    """Return the speed of one unit of 6099h."""
+    return _RAD_S_PER_RPM if drive.velocity_unit == "rpm" else math.tau / counts_per_turn
+
+
+def acceleration_unit_rad_s2(drive: DriveProfile, counts_per_turn: int) -> float:
+    """Return the acceleration of one unit of 609Ah."""
+    per_second = drive.acceleration_unit == "rpm_per_s"
+    return _RAD_S_PER_RPM if per_second else math.tau / counts_per_turn
+
+
+def torque_settings(
+    drive: DriveProfile, rated_torque_Nm: float, limit_Nm: float
+) -> Iterator[tuple[int, int]]:
+    """Yield object index and value of what bounds the torque: limit and, where given, slope."""
+    unit = torque_unit_Nm(drive, rated_torque_Nm)
+    yield 0x6072, round(min(limit_Nm / unit, 0xFFFF)) if unit > 0.0 else 0
+    if drive.torque_slope_Nm_s is not None and unit > 0.0:
+        yield 0x6087, round(min(drive.torque_slope_Nm_s / unit, 0xFFFFFFFF))
