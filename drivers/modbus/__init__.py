@@ -1,1 +1,1 @@
-"""Devices on Modbus: load-cell amplifiers, remote I/O, position axes."""
+"""Modbus devices beside the drives: serial lines, load cells, remote inputs and outputs."""
