@@ -6,14 +6,17 @@ from profiles.catalogue import (
     load_all,
     load_cable,
     load_drive,
+    load_machine,
     load_motor,
     load_motor_ratings,
+    load_robot,
     load_winch,
     time_load_all,
 )
 from profiles.drive import DriveProfile, Pdo, PdoEntry
 from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings
+from profiles.robot import Robot, RobotAxis, RobotBus
 from profiles.winch import Winch
 
 __all__ = [
@@ -24,13 +27,18 @@ __all__ = [
     "Pdo",
     "PdoEntry",
     "ProfileError",
+    "Robot",
+    "RobotAxis",
+    "RobotBus",
     "Winch",
     "list_profiles",
     "load_all",
     "load_cable",
     "load_drive",
+    "load_machine",
     "load_motor",
     "load_motor_ratings",
+    "load_robot",
     "load_winch",
     "time_load_all",
 ]

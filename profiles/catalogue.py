@@ -1,7 +1,8 @@
 """Find profiles by name or path and load them, references included."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -10,11 +11,12 @@ from profiles.cable import Cable, CableSeries
 from profiles.drive import DriveProfile
 from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings, MotorSeries
-from profiles.reader import closest, read_toml_model
+from profiles.reader import closest, read_toml, read_toml_model
+from profiles.robot import Robot, RobotAxis, RobotFile
 from profiles.winch import Winch, WinchFile
 
-Kind = Literal["motors", "drives", "cables", "winches"]
-KINDS: tuple[Kind, ...] = ("motors", "drives", "cables", "winches")
+Kind = Literal["motors", "drives", "cables", "winches", "robots"]
+KINDS: tuple[Kind, ...] = ("motors", "drives", "cables", "winches", "robots")
 SHIPPED = Path(__file__).parent
 
 _SERIES = ".series.toml"
@@ -90,6 +92,57 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     )
 
 
+def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
+    """Return a robot by name or path with the winches it names; raises ProfileError.
+
+    The winches are looked for beside the robot's own file, then among the shipped ones.
+    """
+    path = _require("robots", name, beside)
+    file = read_toml_model(path, RobotFile)
+    faults = list(file.faults())
+    if faults:
+        further = "".join(f"\n{path}: {key}: {problem}" for key, problem in faults[1:])
+        raise ProfileError(path, faults[0][0], faults[0][1] + further)
+    bitrates = {bus.name: bus.bitrate_bit_s for bus in file.buses}
+    winches: dict[str, Winch] = {}
+    axes = []
+    for i, axis in enumerate(file.axes):
+        if axis.winch not in winches:
+            winches[axis.winch] = _referred(
+                path, f"axes[{i}].winch", load_winch, axis.winch, path.parent
+            )
+        winch = replace(
+            winches[axis.winch],
+            node_id=axis.node_id,
+            master_node_id=file.master_node_id,
+            bitrate_bit_s=bitrates[axis.bus],
+            sync_period_s=file.sync_period_s,
+        )
+        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory))
+    return Robot(
+        profile=path.stem,
+        path=path.resolve(),
+        name=file.name,
+        sync_period_s=file.sync_period_s,
+        master_node_id=file.master_node_id,
+        buses=file.buses,
+        axes=tuple(axes),
+        notes=file.notes,
+    )
+
+
+def load_machine(name: str | Path) -> Winch | Robot:
+    """Return the robot or the winch of this name or path; raises ProfileError."""
+    robot = _find("robots", name, None)
+    if robot is None:
+        if _find("winches", name, None) is None:
+            raise _unknown("winches", name, None, _shipped_names("robots"))
+        return load_winch(name)
+    if _find("winches", name, None) == robot and not {"axes", "buses"} & set(read_toml(robot)):
+        return load_winch(name)
+    return load_robot(name)
+
+
 def list_profiles() -> dict[str, tuple[str, ...]]:
     """Return the names of the shipped profiles by kind; motors include every one of a series."""
     return {kind: tuple(sorted(_shipped_names(kind))) for kind in KINDS}
@@ -113,6 +166,7 @@ def load_all() -> dict[str, dict[str, object]]:
         ("drives", load_drive),
         ("cables", load_cable),
         ("winches", load_winch),
+        ("robots", load_robot),
     )
     for kind, load in loaders:
         for path in _files(kind):
@@ -174,8 +228,10 @@ def _require(kind: Kind, name: str | Path, beside: Path | None) -> Path:
     return path
 
 
-def _unknown(kind: Kind, name: str | Path, beside: Path | None) -> ProfileError:
-    known = _shipped_names(kind)
+def _unknown(
+    kind: Kind, name: str | Path, beside: Path | None, more: Iterable[str] = ()
+) -> ProfileError:
+    known = _shipped_names(kind) | set(more)
     if beside is not None:
         known |= {path.stem for path in beside.glob("*.toml")}
     meant = closest(str(name), known)

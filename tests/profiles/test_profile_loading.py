@@ -17,6 +17,7 @@ from profiles.catalogue import KINDS, SHIPPED
 from profiles.drive import DriveProfile
 from profiles.motor import Motor, MotorRatings, MotorSeries
 from profiles.reader import Profile, read_toml_model
+from profiles.robot import RobotFile
 from profiles.winch import WinchFile
 
 FILES: dict[Path, type[Profile]] = {
@@ -25,6 +26,7 @@ FILES: dict[Path, type[Profile]] = {
     SHIPPED / "cables" / "barry-dyneema.series.toml": CableSeries,
     SHIPPED / "cables" / "dyneema-4.8mm.toml": Cable,
     SHIPPED / "winches" / "winch-mpp0923d.toml": WinchFile,
+    SHIPPED / "robots" / "spatial-8.toml": RobotFile,
 }
 repeatable = settings(
     derandomize=True,

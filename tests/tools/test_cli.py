@@ -19,6 +19,7 @@ from unittest import mock
 import can
 import pytest
 
+from profiles.catalogue import KINDS
 from tools.cli import main
 
 WINCH = "winch-mpp0923d"
@@ -125,7 +126,8 @@ def test_profiles_are_listed_by_kind() -> None:
     told = done("profiles", "list")
     assert WINCH in told["winches"]
     assert {"MPP0923D", "MPJ0921B", "MPP2708N"} <= set(told["motors"])
-    assert set(told) == {"ok", "motors", "drives", "cables", "winches"}
+    assert set(told) == {"ok", *KINDS}
+    assert "spatial-8" in told["robots"]
 
 
 def test_profile_is_shown_for_people_and_for_programs() -> None:

@@ -1,4 +1,4 @@
-"""`cdpr profiles`: what is known of motors, drives, cables and winches."""
+"""`cdpr profiles`: what is known of motors, drives, cables, winches and robots."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ import typer
 from pydantic import BaseModel
 
 import profiles as catalogue
+from profiles import RobotAxis
 from profiles.reader import closest
 from tools.errors import BadInputError
 from tools.output import Output
 
-app = typer.Typer(help="Profiles of motors, drives, cables and winches.", no_args_is_help=True)
+app = typer.Typer(
+    help="Profiles of motors, drives, cables, winches and robots.", no_args_is_help=True
+)
 
 _JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON line.")]
 
@@ -60,7 +63,17 @@ def _plain(profile: object) -> dict[str, Any]:
         return profile.model_dump(mode="json")
     assert dataclasses.is_dataclass(profile)  # the catalogue holds nothing else
     values = {f.name: getattr(profile, f.name) for f in dataclasses.fields(profile)}
-    return {k: _plain(v) if isinstance(v, BaseModel) else v for k, v in values.items()}
+    if isinstance(profile, RobotAxis):
+        values["winch"] = profile.winch.reference  # which has a page of its own
+    return {key: _plain_value(value) for key, value in values.items()}
+
+
+def _plain_value(value: object) -> object:
+    if isinstance(value, tuple):
+        return [_plain_value(v) for v in value]
+    if isinstance(value, BaseModel) or dataclasses.is_dataclass(value):
+        return _plain(value)
+    return value
 
 
 def _flat(table: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
@@ -70,6 +83,9 @@ def _flat(table: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
             rows += _flat(value, f"{prefix}{key}.")
         elif isinstance(value, list | tuple) and value and isinstance(value[0], str):
             rows += [(f"{prefix}{key}", text) for text in value]
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], dict):
+            for i, one in enumerate(value):
+                rows += _flat(one, f"{prefix}{key}[{i}].")
         else:
             rows.append((prefix + key, value))
     return rows
