@@ -19,7 +19,8 @@ Ints = NDArray[np.int64]
 EMCY, HEARTBEAT = 100, 101
 
 MAX_FIELDS = 8
-CONTROLWORD, TARGET_TORQUE = 0, 1
+# columns of `answer`
+CONTROLWORD_FRAME, CONTROLWORD, TORQUE_FRAME, TARGET_TORQUE = range(4)
 
 # rows of `ints`; the first ones are filled from TPDOs as they come
 (
@@ -47,8 +48,10 @@ CONTROLWORD, TARGET_TORQUE = 0, 1
     EMERGENCY,
     NMT_STATE,
     MISSED,
-) = range(24)
-INT_ROWS = 24
+    AWAITED,
+    SEEN,
+) = range(26)
+INT_ROWS = 26
 
 # rows of `floats`
 (
@@ -162,32 +165,36 @@ def _take_tpdo(
     words: WordArray,
     flags: BoolArray,
 ) -> int:
-    statusword_came = False
+    fields_came = 0
     for k in range(MAX_FIELDS):
         size = fields[i, k, 3]
         if size == 0:
             break
-        start = fields[i, k, 2]
-        if fields[i, k, 0] != pdo or start + size > frame[4]:
+        if fields[i, k, 0] != pdo:
             continue
+        start = fields[i, k, 2]
+        if start + size > frame[4]:
+            return 0  # shorter than it was configured
         field = fields[i, k, 1]
         ints[field, i] = _number(frame, _DATA + start, size, fields[i, k, 4])
-        statusword_came = statusword_came or field == STATUSWORD
+        fields_came |= 1 << field
     if ints[PROBE_ARMED, i] and ints[PROBE_STATUS, i] & _PROBE_LATCHED:
         behind = _difference(ints[PROBE_POSITION, i], ints[LAST_RAW_POSITION, i])
         floats[INDEX_RAD, i] = (ints[POSITION, i] + behind) * floats[RAD_PER_COUNT, i]
         flags[INDEX_KNOWN, i] = True
         ints[PROBE_ARMED, i] = 0
-    if not statusword_came:
-        return 0
-    # 6064h has 32 bits: counted on beyond them
-    ints[POSITION, i] += _difference(ints[RAW_POSITION, i], ints[LAST_RAW_POSITION, i])
-    ints[LAST_RAW_POSITION, i] = ints[RAW_POSITION, i]
-    floats[POSITION_RAD, i] = ints[POSITION, i] * floats[RAD_PER_COUNT, i]
-    floats[TORQUE_NM, i] = ints[TORQUE_UNITS, i] * floats[NM_PER_UNIT, i]
-    words[0, i] = ints[STATUSWORD, i]
-    _follow_state(i, state_table[ints[STATUSWORD, i] & 0x7F], ints)
-    if flags[VALID, i]:
+    if fields_came >> RAW_POSITION & 1:
+        # 6064h has 32 bits: counted on beyond them
+        ints[POSITION, i] += _difference(ints[RAW_POSITION, i], ints[LAST_RAW_POSITION, i])
+        ints[LAST_RAW_POSITION, i] = ints[RAW_POSITION, i]
+        floats[POSITION_RAD, i] = ints[POSITION, i] * floats[RAD_PER_COUNT, i]
+    if fields_came >> TORQUE_UNITS & 1:
+        floats[TORQUE_NM, i] = ints[TORQUE_UNITS, i] * floats[NM_PER_UNIT, i]
+    if fields_came >> STATUSWORD & 1:
+        words[0, i] = ints[STATUSWORD, i]
+        _follow_state(i, state_table[ints[STATUSWORD, i] & 0x7F], ints)
+    ints[SEEN, i] |= 1 << pdo
+    if flags[VALID, i] or ints[SEEN, i] & ints[AWAITED, i] != ints[AWAITED, i]:
         return 0
     flags[VALID, i] = True
     return 1
@@ -227,10 +234,11 @@ def encode(
     floats: FloatArray,
     flags: BoolArray,
 ) -> int:
-    """Write controlword and target torque of n axes into their RPDOs `frames` (n, 16).
+    """Write controlword and target torque of n axes into their RPDOs `frames` (k, 16).
 
-    `answer` (n, 2) holds the first byte of either, `controlwords` (9, 9) the word by target and
-    present state. Counts silent cycles and heartbeat ages too. Returns the alarm bits of all axes.
+    `answer` (n, 4) holds frame and first byte of either, `controlwords` (9, 9) the word by target
+    and present state. Counts silent cycles and heartbeat ages too. Returns the alarm bits of all
+    axes.
     """
     alarms = 0
     for i in range(ints.shape[1]):
@@ -238,12 +246,12 @@ def encode(
         units = _torque_units(i, ints, floats)
         floats[SENT_NM, i] = units * floats[NM_PER_UNIT, i]
         word = _controlword(i, controlwords, ints)
-        at = _DATA + answer[i, CONTROLWORD]
-        frames[i, at] = word & 0xFF
-        frames[i, at + 1] = (word >> 8) & 0xFF
-        at = _DATA + answer[i, TARGET_TORQUE]
-        frames[i, at] = units & 0xFF
-        frames[i, at + 1] = (units >> 8) & 0xFF
+        row, at = answer[i, CONTROLWORD_FRAME], _DATA + answer[i, CONTROLWORD]
+        frames[row, at] = word & 0xFF
+        frames[row, at + 1] = (word >> 8) & 0xFF
+        row, at = answer[i, TORQUE_FRAME], _DATA + answer[i, TARGET_TORQUE]
+        frames[row, at] = units & 0xFF
+        frames[row, at + 1] = (units >> 8) & 0xFF
         alarms |= ints[ALARM, i]
     return alarms
 

@@ -69,6 +69,7 @@ class AxisExchange:
         self._words, self._flags = state.words, state.flags
         self.feedback, self.command = state.feedback, state.command
         self._valid = state.feedback.valid
+        self._seen = state.ints[codec.SEEN]
         self._compile(None if room is None else room.spare())
 
     def _compile(self, room: StateArrays | None) -> None:
@@ -95,6 +96,7 @@ class AxisExchange:
         feedback.cycle += 1
         feedback.time_s = feedback.cycle * self.period_s
         self._valid.fill(False)
+        self._seen.fill(0)
         try:
             self._port.send(self._sync_frame)
         except OSError as error:

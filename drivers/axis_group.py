@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -103,32 +104,43 @@ class AxisGroup(AxisExchange):
 
     # -- modes of operation
 
-    def ask_mode(self, mode: int) -> None:
-        """Ask all axes for a mode of operation; `mode_confirmed` tells when they have it.
+    @property
+    def torque_modes(self) -> list[int]:
+        """The mode in which each axis' drive takes torques, for `ask_mode`."""
+        return [axis.drive.mode_torque for axis in self.axes]
 
-        Raises ModeRefusedError when an axis is enabled or refuses, with the drive's reason.
+    def ask_mode(self, modes: int | Sequence[int]) -> None:
+        """Ask for a mode of operation, one for all axes or one each.
+
+        `mode_confirmed` tells when they have it. Raises ModeRefusedError when an axis is enabled
+        or refuses, with the drive's reason.
         """
-        for i, axis in enumerate(self.axes):
-            node = axis.node_id
+        wanted = [modes] * self.n if isinstance(modes, int) else list(modes)
+        for i, (axis, mode) in enumerate(zip(self.axes, wanted, strict=True)):
             if self._ints[codec.STATE, i] == State.OPERATION_ENABLED:
                 raise ModeRefusedError(
-                    f"node {node}: the mode is not changed while the drive is enabled"
+                    f"node {axis.node_id}: the mode is not changed while the drive is enabled"
                 )
             if not supports(axis.supported_modes, mode):
                 raise ModeRefusedError(
-                    f"node {node}: mode {mode_name(mode)} is not among the modes "
+                    f"node {axis.node_id}: mode {mode_name(mode)} is not among the modes "
                     f"the drive supports (6502h = {axis.supported_modes:08X}h)"
                 )
-            try:
-                if axis.drive.quirks.halt_before_mode_change:
-                    self.network.write(node, 0x6040, 0, HALT)
-                self.network.write(node, 0x6060, 0, mode)
-                self._ints[codec.MODE_SHOWN, i] = self.network.read_int(node, 0x6061)
-            except SdoError as error:
-                raise ModeRefusedError(
-                    f"node {node}: mode {mode_name(mode)} was refused: {error}"
-                ) from error
+            self._write_mode(i, mode)
             self._ints[codec.MODE_WANTED, i] = mode
+
+    def _write_mode(self, i: int, mode: int) -> None:
+        node = self.axes[i].node_id
+        try:
+            if self.axes[i].drive.quirks.halt_before_mode_change:
+                # until the next cycle's controlword takes the halt back
+                self.network.write(node, 0x6040, 0, HALT)
+            self.network.write(node, 0x6060, 0, mode)
+            self._ints[codec.MODE_SHOWN, i] = self.network.read_int(node, 0x6061)
+        except SdoError as error:
+            raise ModeRefusedError(
+                f"node {node}: mode {mode_name(mode)} was refused: {error}"
+            ) from error
 
     def mode_confirmed(self) -> bool:
         """Return whether every axis reports the mode it was asked for (6061h).

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from drivers import axis_codec as codec
 from drivers.boot import BootReport
 from drivers.bus import FrameBuffer
+from drivers.drive_units import acceleration_unit_rad_s2, torque_unit_Nm, velocity_unit_rad_s
 from drivers.errors import DriverError
 from profiles import DriveProfile, Pdo
 
@@ -26,8 +27,11 @@ _TPDO_FIELDS = {
 }
 _EVERY_CYCLE = (0x6041, 0x6064, 0x6077)
 _UNSIGNED = (0x6041, 0x60B9)
-_RPDO_FIELDS = {0x6040: codec.CONTROLWORD, 0x6071: codec.TARGET_TORQUE}
-_UNITS_PER_RATED_TORQUE = {"per_mille_of_rated": 1000}
+_RPDO_FIELDS = {
+    0x6040: (codec.CONTROLWORD_FRAME, codec.CONTROLWORD),
+    0x6071: (codec.TORQUE_FRAME, codec.TARGET_TORQUE),
+}
+_EVERY_SYNC = 1
 
 
 @dataclass(frozen=True)
@@ -37,11 +41,11 @@ class AxisConfig:
     node_id: int
     drive: DriveProfile
     rated_torque_Nm: float
-    """6076h: what the drive's torque unit refers to."""
+    """6076h: what a relative torque unit refers to."""
     counts_per_turn: int
-    """608Fh."""
+    """608Fh, or the winch's where the drive has none."""
     supported_modes: int
-    """6502h."""
+    """6502h, or the profile's modes in its place."""
     torque_limit_Nm: float
 
     @classmethod
@@ -66,8 +70,26 @@ class AxisConfig:
     @property
     def Nm_per_unit(self) -> float:
         """Motor torque of one unit of 6071h and 6077h, with the drive's sign."""
-        units = _UNITS_PER_RATED_TORQUE[self.drive.torque_unit]
-        return self.drive.torque_sign * self.rated_torque_Nm / units
+        return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm)
+
+    def speed_units(self, speed_rad_s: float) -> int:
+        """Return a speed as 6099h has it, at least one unit."""
+        unit = velocity_unit_rad_s(self.drive, self.counts_per_turn)
+        return max(1, round(speed_rad_s / unit))
+
+    def acceleration_units(self, acceleration_rad_s2: float) -> int:
+        """Return an acceleration as 609Ah has it, at least one unit."""
+        unit = acceleration_unit_rad_s2(self.drive, self.counts_per_turn)
+        return max(1, round(acceleration_rad_s2 / unit))
+
+    @property
+    def awaited_tpdos(self) -> int:
+        """The TPDOs that make the answer to a SYNC, as bits by their place in the profile."""
+        awaited = 0
+        for number, pdo in enumerate(self.drive.tpdos):
+            if any(entry.index in _EVERY_CYCLE for entry in pdo.entries):
+                awaited |= 1 << number
+        return awaited
 
 
 class GroupLayout:
@@ -81,15 +103,18 @@ class GroupLayout:
         """Axis and kind (TPDO number in the profile, EMCY, HEARTBEAT) by identifier."""
         self.fields: NDArray[np.int64] = np.zeros((len(axes), codec.MAX_FIELDS, 5), np.int64)
         """By axis: TPDO, target row, first byte, bytes, signed; 0 bytes end the list."""
-        self.answer: NDArray[np.int64] = np.zeros((len(axes), 2), np.int64)
-        """By axis: first byte of controlword and of target torque."""
-        self.rpdos = FrameBuffer(len(axes))
-        """The RPDO of each axis, to be filled and sent each cycle."""
+        self.answer: NDArray[np.int64] = np.zeros((len(axes), 4), np.int64)
+        """By axis: row in `rpdos` and first byte of controlword, the same of target torque."""
+        commands = [_command_rpdos(axis.drive) for axis in axes]
+        self.rpdos = FrameBuffer(sum(len(pdos) for pdos in commands))
+        """The RPDOs of all axes, to be filled and sent each cycle."""
         self.mode_mapped = np.zeros(len(axes), np.bool_)
         self.probe_mapped = np.zeros(len(axes), np.bool_)
+        first = 0
         for i, axis in enumerate(axes):
             self._place_feedback(i, axis)
-            self._place_command(i, axis)
+            self._place_command(i, axis, commands[i], first)
+            first += len(commands[i])
 
     @property
     def identifiers(self) -> list[int]:
@@ -110,11 +135,13 @@ class GroupLayout:
                 signed = int(index not in _UNSIGNED)
                 self.fields[i, row] = number, _TPDO_FIELDS[index], start, size, signed
                 row += 1
-        if len({pdo_of.get(index) for index in _EVERY_CYCLE}) != 1 or 0x6041 not in pdo_of:
-            raise DriverError(
-                f"drive profile {axis.drive.name!r}: tpdos: no single TPDO holds 6041h, 6064h and "
-                "6077h, which torque control needs of one instant"
-            )
+        for index in _EVERY_CYCLE:
+            kind = pdo_of.get(index)
+            if kind is None or axis.drive.tpdos[kind].transmission_type != _EVERY_SYNC:
+                raise DriverError(
+                    f"drive profile {axis.drive.name!r}: tpdos: no TPDO of transmission_type 1 "
+                    f"holds {index:04X}h, which torque control needs of every cycle"
+                )
         self.mode_mapped[i] = 0x6061 in pdo_of
         self.probe_mapped[i] = 0x60B9 in pdo_of and pdo_of[0x60B9] == pdo_of.get(0x60BA)
 
@@ -126,20 +153,30 @@ class GroupLayout:
             )
         self.slots[identifier] = axis, kind
 
-    def _place_command(self, i: int, axis: AxisConfig) -> None:
-        for pdo in axis.drive.rpdos:
-            places = {index: (start, size) for index, start, size in _places(pdo)}
-            if all(places.get(index, (0, 0))[1] == 2 for index in _RPDO_FIELDS):
-                for index, column in _RPDO_FIELDS.items():
-                    self.answer[i, column] = places[index][0]
-                frame = self.rpdos.array[i]
-                frame["can_id"] = pdo.cob_id(axis.node_id)
-                frame["length"] = sum(entry.bits for entry in pdo.entries) // 8
-                return
-        raise DriverError(
-            f"drive profile {axis.drive.name!r}: rpdos: no RPDO holds 6040h and 6071h with 16 bits "
-            "each, which torque control needs"
-        )
+    def _place_command(self, i: int, axis: AxisConfig, pdos: Sequence[Pdo], first: int) -> None:
+        for row, pdo in enumerate(pdos, first):
+            frame = self.rpdos.array[row]
+            frame["can_id"] = pdo.cob_id(axis.node_id)
+            frame["length"] = sum(entry.bits for entry in pdo.entries) // 8
+            for index, start, _ in _places(pdo):
+                if index in _RPDO_FIELDS:
+                    frame_column, byte_column = _RPDO_FIELDS[index]
+                    self.answer[i, frame_column], self.answer[i, byte_column] = row, start
+
+
+def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
+    """Return the RPDOs that carry controlword and target torque."""
+    found: dict[int, Pdo] = {}
+    for index in _RPDO_FIELDS:
+        for pdo in drive.rpdos:
+            if any(index == i and size == 2 for i, _, size in _places(pdo)):
+                found[index] = pdo
+        if index not in found:
+            raise DriverError(
+                f"drive profile {drive.name!r}: rpdos: no RPDO holds {index:04X}h with 16 bits, "
+                "which torque control needs"
+            )
+    return [pdo for pdo in drive.rpdos if pdo in found.values()]
 
 
 def _places(pdo: Pdo) -> Iterator[tuple[int, int, int]]:

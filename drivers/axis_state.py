@@ -89,6 +89,7 @@ class GroupState:
         for i, axis in enumerate(axes):
             floats[codec.RAD_PER_COUNT, i] = axis.rad_per_count
             floats[codec.NM_PER_UNIT, i] = axis.Nm_per_unit
+            ints[codec.AWAITED, i] = axis.awaited_tpdos
             most = int(axis.torque_limit_Nm / abs(axis.Nm_per_unit) + 1e-9)
             floats[codec.LIMIT_UNITS, i] = min(most, 0x7FFF)
             patience_s = _HEARTBEAT_PATIENCE * axis.drive.heartbeat_producer_s

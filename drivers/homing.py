@@ -51,17 +51,19 @@ class Homing:
         self._timeout_s = timeout_s
         self._started_s = 0.0
         self._seen_running = False
+        alone = drive.quirks.homing_done_by_bit_12_alone
+        self._telling = _ERROR | _ATTAINED if alone else _ERROR | _ATTAINED | _REACHED
+        self._done = self._telling & ~_ERROR
 
     def configure(self) -> None:
         """Write method, speeds and offset by SDO; raises SdoError."""
         config = self._group.axes[self._axis]
-        counts_per_rad = config.counts_per_turn / math.tau
-        speed = max(1, round(_SPEED_RAD_S * counts_per_rad))
-        acceleration = max(1, round(_ACCELERATION_RAD_S2 * counts_per_rad))
+        speed = config.speed_units(_SPEED_RAD_S)
         write = self._group.network.write
         write(self._node_id, 0x6098, 0, self._drives_method())
         for sub in (1, 2):
             write(self._node_id, 0x6099, sub, speed)
+        acceleration = config.acceleration_units(_ACCELERATION_RAD_S2)
         write(self._node_id, 0x609A, 0, acceleration)
         write(self._node_id, 0x607C, 0, 0)
 
@@ -87,13 +89,13 @@ class Homing:
         return self.step is HomingStep.DONE
 
     def _look(self, word: int, elapsed_s: float) -> None:
-        bits = word & (_ERROR | _ATTAINED | _REACHED)
+        bits = word & self._telling
         self._seen_running |= bits == 0
         # before that, the bits may tell of an earlier homing
         current = self._seen_running or elapsed_s > _ANSWER_S
         if bits & _ERROR and current:
             self._fail(f"the drive reports a homing error (statusword {word:04X}h)")
-        if bits == _ATTAINED | _REACHED and current:
+        if bits == self._done and current:
             self._group.set_extra_bits(self._axis, 0)
             if self._method in _FINDING_INDEX:
                 self._group.set_index(self._axis, 0.0)
