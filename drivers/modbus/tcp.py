@@ -53,7 +53,9 @@ class ModbusTcp:
 
     def close(self) -> None:
         """Leave the device; a later request connects again."""
-        self._client.close()
+        if self._client.socket is not None:
+            self._client.socket.close()
+            self._client.socket = None
 
     def inputs(self, start: int, count: int) -> list[bool]:
         """Return `count` discrete inputs from address `start` on."""
@@ -140,7 +142,7 @@ class ModbusTcp:
 
     def _wrong(self, what: str, reason: str) -> ModbusError:
         """Return the error, after leaving a connection on which nothing can be believed now."""
-        self._client.close()
+        self.close()
         return ModbusError(f"{self.name}: {what}: {reason}")
 
 

@@ -1,0 +1,74 @@
+"""Whether a robot is calibrated: said by a small file that outlives the commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.state_file import StateFileError, read_state, state_path, write_state
+
+
+class NotCalibratedError(ControlError):
+    """What was asked for needs a calibrated robot; says since when and why it is not."""
+
+
+@dataclass(frozen=True)
+class CalibrationState:
+    """Whether a robot's geometry may be believed."""
+
+    robot: str
+    calibrated: bool
+    why: str
+    """What made it so: which calibration, or what moved."""
+    date: str
+    """ISO 8601, UTC; empty where nothing was ever written down."""
+
+
+def calibration_file(robot: str) -> Path:
+    """Return the file that holds the robot's state."""
+    return state_path("calibration", robot)
+
+
+def calibration_state(robot: str) -> CalibrationState:
+    """Return the robot's state; without a file, or with a damaged one, it is not calibrated."""
+    path = calibration_file(robot)
+    try:
+        held = read_state(path)
+    except StateFileError as error:
+        return CalibrationState(robot, False, str(error), "")
+    if held is None:
+        return CalibrationState(robot, False, "it has never been calibrated", "")
+    calibrated, why, date = (held.get(key) for key in ("calibrated", "why", "date"))
+    if not (isinstance(calibrated, bool) and isinstance(why, str) and isinstance(date, str)):
+        problem = f"{path}: is damaged: calibrated, why and date are wanted"
+        return CalibrationState(robot, False, problem, "")
+    return CalibrationState(robot, calibrated, why, date)
+
+
+def mark_calibrated(robot: str, why: str) -> CalibrationState:
+    """Write down that the robot is calibrated from now on; raises StateFileError."""
+    return _mark(robot, True, why)
+
+
+def mark_not_calibrated(robot: str, why: str) -> CalibrationState:
+    """Write down that the robot's geometry may not be believed; raises StateFileError."""
+    return _mark(robot, False, why)
+
+
+def require_calibrated(robot: str) -> CalibrationState:
+    """Return the state of a calibrated robot; raises NotCalibratedError for any other."""
+    state = calibration_state(robot)
+    if not state.calibrated:
+        since = f" since {state.date}" if state.date else ""
+        raise NotCalibratedError(f"robot {robot!r} is not calibrated{since}: {state.why}")
+    return state
+
+
+def _mark(robot: str, calibrated: bool, why: str) -> CalibrationState:
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    state = CalibrationState(robot, calibrated, why, date)
+    held = {"robot": robot, "calibrated": calibrated, "why": why, "date": date}
+    write_state(calibration_file(robot), held)
+    return state

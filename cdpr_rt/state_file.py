@@ -1,0 +1,69 @@
+"""Small files that outlive a command: one JSON object each, replaced as a whole."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from cdpr_rt.errors import ControlError
+
+
+class StateFileError(ControlError):
+    """A state file cannot be read, written or understood; names the file."""
+
+
+def state_path(kind: str, name: str) -> Path:
+    """Return the file that keeps the state of `kind` for `name`.
+
+    It lies in $XDG_STATE_HOME/cdpr-rt, by default ~/.local/state/cdpr-rt.
+    """
+    base = os.environ.get("XDG_STATE_HOME", "")
+    folder = Path(base) if base.startswith("/") else Path.home() / ".local" / "state"
+    safe = re.sub(r"[^A-Za-z0-9_.-]", "-", name)
+    return folder / "cdpr-rt" / f"{kind}.{safe}.json"
+
+
+def read_state(path: Path) -> dict[str, Any] | None:
+    """Return what the file holds, None where there is none; raises StateFileError."""
+    try:
+        held = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise StateFileError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:  # neither JSON nor UTF-8
+        raise StateFileError(f"{path}: is damaged: {error}") from error
+    if not isinstance(held, dict):
+        raise StateFileError(f"{path}: is damaged: it does not hold one JSON object")
+    return held
+
+
+def write_state(path: Path, state: dict[str, Any]) -> None:
+    """Replace the file as a whole, so that power lost at any time leaves the old or the new one.
+
+    Raises StateFileError.
+    """
+    fresh = path.with_name(f"{path.name}.{os.getpid()}.new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with fresh.open("w", encoding="utf-8") as file:
+            file.write(json.dumps(state, indent=1) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            fresh.unlink(missing_ok=True)
+        raise StateFileError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def remove_state(path: Path) -> None:
+    """Remove the file, if it is there; raises StateFileError."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise StateFileError(f"{path}: cannot be removed: {error.strerror}") from error

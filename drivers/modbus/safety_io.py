@@ -1,0 +1,336 @@
+"""A safety I/O polled beside the cycle: trips on what it sees, and on seeing nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+from cdpr_rt.state_file import StateFileError, read_state, remove_state, write_state
+from drivers.errors import DriverError
+from drivers.modbus.io_link import IoLink
+from drivers.modbus.io_rules import IoState, Rules, interpret
+from drivers.modbus.tcp import ModbusError
+from profiles.safety_io import Brake, SafetyIoProfile
+
+_STOP_GRACE_S: Final = 2.0
+"""Longest time that a controlled stop may take before power is taken all the same."""
+_LOOK_S = 0.002
+_SHOWN: Final = ("red", "yellow", "green")
+
+
+class SafetyIoError(DriverError):
+    """The safety I/O forbids what was asked, or did not do it; says which point reads what."""
+
+
+class SafetyIo:
+    """One safety I/O; implements `cdpr_rt.executive.Watch`.
+
+    A thread of its own polls and writes; whoever reads `alarm` or `stop_reason` judges by himself
+    how old the last good poll is, so that a thread that hangs trips as well. A trip stays, also in
+    the file `latch`, until `acknowledge`. The contactor closes only by `energise`. Leaving the
+    block applies the brakes and opens the contactor.
+    """
+
+    def __init__(self, profile: SafetyIoProfile, latch: Path | None = None) -> None:
+        self.profile = profile
+        self._link = IoLink(profile)
+        self.name = self._link.name
+        self._latch_file = latch
+        self._rules = Rules(profile)
+        self._lock = threading.Lock()
+        self._contactor = profile.contactor.output.coil
+        self._brakes = {a.axis: a.brake for a in profile.axes if a.brake is not None}
+        safe = [self._contactor, *(brake.output.coil for brake in self._brakes.values())]
+        self._wanted = dict.fromkeys(safe, False)
+        self._written: dict[int, bool] = {}
+        self._lights: dict[int, bool] = {}
+        self._armed = self._kept_trip = False
+        self._alarm = self._stop = self._error = ""
+        self._stop_at_s = 0.0
+        self._good_at_s = 0.0
+        self._state: IoState | None = None
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="safety-io", daemon=True)
+
+    # -- what the executive asks every cycle
+
+    def alarm(self) -> str:
+        """Return why the torque must go at once, or an empty text."""
+        return self._alarm
+
+    def stop_reason(self) -> str:
+        """Return why the motion must be braked to its end, or an empty text."""
+        if self._armed and time.monotonic() - self._good_at_s > self.profile.trip_timeout_s:
+            self._trip(stop=self._unheard())
+        return self._stop
+
+    # -- for whoever uses it
+
+    @property
+    def state(self) -> IoState:
+        """What the last good poll saw; raises SafetyIoError when that is too long ago."""
+        if time.monotonic() - self._good_at_s > self.profile.trip_timeout_s:
+            raise SafetyIoError(self._unheard())
+        assert self._state is not None  # `open` has polled
+        return self._state
+
+    def open(self) -> Self:
+        """Connect, set all outputs safe, and begin to poll; raises ModbusError."""
+        try:
+            self._link.set_watchdog()
+            self._poll()
+        except BaseException:
+            self._link.close()
+            raise
+        self._thread.start()
+        return self
+
+    def energise(self) -> None:
+        """Close the contactor and watch from now on; raises SafetyIoError where that is refused."""
+        tripped = self._tripped or self._kept()
+        if tripped:
+            raise SafetyIoError(f"{tripped}; see to it, then acknowledge it: cdpr io ack")
+        self._refuse(self._obstacle(self.state))
+        with self._lock:
+            self._rules.restart(time.monotonic())
+            self._armed = self._wanted[self._contactor] = True
+        self._await(lambda state: state.contactor_closed, self.profile.contactor.timeout_s)
+
+    def release_brakes(self, *axes: str) -> None:
+        """Have brakes released (all, where none is named); `brakes_released` tells when they are.
+
+        Raises SafetyIoError for an axis without brake.
+        """
+        self._set_brakes(axes, True)
+
+    def apply_brakes(self, *axes: str) -> None:
+        """Have brakes applied (all, where none is named)."""
+        self._set_brakes(axes, False)
+
+    def brakes_released(self) -> bool:
+        """Return whether every brake's feedback says released."""
+        return all(self.state.brakes_released.values())
+
+    def await_brakes(self, released: bool, *axes: str) -> None:
+        """Wait until the feedback of brakes says `released` (or not); raises SafetyIoError."""
+        names = axes or tuple(self._brakes)
+        longest = max((self._brake(name).timeout_s for name in names), default=0.0)
+        self._await(lambda s: all(s.brakes_released[n] == released for n in names), longest)
+
+    def de_energise(self) -> str:
+        """Apply the brakes, open the contactor; return what did not follow, empty if all did."""
+        with self._lock:
+            self._armed = False
+        self.apply_brakes()
+        doubt = self._doubt(lambda: self.await_brakes(False))
+        with self._lock:
+            self._wanted[self._contactor] = False
+        timeout_s = self.profile.contactor.timeout_s
+        opened = self._doubt(lambda: self._await(lambda s: not s.contactor_closed, timeout_s))
+        return "; ".join(dict.fromkeys(text for text in (doubt, opened) if text))
+
+    def acknowledge(self) -> None:
+        """Forget a trip whose cause is gone; raises SafetyIoError while it is not."""
+        self._refuse(self._obstacle(self.state, limits=False))
+        with self._lock:
+            self._alarm = self._stop = ""
+            self._kept_trip = False
+            self._written.clear()
+            self._rules.restart(time.monotonic())
+        if self._latch_file is not None:
+            remove_state(self._latch_file)
+
+    def close(self) -> str:
+        """Apply the brakes, open the contactor and leave; return what did not follow."""
+        if self._ended.is_set():
+            return ""
+        doubt = self.de_energise()
+        self._ended.set()
+        self._thread.join()
+        self._keep_trip()
+        with contextlib.suppress(ModbusError):
+            for colour, output in self.profile.lights.items():
+                if colour in _SHOWN:  # red stays on until the trip is acknowledged
+                    on = colour == "red" and bool(self._tripped)
+                    self._link.write(output.coil, on != output.inverted)
+        self._link.close()
+        return doubt
+
+    def __enter__(self) -> Self:
+        return self.open()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        doubt = self.close()
+        if doubt and error is None:
+            raise SafetyIoError(doubt)
+        if doubt and error is not None:
+            error.add_note(doubt)
+
+    # -- the polling thread
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        while not self._ended.is_set():
+            try:
+                self._poll()
+            except ModbusError as error:
+                self._error = str(error)
+            self._keep_trip()
+            due = max(due + self.profile.poll_period_s, time.monotonic())
+            self._ended.wait(due - time.monotonic())
+
+    def _poll(self) -> None:
+        """Write what has changed, read everything, judge it; raises ModbusError."""
+        began = time.monotonic()
+        self._link.feed_watchdog()
+        wanted = self._write()
+        inputs, coils = self._link.read()
+        state = interpret(self.profile, inputs, coils, began)
+        self._state, self._good_at_s, self._error = state, began, ""
+        stray = {coil: coils[coil] for coil, on in wanted.items() if coils[coil] != on}
+        with self._lock:
+            alarm = self._rules.alarm(state, inputs, wanted, stray)
+            armed = self._armed
+        if armed and alarm:
+            self._trip(alarm=f"{self.name}: {alarm}")
+        elif armed and state.limits:
+            self._trip(stop=f"{self.name}: {state.limits[0]}")
+        if self._alarm or (self._stop and began - self._stop_at_s > _STOP_GRACE_S):
+            self._drop()
+        self._light(state)
+
+    def _write(self) -> dict[int, bool]:
+        with self._lock:
+            wanted = dict(self._wanted)
+        for coil, on in (wanted | self._lights).items():
+            if self._written.get(coil) != on:
+                self._link.write(coil, on)
+                self._written[coil] = on
+        return wanted
+
+    def _drop(self) -> None:
+        """Apply all brakes and open the contactor, without waiting for the next poll."""
+        with self._lock:
+            self._wanted = dict.fromkeys(self._wanted, False)
+        self._write()
+
+    def _light(self, state: IoState) -> None:
+        """Show red: tripped or stopped; yellow: power is on; green: ready; with the next poll."""
+        red = bool(self._tripped or not state.chain_ok)
+        yellow = state.contactor_closed
+        shown = {"red": red, "yellow": yellow, "green": not red and not yellow}
+        for colour, output in self.profile.lights.items():
+            if colour in shown:
+                self._lights[output.coil] = shown[colour] != output.inverted
+
+    # -- trips
+
+    @property
+    def _tripped(self) -> str:
+        return self._alarm or self._stop
+
+    def _trip(self, alarm: str = "", stop: str = "") -> None:
+        with self._lock:
+            self._alarm = self._alarm or alarm
+            if stop and not self._stop:
+                self._stop, self._stop_at_s = stop, time.monotonic()
+
+    def _keep_trip(self) -> None:
+        """Write a new trip down for later commands; never in the control cycle, as disks wait."""
+        reason = self._tripped
+        if not reason or self._kept_trip or self._latch_file is None:
+            return
+        self._kept_trip = True
+        date = datetime.now(UTC).isoformat(timespec="seconds")
+        try:
+            write_state(self._latch_file, {"reason": reason, "date": date})
+        except StateFileError as error:
+            self._alarm = f"{reason} ({error})"
+
+    def _kept(self) -> str:
+        """Return the trip that an earlier command has left, or an empty text."""
+        held = None if self._latch_file is None else read_state(self._latch_file)
+        return "" if held is None else f"tripped on {held.get('date')}: {held.get('reason')}"
+
+    def _unheard(self) -> str:
+        age = time.monotonic() - self._good_at_s
+        return (
+            f"{self.name}: no good poll for {age:.2f} s, {self.profile.trip_timeout_s:g} s allowed "
+            f"({self._error or 'no answer has come'})"
+        )
+
+    def _obstacle(self, state: IoState, limits: bool = True) -> str:
+        """Return what forbids to energise, or an empty text."""
+        if not state.chain_ok:
+            return (
+                f"the emergency-stop chain is open (input {self.profile.chain.input}): release "
+                "the buttons and reset the chain"
+            )
+        if state.contactor_closed and not self._wanted[self._contactor]:
+            feedback = self.profile.contactor.feedback.input
+            return (
+                f"the contactor is closed (input {feedback}) though output {self._contactor} is 0; "
+                "is it welded?"
+            )
+        for axis, brake in self._brakes.items():
+            if state.brakes_released[axis] and not self._wanted[brake.output.coil]:
+                return (
+                    f"the brake of {axis} is released (input {brake.feedback.input}) though "
+                    f"output {brake.output.coil} is 0; is it stuck?"
+                )
+        return state.limits[0] if limits and state.limits else ""
+
+    # -- waiting
+
+    def _refuse(self, obstacle: str) -> None:
+        if obstacle:
+            raise SafetyIoError(f"{self.name}: {obstacle}")
+
+    def _set_brakes(self, axes: tuple[str, ...], released: bool) -> None:
+        coils = [self._brake(axis).output.coil for axis in axes or self._brakes]
+        with self._lock:
+            if released and self._tripped:
+                raise SafetyIoError(self._tripped)
+            for coil in coils:
+                self._wanted[coil] = released
+
+    def _brake(self, axis: str) -> Brake:
+        brake = self._brakes.get(axis)
+        if brake is None:
+            known = ", ".join(repr(name) for name in self._brakes) or "none"
+            raise SafetyIoError(f"{self.name}: {axis!r} has no brake there; with one: {known}")
+        return brake
+
+    def _await(self, done: Callable[[IoState], bool], timeout_s: float) -> None:
+        """Wait until a poll begun from now on sees `done`; raises SafetyIoError."""
+        asked = time.monotonic()
+        # the rules know better what is wrong, a poll after the same time
+        patience = timeout_s + self.profile.trip_timeout_s
+        while True:
+            if self._armed and self._tripped:
+                raise SafetyIoError(self._tripped)
+            state = self.state
+            if state.at_s > asked and done(state):
+                return
+            if time.monotonic() - asked > patience:
+                raise SafetyIoError(f"{self.name}: {self._obstacle(state) or 'does not follow'}")
+            time.sleep(_LOOK_S)
+
+    @staticmethod
+    def _doubt(wait: Callable[[], None]) -> str:
+        try:
+            wait()
+        except SafetyIoError as error:
+            return str(error)
+        return ""
