@@ -66,6 +66,11 @@ def _widen(sock: socket.socket) -> None:
         sock.setsockopt(socket.SOL_SOCKET, _SO_SNDBUFFORCE, _SEND_BUFFER_BYTES)
 
 
+def bus_address(name: str) -> str:
+    """Return the abstract AF_UNIX address of the bus `name`."""
+    return f"\0cdpr-rt/simbus/{name}"
+
+
 def listening_socket(name: str) -> socket.socket:
     """Return the socket on which clients of the bus `name` arrive.
 
@@ -79,7 +84,7 @@ def listening_socket(name: str) -> socket.socket:
         )
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
     try:
-        sock.bind(f"\0cdpr-rt/simbus/{name}")
+        sock.bind(bus_address(name))
     except OSError as error:
         sock.close()
         if error.errno == errno.EADDRINUSE:

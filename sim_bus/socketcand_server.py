@@ -1,0 +1,244 @@
+"""The simulated bus by the socketcand protocol, on loopback (github.com/linux-can/socketcand).
+
+A program of its own, `python -m sim_bus.socketcand_server NAME PORT`, which ends with its standard
+input or with the bus. Killing it is losing the connection.
+"""
+
+from __future__ import annotations
+
+import re
+import selectors
+import socket
+import sys
+import time
+from contextlib import suppress
+
+from sim_bus.errors import BusSetupError
+from sim_bus.frame import EFF_FLAG, EFF_MASK, FRAME, FRAME_BYTES, RTR_FLAG, SFF_MASK, pack_frame
+from sim_bus.membership import join, listen_to_all, tell
+
+ALIAS = "can0"
+"""A second name of the bus, for clients that only know interface names."""
+
+_HOST = "127.0.0.1"
+_READ_BYTES = 4096
+_LONGEST_COMMAND = 256
+_MOST_BYTES_WAITING = 1 << 20
+_QUIET_S = 0.02
+"""No frames so long after raw mode: python-can takes the answer for one message by itself."""
+_SEND = re.compile(r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}) ([0-8])((?: +[0-9A-Fa-f]{1,2})*)")
+
+
+class Connection:
+    """One client; it joins the bus when it opens it."""
+
+    def __init__(self, name: str, sock: socket.socket, selector: selectors.BaseSelector) -> None:
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.quiet_until_s = 0.0
+        """When the frames that wait may be told; 0 while none is held back."""
+        self.lost = 0
+        """Frames that the client had no room for."""
+        self._name = name
+        self._sock = sock
+        self._selector = selector
+        self._bus: socket.socket | None = None
+        self._raw = False
+        self._text = ""
+        self._waiting = bytearray()
+        selector.register(sock, selectors.EVENT_READ, self._serve)
+        self._say("< hi >")
+
+    def _serve(self, events: int) -> None:
+        try:
+            if events & selectors.EVENT_WRITE:
+                self._flush()
+            if events & selectors.EVENT_READ:
+                data = self._sock.recv(_READ_BYTES)
+                if not data:
+                    raise ConnectionResetError
+                # a client that leaves TCP's delays on would wait for our acknowledgement
+                self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
+                self._take(data.decode("ascii", "replace"))
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+
+    def _take(self, text: str) -> None:
+        """Carry out the commands in `text`, each between `<` and `>`."""
+        self._text += text
+        while (end := self._text.find(">")) >= 0:
+            command, self._text = self._text[:end], self._text[end + 1 :]
+            start = command.rfind("<")
+            # one space belongs to each bracket; a frame without data has two before the second
+            self._obey(command[start + 1 :].strip() if start >= 0 else "")
+        if len(self._text) > _LONGEST_COMMAND:
+            self._text = ""
+            self._say("< error command too long >")
+
+    def _obey(self, command: str) -> None:
+        word, _, rest = command.partition(" ")
+        if word == "echo":
+            self._say("< echo >")
+        elif word == "open":
+            self._open(rest.strip())
+        elif self._bus is None:
+            self._say("< error no bus is open >")
+        elif word == "rawmode":
+            self._say("< ok >")
+            self._raw = True
+            listen_to_all(self._bus, listen=True)
+            self._hold_back()
+        elif word == "send":
+            self._send(rest)
+        else:
+            self._say("< error unknown command >")
+
+    def _open(self, name: str) -> None:
+        if self._bus is not None:
+            self._say("< error a bus is open already >")
+            return
+        if name not in (self._name, ALIAS):
+            self._say("< error could not open bus >")
+            return
+        try:
+            self._bus = join(self._name)
+        except BusSetupError:
+            self._say("< error could not open bus >")
+            return
+        self._selector.register(self._bus, selectors.EVENT_READ, self._take_frames)
+        self._say("< ok >")
+
+    def _send(self, text: str) -> None:
+        assert self._bus is not None
+        match = _SEND.fullmatch(text)
+        data = bytes(int(octet, 16) for octet in match[3].split()) if match else b""
+        if match is None or len(data) != int(match[2]):
+            self._say("< error malformed send command >")
+            return
+        can_id = int(match[1], 16)
+        if can_id > (SFF_MASK if len(match[1]) == 3 else EFF_MASK):
+            self._say("< error malformed send command >")
+            return
+        can_id |= 0 if len(match[1]) == 3 else EFF_FLAG
+        try:
+            self._bus.send(pack_frame(can_id, data))
+        except BlockingIOError:
+            self._say("< error transmit buffer full >")
+
+    # -- frames of the bus
+
+    def _hold_back(self) -> None:
+        assert self._bus is not None
+        self.quiet_until_s = time.monotonic() + _QUIET_S
+        self._selector.unregister(self._bus)
+
+    def end_quiet(self) -> None:
+        """Tell from now on what the bus carries."""
+        assert self._bus is not None
+        self.quiet_until_s = 0.0
+        self._selector.register(self._bus, selectors.EVENT_READ, self._take_frames)
+
+    def _take_frames(self, _events: int) -> None:
+        assert self._bus is not None
+        now = time.time()
+        try:
+            while packet := self._bus.recv(FRAME_BYTES):
+                if not self._raw or len(self._waiting) > _MOST_BYTES_WAITING:
+                    self.lost += 1
+                else:
+                    self._waiting += _text_of(packet, now)
+        except BlockingIOError:
+            with suppress(BlockingIOError):
+                self._flush()
+            return
+        except OSError:
+            pass
+        self.close()
+
+    def _say(self, text: str) -> None:
+        self._waiting += text.encode("ascii")
+        with suppress(BlockingIOError):
+            self._flush()
+
+    def _flush(self) -> None:
+        """Send what waits, and ask to be called again for what there was no room for."""
+        try:
+            while self._waiting:
+                del self._waiting[: self._sock.send(self._waiting)]
+        except BlockingIOError:
+            self._watch(selectors.EVENT_READ | selectors.EVENT_WRITE)
+            raise
+        self._watch(selectors.EVENT_READ)
+
+    def _watch(self, events: int) -> None:
+        if self._selector.get_key(self._sock).events != events:
+            self._selector.modify(self._sock, events, self._serve)
+
+    @property
+    def closed(self) -> bool:
+        """Whether client or bus have gone."""
+        return self._sock.fileno() < 0
+
+    def close(self) -> None:
+        """Part client and bus."""
+        for sock in (self._sock, self._bus):
+            if sock is not None and sock.fileno() >= 0:
+                with suppress(KeyError):
+                    self._selector.unregister(sock)
+                sock.close()
+
+
+def _text_of(frame: bytes, wall_s: float) -> bytes:
+    """Return the message that tells of a frame; the protocol has none for remote frames."""
+    can_id, length, data = FRAME.unpack(frame)
+    if can_id & RTR_FLAG:
+        return b""
+    head = f"{can_id & EFF_MASK:08X}" if can_id & EFF_FLAG else f"{can_id & SFF_MASK:03X}"
+    return f"< frame {head} {wall_s:.6f} {data[:length].hex().upper()} >".encode("ascii")
+
+
+def serve(name: str, listener: socket.socket) -> None:
+    """Serve the bus `name` to all who connect, until standard input ends or the bus goes away."""
+    bus = join(name)  # a member that listens to nothing: it tells when the bus ends
+    connections: list[Connection] = []
+    with selectors.DefaultSelector() as selector:
+        selector.register(sys.stdin, selectors.EVENT_READ, None)
+        selector.register(bus, selectors.EVENT_READ, None)
+        selector.register(listener, selectors.EVENT_READ, None)
+        while True:
+            held = [c for c in connections if c.quiet_until_s and not c.closed]
+            now = time.monotonic()
+            wait_s = max(min(c.quiet_until_s for c in held) - now, 0.0) if held else None
+            for key, events in selector.select(wait_s):
+                if key.fileobj is listener:
+                    with suppress(OSError):  # a client that has gone already
+                        connections.append(Connection(name, listener.accept()[0], selector))
+                elif key.data is None:
+                    return
+                elif key.fileobj.fileno() >= 0:  # type: ignore[union-attr]  # sockets only
+                    key.data(events)
+            connections = [c for c in connections if not c.closed]
+            for connection in connections:
+                if connection.quiet_until_s and connection.quiet_until_s <= time.monotonic():
+                    connection.end_quiet()
+
+
+def main() -> None:
+    """Serve the bus and port given as arguments (port 0: any); tell the port."""
+    name, port = sys.argv[1], int(sys.argv[2])
+    try:
+        listener = socket.create_server((_HOST, port))
+    except OSError as error:
+        tell({"error": f"socketcand server on {_HOST}:{port}: {error.strerror}"})
+        return
+    listener.setblocking(False)
+    with listener:
+        tell({"port": listener.getsockname()[1]})
+        with suppress(BusSetupError):  # the bus has ended meanwhile
+            serve(name, listener)
+
+
+if __name__ == "__main__":
+    main()
