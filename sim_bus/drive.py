@@ -11,6 +11,7 @@ from typing_extensions import override
 
 from profiles.winch import Winch
 from sim_bus import servo
+from sim_bus.board_link import BoardLink
 from sim_bus.canopen import (
     Abort,
     CanopenSlave,
@@ -28,7 +29,8 @@ from sim_bus.cia402.machine import Machine
 from sim_bus.cia402.misbehaviour import Misbehaviour
 from sim_bus.cia402.touch_probe import TouchProbes
 from sim_bus.cia402.words import ErrorCode
-from sim_bus.motor_state import MotorRatings
+from sim_bus.motor_state import MotorRatings, Transmission
+from sim_bus.physics_board import BoardAxis
 from sim_bus.plant import Plant
 from sim_bus.truth_log import TruthLog
 
@@ -68,21 +70,25 @@ class SimDrive(SlaveApplication):
         truth_log: Path | None = None,
         store: Path | None = None,
         bitrate: int = 1_000_000,
+        serial: int | None = None,
+        transmission: Transmission | None = None,
     ) -> None:
         """Build the drive, switched on at bus time 0.
 
-        `truth_log` and `store` (parameters kept by 1010h) are files to write. Raises
-        DictionaryError for an EDS that lacks objects, StoreError for a damaged store, OSError when
-        the truth log cannot be created.
+        `truth_log` and `store` (what 1010h and LSS keep) are files to write; `serial` is 1018h:4
+        where it is not the EDS's. Raises DictionaryError for an EDS that lacks objects, StoreError
+        for a damaged store, OSError when the truth log cannot be created.
         """
         ratings = ratings or MotorRatings()
         self.od = od = ObjectDictionary.from_eds(eds, node_id)
         _adapt(od, plant, ratings)
+        if serial is not None:
+            od.set_default(0x1018, 4, serial)
         self._slave = CanopenSlave(
             od, node_id, self, store=ParameterStore(store, PROCESS_DATA), bitrate=bitrate
         )
         self.outbox = self._slave.outbox
-        self.axis = Axis(od, plant, ratings)
+        self.axis = Axis(od, plant, ratings, transmission)
         self.probes = TouchProbes(self.axis)
         self.machine = Machine(self.axis, self._slave)
         self.misbehaviour = Misbehaviour(od, self.machine, self.outbox)
@@ -93,6 +99,7 @@ class SimDrive(SlaveApplication):
             index = float(motor["index"][0]) / float(motor["counts_per_rad"][0])
             self._log = TruthLog(truth_log, node_id, index, float(motor["angle"][0]))
         self._log_idle_at = math.inf
+        self._board: BoardLink | None = None
         self.sync_count = 0
         """SYNCs seen."""
 
@@ -104,6 +111,7 @@ class SimDrive(SlaveApplication):
         *,
         truth_log: Path | None = None,
         store: Path | None = None,
+        serial: int | None = None,
     ) -> Self:
         """Build the drive that a winch's profile describes."""
         motor = winch.motor
@@ -123,7 +131,13 @@ class SimDrive(SlaveApplication):
             truth_log=truth_log,
             store=store,
             bitrate=winch.bitrate_bit_s,
+            serial=serial,
+            transmission=Transmission(winch.cable_m_per_motor_rad, winch.cable.stiffness_N),
         )
+
+    def connect(self, board: BoardAxis) -> None:
+        """Share the physics: write the truth to the board, take power and brake from there."""
+        self._board = BoardLink(self.axis, self.machine, board)
 
     # -- LocalNode
 
@@ -145,6 +159,8 @@ class SimDrive(SlaveApplication):
     def advance(self, now: float) -> None:
         """Bring physics, state machine and communication timers to bus time `now`."""
         axis, machine = self.axis, self.machine
+        if self._board is not None:
+            self._board.obey()
         while now - axis.time > 1e-9:
             ahead = now - axis.time
             flags = axis.step(now if ahead < 1.5 * TICK_S else axis.time + TICK_S)
@@ -152,6 +168,8 @@ class SimDrive(SlaveApplication):
                 self.probes.latch(flags)
             if machine.needs_tick(flags):
                 machine.tick()
+        if self._board is not None:
+            self._board.publish()
         if now > self._log_idle_at and self._log is not None:
             self._log.flush()
             self._log_idle_at = math.inf

@@ -148,7 +148,7 @@ class LssSlave:
         self._send(bytes([0x13, 0 if valid else _OUT_OF_RANGE]))
 
     def _activate_bit_timing(self, data: bytes) -> None:
-        """Keep silent for two switch delays; the bus itself has no bit rate to lose."""
+        """Keep silent for two switch delays, then use the new bit rate, which the bus may lack."""
         if self._configuration:
             delay_s = int.from_bytes(data[1:3], "little") * 1e-3
             self._slave.muted = True
@@ -157,7 +157,7 @@ class LssSlave:
 
     def _unmute(self, _now: float) -> None:
         self._slave.bitrate = self._pending_bitrate
-        self._slave.muted = False
+        self._slave.muted = self._slave.bitrate != self._slave.bus_bitrate
         self._slave.rebuild_handlers()
 
     def _store(self, _data: bytes) -> None:

@@ -32,7 +32,8 @@ class CanopenSlave:
 
     The first `advance` boots it. `outbox` is one list for good: whoever sends its frames
     empties it with `clear()`. A node id stored by LSS wins over `node_id`; 255 starts it
-    unconfigured, with LSS only. Raises DictionaryError when the EDS cannot be served.
+    unconfigured, with LSS only. `bitrate` is that of the bus; one that LSS set to another does
+    not hear it. Raises DictionaryError when the EDS cannot be served.
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class CanopenSlave:
         self.store = store or ParameterStore()
         self.node_id = self.store.node_id or node_id
         """Active node id, 255 while unconfigured."""
+        self.bus_bitrate = bitrate
         self.bitrate = self.store.bitrate or bitrate
         self.nmt_state = NmtState.INITIALISING
         self.sync_period_s = 0.0
@@ -59,8 +61,8 @@ class CanopenSlave:
         """CAN identifiers that concern this node now."""
         self.now = 0.0
         """Bus time of the last call."""
-        self.muted = False
-        """Whether it neither sends nor listens (LSS switches the bit timing)."""
+        self.muted = self.bitrate != self.bus_bitrate
+        """Whether it neither sends nor listens: another bit timing, or LSS is switching it."""
         self.timers = Timers()
         self.timers.add(self._boot).arm(0.0)
         self._handlers: dict[int, wire.Handler] = {}
@@ -89,8 +91,8 @@ class CanopenSlave:
         self.now = now
         if now >= self.timers.next_due:
             self.timers.run(now)
-            if self.muted:
-                self.outbox.clear()
+        if self.muted:
+            self.outbox.clear()
         if self.pdo.event_driven and not self.muted:
             self.pdo.offer_events(now)
 

@@ -12,8 +12,11 @@ import typer
 from drivers.bus import BusUrl
 from drivers.errors import BusError
 from profiles import load_winch
+from sim_bus.canopen.lss import UNCONFIGURED
+from sim_bus.canopen.store import StoreError
 from sim_bus.clock import ClockMode
 from sim_bus.drive import SimDrive
+from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
 from tools.errors import BadInputError
@@ -50,6 +53,26 @@ def up(
     truth_log: Annotated[
         Path | None, typer.Option(help="Write the true motion to this file (one drive only).")
     ] = None,
+    unconfigured: Annotated[
+        bool, typer.Option("--unconfigured", help="New drives: without node ids, waiting for LSS.")
+    ] = False,
+    store: Annotated[
+        Path | None,
+        typer.Option(help="Folder where the drives keep what is stored in them (1010h, LSS)."),
+    ] = None,
+    slcan: Annotated[
+        bool, typer.Option("--slcan", help="Offer the bus as a serial CAN adapter as well.")
+    ] = False,
+    socketcand: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PORT", min=0, max=65535, help="Serve socketcand on 127.0.0.1:PORT; 0: any."
+        ),
+    ] = None,
+    board: Annotated[
+        Path | None,
+        typer.Option(help="Make this file, a physics board for simulated sensors and safety I/O."),
+    ] = None,
     exit_with_stdin: Annotated[
         bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
     ] = False,
@@ -65,14 +88,23 @@ def up(
         raise BadInputError(f"--nodes {nodes}: node ids end at 127, the first is {first}")
     with ExitStack() as stack:
         drives = []
-        for node_id in range(first, first + nodes):
-            one = dataclasses.replace(profile, node_id=node_id)
+        for serial, node_id in enumerate(range(first, first + nodes), 1):
+            one = dataclasses.replace(profile, node_id=UNCONFIGURED if unconfigured else node_id)
+            kept = _store_file(store, serial)
             try:
-                drive = SimDrive.for_winch(one, truth, truth_log=truth_log)
+                drive = SimDrive.for_winch(
+                    one, truth, truth_log=truth_log, store=kept, serial=serial
+                )
+            except StoreError as error:
+                raise BadInputError(str(error)) from error
             except OSError as error:
                 raise BadInputError(f"--truth-log {truth_log}: {error.strerror}") from error
             stack.callback(drive.close)
             drives.append(drive)
+        if board is not None:
+            shared = stack.enter_context(PhysicsBoard.create(board, len(drives)))
+            for number, drive in enumerate(drives):
+                drive.connect(shared.axis(number))
         serve(
             drives,
             str(url),
@@ -80,7 +112,20 @@ def up(
             bitrate=profile.bitrate_bit_s,
             truth_log=str(truth_log) if truth_log else None,
             until_stdin_ends=exit_with_stdin,
+            slcan=slcan,
+            socketcand_port=socketcand,
         )
+
+
+def _store_file(folder: Path | None, serial: int) -> Path | None:
+    """Return the file in which the drive with this serial number keeps what is stored in it."""
+    if folder is None:
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInputError(f"--store {folder}: {error.strerror}") from error
+    return folder / f"drive-{serial}.json"
 
 
 def _bus(text: str) -> BusUrl:

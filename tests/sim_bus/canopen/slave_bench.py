@@ -88,13 +88,14 @@ class Bench:
         node_id: int = NODE,
         store: ParameterStore | None = None,
         app: SlaveApplication | None = None,
+        bitrate: int = 1_000_000,
     ) -> None:
         self.od = ObjectDictionary.from_eds(eds, node_id)
         # the drive ships with types that any master can use; these are a synchronous master's
         self.od.set_default(0x1400, 2, 1)
         self.od.set_default(0x1801, 2, 0)
         self.app = Recorder() if app is None else app
-        self.slave = CanopenSlave(self.od, node_id, self.app, store=store)
+        self.slave = CanopenSlave(self.od, node_id, self.app, store=store, bitrate=bitrate)
         self.now = 0.0
         self.network = DirectNetwork(self)
         self.remote = self.network.add_node(node_id, _parsed(eds)) if node_id < 128 else None

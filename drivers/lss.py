@@ -1,0 +1,398 @@
+"""LSS master of CiA 305: find drives by their identity, give them a node id and a bit rate.
+
+Of our own, since the `canopen` package's master takes any frame for the answer to the question
+before it: with several drives without a node id its fastscan can put together an identity that
+none of them has. It also waits 0.2 s for each number of an address and drops the error codes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import can
+
+from drivers.bus import BusUrl, open_python_can
+from drivers.bus.packed import EFF_FLAG, RTR_FLAG
+from drivers.errors import BusError, DriverError
+
+UNCONFIGURED = 255
+"""Node id of a device that has none."""
+
+BITRATE_INDEX = {
+    1_000_000: 0,
+    800_000: 1,
+    500_000: 2,
+    250_000: 3,
+    125_000: 4,
+    50_000: 6,
+    20_000: 7,
+    10_000: 8,
+}
+"""Index of CiA 305's table by bit rate, bit/s."""
+
+_MASTER, _SLAVE = 0x7E5, 0x7E4
+_NMT, _SDO_REQUEST, _SDO_ANSWER, _HEARTBEAT = 0x000, 0x600, 0x580, 0x700
+_EXACT = 0x7FF | EFF_FLAG | RTR_FLAG
+_ANY_NODE = 0x780 | EFF_FLAG | RTR_FLAG
+_RESET_COMMUNICATION = 130
+
+_SWITCH_GLOBAL, _WAITING, _CONFIGURATION = 0x04, 0, 1
+_SELECT, _SELECTED = 0x40, 0x44
+_IDENTIFY, _IDENTIFIED = 0x46, 0x4F
+_IDENTIFY_UNCONFIGURED, _UNCONFIGURED_IDENTIFIED = 0x4C, 0x50
+_FASTSCAN, _FROM_THE_START = 0x51, 128
+_INQUIRE, _INQUIRE_NODE_ID = 0x5A, 0x5E
+_SET_NODE_ID, _SET_BIT_TIMING, _ACTIVATE, _STORE = 0x11, 0x13, 0x15, 0x17
+_REASONS = {
+    (_SET_NODE_ID, 1): "it takes node ids 1 to 127 only",
+    (_SET_BIT_TIMING, 1): "it does not support this bit rate",
+    (_STORE, 1): "it cannot store node id and bit rate",
+    (_STORE, 2): "its memory could not be written",
+}
+_VENDORS_OWN = 255
+
+_SEARCHES = 4
+_MOST_DEVICES = 127
+_SETTLE_S = 0.005
+_SDO_TIMEOUT_S = 0.3
+_ALL = (0, 0xFFFFFFFF)
+
+
+class LssError(DriverError):
+    """A device refused a setting, or did not answer, over LSS; says which and why."""
+
+
+@dataclass(frozen=True, order=True)
+class LssAddress:
+    """The four numbers of 1018h, which together belong to one device only."""
+
+    vendor_id: int
+    product_code: int
+    revision: int
+    serial: int
+
+    @property
+    def numbers(self) -> tuple[int, int, int, int]:
+        """The numbers in the standard's order."""
+        return self.vendor_id, self.product_code, self.revision, self.serial
+
+    def __str__(self) -> str:
+        vendor, product, revision, _ = (f"{number:08X}h" for number in self.numbers)
+        return f"vendor {vendor}, product {product}, revision {revision}, serial {self.serial}"
+
+
+class LssMaster:
+    """LSS on one bus; a context manager that leaves every device in the waiting state.
+
+    `timeout_s` is how long a device may take to answer. Silence is an answer too (fastscan asks
+    bit by bit), so it also decides how long a search takes. Raises BusError when the bus cannot
+    be opened, or is lost later.
+    """
+
+    def __init__(self, url: BusUrl, timeout_s: float = 0.1) -> None:
+        self.url = url
+        self.timeout_s = timeout_s
+        heard = [(_SLAVE, _EXACT), (_SDO_ANSWER, _ANY_NODE), (_HEARTBEAT, _ANY_NODE)]
+        self._bus = open_python_can(url, heard)
+        self._settle_s = _SETTLE_S
+
+    def __enter__(self) -> Self:
+        self.release()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self.release()
+        except BusError:
+            if error is None:
+                raise
+        finally:
+            self._bus.shutdown()
+
+    # -- finding
+
+    def release(self) -> None:
+        """Return all devices to the waiting state; one that got its first node id boots now."""
+        self._send(bytes([_SWITCH_GLOBAL, _WAITING]))
+
+    def has_unconfigured(self) -> bool:
+        """Tell whether a device without a node id is on the bus (not all know this question)."""
+        return bool(self._ask(bytes([_IDENTIFY_UNCONFIGURED]), _UNCONFIGURED_IDENTIFIED))
+
+    def unconfigured(self) -> list[LssAddress]:
+        """Return the devices without a node id, by fastscan, sorted.
+
+        Raises LssError when they do not answer in a way that makes sense.
+        """
+        for _ in range(_SEARCHES):
+            found = self._fastscan_all()
+            if found is not None and all(self._is_there(address) for address in found):
+                self.release()
+                return sorted(found)
+            self._settle_s *= 2.0  # answers of several devices ran into the next question
+        raise LssError(
+            "the devices without a node id do not answer the fastscan in a way that makes sense; "
+            "give them a longer --timeout, or connect one at a time"
+        )
+
+    def find(
+        self,
+        vendor_id: int,
+        product_code: int,
+        revisions: tuple[int, int] = _ALL,
+        serials: tuple[int, int] = _ALL,
+    ) -> list[LssAddress]:
+        """Return the devices of one type, with a node id or without, in inclusive ranges."""
+        kind = vendor_id, product_code
+        found = []
+        for serial in self._bisect(serials, lambda part: self._identify(*kind, revisions, part)):
+            one = serial, serial
+
+            def of_one(part: tuple[int, int], one: tuple[int, int] = one) -> bool:
+                return self._identify(*kind, part, one)
+
+            found += [
+                LssAddress(*kind, revision, serial) for revision in self._bisect(revisions, of_one)
+            ]
+        return found
+
+    def select(self, address: LssAddress) -> int:
+        """Put one device into the configuration state and return its node id (255: none).
+
+        Raises LssError when it does not answer.
+        """
+        self.release()
+        for part, number in enumerate(address.numbers):
+            question = bytes([_SELECT + part]) + number.to_bytes(4, "little")
+            if part < 3:
+                self._send(question)
+            elif not self._ask(question, _SELECTED):
+                raise LssError(f"no device answers to {address}")
+        return self._node_id()
+
+    def select_only(self) -> tuple[LssAddress, int]:
+        """Put the only device on the bus into the configuration state; return who it is.
+
+        Raises LssError when none answers, or more than one.
+        """
+        self._send(bytes([_SWITCH_GLOBAL, _CONFIGURATION]))
+        return LssAddress(*self._inquire()), self._node_id()
+
+    def _identify(
+        self,
+        vendor_id: int,
+        product_code: int,
+        revisions: tuple[int, int],
+        serials: tuple[int, int],
+    ) -> bool:
+        numbers = (vendor_id, product_code, *revisions, *serials)
+        *first, last = (
+            bytes([_IDENTIFY + part]) + number.to_bytes(4, "little")
+            for part, number in enumerate(numbers)
+        )
+        for question in first:
+            self._send(question)
+        return bool(self._ask(last, _IDENTIFIED))
+
+    def _bisect(self, whole: tuple[int, int], some: Callable[[tuple[int, int]], bool]) -> list[int]:
+        """Return the numbers of a range that devices have; `some` tells whether a part has any."""
+        found: list[int] = []
+        parts = [whole]
+        while parts:
+            low, high = parts.pop()
+            if not some((low, high)):
+                continue
+            if low == high:
+                found.append(low)
+                continue
+            middle = (low + high) // 2
+            parts += [(middle + 1, high), (low, middle)]
+        return found
+
+    def _fastscan_all(self) -> set[LssAddress] | None:
+        """Return what fastscan after fastscan finds, None when one comes to no end."""
+        self.release()
+        found: set[LssAddress] = set()
+        while self._scan(0, _FROM_THE_START, 0, 0):
+            numbers = []
+            for part in range(4):
+                number = self._scan_number(part)
+                if number is None:
+                    return None
+                numbers.append(number)
+            # it is in configuration state now, so that the next scan passes it by
+            found.add(LssAddress(*numbers))
+            if len(found) > _MOST_DEVICES:
+                return None
+        return found
+
+    def _is_there(self, address: LssAddress) -> bool:
+        try:
+            return self.select(address) == UNCONFIGURED
+        except LssError:
+            return False
+
+    def _scan_number(self, part: int) -> int | None:
+        """Return one number of the lowest address, None when nobody confirms it."""
+        number = 0
+        for bit in range(31, -1, -1):
+            if not self._scan(number, bit, part, part):
+                number |= 1 << bit
+        return number if self._scan(number, 0, part, (part + 1) % 4) else None
+
+    def _scan(self, number: int, bit: int, part: int, following: int) -> bool:
+        question = bytes([_FASTSCAN]) + number.to_bytes(4, "little")
+        if not self._ask(question + bytes([bit, part, following]), _IDENTIFIED):
+            return False
+        # each device that fits answers, and not all are equally quick
+        self._collect(_IDENTIFIED, self._settle_s)
+        return True
+
+    # -- asking the device in the configuration state
+
+    def _inquire(self) -> tuple[int, int, int, int]:
+        numbers = []
+        for part in range(4):
+            answer = self._one(bytes([_INQUIRE + part]), _INQUIRE + part)
+            numbers.append(int.from_bytes(answer[1:5], "little"))
+        vendor, product, revision, serial = numbers
+        return vendor, product, revision, serial
+
+    def _node_id(self) -> int:
+        return self._one(bytes([_INQUIRE_NODE_ID]), _INQUIRE_NODE_ID)[1]
+
+    def set_node_id(self, node_id: int) -> None:
+        """Give the selected device a node id, 1 to 127 or 255; raises LssError if refused.
+
+        It counts from the next reset of communication on, for good when stored.
+        """
+        self._set(_SET_NODE_ID, bytes([node_id]), f"node id {node_id}")
+
+    def set_bitrate(self, bitrate_bit_s: int) -> None:
+        """Give the selected device a bit rate of `BITRATE_INDEX`; raises LssError if refused.
+
+        It counts from `activate_bitrate` on, or when stored from the next power-on.
+        """
+        table = bytes([0, BITRATE_INDEX[bitrate_bit_s]])
+        self._set(_SET_BIT_TIMING, table, f"a bit rate of {bitrate_bit_s // 1000} kbit/s")
+
+    def store(self) -> None:
+        """Have the selected device keep node id and bit rate; raises LssError if it cannot."""
+        self._set(_STORE, b"", "to store its settings")
+
+    def activate_bitrate(self, delay_s: float) -> None:
+        """Have the selected device change over: `delay_s` of silence before and after."""
+        self._send(bytes([_ACTIVATE]) + round(delay_s * 1e3).to_bytes(2, "little"))
+
+    def _set(self, command: int, content: bytes, what: str) -> None:
+        error, own = self._one(bytes([command]) + content, command)[1:3]
+        if error == 0:
+            return
+        reason = _REASONS.get((command, error), f"LSS error code {error}")
+        if error == _VENDORS_OWN:
+            reason = f"for a reason of the maker's own, code {own}"
+        raise LssError(f"the device refuses {what}: {reason}")
+
+    # -- other nodes of the bus
+
+    def who_has(self, node_id: int, listen_s: float = 0.5) -> str:
+        """Return how a node shows that it has `node_id`, "" when nothing does."""
+        if self._upload(node_id, 0x1000) is not None:
+            return "it answers to SDO"
+        deadline = time.monotonic() + listen_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _HEARTBEAT + node_id:
+                return "its heartbeat is on the bus"
+        return ""
+
+    def read_object(self, node_id: int, index: int) -> int | None:
+        """Return an integer object of at most 4 bytes by SDO, None where there is no answer."""
+        answer = self._upload(node_id, index)
+        if answer is None or answer[0] & 0xE2 != 0x42:
+            return None
+        return int.from_bytes(answer[4:8], "little")
+
+    def _upload(self, node_id: int, index: int) -> bytes | None:
+        question = bytes([0x40]) + index.to_bytes(2, "little") + bytes(5)
+        for _ in range(2):
+            self._collect(_IDENTIFIED, 0.0)
+            self._send(question, _SDO_REQUEST + node_id)
+            deadline = time.monotonic() + _SDO_TIMEOUT_S
+            while (frame := self._receive(deadline)) is not None:
+                if frame[0] == _SDO_ANSWER + node_id and len(frame[1]) == 8:
+                    return frame[1]
+        return None
+
+    def reset_communication(self, node_id: int) -> None:
+        """Restart a node's communication by NMT, so that its new node id counts."""
+        self._transmit(_NMT, bytes([_RESET_COMMUNICATION, node_id]))
+
+    def wait_for_boot_up(self, node_id: int, timeout_s: float = 2.0) -> bool:
+        """Tell whether a node's boot-up message or heartbeat comes in time."""
+        deadline = time.monotonic() + timeout_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _HEARTBEAT + node_id:
+                return True
+        return False
+
+    # -- frames
+
+    def _one(self, question: bytes, specifier: int) -> bytes:
+        """Return the answer of the one device in the configuration state; raises LssError."""
+        answer = self._ask(question, specifier)
+        if answer is None:
+            raise LssError(f"no device answers (LSS command {question[0]:02X}h)")
+        answers = [answer, *self._collect(specifier, self._settle_s)]
+        if len(answers) > 1:
+            raise LssError(
+                f"{len(answers)} devices answer at once: connect one at a time, or name one by its "
+                "profile and serial number"
+            )
+        return answers[0]
+
+    def _ask(self, question: bytes, specifier: int) -> bytes | None:
+        self._collect(specifier, 0.0)
+        self._send(question)
+        deadline = time.monotonic() + self.timeout_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
+                return frame[1].ljust(8, b"\0")
+        return None
+
+    def _collect(self, specifier: int, wait_s: float) -> list[bytes]:
+        """Return the answers that come within `wait_s`; with 0.0 throw away what waits."""
+        deadline = time.monotonic() + wait_s
+        answers = []
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
+                answers.append(frame[1].ljust(8, b"\0"))
+        return answers
+
+    def _receive(self, deadline: float) -> tuple[int, bytes] | None:
+        try:
+            message = self._bus.recv(max(0.0, deadline - time.monotonic()))
+        except (can.CanError, OSError) as error:
+            raise BusError(f"{self.url}: the bus has gone away ({error})") from error
+        if message is None:
+            return None
+        if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+            return -1, b""
+        return message.arbitration_id, bytes(message.data)
+
+    def _send(self, data: bytes, identifier: int = _MASTER) -> None:
+        self._transmit(identifier, data.ljust(8, b"\0"))
+
+    def _transmit(self, identifier: int, data: bytes) -> None:
+        try:
+            self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+        except (can.CanError, OSError) as error:
+            raise BusError(f"{self.url}: cannot send: {error}") from error
