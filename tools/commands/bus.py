@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import typer
 
+from tools.commands import bus_budget
+
 app = typer.Typer(help="Look at a CAN bus.", no_args_is_help=True)
 
 
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
+    bus_budget.add(app)
     parent.add_typer(app, name="bus")
 
 

@@ -1,0 +1,177 @@
+"""Bus budget: whether what crosses a bus in one cycle fits into it, by its longest on the wire."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from profiles import DriveProfile, Pdo, Robot, Winch
+
+_SYNC_BYTES, _HEARTBEAT_BYTES, _FULL_BYTES = 0, 1, 8
+_COMMANDS = (0x6040, 0x6071)
+_AT_EVERY_SYNC = range(1, 241)
+_ON_REQUEST = (252, 253)
+# how often within what a drive tolerates its master is heard
+HEARTBEATS_IN_TOLERANCE = 4
+
+
+def worst_case_bits(n: int) -> int:
+    """Return the bits a frame with an 11-bit identifier and `n` data bytes takes at most.
+
+    The 34 + 8n bits from start of frame to the CRC may be stuffed: once after five equal bits,
+    then, since a stuff bit counts as the first of the next five, after every four. 13 more bits,
+    interframe space included, are never stuffed (ISO 11898-1).
+    """
+    return bare_bits(n) + (34 + 8 * n - 1) // 4
+
+
+def bare_bits(n: int) -> int:
+    """Return the bits of such a frame when nothing in it has to be stuffed."""
+    return 8 * n + 47
+
+
+@dataclass(frozen=True)
+class BusBudget:
+    """What one bus of a machine has to carry, in seconds on the wire."""
+
+    bus: str
+    bitrate_bit_s: int
+    nodes: tuple[int, ...]
+    period_s: float
+    cycle_s: float
+    """SYNC and every PDO of a cycle, stuffed as badly as can be."""
+    bare_cycle_s: float
+    """The same without a single stuff bit."""
+    heartbeat_share: float
+    """Share of the wire that heartbeats (and PDOs limited by their own times) take."""
+    changes_s: float
+    """PDOs that drives send on a change, all of them at once; they wait for gaps."""
+    longest_wait_s: float
+    """For how long SYNC may have to wait for a frame that has begun."""
+
+    @property
+    def margin_s(self) -> float:
+        """What a cycle leaves to SDO, EMCY and PDOs sent on a change, and to computing."""
+        return self.period_s * (1.0 - self.heartbeat_share) - self.cycle_s
+
+    @property
+    def fits(self) -> bool:
+        """Whether the cycle can go on for ever, heartbeats included."""
+        return self.margin_s >= -1e-12
+
+    @property
+    def cycle_limit_Hz(self) -> float:
+        """Rate at which cycles alone fill the bus."""
+        return 1.0 / self.cycle_s
+
+    @property
+    def highest_rate_Hz(self) -> float:
+        """Highest rate that leaves room for the heartbeats."""
+        return max(0.0, 1.0 - self.heartbeat_share) / self.cycle_s
+
+    @property
+    def sdo_transfers_s(self) -> float:
+        """Expedited SDO transfers (request and answer) a second that fit beside the cycles."""
+        transfer_s = 2 * worst_case_bits(_FULL_BYTES) / self.bitrate_bit_s
+        return max(0.0, self.margin_s) / self.period_s / transfer_s
+
+    @property
+    def recovery_cycles(self) -> float:
+        """Cycles until a change in all drives at once has been told; inf without margin."""
+        if self.changes_s == 0.0:
+            return 0.0
+        return math.inf if self.margin_s <= 0.0 else math.ceil(self.changes_s / self.margin_s)
+
+    def __str__(self) -> str:
+        """Return the figures in one sentence, as a refusal tells them."""
+        return (
+            f"bus {self.bus}: {len(self.nodes)} drives need {self.cycle_s * 1e6:.0f} us of each "
+            f"cycle in the worst case and {self.heartbeat_share * self.period_s * 1e6:.1f} us for "
+            f"heartbeats, a cycle at {1.0 / self.period_s:.6g} Hz has {self.period_s * 1e6:.0f} us"
+            f"; highest rate at {self.bitrate_bit_s} bit/s: {math.floor(self.highest_rate_Hz)} Hz"
+        )
+
+
+def bus_budget(
+    bus: str, bitrate_bit_s: int, period_s: float, drives: Sequence[tuple[int, DriveProfile]]
+) -> BusBudget:
+    """Return the budget of a bus with `drives`, each a node id and its profile."""
+    every, waiting = _Frames(), _Frames()
+    every.add(_SYNC_BYTES)
+    share_bit_s = 0.0
+    last = max(
+        (pdo.cob_id(node) for node, drive in drives for pdo in _cyclic_pdos(drive)), default=0
+    )
+    for node, drive in drives:
+        for pdo in _cyclic_pdos(drive):
+            every.add(_bytes(pdo))
+        for pdo in _pdos_on_change(drive):
+            if pdo.cob_id(node) < last:
+                # it goes before a PDO of the cycle, so it may come in every one
+                every.add(_bytes(pdo))
+                continue
+            waiting.add(_bytes(pdo))
+            pause_s = pdo.inhibit_time_s or pdo.event_timer_s
+            share_bit_s += worst_case_bits(_bytes(pdo)) / pause_s if pause_s else 0.0
+        share_bit_s += worst_case_bits(_HEARTBEAT_BYTES) / drive.heartbeat_producer_s
+    if drives:
+        tolerated_s = min(drive.heartbeat_consumer_s for _, drive in drives)
+        share_bit_s += worst_case_bits(_HEARTBEAT_BYTES) * HEARTBEATS_IN_TOLERANCE / tolerated_s
+    return BusBudget(
+        bus=bus,
+        bitrate_bit_s=bitrate_bit_s,
+        nodes=tuple(node for node, _ in drives),
+        period_s=period_s,
+        cycle_s=every.worst / bitrate_bit_s,
+        bare_cycle_s=every.bare / bitrate_bit_s,
+        heartbeat_share=share_bit_s / bitrate_bit_s,
+        changes_s=waiting.worst / bitrate_bit_s,
+        longest_wait_s=worst_case_bits(_FULL_BYTES) / bitrate_bit_s,
+    )
+
+
+def machine_budget(machine: Winch | Robot, period_s: float | None = None) -> list[BusBudget]:
+    """Return the budget of each bus of a winch or a robot, at its own cycle or `period_s`."""
+    period_s = period_s or machine.sync_period_s
+    if isinstance(machine, Winch):
+        drives = [(machine.node_id, machine.drive)]
+        return [bus_budget("of the winch", machine.bitrate_bit_s, period_s, drives)]
+    return [
+        bus_budget(
+            bus.name,
+            bus.bitrate_bit_s,
+            period_s,
+            [(axis.node_id, axis.winch.drive) for axis in machine.axes if axis.bus == bus.name],
+        )
+        for bus in machine.buses
+    ]
+
+
+class _Frames:
+    """Bits of some frames."""
+
+    def __init__(self) -> None:
+        self.worst = self.bare = 0
+
+    def add(self, n: int) -> None:
+        self.worst += worst_case_bits(n)
+        self.bare += bare_bits(n)
+
+
+def _cyclic_pdos(drive: DriveProfile) -> list[Pdo]:
+    """Return what crosses the bus in every cycle: the master's commands and the answers to SYNC."""
+    commands = [p for p in drive.rpdos if any(e.index in _COMMANDS for e in p.entries)]
+    return commands + [p for p in drive.tpdos if p.transmission_type in _AT_EVERY_SYNC]
+
+
+def _pdos_on_change(drive: DriveProfile) -> list[Pdo]:
+    return [
+        p
+        for p in drive.tpdos
+        if p.transmission_type not in _AT_EVERY_SYNC and p.transmission_type not in _ON_REQUEST
+    ]
+
+
+def _bytes(pdo: Pdo) -> int:
+    return sum(entry.bits for entry in pdo.entries) // 8

@@ -1,0 +1,178 @@
+"""The bus budget against frames stuffed bit by bit, against the simulated bus, and as a command."""
+
+import json
+import random
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.bus.budget import bare_bits, bus_budget, machine_budget, worst_case_bits
+from profiles import load_drive, load_robot, load_winch
+from sim_bus.frame import SFF_BITS
+from tools.bus_fit import require_fit
+from tools.errors import BadInputError
+
+DRIVE = load_drive("generic-cia402")
+repeatable = settings(derandomize=True, deadline=None, max_examples=300)
+# after the CRC: its delimiter, acknowledge slot and delimiter, end of frame, interframe space
+UNSTUFFED = 1 + 2 + 7 + 3
+
+
+def bits_of(value: int, width: int) -> list[int]:
+    return [value >> k & 1 for k in reversed(range(width))]
+
+
+def crc15(bits: list[int]) -> int:
+    """ISO 11898-1: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1."""
+    register = 0
+    for bit in bits:
+        register = (register << 1 & 0x7FFF) ^ (0x4599 if bit ^ register >> 14 else 0)
+    return register
+
+
+def stuff_bits(bits: list[int]) -> int:
+    """Put a bit of the other kind after each five equal ones; return how many there were."""
+    sent: list[int] = []
+    for bit in bits:
+        sent.append(bit)
+        if len(sent) >= 5 and len(set(sent[-5:])) == 1:
+            sent.append(1 - bit)
+    return len(sent) - len(bits)
+
+
+def on_the_wire(identifier: int, data: bytes) -> int:
+    """Return the bits of a base format data frame, from its start to the end of the space."""
+    # start of frame, identifier, RTR, IDE, r0, DLC, data, CRC
+    bits = [0, *bits_of(identifier, 11), 0, 0, 0, *bits_of(len(data), 4)]
+    for byte in data:
+        bits += bits_of(byte, 8)
+    bits += bits_of(crc15(bits), 15)
+    return len(bits) + stuff_bits(bits) + UNSTUFFED
+
+
+def test_the_reference_knows_a_printed_crc():
+    # one start bit and zeros leave the register empty, a lone 1 leaves the polynomial
+    assert crc15([0] * 20) == 0
+    assert crc15([0, 0, 1]) == 0x4599
+
+
+identifiers = st.integers(0, 0x7FF)
+# bytes with long runs of equal bits, which are what has to be stuffed
+runs = st.sampled_from([0x00, 0xFF, 0x0F, 0xF0, 0x1E, 0x3C, 0x78, 0x87, 0xC3, 0xE1])
+payloads = st.binary(max_size=8) | st.lists(runs, max_size=8).map(bytes)
+
+
+@repeatable
+@given(identifiers, payloads)
+def test_no_frame_is_longer_than_the_bound(identifier: int, data: bytes):
+    n = len(data)
+    assert bare_bits(n) <= on_the_wire(identifier, data) <= worst_case_bits(n)
+
+
+@pytest.mark.parametrize("n", range(9))
+def test_the_bound_is_attained_by_bits_of_ones_own_choice(n: int):
+    """0 00001111 0000 1111 ...: each stuff bit begins the next run."""
+    m = 34 + 8 * n
+    worst = [0] + [(k // 4) % 2 for k in range(m - 1)]
+    assert bare_bits(n) + stuff_bits(worst) == worst_case_bits(n)
+
+
+@pytest.mark.parametrize("n", range(9))
+def test_frames_come_near_the_bound(n: int):
+    """Length code, reserved bits and CRC are not free: a climb finds frames some bits below."""
+    random_bits = random.Random(n)
+    best = 0
+    for _ in range(4):
+        identifier, data = 0x078, bytearray(random_bits.choice((0x78, 0x87)) for _ in range(n))
+        length = on_the_wire(identifier, bytes(data))
+        for _ in range(400):
+            other, trial = identifier, bytearray(data)
+            flip = random_bits.randrange(11 + 8 * n)
+            if flip < 11:
+                other ^= 1 << flip
+            else:
+                trial[(flip - 11) // 8] ^= 1 << (flip - 11) % 8
+            if (found := on_the_wire(other, bytes(trial))) >= length:
+                identifier, data, length = other, trial, found
+        best = max(best, length)
+    assert worst_case_bits(n) - 6 <= best <= worst_case_bits(n)
+
+
+def test_the_figures_are_those_of_the_simulated_bus():
+    """Two formulas, written apart, for one wire."""
+    assert tuple(worst_case_bits(n) for n in range(9)) == SFF_BITS
+    assert [worst_case_bits(n) for n in (0, 4, 6, 8)] == [55, 95, 115, 135]
+
+
+def test_eight_drives_take_two_buses_at_1_kHz():
+    eight = bus_budget("one", 1_000_000, 1e-3, [(node, DRIVE) for node in range(1, 9)])
+    assert eight.cycle_s == pytest.approx(1895e-6)
+    assert eight.cycle_limit_Hz == pytest.approx(527.7, abs=0.05)
+    assert not eight.fits
+    assert "8 drives need 1895 us" in str(eight)
+    four = machine_budget(load_robot("spatial-8"))
+    assert [budget.cycle_s for budget in four] == pytest.approx([975e-6] * 2)
+    assert all(budget.fits for budget in four)
+    # 65 bits of 4 drives each 100 ms and of the master each 125 ms
+    assert four[0].heartbeat_share == pytest.approx((4 * 65 / 0.1 + 65 / 0.125) * 1e-6)
+
+
+@repeatable
+@given(st.integers(1, 30), st.sampled_from([125_000, 500_000, 1_000_000]))
+def test_the_highest_rate_is_where_it_stops_to_fit(n: int, bitrate: int):
+    drives = [(node, DRIVE) for node in range(1, n + 1)]
+    highest = bus_budget("b", bitrate, 1e-2, drives).highest_rate_Hz
+    at, above = (bus_budget("b", bitrate, 1 / (highest * f), drives) for f in (1.0, 1.001))
+    assert at.fits
+    assert at.margin_s == pytest.approx(0.0, abs=1e-9)
+    assert not above.fits
+
+
+def test_what_comes_on_a_change_counts_by_its_priority():
+    first, second = DRIVE.tpdos
+    below = second.model_copy(update={"cob_id_offset": 0x181, "transmission_type": 255})
+    waits = bus_budget("b", 1_000_000, 1e-3, [(1, DRIVE)])
+    pushes = bus_budget(
+        "b", 1_000_000, 1e-3, [(1, DRIVE.model_copy(update={"tpdos": (first, below)}))]
+    )
+    assert pushes.cycle_s - waits.cycle_s == pytest.approx(worst_case_bits(7) * 1e-6)
+    assert (waits.changes_s, pushes.changes_s) == (pytest.approx(125e-6), 0.0)
+
+
+def test_a_machine_that_does_not_fit_is_refused_with_the_figure():
+    robot = load_robot("spatial-8")
+    require_fit(robot)
+    with pytest.raises(BadInputError, match=r"bus can0: 4 drives need 975 us .* 500 us") as caught:
+        require_fit(replace(robot, sync_period_s=0.0005))
+    assert "highest rate at 1000000 bit/s: 1022 Hz" in str(caught.value)
+    with pytest.raises(BadInputError, match="1 drives need 5700 us"):
+        require_fit(replace(load_winch("winch-mpp0923d"), bitrate_bit_s=50_000))
+
+
+def run(*arguments: str) -> tuple[int, dict[str, object], str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "tools.cli", "bus", "budget", *arguments, "--json"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=Path(__file__).parents[3],
+    )
+    return done.returncode, json.loads(done.stdout.splitlines()[-1]), done.stderr
+
+
+def test_the_command_tells_and_refuses():
+    status, told, _ = run("spatial-8")
+    assert (status, told["ok"]) == (0, True)
+    assert [bus["cycle_us"] for bus in told["buses"]] == [975.0, 975.0]
+    highest = told["buses"][0]["highest_rate_Hz"]
+    assert run("spatial-8", "--rate", str(highest))[0] == 0
+    status, told, errors = run("spatial-8", "--rate", str(highest + 1))
+    assert (status, told["ok"], told["exit_status"]) == (2, False, 2)
+    assert [bus["fits"] for bus in told["buses"]] == [False, False]
+    assert "975 us" in errors
+    assert "Traceback" not in errors
