@@ -1,0 +1,240 @@
+"""Values of objects in words and SI units, as far as a drive's profile and ratings are known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+from drivers.cia402 import fault_text, mode_name, state_of, supported_modes
+from drivers.decode.messages import error_register
+from drivers.decode.names import ObjectNames
+from drivers.drive_units import torque_unit_Nm, velocity_unit_rad_s
+from profiles import DriveProfile
+
+_POSITIONS = frozenset(
+    (0x6062, 0x6064, 0x6067, 0x607A, 0x607C, 0x60E4, 0x60F4, *range(0x60BA, 0x60BE))
+)
+_VELOCITIES = frozenset((0x606B, 0x606C, 0x60FF, 0x6081, 0x6099))
+_TORQUES = frozenset((0x6071, 0x6074, 0x6077, 0x60B2))
+_TORQUE_LIMITS = frozenset((0x6072, 0x60E0, 0x60E1))
+_HOMING, _CYCLIC = 6, (8, 9, 10)
+_OWN_UNITS = {
+    "per_mille_of_rated": "per mille of rated",
+    "percent_of_rated": "percent of rated",
+}
+_MICRO, _MILLI = 1e-6, 1e-3
+_PDO_PARAMETERS = ((0x1400, 0x1600), (0x1800, 0x1A00))
+_PDO_MAPS = ((0x1600, 0x1800), (0x1A00, 0x1C00))
+
+
+@dataclass(frozen=True)
+class Field:
+    """One value in a frame."""
+
+    index: int
+    sub: int
+    name: str
+    raw: bytes
+    value: float | str
+    """In `unit`; text where the object is a word of bits or a name."""
+    unit: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.name or f'{self.index:04X}h:{self.sub}'} {self.text}"
+
+
+@dataclass
+class NodeView:
+    """What is known of one node; it grows with what the node and its master say."""
+
+    node_id: int
+    names: ObjectNames
+    drive: DriveProfile | None = None
+    rated_torque_Nm: float | None = None
+    counts_per_turn: int | None = None
+    mode: int | None = None
+
+    def torque_Nm(self) -> float | None:
+        """Motor torque of one unit of 6077h, with the drive's sign; None where not known."""
+        if self.drive is None:
+            return None
+        if self.rated_torque_Nm is None and self.drive.torque_unit in _OWN_UNITS:
+            return None
+        return self.drive.torque_sign * torque_unit_Nm(self.drive, self.rated_torque_Nm or 0.0)
+
+    def position_rad(self) -> float | None:
+        """Motor angle of one unit of 6064h, with the drive's sign; None where not known."""
+        if self.drive is None or not self.counts_per_turn:
+            return None
+        return self.drive.position_sign * math.tau / self.counts_per_turn
+
+    def velocity_rad_s(self) -> float | None:
+        """Motor speed of one unit of 606Ch, with the drive's sign; None where not known."""
+        if self.drive is None or not (self.counts_per_turn or self.drive.velocity_unit == "rpm"):
+            return None
+        unit = velocity_unit_rad_s(self.drive, self.counts_per_turn or 1)
+        return self.drive.position_sign * unit
+
+
+def read_field(node: NodeView, index: int, sub: int, raw: bytes) -> Field:
+    """Return what the bytes of an object mean on this node; any bytes are taken."""
+    name = node.names.name(index, sub)
+    if not raw or len(raw) > 8 or node.names.is_other(index, sub):
+        text = _other(node.names.plain(index, sub, raw))
+        return Field(index, sub, name, raw, text, "", text)
+    number = int.from_bytes(raw, "little", signed=node.names.is_signed(index, sub))
+    quantity = _quantity(node, index, sub)
+    if quantity is not None:
+        scale, unit, digits = quantity
+        value = number * scale
+        return Field(index, sub, name, raw, value, unit, f"{value:.{digits}f} {unit}".rstrip())
+    words = _words(node, index, sub, number)
+    if words is not None:
+        return Field(index, sub, name, raw, words, "", words)
+    return Field(index, sub, name, raw, float(number), "", _integer(number))
+
+
+def _integer(number: int) -> str:
+    return f"{number} ({number:X}h)" if number > 9 else str(number)
+
+
+def _other(value: object) -> str:
+    if isinstance(value, str):
+        return repr(value)
+    if isinstance(value, bytes | bytearray):
+        return value.hex(" ").upper() or "(nothing)"
+    return str(value)
+
+
+def _quantity(node: NodeView, index: int, sub: int) -> tuple[float, str, int] | None:
+    """Return scale, unit and digits to show of an object that is a physical quantity."""
+    if _within(index, _PDO_PARAMETERS):
+        return _PDO_TIMES.get(sub)
+    if index in _POSITIONS:
+        scale = node.position_rad()
+        return (1.0, "counts", 0) if scale is None else (math.degrees(scale), "deg", 3)
+    if index in _VELOCITIES:
+        scale = node.velocity_rad_s()
+        return None if scale is None else (math.degrees(scale), "deg/s", 3)
+    if index in _TORQUES:
+        return _torque(node)
+    if index in _TORQUE_LIMITS:
+        scale, unit, digits = _torque(node)
+        return abs(scale), unit, digits
+    return _FIXED.get(index)
+
+
+def _torque(node: NodeView) -> tuple[float, str, int]:
+    scale = node.torque_Nm()
+    if scale is not None:
+        return scale, "Nm", 4
+    unit = node.drive.torque_unit if node.drive is not None else "per_mille_of_rated"
+    return 1.0, _OWN_UNITS[unit], 0
+
+
+_PDO_TIMES = {3: (0.1, "ms", 1), 5: (1.0, "ms", 0)}
+"""Inhibit time and event timer of a PDO, by sub-index."""
+_FIXED: dict[int, tuple[float, str, int]] = {
+    0x1006: (1e3 * _MICRO, "ms", 3),
+    0x1017: (1.0, "ms", 0),
+    0x6075: (_MILLI, "A", 3),
+    0x6076: (_MILLI, "Nm", 3),
+    0x6079: (_MILLI, "V", 3),
+}
+
+
+def _within(index: int, ranges: tuple[tuple[int, int], ...]) -> bool:
+    return any(low <= index < high for low, high in ranges)
+
+
+def _words(node: NodeView, index: int, sub: int, number: int) -> str | None:
+    """Return an object that is a word of bits or a code, in words; None for another object."""
+    known = _WORDS.get(index)
+    if known is not None:
+        return known(number)
+    if index in _STATE_WORDS:
+        return _STATE_WORDS[index](number & 0xFFFF, node.mode)
+    if _within(index, _PDO_PARAMETERS) and sub == 1:
+        return f"{number & 0x7FF:03X}h{', off' if number >> 31 & 1 else ''}"
+    if _within(index, _PDO_MAPS) and sub:
+        return f"{number >> 16:04X}h:{number >> 8 & 0xFF}, {number & 0xFF} bits"
+    return _PARTS[index](number) if index in _PARTS and sub else None
+
+
+def _watched(number: int) -> str:
+    return f"node {number >> 16 & 0x7F} within {number & 0xFFFF} ms" if number else "nobody"
+
+
+_PARTS: dict[int, Callable[[int], str]] = {
+    0x1003: _error_field,
+    0x1016: _watched,
+    0x1018: lambda number: f"{number:08X}h",
+}
+
+
+def _device_type(number: int) -> str:
+    return f"CiA {number & 0xFFFF} ({number:08X}h)" if number & 0xFFFF else f"{number:08X}h"
+
+
+def _error_field(number: int) -> str:
+    return fault_text(number & 0xFFFF) if number & 0xFFFF else "no error"
+
+
+def _modes(number: int) -> str:
+    return ", ".join(mode_name(mode) for mode in supported_modes(number)) or "none"
+
+
+_WORDS: dict[int, Callable[[int], str]] = {
+    0x1000: _device_type,
+    0x1001: lambda number: error_register(number & 0xFF),
+    0x603F: _error_field,
+    0x6060: mode_name,
+    0x6061: mode_name,
+    0x6502: _modes,
+}
+
+_STATUS_BITS = ((7, "warning"), (10, "target reached"), (11, "internal limit"))
+
+
+@lru_cache(maxsize=4096)
+def statusword_text(word: int, mode: int | None = None) -> str:
+    """Return a statusword in words; bits that depend on the mode need `mode` (6061h)."""
+    told = [state_of(word).label]
+    told += [name for bit, name in _STATUS_BITS if word >> bit & 1]
+    if not word >> 9 & 1:
+        told.append("not remote")
+    if mode == _HOMING:
+        told += [name for bit, name in ((12, "homed"), (13, "homing error")) if word >> bit & 1]
+    elif mode in _CYCLIC:
+        told += ["follows commands"] if word >> 12 & 1 else []
+        told += ["following error"] if word >> 13 & 1 and mode == 8 else []
+    return f"{', '.join(told)} ({word:04X}h)"
+
+
+@lru_cache(maxsize=4096)
+def controlword_text(word: int, mode: int | None = None) -> str:
+    """Return the command in a controlword in words."""
+    if word & 0x80:
+        told = "fault reset"
+    elif not word & 0x02:
+        told = "disable voltage"
+    elif not word & 0x04:
+        told = "quick stop"
+    elif not word & 0x01:
+        told = "shutdown"
+    else:
+        told = "enable operation" if word & 0x08 else "switch on"
+    if mode == _HOMING and word & 0x10:
+        told += ", start homing"
+    if word & 0x100:
+        told += ", halt"
+    return f"{told} ({word:04X}h)"
+
+
+_STATE_WORDS: dict[int, Callable[[int, int | None], str]] = {
+    0x6040: controlword_text,
+    0x6041: statusword_text,
+}
