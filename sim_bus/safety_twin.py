@@ -1,0 +1,207 @@
+"""A simulated safety I/O: the remote I/O itself and the contactor, brakes and switches behind it.
+
+Wired as docs/safety-io.md asks for: the emergency-stop chain takes the contactor's coil and the
+drives' safe torque off by itself, whatever the outputs say.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from enum import IntFlag
+
+from pymodbus.constants import ExcCodes
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from profiles.safety_io import Input, SafetyIoProfile
+from sim_bus.modbus_tcp_server import Line, Panel
+from sim_bus.physics_board import BoardAxis
+from sim_bus.safety_plant import SafetyAxisPlant, SafetyPlant
+
+_READ_COILS, _READ_INPUTS, _WRITE_COIL, _WRITE_COILS = 1, 2, 5, 15
+
+
+class Fault(IntFlag):
+    """Register 1 of the panel: what is broken."""
+
+    SILENT = 1
+    TRUNCATED = 2
+    WRONG_UNIT = 4
+    EXCEPTIONS = 8
+    CONTACTOR_WELDED = 16
+    FEEDBACK_STUCK = 32
+    """The contactor's feedback stays as it is."""
+    BRAKES_WORN = 64
+    """Brakes whose feedback says applied do not hold."""
+    BRAKES_STUCK = 128
+    """Brakes stay as they are, and their feedback with them."""
+
+
+class Follower:
+    """Something that follows its coil after a while, unless it is stuck."""
+
+    def __init__(self, on_delay_s: float, off_delay_s: float) -> None:
+        self._delays = {True: on_delay_s, False: off_delay_s}
+        self.on = False
+        self._until: float | None = None
+
+    def step(self, coil: bool, now: float) -> None:
+        """Move on to `now`."""
+        if coil == self.on:
+            self._until = None
+        elif self._until is None:
+            self._until = now + self._delays[coil]
+        if self._until is not None and now >= self._until:
+            self.on, self._until = coil, None
+
+
+class SafetyTwin:
+    """The device and what it switches; axes of the profile lie on `axes` of the board in turn."""
+
+    def __init__(
+        self,
+        profile: SafetyIoProfile,
+        plant: SafetyPlant,
+        axes: Sequence[BoardAxis] = (),
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._profile, self._board, self._clock = profile, axes, clock
+        self.line = Line(profile.unit)
+        self.fault = Fault(0)
+        self._pressed = False
+        self._coils = [False] * (1 + max(output.coil for _, output in profile.outputs()))
+        self._contactor = Follower(plant.contactor_close_s, plant.contactor_open_s)
+        self._brakes = [Follower(plant.brake_release_s, plant.brake_apply_s) for _ in profile.axes]
+        missing = len(profile.axes) - len(plant.axes)
+        self._switches = (*plant.axes, *[SafetyAxisPlant()] * missing)
+        self._fed_at = math.inf
+        self._watchdog_s = math.inf
+        self._stuck_feedback = False
+        self._inputs = [False] * (1 + max(point.input for _, point in profile.inputs()))
+        self.panel = Panel(profile.unit, {0: self._press, 1: self._break})
+        self.step()
+
+    # -- hands
+
+    def _press(self, pressed: int) -> None:
+        self._pressed = bool(pressed)
+        self.step()
+
+    def _break(self, bits: int) -> None:
+        self.fault = Fault(bits)
+        self.line.silent = Fault.SILENT in self.fault
+        self.line.truncated = Fault.TRUNCATED in self.fault
+        self.line.wrong_unit = Fault.WRONG_UNIT in self.fault
+        self._stuck_feedback = self._contactor.on
+
+    # -- physics
+
+    def step(self) -> None:
+        """Move contactor, brakes and inputs on to now, and tell the board."""
+        now, profile, fault = self._clock(), self._profile, self.fault
+        if now - self._fed_at > self._watchdog_s:
+            self._coils = [False] * len(self._coils)
+        closed = self._coils[profile.contactor.output.coil] and not self._pressed
+        if closed or Fault.CONTACTOR_WELDED not in fault:
+            self._contactor.step(closed, now)
+        for axis, brake in zip(profile.axes, self._brakes, strict=True):
+            if axis.brake is not None and Fault.BRAKES_STUCK not in fault:
+                brake.step(self._coils[axis.brake.output.coil], now)
+        power = self._contactor.on and not self._pressed
+        for place, (axis, brake) in zip(
+            self._board, zip(profile.axes, self._brakes, strict=True), strict=False
+        ):
+            place.power_allowed = power
+            if axis.brake is not None:
+                place.brake_released = brake.on or Fault.BRAKES_WORN in fault
+        self._read_switches()
+
+    def switch_off(self) -> None:
+        """Lose the supply: the contactor opens, the brakes hold."""
+        for i, place in enumerate(self._board[: len(self._profile.axes)]):
+            place.power_allowed = False
+            if self._profile.axes[i].brake is not None:
+                place.brake_released = False
+
+    def _read_switches(self) -> None:
+        profile = self._profile
+        self._show(profile.chain, not self._pressed)
+        stuck = Fault.FEEDBACK_STUCK in self.fault
+        self._show(
+            profile.contactor.feedback, self._stuck_feedback if stuck else self._contactor.on
+        )
+        for i, (axis, brake) in enumerate(zip(profile.axes, self._brakes, strict=True)):
+            if axis.brake is not None:
+                self._show(axis.brake.feedback, brake.on)
+            angle = math.degrees(self._board[i].state().motor_rad) if i < len(self._board) else 0.0
+            low, high = self._switches[i].limit_negative_deg, self._switches[i].limit_positive_deg
+            if axis.limit_negative is not None:
+                self._show(axis.limit_negative, low is not None and angle < low)
+            if axis.limit_positive is not None:
+                self._show(axis.limit_positive, high is not None and angle > high)
+
+    def _show(self, point: Input, on: bool) -> None:
+        self._inputs[point.input] = on != point.inverted
+
+    # -- the device
+
+    def units(self) -> list[SimDevice]:
+        """Return the units to serve: the I/O and its panel."""
+        watchdog = self._profile.watchdog
+        given = (watchdog.timeout_register, watchdog.trigger_register) if watchdog else ()
+        known = [register for register in given if register is not None] or [0]
+        registers = [0] * (1 + max(known) - min(known))
+        device = SimDevice(
+            self._profile.unit,
+            (
+                [SimData(0, values=[False] * len(self._coils), datatype=DataType.BITS)],
+                [SimData(0, values=[False] * len(self._inputs), datatype=DataType.BITS)],
+                [SimData(min(known), values=registers, datatype=DataType.REGISTERS)],
+                [SimData(0, values=[0], datatype=DataType.REGISTERS)],
+            ),
+            action=self._act,
+        )
+        return [device, self.panel.device()]
+
+    async def _act(
+        self,
+        code: int,
+        _start: int,
+        address: int,
+        _count: int,
+        registers: list[int],
+        values: list[int] | list[bool] | None,
+    ) -> ExcCodes | None:
+        if Fault.EXCEPTIONS in self.fault:
+            return ExcCodes.DEVICE_FAILURE
+        if code in (_WRITE_COIL, _WRITE_COILS):
+            if address + len(values or ()) > len(self._coils):
+                return ExcCodes.ILLEGAL_ADDRESS
+            for offset, value in enumerate(values or ()):
+                self._coils[address + offset] = bool(value)
+        elif values is not None:
+            self._set_register(address, [int(value) for value in values])
+        self.step()
+        if code == _READ_COILS:
+            _fill(registers, self._coils)
+        elif code == _READ_INPUTS:
+            _fill(registers, self._inputs)
+        return None
+
+    def _set_register(self, start: int, values: list[int]) -> None:
+        watchdog = self._profile.watchdog
+        for address, value in enumerate(values, start):
+            if watchdog is None:
+                return
+            if address == watchdog.timeout_register:
+                self._watchdog_s = value * watchdog.timeout_unit_s
+            if address == watchdog.trigger_register:
+                self._fed_at = self._clock()
+
+
+def _fill(registers: list[int], bits: list[bool]) -> None:
+    """Write bits into the words that the server answers from."""
+    for word in range((len(bits) + 15) // 16):
+        part = bits[16 * word : 16 * word + 16]
+        registers[word] = sum(1 << i for i, bit in enumerate(part) if bit)

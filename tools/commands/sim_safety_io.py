@@ -1,0 +1,91 @@
+"""`cdpr sim safety-io` and `cdpr sim panel`: a simulated safety I/O and the hands at it."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pymodbus.client import ModbusTcpClient
+from pymodbus.exceptions import ModbusException
+
+from profiles.safety_io import load_safety_io
+from sim_bus.modbus_tcp_server import serve_units
+from sim_bus.physics_board import PhysicsBoard
+from sim_bus.safety_plant import SafetyPlant
+from sim_bus.safety_twin import Fault, SafetyTwin
+from tools.errors import BadInputError, WorkFailedError
+
+_FAULTS = {fault.name.lower().replace("_", "-"): fault for fault in Fault if fault.name}
+_PANEL_UNIT = 247
+_PRESSED, _FAULT = 0, 1
+
+
+def add(app: typer.Typer) -> None:
+    """Add the commands to the group `sim`."""
+    app.command("safety-io")(safety_io)
+    app.command("panel")(panel)
+
+
+def safety_io(
+    io: Annotated[str, typer.Argument(help="Safety I/O profile: a name or a file.", metavar="IO")],
+    board: Annotated[
+        list[Path] | None,
+        typer.Option(help="Physics board whose axes are those of the profile; may be repeated."),
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port of 127.0.0.1; 0: any that is free.")
+    ] = None,
+    plant: Annotated[
+        Path | None, typer.Option(help="Plant file: delays and where the limit switches stand.")
+    ] = None,
+    exit_with_stdin: Annotated[
+        bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
+    ] = False,
+) -> None:
+    """Run a simulated safety I/O until Ctrl-C; tells on standard output when it is up."""
+    profile = load_safety_io(io)
+    truth = SafetyPlant() if plant is None else SafetyPlant.load_file(plant)
+    with ExitStack() as stack:
+        boards = [stack.enter_context(PhysicsBoard.attach(path)) for path in board or ()]
+        axes = [one.axis(i) for one in boards for i in range(one.axes)]
+        twin = SafetyTwin(profile, truth, axes)
+        stack.callback(twin.switch_off)
+        told = {"unit": profile.unit, "panel_unit": twin.panel.unit}
+        serve_units(
+            twin.units(),
+            twin.line,
+            twin.step,
+            profile.port if port is None else port,
+            told,
+            exit_with_stdin,
+        )
+
+
+def panel(
+    action: Annotated[
+        str, typer.Argument(help=f"press, release, mend, {', '.join(_FAULTS)}.", metavar="ACTION")
+    ],
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the simulated safety I/O.")],
+    unit: Annotated[int, typer.Option(help="The panel's unit, as `sim safety-io` tells.")] = 247,
+) -> None:
+    """Press the emergency stop of a simulated safety I/O, release it, break or mend something."""
+    if action in ("press", "release"):
+        register, value = _PRESSED, int(action == "press")
+    elif action in _FAULTS or action == "mend":
+        register, value = _FAULT, int(_FAULTS.get(action, 0))
+    else:
+        known = ", ".join(("press", "release", "mend", *_FAULTS))
+        raise BadInputError(f"action {action!r}; allowed: {known}")
+    client = ModbusTcpClient("127.0.0.1", port=port, timeout=2, retries=0)
+    try:
+        refused = client.write_register(register, value, device_id=unit).isError()
+    except ModbusException as error:
+        raise WorkFailedError(f"127.0.0.1:{port}: nobody answers at the panel: {error}") from None
+    finally:
+        client.close()  # type: ignore[no-untyped-call]
+    if refused:
+        raise WorkFailedError(
+            f"127.0.0.1:{port}: unit {unit} is no panel of a simulated safety I/O"
+        )
