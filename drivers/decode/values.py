@@ -168,13 +168,6 @@ def _watched(number: int) -> str:
     return f"node {number >> 16 & 0x7F} within {number & 0xFFFF} ms" if number else "nobody"
 
 
-_PARTS: dict[int, Callable[[int], str]] = {
-    0x1003: _error_field,
-    0x1016: _watched,
-    0x1018: lambda number: f"{number:08X}h",
-}
-
-
 def _device_type(number: int) -> str:
     return f"CiA {number & 0xFFFF} ({number:08X}h)" if number & 0xFFFF else f"{number:08X}h"
 
@@ -187,6 +180,11 @@ def _modes(number: int) -> str:
     return ", ".join(mode_name(mode) for mode in supported_modes(number)) or "none"
 
 
+_PARTS: dict[int, Callable[[int], str]] = {
+    0x1003: _error_field,
+    0x1016: _watched,
+    0x1018: lambda number: f"{number:08X}h",
+}
 _WORDS: dict[int, Callable[[int], str]] = {
     0x1000: _device_type,
     0x1001: lambda number: error_register(number & 0xFF),
