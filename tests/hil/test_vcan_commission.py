@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,14 +12,12 @@ from pathlib import Path
 
 import pytest
 
-import profiles
-
 pytestmark = pytest.mark.vcan
 
 WINCH = """
 name = "Winch on a virtual CAN, two milliseconds a cycle"
 motor = "MPP0923D"
-drive = "drive.toml"
+drive = "generic-cia402"
 cable = "dyneema-4.8mm"
 gear_ratio = 4.0
 drum_radius_m = 0.104
@@ -26,8 +25,9 @@ encoder_counts_per_turn = 8192
 node_id = 5
 sync_period_s = 0.002
 """
-DRIVES = Path(profiles.__file__).parent / "drives"
 CDPR = (sys.executable, "-m", "tools.cli")
+# memory that is given back comes in again page by page, and a page fault is dear in a guest kernel
+KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30)}
 
 
 @contextlib.contextmanager
@@ -48,11 +48,6 @@ def simulated_drive(winch: Path) -> Iterator[None]:
 def test_commissioning_over_socketcan(tmp_path: Path) -> None:
     winch = tmp_path / "winch.toml"
     winch.write_text(WINCH)
-    # a guest kernel with ten milliseconds a tick is heard late at times
-    patient = (DRIVES / "generic-cia402.toml").read_text()
-    patient = patient.replace("heartbeat_consumer_s = 0.5", "heartbeat_consumer_s = 10.0")
-    patient = patient.replace('"generic-cia402.eds"', f'"{DRIVES / "generic-cia402.eds"}"', 1)
-    (tmp_path / "drive.toml").write_text(patient)
     with simulated_drive(winch):
         out = tmp_path / "out"
         bus = "socketcan:vcan0?lockstep=true"
@@ -63,6 +58,7 @@ def test_commissioning_over_socketcan(tmp_path: Path) -> None:
             text=True,
             timeout=240,
             check=False,
+            env=os.environ | KEEP_MEMORY,
         )
         assert result.returncode == 0, result.stderr[-2000:]
     told = json.loads(result.stdout.splitlines()[-1])

@@ -19,7 +19,7 @@ INTERFACE = "vcan0"
 PACKAGES = ("user-mode-linux", "busybox-static")
 MEMORY_MB = 2048
 DOWNLOAD_TIMEOUT_S = 240
-RUN_TIMEOUT_S = 300
+RUN_TIMEOUT_S = 480
 _CONSOLE_TAIL_LINES = 30
 
 
