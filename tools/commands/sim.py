@@ -19,6 +19,7 @@ from sim_bus.drive import SimDrive
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
+from tools.commands import sim_safety_io
 from tools.errors import BadInputError
 
 app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
@@ -27,6 +28,7 @@ app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
     parent.add_typer(app, name="sim")
+    sim_safety_io.add(app)
 
 
 @app.callback()
