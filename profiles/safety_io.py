@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from profiles.errors import ProfileError
-from profiles.reader import Profile, closest, read_toml_model
+from profiles.reader import Profile, closest, read_toml, read_toml_model, validated
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 # what one Modbus request may read or write; the same for both keeps every image one request
@@ -53,6 +53,8 @@ class AxisPoints(Profile):
     """What belongs to one axis; `axis` is what messages call it, such as "winch 1"."""
 
     axis: str = Field(min_length=1)
+    node_id: int | None = Field(default=None, ge=1, le=127)
+    """Node id of the axis' drive, by which a session finds its brake."""
     brake: Brake | None = None
     limit_negative: Input | None = None
     """True while the axis stands on the switch."""
@@ -152,9 +154,10 @@ class SafetyIoProfile(Profile):
                     f"{key}.inverted: value True; allowed: False, for without its supply a "
                     "contactor has to open and a brake to hold"
                 )
-        names = [axis.axis for axis in self.axes]
-        if len(set(names)) < len(names):
-            raise ValueError(f"axes: axis {names}; allowed: each name once")
+        for key in ("axis", "node_id"):
+            told = [getattr(axis, key) for axis in self.axes if getattr(axis, key) is not None]
+            if len(set(told)) < len(told):
+                raise ValueError(f"axes: {key} {told}; allowed: each once")
         if self.trip_timeout_s < 2 * self.poll_period_s:
             raise ValueError(
                 f"trip_timeout_s: value {self.trip_timeout_s}; allowed: at least two poll periods "
@@ -186,8 +189,23 @@ def _once(points: list[tuple[str, int]], what: str) -> None:
 
 
 def load_safety_io(name: str | Path) -> SafetyIoProfile:
-    """Return a safety I/O by name of a shipped one or by path; raises ProfileError."""
-    return read_toml_model(find_shipped(SHIPPED, name), SafetyIoProfile)
+    """Return a safety I/O by name of a shipped one or by path; raises ProfileError.
+
+    NAME@HOST or NAME@HOST:PORT is the same at another place.
+    """
+    text, at, place = str(name).partition("@")
+    path = find_shipped(SHIPPED, text)
+    if not at:
+        return read_toml_model(path, SafetyIoProfile)
+    host, colon, port = place.rpartition(":") if ":" in place else (place, "", "")
+    moved = {"host": host} | ({"port": _number(port, path)} if colon else {})
+    return validated(path, read_toml(path) | moved, SafetyIoProfile)
+
+
+def _number(text: str, path: Path) -> int:
+    if not text.isdecimal():
+        raise ProfileError(path, "port", f"value {text!r}; allowed: a number from 1 to 65535")
+    return int(text)
 
 
 def find_shipped(folder: Path, name: str | Path) -> Path:

@@ -51,7 +51,8 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
-        _end(str(error), _exit_status(error))
+        notes = getattr(error, "__notes__", ())
+        _end("; ".join([str(error), *notes]), _exit_status(error))
     except SystemExit as end:
         # how the command line library passes an interrupt on
         if end.code == _INTERRUPTED:

@@ -32,6 +32,7 @@ from drivers.network import CanNetwork
 from profiles import Winch
 from tools.errors import BadInputError
 from tools.output import Output
+from tools.safety import SessionSafety, open_safety
 from tools.simulator import OwnSimulator
 
 _SPEED_SHARE = 0.2
@@ -51,6 +52,7 @@ class WinchSession:
         device: AxisGroup,
         executive: Executive,
         report: BootReport,
+        safety: SessionSafety | None = None,
     ) -> None:
         self.winch = winch
         self.url = url
@@ -58,6 +60,7 @@ class WinchSession:
         self.device = device
         self.executive = executive
         self.boot = report
+        self.safety = safety
         self._paused_watch: list[tuple[int, int]] = []
 
     @property
@@ -118,7 +121,8 @@ class WinchSession:
         try:
             self.executive.step(self.device.mode_confirmed, timeout, "the mode's confirmation")
         except TripError as error:
-            if self.device.alarm() or self.device.mode_confirmed():
+            tripped = self.device.alarm() or (self.safety is not None and self.safety.tripped)
+            if tripped or self.device.mode_confirmed():
                 raise
             raise self.device.unconfirmed_mode() from error
 
@@ -127,9 +131,13 @@ class WinchSession:
         self.network.resume_watch(self.winch.node_id, self._paused_watch)
         self._paused_watch = []
         self._lead_to(State.OPERATION_ENABLED)
+        if self.safety is not None:
+            self.safety.release_brakes(self.executive)
 
     def disable(self) -> None:
         """Switch the power stage off, so that computation may take its time."""
+        if self.safety is not None:
+            self.safety.apply_brakes(self.executive)
         self._lead_to(State.SWITCH_ON_DISABLED)
         self.device.stop_cycling()
         self._paused_watch = self.network.pause_watch(self.winch.node_id) or []
@@ -250,14 +258,17 @@ def open_winch(
     out: Output,
     plant: Path | None = None,
     truth_log: Path | None = None,
+    safety_io: str | None = None,
 ) -> Iterator[WinchSession]:
     """Boot the winch's drive on `url` and get ready to run its axis.
 
+    With `safety_io`, the profile of a safety I/O, there is power only while that allows it.
     Whatever ends the block, the drive's power stage is off afterwards. Raises what `open_network`
-    raises and the drivers' errors for a drive that does not boot.
+    and `open_safety` raise and the drivers' errors for a drive that does not boot.
     """
     with ExitStack() as stack:
         stop_requested = stack.enter_context(_stop_on_signals())
+        safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id]))
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
         limit = winch.motor.rated_torque_Nm
         settings = BootSettings(
@@ -282,14 +293,16 @@ def open_winch(
                 out.note(notice)
         limits = Limits(limit, _SPEED_SHARE * winch.motor.rated_speed_rad_s, _FOLLOWING_ERROR_RAD)
         supervisor = Supervisor(limits, device.n, device.period_s)
-        executive = Executive(device, supervisor, stop_requested)
+        watches = () if safety is None else (safety.io,)
+        executive = Executive(device, supervisor, stop_requested, watches)
         try:
-            yield WinchSession(winch, network.url, network, device, executive, report)
+            yield WinchSession(winch, network.url, network, device, executive, report, safety)
         except TripError as error:
+            reason = str(error) if safety is None else safety.cause(str(error))
             if device.faulted().any():
                 code = _fault_of(network, winch.node_id)
-                raise DriveFaultError(f"{error}: {code}") from error
-            raise
+                raise DriveFaultError(f"{reason}: {code}") from error
+            raise TripError(reason) from error
 
 
 def _heartbeat_s(winch: Winch) -> float:

@@ -19,6 +19,7 @@ from tools.commands.options import (
     IndexOption,
     JsonOption,
     PlantOption,
+    SafetyIoOption,
     WinchArgument,
     YesOption,
 )
@@ -56,6 +57,7 @@ def commission(
         bool, typer.Option("--quick", help="A rough look in a tenth of the time.")
     ] = False,
     index: IndexOption = "homing",
+    safety_io: SafetyIoOption = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -67,7 +69,7 @@ def commission(
     confirm_motion(url, yes, "commissioning turns the motor for about 20 minutes")
     plan = QUICK if quick else THOROUGH
     with keeping_raw_data(paths):
-        with open_winch(profile, url, out, plant, paths.truth) as session:
+        with open_winch(profile, url, out, plant, paths.truth, safety_io) as session:
             run = Commissioning(session, out, paths, plan).run(bandwidth_Hz, index)
         write(paths.run, to_json(run, indent=1))
         found = identify(profile, run["latency_s"], paths)

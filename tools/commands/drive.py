@@ -14,7 +14,15 @@ from cdpr_rt.tuning import design_pid
 from drivers.cia402 import fault_text, mode_name, state_of, supported_modes
 from drivers.errors import SdoError
 from profiles import load_winch
-from tools.commands.options import BusOption, JsonOption, PlantOption, WinchArgument, YesOption
+from tools.commands import drive_setup
+from tools.commands.options import (
+    BusOption,
+    JsonOption,
+    PlantOption,
+    SafetyIoOption,
+    WinchArgument,
+    YesOption,
+)
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.procedure import DEFAULT_BANDWIDTH_HZ
@@ -31,6 +39,7 @@ _JOG_SPEEDS, _JOG_LEAST_RAD_S = 4.0, 40.0
 
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
+    drive_setup.add(app)
     parent.add_typer(app, name="drive")
 
 
@@ -80,6 +89,7 @@ def enable(
     bus: BusOption,
     plant: PlantOption = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 2.0,
+    safety_io: SafetyIoOption = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -87,7 +97,7 @@ def enable(
     out = Output(as_json)
     profile, url = load_winch(winch), open_bus(bus)
     confirm_motion(url, yes, "the drive's power stage is switched on")
-    with open_winch(profile, url, out, plant) as session:
+    with open_winch(profile, url, out, plant, safety_io=safety_io) as session:
         session.set_mode(profile.drive.mode_torque)
         session.enable()
         out.say(f"{session.device.states()[0].label}, no torque")
@@ -120,6 +130,7 @@ def home(
     method: Annotated[
         int, typer.Option(help="Homing method of CiA 402: 33, 34, 37, 35, 1 to 14.")
     ] = 34,
+    safety_io: SafetyIoOption = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -132,7 +143,7 @@ def home(
             f"--method {method}: {profile.drive.name} has {', '.join(map(str, known))}"
         )
     confirm_motion(url, yes, "homing turns the motor by up to a turn")
-    with open_winch(profile, url, out, plant) as session:
+    with open_winch(profile, url, out, plant, safety_io=safety_io) as session:
         session.find_index(method)
         position = math.degrees(session.device.feedback.position_rad[0])
         out.say(f"homed by method {method}; the motor stands {position:.2f} deg from there")
@@ -148,6 +159,7 @@ def jog(
         float, typer.Option("--speed-deg-s", help="Motor speed; its sign is the direction.")
     ] = 22.0,
     seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 3.0,
+    safety_io: SafetyIoOption = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -160,7 +172,7 @@ def jog(
             f"--speed-deg-s {speed_deg_s:g}: allowed are up to {fastest:.0f} deg/s, not 0"
         )
     confirm_motion(url, yes, f"the motor turns at {speed_deg_s:g} deg/s for {seconds:g} s")
-    with open_winch(profile, url, out, plant) as session:
+    with open_winch(profile, url, out, plant, safety_io=safety_io) as session:
         session.set_mode(profile.drive.mode_torque)
         speed = math.radians(speed_deg_s)
         session.restrict(max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S), _JOG_ERROR_RAD)

@@ -38,3 +38,12 @@ IndexOption = Annotated[
         help="Find the encoder index by homing, or by the touch probe in ordinary motion.",
     ),
 ]
+
+SafetyIoOption = Annotated[
+    str | None,
+    typer.Option(
+        "--safety-io",
+        help="Safety I/O without which there is no power: a name, a file, NAME@HOST:PORT.",
+        metavar="IO",
+    ),
+]

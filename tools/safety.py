@@ -1,0 +1,91 @@
+"""A safety I/O beside a session on a bus: power only behind it, brakes with the power stage."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from cdpr_rt.executive import Executive
+from cdpr_rt.state_file import state_path
+from drivers.modbus.safety_io import SafetyIo
+from profiles.safety_io import load_safety_io
+from tools.output import Output
+
+# a brake that does not follow trips by itself, on the clock; bus time may be much faster
+_FOR_EVER_S = 1e5
+
+
+class SessionSafety:
+    """The safety I/O of a session and the axes whose brakes belong to it."""
+
+    def __init__(self, io: SafetyIo, node_ids: Iterable[int]) -> None:
+        self.io = io
+        nodes = set(node_ids)
+        self._braked = tuple(
+            axis.axis
+            for axis in io.profile.axes
+            if axis.brake is not None and axis.node_id in nodes
+        )
+
+    def release_brakes(self, executive: Executive) -> None:
+        """Release the brakes once the drives hold the axes; raises TripError, SafetyIoError."""
+        if self._braked:
+            self.io.release_brakes(*self._braked)
+            executive.step(lambda: self._are(True), _FOR_EVER_S, "the release of the brakes")
+
+    def apply_brakes(self, executive: Executive) -> None:
+        """Apply the brakes before the drives let go; raises TripError, SafetyIoError."""
+        if self._braked:
+            self.io.apply_brakes(*self._braked)
+            executive.step(lambda: self._are(False), _FOR_EVER_S, "the brakes to be applied")
+
+    @property
+    def tripped(self) -> str:
+        """Why the safety I/O ends the motion, or an empty text."""
+        return self.io.alarm() or self.io.stop_reason()
+
+    def cause(self, reason: str) -> str:
+        """Return why a motion ended, for which the bus gives `reason`.
+
+        An open chain takes the drives' power, so that their faults are heard before the next poll.
+        """
+        deadline = time.monotonic() + 3.0 * self.io.profile.poll_period_s
+        while not self.tripped and time.monotonic() < deadline:
+            time.sleep(self.io.profile.poll_period_s / 4.0)
+        tripped = self.tripped
+        return reason if not tripped or tripped in reason else f"{tripped} (besides: {reason})"
+
+    def _are(self, released: bool) -> bool:
+        told = self.io.state.brakes_released
+        return all(told[axis] == released for axis in self._braked)
+
+
+def trip_file(reference: str) -> Path:
+    """Return the file in which a safety I/O's trip is kept until it is acknowledged."""
+    return state_path("safety-io", Path(reference.partition("@")[0]).stem)
+
+
+def connect(reference: str) -> SafetyIo:
+    """Return the safety I/O that `reference` names, not opened yet; raises ProfileError."""
+    return SafetyIo(load_safety_io(reference), trip_file(reference))
+
+
+@contextmanager
+def open_safety(
+    reference: str | None, out: Output, node_ids: Iterable[int]
+) -> Iterator[SessionSafety | None]:
+    """Connect to a safety I/O and close its contactor, for as long as the block runs.
+
+    None where none is named. Raises ModbusError for an I/O that does not answer and SafetyIoError
+    where it forbids to energise, or did not open its contactor at the end.
+    """
+    if reference is None:
+        yield None
+        return
+    with connect(reference) as io:
+        io.energise()
+        session = SessionSafety(io, node_ids)
+        out.note(f"{io.name}: the chain is closed, the contactor is on")
+        yield session
