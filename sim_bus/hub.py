@@ -11,43 +11,20 @@ import socket
 import time
 from collections.abc import Callable, Sequence
 
-from sim_bus.bus_load import BusLoad, is_acyclic
+from sim_bus.bus_load import BusLoad
 from sim_bus.client import PACKET_BYTES, Client, listening_socket
 from sim_bus.clock import HOLD_S, BusClock, ClockMode
 from sim_bus.control import handle
 from sim_bus.errors import SimulatorError
-from sim_bus.frame import (
-    ERR_FLAG,
-    FRAME_BYTES,
-    HEADER,
-    SYNC_ID,
-    arbitration_key,
-    base_id,
-    bits_by_length,
-)
+from sim_bus.frame import FRAME_BYTES, HEADER, arbitration_key
 from sim_bus.node_protocol import LocalNode
+from sim_bus.route import Route
 
 _BURST = 64
 _EVENTS = 64
 _MOST_ROUTES = 4096
-_FINE_WAIT_S = 0.01
-
-
-class Route:
-    """What becomes of the frames with one identifier, worked out once."""
-
-    __slots__ = ("acyclic", "bits", "clients", "configures", "key", "longest", "nodes", "sync")
-
-    def __init__(self, can_id: int, clients: list[Client], nodes: list[LocalNode]) -> None:
-        self.key = arbitration_key(can_id)
-        self.bits = bits_by_length(can_id)
-        # error frames are no traffic: no length is right for them
-        self.longest = -1 if can_id & ERR_FLAG else 8
-        self.acyclic = is_acyclic(can_id)
-        self.configures = self.acyclic or base_id(can_id) == 0
-        self.sync = can_id == SYNC_ID
-        self.clients = tuple(clients)
-        self.nodes = tuple(nodes)
+FINE_WAIT_S = 0.01
+"""Below this a wait in whole milliseconds, as epoll has it, is too coarse."""
 
 
 class Hub:
@@ -84,7 +61,8 @@ class Hub:
         self._batch: list[tuple[int, int, int, Route, bytes, LocalNode]] = []
         self._poller = select.epoll()
         self._handlers: dict[int, Callable[[], None]] = {}
-        self._stopping = False
+        self.stopping = False
+        """Whether the loop is to end."""
         self._failure: str | None = None
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._listener: socket.socket | None = None
@@ -133,13 +111,13 @@ class Hub:
         self._routes.clear()
         if client.essential:
             self._failure = reason
-            self._stopping = True
+            self.stopping = True
 
     # -- the loop
 
     def stop(self) -> None:
         """End `run` soon; may be called from a signal handler or another thread."""
-        self._stopping = True
+        self.stopping = True
         os.eventfd_write(self._wake, 1)
 
     def run(self) -> None:
@@ -148,8 +126,12 @@ class Hub:
         Raises:
             SimulatorError: an essential client has gone.
         """
-        while not self._stopping:
+        while not self.stopping:
             self.turn(self.wait_s())
+        self.check()
+
+    def check(self) -> None:
+        """Raise SimulatorError when an essential client has gone."""
         if self._failure is not None:
             raise SimulatorError(self._failure)
 
@@ -159,8 +141,7 @@ class Hub:
 
     def turn(self, wait_s: float | None) -> None:
         """Wait up to `wait_s` for something to do (None: for ever), then do it."""
-        if wait_s and wait_s < _FINE_WAIT_S:
-            # epoll counts whole milliseconds, which is too coarse for timers of the bus
+        if wait_s and wait_s < FINE_WAIT_S:
             select.select([self._poller], [], [], wait_s)
             wait_s = 0.0
         events = self._poller.poll(wait_s, _EVENTS)

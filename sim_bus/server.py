@@ -8,9 +8,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from typing import Any
+from typing import Any, Protocol
 
 from sim_bus.client import raw_can_socket
 from sim_bus.clock import ClockMode
@@ -21,6 +21,19 @@ from sim_bus.membership import Gateway
 from sim_bus.node_protocol import LocalNode
 
 _PRIORITY = 40
+
+
+class Loop(Protocol):
+    """What runs one bus or several in one thread."""
+
+    def run(self) -> None:
+        """Carry frames until `stop` is called."""
+
+    def stop(self) -> None:
+        """End `run` soon; may be called from a signal handler."""
+
+    def watch(self, descriptor: int, handler: Callable[[], None]) -> None:
+        """Call `handler` whenever `descriptor` is readable."""
 
 
 def serve(
@@ -50,47 +63,62 @@ def serve(
         BusSetupError: the bus cannot be opened, or a gateway to it.
         SimulatorError: a real interface went away while running.
     """
+    with ExitStack() as stack:
+        hub = open_hub(stack, nodes, bus, mode=mode, bitrate=bitrate, truth_log=truth_log)
+        gateways = _open_gateways(stack, hub, slcan, socketcand_port)
+        ready = {"bus": bus, "pid": os.getpid(), **gateways, **status(hub)}
+        run_until_stopped(hub, ready, mode, until_stdin_ends)
+
+
+def open_hub(
+    stack: ExitStack,
+    nodes: Sequence[LocalNode],
+    bus: str,
+    *,
+    mode: ClockMode,
+    bitrate: int,
+    truth_log: str | None = None,
+) -> Hub:
+    """Return the hub of `bus`, closed with `stack`; raises BusSetupError."""
     interface, _, channel = bus.partition(":")
-    hub = Hub(
-        nodes,
-        mode=mode,
-        bitrate=bitrate,
-        name=channel if interface == "simbus" else bus,
-        truth_log=truth_log,
-    )
-    try:
-        if interface == "simbus":
-            hub.listen()
-        elif interface == "socketcan":
-            hub.attach(raw_can_socket(channel), essential=True)
+    name = channel if interface == "simbus" else bus
+    hub = Hub(nodes, mode=mode, bitrate=bitrate, name=name, truth_log=truth_log)
+    stack.callback(hub.close)
+    if interface == "simbus":
+        hub.listen()
+    elif interface == "socketcan":
+        hub.attach(raw_can_socket(channel), essential=True)
+    else:
+        raise BusSetupError(f"bus {bus!r}: simulated drives run on simbus:NAME or socketcan:IFACE")
+    return hub
+
+
+def run_until_stopped(
+    loop: Loop, ready: dict[str, Any], mode: ClockMode, until_stdin_ends: bool
+) -> None:
+    """Tell on standard output what is `ready`, and run `loop` until SIGTERM or SIGINT.
+
+    Raises BusSetupError when standard input cannot be watched, and what the loop raises.
+    """
+    with _stopped_by_signals(loop):
+        if until_stdin_ends:
+            _stop_with_stdin(loop)
+        print(json.dumps({"ready": ready}), flush=True)
+        # what lives from here on is never garbage, so it need not be searched
+        gc.collect()
+        gc.freeze()
+        if mode is ClockMode.LOCKSTEP:
+            _let_sender_finish()
         else:
-            raise BusSetupError(
-                f"bus {bus!r}: simulated drives run on simbus:NAME or socketcan:IFACE"
-            )
-        with ExitStack() as stack:
-            gateways = _open_gateways(stack, interface, hub, slcan, socketcand_port)
-            stack.enter_context(_stopped_by_signals(hub))
-            if until_stdin_ends:
-                _stop_with_stdin(hub)
-            ready = {"ready": {"bus": bus, "pid": os.getpid(), **gateways, **status(hub)}}
-            print(json.dumps(ready), flush=True)
-            # what lives from here on is never garbage, so it need not be searched
-            gc.collect()
-            gc.freeze()
-            if mode is ClockMode.LOCKSTEP:
-                _let_sender_finish()
-            else:
-                _answer_at_once()
-            hub.run()
-    finally:
-        hub.close()
+            _answer_at_once()
+        loop.run()
 
 
 def _open_gateways(
-    stack: ExitStack, interface: str, hub: Hub, slcan: bool, socketcand_port: int | None
+    stack: ExitStack, hub: Hub, slcan: bool, socketcand_port: int | None
 ) -> dict[str, Any]:
     """Start what else the bus can be reached by, until `stack` ends; return how to reach it."""
-    if interface != "simbus" and (slcan or socketcand_port is not None):
+    if ":" in hub.name and (slcan or socketcand_port is not None):
         raise BusSetupError(f"bus {hub.name!r}: --slcan and --socketcand are for simbus:NAME only")
     told: dict[str, Any] = {}
     if slcan:
@@ -122,12 +150,12 @@ def _answer_at_once() -> None:
 
 
 @contextmanager
-def _stopped_by_signals(hub: Hub) -> Iterator[None]:
+def _stopped_by_signals(loop: Loop) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     previous = {
-        number: signal.signal(number, lambda *_: hub.stop())
+        number: signal.signal(number, lambda *_: loop.stop())
         for number in (signal.SIGTERM, signal.SIGINT)
     }
     try:
@@ -137,14 +165,14 @@ def _stopped_by_signals(hub: Hub) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _stop_with_stdin(hub: Hub) -> None:
+def _stop_with_stdin(loop: Loop) -> None:
     descriptor = sys.stdin.fileno()
 
     def read() -> None:
         if not os.read(descriptor, 4096):
-            hub.stop()
+            loop.stop()
 
     try:
-        hub.watch(descriptor, read)
+        loop.watch(descriptor, read)
     except PermissionError:
         raise BusSetupError("standard input must be a pipe to be watched for its end") from None

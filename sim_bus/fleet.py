@@ -1,0 +1,102 @@
+"""Several buses of one robot in one process and one thread."""
+
+from __future__ import annotations
+
+import os
+import select
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from sim_bus.clock import ClockMode
+from sim_bus.control import status
+from sim_bus.hub import FINE_WAIT_S, Hub
+from sim_bus.node_protocol import LocalNode
+from sim_bus.server import open_hub, run_until_stopped
+
+
+@dataclass(frozen=True)
+class FleetBus:
+    """One bus and what hangs on it; `url` is simbus:NAME or socketcan:IFACE."""
+
+    name: str
+    url: str
+    bitrate_bit_s: int
+    nodes: Sequence[LocalNode]
+
+
+class Fleet:
+    """The loops of several hubs, each of which keeps its own bus time."""
+
+    def __init__(self, hubs: Sequence[Hub]) -> None:
+        self._hubs = {hub.fileno(): hub for hub in hubs}
+        self._first = hubs[0]
+        self._poller = select.epoll()
+        for descriptor in self._hubs:
+            self._poller.register(descriptor, select.EPOLLIN)
+
+    def watch(self, descriptor: int, handler: Callable[[], None]) -> None:
+        """Call `handler` whenever `descriptor` is readable."""
+        self._first.watch(descriptor, handler)
+
+    def stop(self) -> None:
+        """End `run` soon; may be called from a signal handler or another thread."""
+        self._first.stop()
+
+    def run(self) -> None:
+        """Carry frames on all buses until `stop` is called.
+
+        Raises SimulatorError when one of them has gone.
+        """
+        hubs = self._hubs
+        while not any(hub.stopping for hub in hubs.values()):
+            self._turn()
+        for hub in hubs.values():
+            hub.check()
+
+    def _turn(self) -> None:
+        """Let those hubs have their turn which have frames, or whose wait is over."""
+        waits = {hub: hub.wait_s() for hub in self._hubs.values()}
+        least = min((wait for wait in waits.values() if wait is not None), default=None)
+        if least and least < FINE_WAIT_S:
+            select.select([self._poller], [], [], least)
+        ready = self._poller.poll(0.0 if least is not None and least < FINE_WAIT_S else least)
+        for descriptor, _ in ready:
+            hub = self._hubs[descriptor]
+            hub.turn(0.0)
+            waits.pop(hub)
+        # with frames on one bus no time has passed on the others
+        over = 0.0 if ready else least
+        for hub, wait in waits.items():
+            if wait is not None and over is not None and wait <= over:
+                hub.turn(0.0)
+
+    def close(self) -> None:
+        """Free what the loop itself holds."""
+        self._poller.close()
+
+
+def serve_fleet(
+    robot: str,
+    buses: Sequence[FleetBus],
+    *,
+    mode: ClockMode = ClockMode.LOCKSTEP,
+    until_stdin_ends: bool = False,
+) -> None:
+    """Run the nodes of all `buses` until SIGTERM or SIGINT, then close them.
+
+    When all is up, one line of JSON goes to standard output: {"ready": {"robot", "pid", "buses":
+    {name: {"bus", and the bus status}}}}. With `until_stdin_ends` the end of standard input stops
+    it too. Raises BusSetupError for a bus that cannot be opened, SimulatorError for a real
+    interface that went away.
+    """
+    with ExitStack() as stack:
+        hubs = {
+            bus.name: open_hub(stack, bus.nodes, bus.url, mode=mode, bitrate=bus.bitrate_bit_s)
+            for bus in buses
+        }
+        fleet = Fleet(list(hubs.values()))
+        stack.callback(fleet.close)
+        told = {bus.name: {"bus": bus.url, **status(hubs[bus.name])} for bus in buses}
+        ready = {"robot": robot, "pid": os.getpid(), "buses": told}
+        run_until_stopped(fleet, ready, mode, until_stdin_ends)
