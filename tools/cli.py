@@ -23,7 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-_COMMANDS = ("bench", "bus", "cogging", "commission", "doctor", "drive", "profiles", "sim")
+_COMMANDS = ("bench", "bus", "cogging", "commission", "doctor", "drive", "io", "profiles", "sim")
 _INTERRUPTED = 130
 
 

@@ -1,0 +1,193 @@
+"""`cdpr io`: look at a safety I/O, try its lamps and brakes by hand, acknowledge a trip."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+import typer
+
+from cdpr_rt.state_file import read_state
+from drivers.modbus.io_link import IoLink
+from drivers.modbus.io_rules import IoState
+from profiles.safety_io import Brake, load_safety_io
+from tools.commands.options import JsonOption, YesOption
+from tools.errors import BadInputError, WorkFailedError
+from tools.output import Output
+from tools.safety import connect, trip_file
+
+app = typer.Typer(help="The safety I/O beside the drives.", no_args_is_help=True)
+
+_IoArgument = Annotated[
+    str, typer.Argument(help="Profile: a name, a file, NAME@HOST:PORT.", metavar="IO")
+]
+_Seconds = Annotated[float, typer.Option(min=0.1, max=86400.0, help="How long; Ctrl-C ends it.")]
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the command group."""
+    parent.add_typer(app, name="io")
+
+
+@app.command()
+def show(io: _IoArgument, as_json: JsonOption = False) -> None:
+    """Say what every point reads; changes nothing."""
+    out = Output(as_json)
+    with _link(io) as link:
+        state = link.state()
+    kept = read_state(trip_file(io))
+    for line in _lines(state):
+        out.say(line)
+    if kept is not None:
+        out.say(f"tripped on {kept.get('date')}: {kept.get('reason')} (cdpr io ack {io})")
+    out.result({"ok": True, **_told(state), "trip": kept})
+
+
+@app.command()
+def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = False) -> None:
+    """Say what changes, as it changes; changes nothing."""
+    out = Output(as_json)
+    deadline = time.monotonic() + seconds
+    before: list[str] = []
+    with _link(io) as link:
+        try:
+            while time.monotonic() < deadline:
+                lines = _lines(state := link.state())
+                for line in lines:
+                    if line not in before:
+                        out.say(f"{time.strftime('%H:%M:%S')}  {line}")
+                before = lines
+                time.sleep(link.profile.poll_period_s)
+        except KeyboardInterrupt:
+            out.note("stopped on request")
+    out.result({"ok": True, **_told(state)})
+
+
+@app.command()
+def light(
+    io: _IoArgument,
+    colour: Annotated[str, typer.Argument(help="red, yellow, green, blue or white.")],
+    on: Annotated[bool, typer.Option("--on/--off")] = True,
+    as_json: JsonOption = False,
+) -> None:
+    """Switch one colour of the stack light."""
+    out = Output(as_json)
+    with _link(io) as link:
+        lights = dict(link.profile.lights.items())
+        wanted = {str(known): output for known, output in lights.items()}.get(colour)
+        if wanted is None:
+            raise BadInputError(f"colour {colour!r}; {io} has {', '.join(lights) or 'no lights'}")
+        link.write(wanted.coil, on != wanted.inverted)
+        state = link.state()
+    if state.lights[colour] != on:
+        raise WorkFailedError(f"{colour} was set, but output {wanted.coil} does not read so")
+    out.say(f"{colour} is {'on' if on else 'off'}")
+    out.result({"ok": True, "colour": colour, "on": on})
+
+
+@app.command()
+def brake(
+    io: _IoArgument,
+    axis: Annotated[str, typer.Argument(help="Axis, as the profile calls it.")],
+    seconds: _Seconds = 5.0,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Release a brake by hand for a while, then apply it; says whether its feedback follows."""
+    out = Output(as_json)
+    with _link(io) as link:
+        brakes = {a.axis: a.brake for a in link.profile.axes if a.brake is not None}
+        one = brakes.get(axis)
+        if one is None:
+            known = ", ".join(repr(name) for name in brakes) or "none"
+            raise BadInputError(f"axis {axis!r} has no brake in {io}; with one: {known}")
+        _confirm_release(axis, yes)
+        link.set_watchdog()
+        try:
+            _hold(link, axis, one, True, one.timeout_s)
+            out.say(f"the brake of {axis} is released")
+            _hold(link, axis, one, True, seconds)
+        except KeyboardInterrupt:
+            out.note("stopped on request")
+        finally:
+            _hold(link, axis, one, False, one.timeout_s)
+        out.say(f"the brake of {axis} is applied")
+    out.result({"ok": True, "axis": axis})
+
+
+@app.command()
+def ack(io: _IoArgument, as_json: JsonOption = False) -> None:
+    """Acknowledge a trip whose cause is gone; nothing is energised by it."""
+    out = Output(as_json)
+    kept = read_state(trip_file(io))
+    with connect(io) as safety:
+        safety.acknowledge()
+    out.say("no trip was kept" if kept is None else f"acknowledged: {kept.get('reason')}")
+    out.result({"ok": True, "acknowledged": kept})
+
+
+@contextmanager
+def _link(io: str) -> Iterator[IoLink]:
+    link = IoLink(load_safety_io(io))
+    try:
+        yield link
+    finally:
+        link.close()
+
+
+def _confirm_release(axis: str, yes: bool) -> None:
+    if yes:
+        return
+    try:
+        agreed = typer.confirm(f"{axis} is held by nothing but its drive then. Go on?", err=True)
+    except typer.Abort:  # nobody there to answer
+        agreed = False
+    if not agreed:
+        raise BadInputError("not confirmed (--yes does it beforehand); the brake stays applied")
+
+
+def _hold(link: IoLink, axis: str, brake: Brake, released: bool, seconds: float) -> None:
+    """Keep a brake's output for a while; raises WorkFailedError unless its feedback follows."""
+    link.write(brake.output.coil, released)
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        link.feed_watchdog()
+        time.sleep(link.profile.poll_period_s)
+    if link.state().brakes_released[axis] != released:
+        wanted = "released" if released else "applied"
+        raise WorkFailedError(
+            f"the brake of {axis} is not {wanted} {brake.timeout_s:g} s after output "
+            f"{brake.output.coil} was set to {int(released)} (input {brake.feedback.input})"
+        )
+
+
+def _told(state: IoState) -> dict[str, Any]:
+    return {
+        "chain_ok": state.chain_ok,
+        "contactor_asked": state.contactor_asked,
+        "contactor_closed": state.contactor_closed,
+        "brakes_asked": state.brakes_asked,
+        "brakes_released": state.brakes_released,
+        "limits": list(state.limits),
+        "lights": state.lights,
+    }
+
+
+def _lines(state: IoState) -> list[str]:
+    def follows(asked: bool, is_so: bool) -> str:
+        return "" if asked == is_so else "  <- does not follow its output"
+
+    closed = "closed" if state.contactor_closed else "open"
+    lines = [
+        f"emergency-stop chain  {'closed (ok)' if state.chain_ok else 'OPEN'}",
+        f"contactor             {closed}{follows(state.contactor_asked, state.contactor_closed)}",
+    ]
+    for axis, released in state.brakes_released.items():
+        text = "released" if released else "applied"
+        lines.append(f"brake of {axis:13}{text}{follows(state.brakes_asked[axis], released)}")
+    lines += list(state.limits) or ["limit switches        none reached"]
+    lit = [colour for colour, on in state.lights.items() if on]
+    lines.append(f"stack light           {', '.join(lit) or 'dark'}")
+    return lines
