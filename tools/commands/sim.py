@@ -1,9 +1,10 @@
-"""`cdpr sim`: simulated drives on a bus of their own or on a real one."""
+"""`cdpr sim`: simulated drives on buses of their own or on real ones."""
 
 from __future__ import annotations
 
 import dataclasses
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ import typer
 
 from drivers.bus import BusUrl
 from drivers.errors import BusError
-from profiles import load_winch
+from profiles import Robot, load_machine
 from sim_bus.canopen.lss import UNCONFIGURED
 from sim_bus.canopen.store import StoreError
 from sim_bus.clock import ClockMode
@@ -19,7 +20,7 @@ from sim_bus.drive import SimDrive
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
-from tools.commands import sim_safety_io
+from tools.commands import sim_robot, sim_safety_io
 from tools.errors import BadInputError
 
 app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
@@ -38,8 +39,18 @@ def _group() -> None:
 
 @app.command()
 def up(
-    winch: Annotated[str, typer.Argument(help="Winch profile: a name or the path of a file.")],
-    bus: Annotated[str, typer.Option(help="simbus:NAME, opened here, or socketcan:IFACE.")],
+    machine: Annotated[
+        str,
+        typer.Argument(
+            help="Winch or robot profile: a name or the path of a file.", metavar="WINCH|ROBOT"
+        ),
+    ],
+    bus: Annotated[
+        list[str],
+        typer.Option(
+            help="simbus:NAME, opened here, or socketcan:IFACE; for a robot also BUS=URL, each bus."
+        ),
+    ],
     plant: Annotated[
         Path | None, typer.Option(help="Plant file: the truth about motor and drive.")
     ] = None,
@@ -80,9 +91,18 @@ def up(
     ] = False,
 ) -> None:
     """Run simulated drives until Ctrl-C; tells on standard output when they are up."""
-    profile = load_winch(winch)
-    url = _bus(bus)
+    profile = load_machine(machine)
     truth = Plant() if plant is None else Plant.load_file(plant)
+    mode = ClockMode.LOCKSTEP if lockstep else ClockMode.PACED
+    if isinstance(profile, Robot):
+        if nodes > 1 or truth_log or unconfigured or slcan or socketcand is not None:
+            raise BadInputError(
+                "--nodes, --truth-log, --unconfigured, --slcan and --socketcand: for a winch only"
+            )
+        stores = partial(_store_file, store)
+        sim_robot.up(profile, bus, truth, mode, stores, board, exit_with_stdin)
+        return
+    url = _bus(bus)
     if truth_log is not None and nodes > 1:
         raise BadInputError("--truth-log: one drive only; leave out --nodes")
     first = profile.node_id
@@ -110,7 +130,7 @@ def up(
         serve(
             drives,
             str(url),
-            mode=ClockMode.LOCKSTEP if lockstep else ClockMode.PACED,
+            mode=mode,
             bitrate=profile.bitrate_bit_s,
             truth_log=str(truth_log) if truth_log else None,
             until_stdin_ends=exit_with_stdin,
@@ -130,7 +150,10 @@ def _store_file(folder: Path | None, serial: int) -> Path | None:
     return folder / f"drive-{serial}.json"
 
 
-def _bus(text: str) -> BusUrl:
+def _bus(texts: list[str]) -> BusUrl:
+    text = texts[0]
+    if len(texts) > 1:
+        raise BadInputError(f"--bus {texts[1]}: a winch has one bus, which is {text} already")
     try:
         url = BusUrl.parse(text)
     except BusError as error:
