@@ -7,7 +7,13 @@ from typing import Any, NamedTuple
 
 from sim_bus import rotor, servo
 from sim_bus.jit import jit
-from sim_bus.motor_state import CONTROL_STEP_S, MotorArray, MotorRatings, build_motor
+from sim_bus.motor_state import (
+    CONTROL_STEP_S,
+    MotorArray,
+    MotorRatings,
+    Transmission,
+    build_motor,
+)
 from sim_bus.plant import Plant
 
 
@@ -26,7 +32,7 @@ class Sample(NamedTuple):
     """True mechanical angle over all turns, and below the other true figures."""
     velocity_rad_s: float
     motor_Nm: float
-    """inertia × acceleration = motor − cogging − friction."""
+    """inertia × acceleration = motor − cogging − friction + pull of the cable."""
     cogging_Nm: float
     friction_Nm: float
     rise_K: float
@@ -74,10 +80,15 @@ def run(
 class Motor:
     """A motor outside any drive: its power stage obeys at once, nobody watches its faults."""
 
-    def __init__(self, plant: Plant, ratings: MotorRatings | None = None) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        ratings: MotorRatings | None = None,
+        transmission: Transmission | None = None,
+    ) -> None:
         self.ratings = ratings or MotorRatings()
         self.plant = plant
-        self.record: MotorArray = build_motor(plant, self.ratings)
+        self.record: MotorArray = build_motor(plant, self.ratings, transmission)
         self.time_s = 0.0
 
     def step(self, dt_s: float, kind: int, target: float) -> Sample:

@@ -15,6 +15,8 @@ CONTROL_STEP_S = 5e-5
 """Period of the inner loops, and the longest step of the physics."""
 DELAY_SLOTS = 256
 
+LOAD_KINDS = ("none", "hung_mass", "fixed_anchor")
+"""Names of `load_kind`: their places here are its values."""
 _F8 = np.float64
 _PHYSICS = [
     # parameters
@@ -48,6 +50,26 @@ _PHYSICS = [
     ("rise", _F8),  # K above ambient
     ("cogging_Nm", _F8),  # what the last step saw
     ("friction_Nm", _F8),
+]
+_CABLE = [
+    # parameters
+    ("load_kind", np.int64),
+    ("cable_gain", _F8),  # m/rad, cable paid out per motor angle, signed
+    ("cable_stiffness", _F8),  # N/m
+    ("cable_damping", _F8),  # N s/m
+    ("cable_start", _F8),  # m, elongation at power-up, negative where slack
+    ("angle_start", _F8),  # rad, motor angle at power-up
+    ("floor", _F8),  # m, position of a mass that stands on it
+    ("gravity", _F8),
+    ("winch_friction", _F8),  # Nm
+    ("friction_share", _F8),  # Nm per N
+    ("brake", _F8),  # Nm; 0 released
+    # state
+    ("mass", _F8),  # kg
+    ("mass_position", _F8),  # m, downward from power-up
+    ("mass_velocity", _F8),  # m/s
+    ("tension", _F8),  # N
+    ("load_friction", _F8),  # Nm, level of the dry friction that the load adds
 ]
 _ENCODER = [
     ("counts_per_rad", _F8),
@@ -111,7 +133,7 @@ _SERVO = [
     ("standing_since", _F8),
     ("following_since", _F8),
 ]
-MOTOR_DTYPE = np.dtype([*_PHYSICS, *_ENCODER, *_SERVO])
+MOTOR_DTYPE = np.dtype([*_PHYSICS, *_CABLE, *_ENCODER, *_SERVO])
 
 MotorArray = NDArray[np.void]
 
@@ -128,11 +150,24 @@ class MotorRatings:
     rated_speed_rad_s: float = 4947 * 2.0 * math.pi / 60.0
 
 
-def build_motor(plant: Plant, ratings: MotorRatings) -> MotorArray:
+@dataclass(frozen=True)
+class Transmission:
+    """What leads from the motor to the cable, by the winch's profile."""
+
+    cable_m_per_rad: float = 0.104 / 4.0
+    """Cable paid out per radian of the motor, signed."""
+    cable_stiffness_N: float = 40_000.0
+    """Axial stiffness EA of the cable."""
+
+
+def build_motor(
+    plant: Plant, ratings: MotorRatings, transmission: Transmission | None = None
+) -> MotorArray:
     """Return the record of a motor at rest, its power off; shape (1,), dtype MOTOR_DTYPE."""
     motor: MotorArray = np.zeros(1, MOTOR_DTYPE)
     m: Any = motor[0]
     _set_physics(m, plant)
+    _set_cable(m, plant, transmission or Transmission())
     _set_cogging(m, plant)
     _set_encoder(m, plant)
     _set_servo(m, plant, ratings)
@@ -159,6 +194,31 @@ def _set_physics(m: Any, plant: Plant) -> None:
     # A stiff bristle on a light rotor rings; a fifth of a radian a step resolves it.
     ringing = math.sqrt(friction.sigma0_Nm_rad / plant.inertia_kg_m2) * CONTROL_STEP_S
     m["steps_per_control"] = min(20, max(1, math.ceil(ringing / 0.2)))
+
+
+def _set_cable(m: Any, plant: Plant, transmission: Transmission) -> None:
+    load = plant.load
+    m["load_kind"] = LOAD_KINDS.index(load.kind)
+    if load.kind == "none":
+        return
+    gain = transmission.cable_m_per_rad * (1.0 + load.drum_radius_error)
+    stiffness = (load.cable_stiffness_N or transmission.cable_stiffness_N) / load.cable_m
+    if load.kind == "fixed_anchor" and load.anchor_stiffness_N_m is not None:
+        stiffness = 1.0 / (1.0 / stiffness + 1.0 / load.anchor_stiffness_N_m)
+    hangs = load.kind == "hung_mass" and load.height_m > 0.0
+    tension = load.mass_kg * load.gravity_m_s2 if hangs else load.pretension_N
+    m["cable_gain"] = gain
+    m["cable_stiffness"] = stiffness
+    m["cable_damping"] = load.cable_damping_s * stiffness
+    m["cable_start"] = tension / stiffness - load.slack_m
+    m["angle_start"] = m["angle"]
+    m["floor"] = load.height_m
+    m["gravity"] = load.gravity_m_s2
+    m["winch_friction"] = load.winch_friction_Nm
+    m["friction_share"] = load.friction_share * abs(gain)
+    m["mass"] = load.mass_kg
+    m["tension"] = tension
+    m["load_friction"] = load.winch_friction_Nm + float(m["friction_share"]) * tension
 
 
 def _set_cogging(m: Any, plant: Plant) -> None:

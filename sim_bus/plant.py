@@ -22,6 +22,8 @@ class MotorPlant(Profile):
     inertia_kg_m2: Annotated[float, Field(ge=1e-6, le=10.0)] = 1.130e-4
     initial_angle_deg: Annotated[float, Field(ge=-36000.0, le=36000.0)] = 0.0
     """Mechanical angle at power-up; the encoder counts from zero there."""
+    brake_torque_Nm: Annotated[float, Field(gt=0.0, le=1000.0)] = 8.0
+    """What the holding brake holds; it is released unless a physics board says otherwise."""
 
 
 class CoggingTerm(Profile):
@@ -110,10 +112,42 @@ class ThermalPlant(Profile):
 
 
 class LoadPlant(Profile):
-    """What the motor turns."""
+    """What the motor turns, and what hangs on the cable."""
 
     inertia_kg_m2: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Inertia of the load on the motor side, rigidly coupled."""
+    kind: Literal["none", "hung_mass", "fixed_anchor"] = "none"
+    """No cable; a mass that stands on the floor or hangs; the cable's end made fast."""
+    mass_kg: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
+    height_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """How far above the floor the mass hangs at power-up; 0: it stands there."""
+    slack_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Slack of the cable at power-up."""
+    pretension_N: Annotated[float, Field(ge=0.0, le=1e5)] = 0.0
+    """Tension of a fixed cable at power-up."""
+    cable_m: Annotated[float, Field(ge=0.01, le=1000.0)] = 3.0
+    """Free length of the cable at power-up; its stiffness stays that of this length."""
+    cable_stiffness_N: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
+    """Axial stiffness EA; that of the cable's profile where left out."""
+    cable_damping_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.002
+    """Damping of the cable over its stiffness."""
+    anchor_stiffness_N_m: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
+    """Of a spring between cable and fixed anchor."""
+    drum_radius_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    """Relative: true drum radius = that of the winch's profile × (1 + this)."""
+    winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Dry friction of gear and drum without tension, on the motor side."""
+    friction_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.05
+    """Further dry friction, as a share of the torque that the tension exerts."""
+    gravity_m_s2: Annotated[float, Field(ge=0.0, le=30.0)] = 9.80665
+
+    @model_validator(mode="after")
+    def _slack_or_taut(self) -> Self:
+        if self.slack_m > 0.0 and (self.pretension_N > 0.0 or self.height_m > 0.0):
+            raise ValueError(
+                f"slack_m = {self.slack_m} must be 0 where pretension_N or height_m is given"
+            )
+        return self
 
 
 class LimitsPlant(Profile):

@@ -54,19 +54,65 @@ def step_rotor(m: Any, h: float, demand: float, energised: bool) -> None:
     side = 1.0 + 0.5 * m.asymmetry * math.copysign(1.0, w if w != 0.0 else z)
     ratio = w / m.stribeck
     level = m.coulomb + (m.breakaway - m.coulomb) * math.exp(-ratio * ratio)
-    g = max(1e-9, warm * side * level)
+    g = max(1e-9, warm * side * level + m.load_friction)
     viscous = warm * m.viscous
     s0, s1, inertia = m.sigma0, m.sigma1, m.inertia
     aa = 1.0 + h * s0 * abs(w) / g
     A = inertia / h + s0 * h / aa + s1 / aa + viscous
     B = inertia / h * w + torque - s0 * z / aa - s1 * (z / aa - z) / h
-    w = B / A
+    w = B / A if m.load_kind == 0 and m.brake == 0.0 else turn_loaded(m, h, A, B)
     z_new = (z + h * w) / aa
     m.friction_Nm = s0 * z_new + s1 * (z_new - z) / h + viscous * w
     m.cogging_Nm = cogging + m.torque_gain * offset
     m.bristle = z_new
     m.velocity = w
     m.angle += h * w
+
+
+@jit
+def braked(m: Any, A: float, B: float) -> float:
+    """Return the velocity w of A·w = B under the dry friction of the brake."""
+    if abs(B) <= m.brake:
+        return 0.0
+    return float((B - math.copysign(m.brake, B)) / A)
+
+
+@jit
+def turn_loaded(m: Any, h: float, A: float, B: float) -> float:
+    """Return the rotor's new velocity, A·w = B without load, and move the load along.
+
+    The cable is a damped spring that cannot push; implicit Euler over rotor, cable and mass
+    together is stable at any stiffness. It damps like `h` seconds more of `cable_damping_s`.
+    """
+    if m.load_kind == 0:
+        return braked(m, A, B)
+    c = m.cable_gain
+    stretch = m.cable_start + m.mass_position - c * (m.angle - m.angle_start)
+    pull = m.cable_stiffness * stretch
+    b = h * m.cable_stiffness + m.cable_damping
+    landing = (m.floor - m.mass_position) / h if m.load_kind == 1 else 0.0
+    # tension = pull + b·(v − c·w) where the mass moves with v = v0 + v1·w
+    w, v, tension = 0.0, 0.0, -1.0
+    if m.load_kind == 1:
+        heavy = m.mass / h + b
+        v0 = (m.mass * (m.mass_velocity / h + m.gravity) - pull) / heavy
+        v1 = b * c / heavy
+        w = braked(m, A + c * b * (c - v1), B + c * (pull + b * v0))
+        v = v0 + v1 * w
+        tension = pull + b * (v - c * w)
+    if m.load_kind == 2 or v > landing:
+        v = landing  # it stands on the floor, or is made fast
+        w = braked(m, A + c * b * c, B + c * (pull + b * v))
+        tension = pull + b * (v - c * w)
+    if tension <= 0.0 or stretch + h * (v - c * w) <= 0.0:
+        tension = 0.0
+        w = braked(m, A, B)
+        v = min(m.mass_velocity + h * m.gravity, landing)
+    m.mass_velocity = v
+    m.mass_position += h * v
+    m.tension = tension
+    m.load_friction = m.winch_friction + m.friction_share * tension
+    return w
 
 
 @jit

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from sim_bus import servo
 from sim_bus.canopen.od import ObjectDictionary
 from sim_bus.motor import run
-from sim_bus.motor_state import MotorRatings, build_motor
+from sim_bus.motor_state import MotorRatings, Transmission, build_motor
 from sim_bus.plant import Plant
 from sim_bus.rotor import restart_counter
 
@@ -27,11 +27,17 @@ class Axis:
     dictionary (position actual = counter + offset).
     """
 
-    def __init__(self, od: ObjectDictionary, plant: Plant, ratings: MotorRatings) -> None:
+    def __init__(
+        self,
+        od: ObjectDictionary,
+        plant: Plant,
+        ratings: MotorRatings,
+        transmission: Transmission | None = None,
+    ) -> None:
         self.od = od
         self.plant = plant
         self.ratings = ratings
-        self.motor = build_motor(plant, ratings)
+        self.motor = build_motor(plant, ratings, transmission)
         self.kind = servo.OFF
         self.target = 0.0
         self.setpoint: Callable[[], float] | None = None

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from typing import Any
 
 from sim_bus import servo
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.datatypes import Value
 from sim_bus.cia402 import modes
 from sim_bus.cia402.axis import Axis
+from sim_bus.cia402.faults import ALWAYS_WATCHED, FAULTS, LASTING, ErrorReporter
 from sim_bus.cia402.homing import Homing
 from sim_bus.cia402.modes import Mode
 from sim_bus.cia402.words import (
@@ -30,15 +31,6 @@ BOOT_S = 0.002
 """From power-up until the drive can be switched on."""
 _REACTION_LIMIT_S = 2.0
 """A fault reaction that cannot bring the motor to rest ends after this time."""
-_FAULTS = (
-    (servo.OVERCURRENT, ErrorCode.OVERCURRENT, True),
-    (servo.OVERSPEED, ErrorCode.SPEED, False),
-    (servo.I2T_TRIP, ErrorCode.LOAD_LEVEL, False),
-    (servo.FOLLOWING_ERROR, ErrorCode.FOLLOWING_ERROR, False),
-)
-_LASTING = servo.OVERCURRENT | servo.OVERSPEED | servo.I2T_WARNING
-"""What refuses a fault reset; an overload must have cooled down to below the warning."""
-_ALWAYS_WATCHED = _LASTING | servo.I2T_TRIP | servo.FOLLOWING_ERROR
 _COASTING = (
     State.NOT_READY_TO_SWITCH_ON,
     State.SWITCH_ON_DISABLED,
@@ -46,16 +38,6 @@ _COASTING = (
     State.SWITCHED_ON,
     State.FAULT,
 )
-
-
-class ErrorReporter(Protocol):
-    """What the state machine tells the communication part."""
-
-    def emergency(self, code: int, register_bits: int) -> None:
-        """Report an error."""
-
-    def emergency_clear(self, code: int | None = None) -> None:
-        """Take an error back."""
 
 
 class Machine:
@@ -90,6 +72,8 @@ class Machine:
         """Misbehaviour: mode displayed in place of the real one, 0 for none."""
         self.configuration_changed = True
         """Whether limits, windows or ramps of the dictionary must be taken anew."""
+        self.power_allowed = True
+        """Whether the safe-torque-off input lets the power stage work."""
         self._reporter = reporter
         self._plant = axis.plant.drive
         self._status = od.entry(0x6041)
@@ -173,6 +157,8 @@ class Machine:
             self._stop_to = None if stays else State.SWITCH_ON_DISABLED
 
     def _shut_down(self) -> None:
+        if self.state is State.SWITCH_ON_DISABLED and not self.power_allowed:
+            return
         if self.state in (State.SWITCH_ON_DISABLED, State.SWITCHED_ON):
             self._enter(State.READY_TO_SWITCH_ON)
         elif self.state is State.OPERATION_ENABLED:
@@ -300,8 +286,25 @@ class Machine:
         elif option in (2, 3):
             self.command(0x0000 if option == 2 else 0x0002)
 
+    def allow_power(self, allowed: bool) -> None:
+        """Obey the safe-torque-off input: without power the torque is off at once.
+
+        A drive that was enabled goes to fault; one that was not cannot be made ready meanwhile.
+        """
+        self.power_allowed = allowed
+        if allowed:
+            self._follow(self.word)
+        elif self.state in (State.READY_TO_SWITCH_ON, State.SWITCHED_ON):
+            self._enable_due = math.inf
+            self._enter(State.SWITCH_ON_DISABLED)
+        elif self.state is State.FAULT_REACTION_ACTIVE:
+            self._enter(State.FAULT)
+        elif self.axis.kind != servo.OFF:
+            self.trip(ErrorCode.CONTACTOR, severe=True)
+        self.update()
+
     def _reset_fault(self) -> None:
-        if self.axis.flags & _LASTING:
+        if self.axis.flags & LASTING:
             return
         self._enter(State.SWITCH_ON_DISABLED)
         self._error.value = 0
@@ -346,7 +349,7 @@ class Machine:
             self.mode.reconfigure()
 
     def _watch_faults(self, flags: int) -> None:
-        for flag, code, severe in _FAULTS:
+        for flag, code, severe in FAULTS:
             if flags & flag:
                 self.trip(code, severe=severe)
 
@@ -369,10 +372,10 @@ class Machine:
     def update(self) -> None:
         """Compose statusword and mode display, and what the next steps must be watched for."""
         flags = self.axis.flags
-        word = self.state | VOLTAGE_ENABLED | REMOTE
+        word = self.state | REMOTE | (VOLTAGE_ENABLED if self.power_allowed else 0)
         if flags & servo.I2T_WARNING:
             word |= WARNING
-        self._watch = _ALWAYS_WATCHED
+        self._watch = ALWAYS_WATCHED
         if self.state is State.OPERATION_ENABLED:
             word |= self._operation_bits(flags)
             self._watch |= self.mode.watch | servo.LIMITED
