@@ -1,39 +1,24 @@
-"""Boot of a drive as CiA 302-2 lays it down: identity, configuration where it differs, start."""
+"""Boot of drives as CiA 302-2 lays it down: identity, configuration where it differs, start."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-
-from canopen.objectdictionary import ODVariable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 
 from drivers.cia402 import State, mode_bits, state_of
-from drivers.drive_units import torque_settings
-from drivers.errors import BootError, SdoError
+from drivers.configuration import BootSettings, wanted_configuration
+from drivers.download import configure, store
+from drivers.errors import BootError, DriverError, SdoError
 from drivers.network import CanNetwork
-from profiles import DriveProfile, Pdo
+from profiles import DriveProfile
+
+__all__ = ["BootReport", "BootReports", "BootSettings", "boot", "boot_all"]
 
 _DEVICE_TYPE, _IDENTITY = 0x1000, 0x1018
 _PROFILE_402 = 402
-_PDO_OFF, _NO_RTR, _IDENTIFIER = 1 << 31, 1 << 30, 0x1FFFFFFF
 _BOOT_UP_TIMEOUT_S = 2.0
-_QUICK_STOP = 3
-_SLOW_DOWN_THEN_OFF = 2
 _QUIET_DRIVE_S = 1.0
-
-
-@dataclass(frozen=True)
-class BootSettings:
-    """What the master wants of a drive besides its profile."""
-
-    master_node_id: int
-    sync_period_s: float
-    torque_limit_Nm: float
-    rated_torque_Nm: float | None = None
-    """What 6076h must hold, and what holds without it; None leaves it unchecked."""
-    counts_per_turn: int | None = None
-    """Encoder resolution of a drive that has no 608Fh."""
 
 
 @dataclass
@@ -53,50 +38,115 @@ class BootReport:
     """Objects that were written since they differed, as "6072h:0 = 250"."""
     absent: list[str] = field(default_factory=list)
     """Objects the master would set, which the drive does not have."""
+    vouched: bool = False
+    """Whether 1020h vouched for the configuration, so that it was not compared one by one."""
+    stored: bool = False
+    """Whether the drive was told to store its configuration (1010h)."""
 
 
-def boot_all(
-    network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]
-) -> dict[int, BootReport]:
-    """Boot several drives at the same time, by node id.
+class BootReports(dict[int, BootReport]):
+    """Reports of the drives that are up, by node id."""
 
-    Raises the BootError of the lowest node id that failed, with the others' as notes, once all
-    have come to an end.
-    """
-    with ThreadPoolExecutor(max_workers=len(drives)) as pool:
-        pending = {
-            node_id: pool.submit(boot, network, node_id, profile, want)
-            for node_id, (profile, want) in sorted(drives.items())
-        }
-    errors = [error for job in pending.values() if (error := job.exception()) is not None]
-    if errors:
-        for other in errors[1:]:
-            errors[0].add_note(str(other))
-        raise errors[0]
-    return {node_id: job.result() for node_id, job in pending.items()}
+    def __init__(self, reports: Mapping[int, BootReport], missing: Mapping[int, BootError]) -> None:
+        super().__init__(reports)
+        self.missing = dict(missing)
+        """Why each optional node that is not up did not boot, by node id."""
 
 
 def boot(
-    network: CanNetwork, node_id: int, profile: DriveProfile, want: BootSettings
+    network: CanNetwork,
+    node_id: int,
+    profile: DriveProfile,
+    want: BootSettings,
+    *,
+    store_configuration: bool = False,
 ) -> BootReport:
-    """Boot one drive that `network` knows.
+    """Boot one drive that `network` knows; see `boot_all`. Raises BootError, BusError."""
+    drives = {node_id: (profile, replace(want, mandatory=True))}
+    return boot_all(network, drives, store_configuration=store_configuration)[node_id]
 
-    The node's communication is reset, its identity held against the profile, the objects that
-    differ are written, its heartbeat is awaited and it is started. Raises BootError with the
-    standard's letter for the step that failed.
+
+def boot_all(
+    network: CanNetwork,
+    drives: Mapping[int, tuple[DriveProfile, BootSettings]],
+    *,
+    store_configuration: bool = False,
+) -> BootReports:
+    """Boot several drives at the same time, by node id.
+
+    All listen together for another master. Then each drive's communication is reset, its identity
+    held against the profile, what differs of its configuration written, and its heartbeat
+    awaited. They are started together once no mandatory one has failed; a node that is not
+    mandatory and fails stays in pre-operational and stands in `missing`. With
+    `store_configuration` a drive whose stored configuration is another one is told to keep it
+    (1010h).
+
+    Raises the BootError of the lowest node id that failed, with the others' as notes, once all
+    have come to an end, and BusError.
     """
-    report = BootReport(node_id)
-    # a master of our kind is heard four times within what its drives tolerate
-    _refuse_a_driven_node(network, node_id, 0.5 * profile.heartbeat_consumer_s)
-    network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S)  # one that is silent may yet answer
+    _listen(network, drives)
     network.clear_alarm()
+    reports: dict[int, BootReport] = {}
+    errors: dict[int, BootError] = {}
+    with ThreadPoolExecutor(max_workers=len(drives)) as pool:
+        pending = {
+            node_id: pool.submit(_prepare, network, node_id, profile, want, store_configuration)
+            for node_id, (profile, want) in sorted(drives.items())
+        }
+    for node_id, job in pending.items():
+        _collect(node_id, job, reports, errors)
+    fatal = [error for node, error in errors.items() if drives[node][1].mandatory]
+    if fatal:
+        for other in fatal[1:]:
+            fatal[0].add_note(str(other))
+        raise fatal[0]
+    for node_id in reports:
+        network.start(node_id, drives[node_id][0].heartbeat_producer_s)
+    return BootReports(reports, errors)
+
+
+def _collect(
+    node_id: int,
+    job: Future[BootReport],
+    reports: dict[int, BootReport],
+    errors: dict[int, BootError],
+) -> None:
+    try:
+        reports[node_id] = job.result()
+    except BootError as error:
+        errors[node_id] = error
+
+
+def _listen(network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]) -> None:
+    # a master of our kind is heard four times within what its drives tolerate
+    listen_s = max(0.5 * profile.heartbeat_consumer_s for profile, _ in drives.values())
+    if network.foreign_master.wait(listen_s):
+        raise BootError(
+            "L", min(drives), "another master's heartbeat is on the bus", "stop that master first"
+        )
+
+
+def _prepare(
+    network: CanNetwork,
+    node_id: int,
+    profile: DriveProfile,
+    want: BootSettings,
+    store_configuration: bool,
+) -> BootReport:
+    """Lead one drive as far as it goes without being started."""
+    report = BootReport(node_id)
+    _refuse_a_driven_node(network, node_id)
+    network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S)  # one that is silent may yet answer
     _check_identity(network, node_id, profile, report)
+    _refuse_twins(network, node_id)
     _configure(network, node_id, profile, want, report)
     patience_s = 5.0 * profile.heartbeat_producer_s + _QUIET_DRIVE_S
     if network.wait_for_heartbeat(node_id, patience_s) is None:
         raise BootError("K", node_id, "no heartbeat came", "check 1017h and the load of the bus")
     _read_ratings(network, node_id, profile, want, report)
-    network.start(node_id)
+    if store_configuration and (report.changed or not report.vouched):
+        report.stored = _store(network, node_id)
+    _refuse_twins(network, node_id)
     return report
 
 
@@ -112,11 +162,7 @@ def _read(network: CanNetwork, node_id: int, index: int, sub: int) -> int:
         ) from error
 
 
-def _refuse_a_driven_node(network: CanNetwork, node_id: int, listen_s: float) -> None:
-    if network.foreign_master.wait(listen_s):
-        raise BootError(
-            "L", node_id, "another master's heartbeat is on the bus", "stop that master first"
-        )
+def _refuse_a_driven_node(network: CanNetwork, node_id: int) -> None:
     try:
         state = state_of(network.read_int(node_id, 0x6041, attempts=1))
     except SdoError:
@@ -127,6 +173,18 @@ def _refuse_a_driven_node(network: CanNetwork, node_id: int, listen_s: float) ->
             node_id,
             "its power stage is already enabled, so somebody drives it",
             "stop the other master, or switch the drive off and on",
+        )
+
+
+def _refuse_twins(network: CanNetwork, node_id: int) -> None:
+    """Raise BootError where two devices answer under one node id."""
+    problem = network.twins(node_id)
+    if problem:
+        raise BootError(
+            "B",
+            node_id,
+            problem,
+            "give each device a node id of its own (connect one alone to see which it is)",
         )
 
 
@@ -167,29 +225,33 @@ def _configure(
     report: BootReport,
 ) -> None:
     try:
-        rated_Nm = _rated_torque_Nm(network, node_id, want)
-        watch = want.master_node_id << 16 | round(profile.heartbeat_consumer_s * 1e3)
-        objects = (
-            (0x1006, 0, round(want.sync_period_s * 1e6)),
-            (0x1016, _heartbeat_entry(network, node_id, want.master_node_id), watch),
-            (0x1017, 0, round(profile.heartbeat_producer_s * 1e3)),
-            (0x6007, 0, _QUICK_STOP),  # when the master's heartbeat is lost
-            (0x605A, 0, _SLOW_DOWN_THEN_OFF),
-            *((i, 0, v) for i, v in torque_settings(profile, rated_Nm, want.torque_limit_Nm)),
-            (0x60B2, 0, 0),  # a torque offset left behind would be added to every torque
+        wanted = wanted_configuration(
+            profile,
+            network.dictionary(node_id),
+            node_id,
+            want,
+            _rated_torque_Nm(network, node_id, want),
+            _heartbeat_entry(network, node_id, want.master_node_id),
         )
-        for index, sub, value in objects:
-            _set(network, node_id, index, sub, value, report)
-        for pdos, parameters in ((profile.rpdos, 0x1400), (profile.tpdos, 0x1800)):
-            ours = {parameters + pdo.number - 1: pdo for pdo in pdos}
-            for index in range(parameters, parameters + 0x200):
-                if index in ours:
-                    _set_pdo(network, node_id, index, ours[index], report)
-                elif index in network.dictionary(node_id):
-                    _switch_off_pdo(network, node_id, index, report)
+        report.absent += wanted.absent
+        report.vouched = configure(network, node_id, wanted, report.changed)
+    except DriverError as error:
+        if isinstance(error, SdoError) or type(error) is DriverError:
+            raise BootError(
+                "J", node_id, f"its configuration failed: {error}", "check the profile of the drive"
+            ) from error
+        raise
+
+
+def _store(network: CanNetwork, node_id: int) -> bool:
+    try:
+        return store(network, node_id)
     except SdoError as error:
         raise BootError(
-            "J", node_id, f"its configuration failed: {error}", "check the profile of the drive"
+            "J",
+            node_id,
+            f"its configuration could not be stored: {error}",
+            "boot without storing; it then is written anew each time",
         ) from error
 
 
@@ -212,6 +274,8 @@ def _heartbeat_entry(network: CanNetwork, node_id: int, master_node_id: int) -> 
 
     CiA 301 refuses a second entry for one node.
     """
+    if 0x1016 not in network.dictionary(node_id):
+        return 1
     entries = network.read_int(node_id, 0x1016, 0)
     watched = {
         sub: network.read_int(node_id, 0x1016, sub) >> 16 & 0x7F for sub in range(1, entries + 1)
@@ -221,54 +285,6 @@ def _heartbeat_entry(network: CanNetwork, node_id: int, master_node_id: int) -> 
             if node == wanted:
                 return sub
     return 1
-
-
-def _set(
-    network: CanNetwork, node_id: int, index: int, sub: int, value: int, report: BootReport
-) -> None:
-    if index not in network.dictionary(node_id):
-        report.absent.append(f"{index:04X}h:{sub}")
-    elif network.read_int(node_id, index, sub) != value:
-        network.write(node_id, index, sub, value)
-        report.changed.append(f"{index:04X}h:{sub} = {value}")
-
-
-def _set_pdo(
-    network: CanNetwork, node_id: int, parameters: int, pdo: Pdo, report: BootReport
-) -> None:
-    mapping = parameters + 0x200
-    settings = {2: pdo.transmission_type}
-    inhibit, timer = round(pdo.inhibit_time_s * 1e4), round(pdo.event_timer_s * 1e3)
-    entry = network.dictionary(node_id)[parameters]
-    for sub, value in ((3, inhibit), (5, timer)):
-        if not isinstance(entry, ODVariable) and sub in entry:
-            settings[sub] = value
-    wanted = {(parameters, sub): value for sub, value in settings.items()}
-    wanted |= {(mapping, i): entry.mapping for i, entry in enumerate(pdo.entries, 1)}
-    cob_id = network.read_int(node_id, parameters, 1)
-    as_it_is = network.read_int(node_id, mapping, 0) == len(pdo.entries) and all(
-        network.read_int(node_id, *key) == value for key, value in wanted.items()
-    )
-    if as_it_is and cob_id & (_PDO_OFF | _IDENTIFIER) == pdo.cob_id(node_id):
-        return
-    # CiA 301: switched off first, the map emptied, filled and counted, then switched on; whether
-    # it may be asked for by a remote frame is the drive's affair
-    enabled = pdo.cob_id(node_id) | cob_id & _NO_RTR
-    network.write(node_id, parameters, 1, enabled | _PDO_OFF)
-    network.write(node_id, mapping, 0, 0)
-    for (index, sub), value in wanted.items():
-        network.write(node_id, index, sub, value)
-    network.write(node_id, mapping, 0, len(pdo.entries))
-    network.write(node_id, parameters, 1, enabled)
-    report.changed.append(f"{parameters:04X}h and {mapping:04X}h")
-
-
-def _switch_off_pdo(network: CanNetwork, node_id: int, parameters: int, report: BootReport) -> None:
-    """Switch off a PDO that the profile does not have: the bus was not laid out for it."""
-    cob_id = network.read_int(node_id, parameters, 1)
-    if not cob_id & _PDO_OFF:
-        network.write(node_id, parameters, 1, cob_id | _PDO_OFF)
-        report.changed.append(f"{parameters:04X}h switched off")
 
 
 def _read_ratings(

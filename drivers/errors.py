@@ -1,5 +1,9 @@
 """Errors of the master side; every message tells what happened, where, and what would help."""
 
+from __future__ import annotations
+
+from drivers.sdo_abort import abort_text
+
 
 class DriverError(Exception):
     """Base of all errors that the master side raises on purpose."""
@@ -11,6 +15,22 @@ class BusError(DriverError):
 
 class SdoError(DriverError):
     """An object of a node could not be read or written; names node, object and reason."""
+
+
+class SdoAbortError(SdoError):
+    """A transfer was aborted, by the node or by us; `code` is the abort code of CiA 301."""
+
+    def __init__(self, code: int, context: str = "") -> None:
+        self.code = code
+        super().__init__(f"{context}{abort_text(code)}")
+
+
+class SdoTimeoutError(SdoError):
+    """A node did not answer in time."""
+
+
+class SdoCancelledError(SdoError):
+    """A transfer was cancelled from another thread."""
 
 
 class BootError(DriverError):

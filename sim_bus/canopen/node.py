@@ -15,6 +15,7 @@ from sim_bus.canopen.sdo_server import SdoServer
 from sim_bus.canopen.store import ParameterStore, serve_store
 from sim_bus.canopen.sync import SyncConsumer
 from sim_bus.canopen.timers import Timers
+from sim_bus.canopen.verify import ConfigurationStamp
 from sim_bus.frame import RTR_FLAG
 
 _IDENTIFIER = struct.Struct("<I").unpack_from
@@ -69,6 +70,7 @@ class CanopenSlave:
         od.set_node_id(self.node_id)
         od.power_on(COMMUNICATION)
         serve_store(self.store, od)
+        self.stamp = ConfigurationStamp(od, self.store)
         self._emcy = EmergencyProducer(self)
         self._heartbeat = HeartbeatProducer(self)
         self._consumers = HeartbeatConsumers(self)
@@ -130,6 +132,7 @@ class CanopenSlave:
         self.store.load(self.od)
         self.od.power_on(APPLICATION)
         self._emcy.reset_node()
+        self.stamp.reset_node()
         self.app.on_reset_node()
         self.reset_communication()
 
@@ -140,6 +143,7 @@ class CanopenSlave:
         self.store.load(self.od)
         self.od.set_node_id(self.node_id)
         self.od.power_on(COMMUNICATION)
+        self.stamp.reset_communication()
         self._emcy.reset_communication()
         self.pdo.forget_faults()
         self._consumers.configure()

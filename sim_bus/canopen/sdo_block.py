@@ -125,6 +125,6 @@ class BlockDownload:
         check_size(self._entry, len(content), self._size, complete=True)
         if self._crc and crc_hqx(content, 0) != checksum:
             raise SdoAbort(Abort.CRC)
-        self._entry.write_bytes(content)
+        self._server.write(self._entry, content)
         self._server.finish()
         self._server.send(b"\xa1")

@@ -67,6 +67,12 @@ class SdoServer:
         cob_id = wire.SDO_RESPONSE + self._slave.node_id
         self._slave.outbox.append(pack_frame(cob_id, data.ljust(8, b"\x00")))
 
+    def write(self, entry: Entry, data: bytes) -> None:
+        """Write what a permitted download carried; raises SdoAbort."""
+        before = entry.value
+        entry.write_bytes(data)
+        self._slave.stamp.written(entry, before)
+
     def finish(self) -> None:
         """Drop the present transfer, if any."""
         self._transfer = None
@@ -111,7 +117,7 @@ class SdoServer:
     def _expedited_download(self, entry: Entry, data: bytes) -> None:
         command = data[0]
         size = 4 - (command >> 2 & 0x03) if command & 0x01 else min(entry.codec.size or 4, 4)
-        entry.write_bytes(data[4 : 4 + size])
+        self.write(entry, data[4 : 4 + size])
         self.send(_MULTIPLEXER.pack(0x60, entry.index, entry.sub))
 
     def _abort(self, index: int, sub: int, code: int) -> None:

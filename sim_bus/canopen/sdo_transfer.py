@@ -22,6 +22,9 @@ class Link(Protocol):
     def send(self, data: bytes) -> None:
         """Send a response of up to 8 bytes."""
 
+    def write(self, entry: Entry, data: bytes) -> None:
+        """Write what a download carried; raises SdoAbort."""
+
     def finish(self) -> None:
         """End the transfer."""
 
@@ -90,7 +93,7 @@ class SegmentedDownload:
         self._data += data[1 : 8 - (command >> 1 & 0x07)]
         check_size(self._entry, len(self._data), self._size, complete=bool(command & _LAST))
         if command & _LAST:
-            self._entry.write_bytes(bytes(self._data))
+            self._server.write(self._entry, bytes(self._data))
             self._server.finish()
         self._server.send(bytes([0x20 | self._toggle]))
         self._toggle ^= _TOGGLE

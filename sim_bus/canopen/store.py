@@ -50,6 +50,10 @@ class ParameterStore:
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise StoreError(f"{path}: not a parameter file: {error!r}") from error
 
+    def keeps(self, index: int) -> bool:
+        """Return whether an object is a parameter, which 1010h stores."""
+        return index not in self._volatile
+
     def write(self) -> None:
         """Write the file; raises SdoAbort with a hardware error when that fails."""
         if self._path is None:

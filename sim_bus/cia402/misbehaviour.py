@@ -2,72 +2,154 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 from sim_bus.canopen.datatypes import Value
 from sim_bus.canopen.od import ObjectDictionary
 from sim_bus.cia402.machine import Machine
+from sim_bus.frame import pack_frame
 
 _RAISE_FAULT, _DROP_TPDOS, _REFUSE_MODES, _SHOW_MODE, _MUTE_HEARTBEAT = 1, 2, 3, 4, 5
+_FALL_SILENT, _DOUBLE_TPDOS, _DELAY_TPDOS, _BABBLE, _VANISH_IN_SDO = 6, 7, 8, 9, 10
+_COUNTED = (_DROP_TPDOS, _DOUBLE_TPDOS, _DELAY_TPDOS, _VANISH_IN_SDO)
 _DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
+_ERROR_CONTROL, _SDO_ANSWER, _EMCY = 0x700, 0x580, 0x080
+_FUNCTION, _NODE = 0x780, 0x07F
+_FOR_GOOD_MS = 0xFFFF
+_BABBLED = b"\x00\xff\x81BABBL"
+"""EMCY FF00h (device specific)."""
 
 
 class Misbehaviour:
-    """Object 2F00h, which no real drive has."""
+    """Object 2F00h, which no real drive has; an EDS may lack it, or some of its sub-indexes."""
 
     def __init__(self, od: ObjectDictionary, machine: Machine, outbox: list[bytes]) -> None:
         self._od = od
         self._machine = machine
         self._outbox = outbox
-        self._drops = 0
+        self._left = dict.fromkeys(_COUNTED, 0)
+        """How many more frames each of the counted kinds concerns."""
+        self._late: list[bytes] = []
         self._muted = False
+        self._babble = 0
+        self._babbled_ms = 0
+        self._now = 0.0
+        self._silent_until = 0.0
         self.active = False
-        """Whether frames of the outbox must be dropped."""
+        """Whether the outbox must be looked through."""
         writers: dict[int, Callable[[Any], None]] = {
             _RAISE_FAULT: self._raise_fault,
-            _DROP_TPDOS: self._set_drops,
             _REFUSE_MODES: self._refuse_modes,
             _SHOW_MODE: self._show_mode,
             _MUTE_HEARTBEAT: self._mute,
+            _FALL_SILENT: self._fall_silent,
+            _BABBLE: self._set_babble,
         }
+        writers |= {sub: self._counter(sub) for sub in _COUNTED}
         for sub, writer in writers.items():
-            od.on_write(0x2F00, sub, writer)
+            if (0x2F00, sub) in od:
+                od.on_write(0x2F00, sub, writer)
 
     def reset(self) -> None:
         """Behave again."""
-        self._set_drops(0)
-        self._mute(0)
+        self._left = dict.fromkeys(_COUNTED, 0)
+        self._late.clear()
+        self._muted = False
+        self._babble = 0
         self._refuse_modes(0)
         self._show_mode(0)
+        self._look()
 
-    def spoil_outbox(self) -> None:
-        """Take out of the outbox what is to be dropped."""
-        kept = [frame for frame in self._outbox if not self._drop(frame)]
-        self._outbox[:] = kept
-        self._od.set(0x2F00, _DROP_TPDOS, self._drops)
+    def deaf(self, now: float) -> bool:
+        """Return whether the drive hears nothing at bus time `now` (and says nothing)."""
+        return now < self._silent_until
 
-    def _drop(self, frame: bytes) -> bool:
+    def spoil_outbox(self, now: float) -> None:
+        """Take out of the outbox what is to be dropped, and put in what is too much."""
+        self._now = now
+        if now < self._silent_until:
+            self._outbox.clear()
+            return
+        self._do_babble()
+        frames, late = list(self._outbox), self._late
+        self._outbox.clear()
+        for frame in frames:
+            if late and _is_tpdo(frame):
+                # the frame held back comes before the one that is on time
+                self._outbox += late
+                late.clear()
+            self._pass(frame)
+        for sub, count in self._left.items():
+            if (0x2F00, sub) in self._od:
+                self._od.set(0x2F00, sub, count)
+        self._look()
+
+    def _pass(self, frame: bytes) -> None:
         identifier = int.from_bytes(frame[:4], "little")
-        if self._muted and identifier & 0x780 == 0x700:
-            return True
-        if self._drops and identifier & 0x780 in _DEFAULT_TPDO:
-            self._drops -= 1
-            self.active = self._drops > 0 or self._muted
-            return True
-        return False
+        if self._muted and identifier & _FUNCTION == _ERROR_CONTROL:
+            return
+        if identifier & _FUNCTION == _SDO_ANSWER and self._use(_VANISH_IN_SDO):
+            if not self._left[_VANISH_IN_SDO]:
+                self._fall_silent(_FOR_GOOD_MS)
+        elif _is_tpdo(frame):
+            if self._use(_DROP_TPDOS):
+                return
+            if self._use(_DELAY_TPDOS):
+                self._late.append(frame)
+                return
+            if self._use(_DOUBLE_TPDOS):
+                self._outbox.append(frame)
+        self._outbox.append(frame)
+
+    def _use(self, sub: int) -> bool:
+        if not self._left[sub]:
+            return False
+        self._left[sub] -= 1
+        return True
+
+    def _do_babble(self) -> None:
+        ms = int(self._now * 1e3)
+        if self._babble and ms != self._babbled_ms:
+            self._babbled_ms = ms
+            node_id = self._od.get_int(0x1014, 0, _EMCY) & _NODE
+            self._outbox += [pack_frame(_EMCY + node_id, _BABBLED)] * self._babble
+
+    def _look(self) -> None:
+        self.active = bool(
+            any(self._left.values())
+            or self._late
+            or self._muted
+            or self._babble
+            or self._now < self._silent_until
+        )
+
+    def _counter(self, sub: int) -> Callable[[Value], None]:
+        def set_count(count: Value) -> None:
+            # the answer to the SDO that asks for it is not meant
+            self._left[sub] = int(count) + (sub == _VANISH_IN_SDO and bool(count))
+            self._look()
+
+        return set_count
 
     def _raise_fault(self, code: Value) -> None:
         if code:
             self._machine.trip(int(code))
 
-    def _set_drops(self, count: Value) -> None:
-        self._drops = int(count)
-        self.active = self._drops > 0 or self._muted
-
     def _mute(self, on: Value) -> None:
         self._muted = bool(on)
-        self.active = self._drops > 0 or self._muted
+        self._look()
+
+    def _set_babble(self, frames_per_ms: Value) -> None:
+        self._babble = int(frames_per_ms)
+        self._look()
+
+    def _fall_silent(self, ms: Value) -> None:
+        duration_s = math.inf if ms == _FOR_GOOD_MS else int(ms) * 1e-3
+        self._now = self._machine.axis.time
+        self._silent_until = self._now + duration_s
+        self._look()
 
     def _refuse_modes(self, how: Value) -> None:
         self._machine.ignore_modes = int(how)
@@ -75,3 +157,7 @@ class Misbehaviour:
     def _show_mode(self, mode: Value) -> None:
         self._machine.shown_mode = int(mode)
         self._machine.update()
+
+
+def _is_tpdo(frame: bytes) -> bool:
+    return int.from_bytes(frame[:4], "little") & _FUNCTION in _DEFAULT_TPDO

@@ -170,11 +170,11 @@ def test_a_fault_that_somebody_else_resets_does_not_enable_again(rig: Rig) -> No
 
 
 def _restart(rig: Rig) -> None:
-    rig.network._canopen.send_message(0, bytes([129, 1]))
+    rig.network.send(0, bytes([129, 1]))
 
 
 def _leave_operational(rig: Rig) -> None:
-    rig.network._canopen.send_message(0, bytes([128, 1]))
+    rig.network.send(0, bytes([128, 1]))
 
 
 def _mute(rig: Rig) -> None:

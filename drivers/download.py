@@ -1,0 +1,82 @@
+"""Bringing a drive's configuration in line with the wanted one, and having the drive keep it."""
+
+from __future__ import annotations
+
+from drivers.concise_dcf import DcfEntry
+from drivers.configuration import (
+    Configuration,
+    Stamp,
+    is_application,
+    is_pdo,
+    matches,
+    to_write,
+)
+from drivers.network import CanNetwork
+
+_VERIFY, _STORE = 0x1020, 0x1010
+_SAVE = int.from_bytes(b"save", "little")
+_STORE_TIMEOUT_S = 10.0
+"""Drives that write their whole memory take seconds."""
+_PDO_OFF = 1 << 31
+
+Block = tuple[DcfEntry, ...]
+
+
+def configure(network: CanNetwork, node_id: int, wanted: Configuration, changed: list[str]) -> bool:
+    """Write into a drive what differs from `wanted`, and append to `changed` what that was.
+
+    Where the drive's 1020h holds the stamp of `wanted`, only objects that a reset of
+    communication does not restore are compared. Afterwards 1020h holds that stamp. Returns
+    whether 1020h vouched for the rest. Raises SdoError, BusError.
+    """
+    stamp = wanted.stamp()
+    vouched = read_stamp(network, node_id) == stamp
+    before = len(changed)
+    for block in wanted.blocks():
+        if is_application(block) or not vouched:
+            _bring_in_line(network, node_id, block, changed)
+    if _VERIFY in network.dictionary(node_id) and (not vouched or len(changed) > before):
+        # last of all: whatever is written after it clears it
+        network.write(node_id, _VERIFY, 1, stamp.days)
+        network.write(node_id, _VERIFY, 2, stamp.ms)
+    return vouched
+
+
+def read_stamp(network: CanNetwork, node_id: int) -> Stamp | None:
+    """Return date and time of the configuration in a drive (1020h), None where there is none."""
+    if _VERIFY not in network.dictionary(node_id):
+        return None
+    days, ms = (network.read_int(node_id, _VERIFY, sub) for sub in (1, 2))
+    return Stamp(days, ms) if days or ms else None
+
+
+def store(network: CanNetwork, node_id: int) -> bool:
+    """Have the drive keep its parameters (1010h:01); False where it has no such object.
+
+    Raises SdoError when it refuses, BusError.
+    """
+    if _STORE not in network.dictionary(node_id):
+        return False
+    network.write(node_id, _STORE, 1, _SAVE, timeout_s=_STORE_TIMEOUT_S)
+    return True
+
+
+def _bring_in_line(network: CanNetwork, node_id: int, block: Block, changed: list[str]) -> None:
+    final = {(entry.index, entry.sub): entry for entry in block}
+    found = {key: network.read_int(node_id, *key) for key in final}
+    if all(matches(entry, found[key]) for key, entry in final.items()):
+        return
+    for entry in block:
+        value = to_write(entry, found[entry.index, entry.sub], block)
+        data = value.to_bytes(len(entry.data), "little")
+        network.write_bytes(node_id, entry.index, entry.sub, data)
+    changed.append(_name(block))
+
+
+def _name(block: Block) -> str:
+    first = block[0]
+    if not is_pdo(block):
+        return f"{first.index:04X}h:{first.sub} = {first.value}"
+    if block[-1].value & _PDO_OFF and block[-1].sub == 1:
+        return f"{first.index:04X}h switched off"
+    return f"{first.index:04X}h and {first.index + 0x200:04X}h"

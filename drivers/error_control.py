@@ -1,0 +1,158 @@
+"""Error control of the nodes of one bus: boot-ups, heartbeats, NMT states, losses."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0, 4, 5, 127
+STATE_NAMES = {
+    BOOT_UP: "initialising",
+    STOPPED: "stopped",
+    OPERATIONAL: "operational",
+    PRE_OPERATIONAL: "pre-operational",
+}
+_PATIENCE = 1.75
+"""A heartbeat that is most of a period late is lost: CAN repeats what was disturbed by itself."""
+
+
+class _Node:
+    """What is known of one node from its error control messages."""
+
+    def __init__(self, node_id: int) -> None:
+        self.node_id = node_id
+        self.boot_ups = 0
+        self.boot_ups_at_reset = 0
+        self.heartbeats = 0
+        self.heard_s = 0.0
+        self.heartbeat_s = 0.0
+        """Period it is watched for between cycles, 0 for not."""
+        self.nmt_state: int | None = None
+        self.expects_boot_up = False
+        self.started = False
+        """Whether it has been seen operational since it was started."""
+        self.starting = False
+
+
+class ErrorControl:
+    """Follows the nodes' error control messages; `alarm` is called with what must end a motion.
+
+    `slack_s` is added to the patience for heartbeats between cycles.
+    """
+
+    def __init__(self, alarm: Callable[[str], None], slack_s: float) -> None:
+        self.restarted: set[int] = set()
+        """Nodes that booted unasked: their configuration and encoder positions are void."""
+        self._alarm = alarm
+        self._slack_s = slack_s
+        self._nodes: dict[int, _Node] = {}
+        self._news = threading.Condition()
+
+    def add(self, node_id: int) -> None:
+        """Follow a node."""
+        self._nodes[node_id] = _Node(node_id)
+
+    def take(self, node_id: int, state: int) -> None:
+        """Take an error control message: an NMT state, 0 for a boot-up."""
+        with self._news:
+            self._take(self._nodes[node_id], state)
+            self._news.notify_all()
+
+    def _take(self, node: _Node, state: int) -> None:
+        name = f"node {node.node_id}"
+        node.nmt_state = state
+        node.heard_s = time.monotonic()
+        if state == BOOT_UP:
+            node.boot_ups += 1
+            if not node.expects_boot_up:
+                self.restarted.add(node.node_id)
+                self._alarm(f"{name} has restarted (unexpected boot-up message)")
+            node.expects_boot_up = node.started = node.starting = False
+            node.heartbeat_s = 0.0
+            return
+        node.heartbeats += 1
+        if state == OPERATIONAL:
+            node.started = node.started or node.starting
+        elif node.started:
+            told = STATE_NAMES.get(state, "unknown")
+            self._alarm(f"{name} is not operational any more (NMT state {state}, {told})")
+
+    # -- what the master does to a node
+
+    def expect_reset(self, node_id: int) -> None:
+        """Take the next boot-up of a node for the answer to our reset."""
+        node = self._nodes[node_id]
+        with self._news:
+            node.boot_ups_at_reset = node.boot_ups
+            node.expects_boot_up = True
+            node.started = node.starting = False
+            node.heartbeat_s = 0.0
+            self.restarted.discard(node_id)
+
+    def expect_start(self, node_id: int, heartbeat_s: float) -> None:
+        """Watch from now on that a node becomes operational and stays so, and is heard."""
+        node = self._nodes[node_id]
+        node.starting = True
+        node.heard_s = time.monotonic()
+        node.heartbeat_s = heartbeat_s
+
+    def expect_stop(self, node_id: int) -> None:
+        """Watch a node no longer for being operational."""
+        node = self._nodes[node_id]
+        node.started = node.starting = False
+
+    def release(self, node_id: int) -> None:
+        """Watch a node no longer at all."""
+        self.expect_stop(node_id)
+        self._nodes[node_id].heartbeat_s = 0.0
+
+    # -- asking
+
+    def wait_for_boot_up(self, node_id: int, timeout_s: float) -> bool:
+        """Return whether a node has booted since `expect_reset`, waiting for it."""
+        node = self._nodes[node_id]
+        with self._news:
+            return self._news.wait_for(lambda: node.boot_ups > node.boot_ups_at_reset, timeout_s)
+
+    def wait_for_heartbeat(self, node_id: int, timeout_s: float) -> int | None:
+        """Return the NMT state of a node's next heartbeat, None when none came."""
+        node = self._nodes[node_id]
+        with self._news:
+            before = node.heartbeats
+            came = self._news.wait_for(lambda: node.heartbeats > before, timeout_s)
+            return node.nmt_state if came else None
+
+    def boot_ups_since_reset(self, node_id: int) -> int:
+        """Return how often a node has booted since it was last reset by us."""
+        node = self._nodes[node_id]
+        return node.boot_ups - node.boot_ups_at_reset
+
+    def nmt_state(self, node_id: int) -> int | None:
+        """Return the NMT state a node told last, None when it was never heard."""
+        return self._nodes[node_id].nmt_state
+
+    # -- losses between cycles
+
+    def look_for_losses(self) -> None:
+        """Raise the alarm for nodes whose heartbeat is overdue, once each.
+
+        To be called when no message waits, so that a busy master does not blame the nodes.
+        """
+        now = time.monotonic()
+        for node in self._nodes.values():
+            if not node.heartbeat_s:
+                continue
+            silent_s = now - node.heard_s
+            if silent_s > _PATIENCE * node.heartbeat_s + self._slack_s:
+                self._alarm(
+                    f"node {node.node_id} is lost: no heartbeat for {silent_s:.1f} s, expected "
+                    f"every {node.heartbeat_s * 1e3:.0f} ms"
+                )
+                node.heartbeat_s = 0.0
+
+    def restart_watch(self) -> None:
+        """Begin to count silences anew (cycles watched the heartbeats until now)."""
+        now = time.monotonic()
+        for node in self._nodes.values():
+            node.heard_s = now
