@@ -204,8 +204,9 @@ def serve(name: str, listener: socket.socket) -> None:
     bus = join(name)  # a member that listens to nothing: it tells when the bus ends
     connections: list[Connection] = []
     with selectors.DefaultSelector() as selector:
-        selector.register(sys.stdin, selectors.EVENT_READ, None)
-        selector.register(bus, selectors.EVENT_READ, None)
+        selector.register(sys.stdin, selectors.EVENT_READ, lambda _: sys.stdin.buffer.read1())
+        # frames of the moment before the hub knew that none are wanted are no end
+        selector.register(bus, selectors.EVENT_READ, lambda _: bus.recv(FRAME_BYTES))
         selector.register(listener, selectors.EVENT_READ, None)
         while True:
             held = [c for c in connections if c.quiet_until_s and not c.closed]
@@ -215,8 +216,9 @@ def serve(name: str, listener: socket.socket) -> None:
                 if key.fileobj is listener:
                     with suppress(OSError):  # a client that has gone already
                         connections.append(Connection(name, listener.accept()[0], selector))
-                elif key.data is None:
-                    return
+                elif key.fileobj in (sys.stdin, bus):
+                    if not key.data(events):
+                        return
                 elif key.fileobj.fileno() >= 0:  # type: ignore[union-attr]  # sockets only
                     key.data(events)
             connections = [c for c in connections if not c.closed]

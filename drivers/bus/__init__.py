@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
-from drivers.bus.packed import FrameBuffer, FramePort, open_simbus, open_socketcan
-from drivers.bus.pythoncan import PythonCanPort, open_python_can
+from drivers.bus.health import BusHealth, BusState
+from drivers.bus.packed import FrameBuffer, FramePort, open_simbus
+from drivers.bus.pythoncan import open_line_port, open_python_can
 from drivers.bus.simbus_socket import Filters, query_status
+from drivers.bus.socketcan import open_socketcan
 from drivers.bus.url import BusUrl
 
 __all__ = [
+    "BusHealth",
+    "BusState",
     "BusUrl",
     "Filters",
     "FrameBuffer",
     "FramePort",
+    "open_line_port",
     "open_port",
     "open_python_can",
     "query_status",
 ]
 
 
-def open_port(url: BusUrl, filters: Filters | None = None) -> FramePort:
+def open_port(
+    url: BusUrl, filters: Filters | None = None, health: BusHealth | None = None
+) -> FramePort:
     """Open `url` for packed frames; only frames that pass one of `filters` come in.
+
+    What the port notices of the bus's state goes into `health`, into one of its own without.
 
     Raises:
         BusError: the bus cannot be opened.
     """
     if url.interface == "simbus":
-        return open_simbus(url, filters)
+        return open_simbus(url, filters, health)
     if url.interface == "socketcan":
-        return open_socketcan(url, filters)
-    return PythonCanPort(url, filters)
+        return open_socketcan(url, filters, health)
+    return open_line_port(url, filters, health)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import errno
 import math
-import os
-import select
 import socket
 import struct
+import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.bus import simbus_socket
+from drivers.bus.health import ERR_FLAG, BusHealth
 from drivers.bus.simbus_socket import FRAME_BYTES, Filters
 from drivers.bus.url import BusUrl
 from drivers.errors import BusError
@@ -28,10 +27,15 @@ FRAME = struct.Struct("=IB3x8s")
 FRAME_DTYPE = np.dtype([("can_id", "=u4"), ("length", "u1"), ("pad", "V3"), ("data", "u1", (8,))])
 EFF_FLAG = 0x80000000
 RTR_FLAG = 0x40000000
-ERR_FLAG = 0x20000000
 
-_BUFFER_BYTES = 1 << 21
-_SEND_TIMEOUT_S = 1.0
+BUFFER_BYTES = 1 << 21
+SEND_TIMEOUT_S = 1.0
+"""How long `send` waits for room before it gives up."""
+
+__all__ = [
+    "BUFFER_BYTES", "EFF_FLAG", "ERR_FLAG", "FRAME", "FRAME_BYTES", "FRAME_DTYPE", "RTR_FLAG",
+    "SEND_TIMEOUT_S", "Bytes", "FrameBuffer", "FramePort", "PackedPort", "open_simbus",
+]  # fmt: skip
 
 
 class FrameBuffer:
@@ -58,6 +62,8 @@ class FramePort(Protocol):
     url: BusUrl
     status: dict[str, Any]
     """What the simulated bus told about itself at opening; empty on other buses."""
+    health: BusHealth
+    """Where the port counts what it notices: a full transmit queue, frames it had no room for."""
 
     def send(self, frame: Bytes, /) -> int:
         """Send one 16-byte frame."""
@@ -71,6 +77,12 @@ class FramePort(Protocol):
     def drain(self) -> int:
         """Throw away the frames that wait; return how many."""
 
+    def arrival_s(self) -> float:
+        """Return when the last frame came in: the kernel's stamp where it gives one, else now.
+
+        Seconds since 1970, as `time.time()`.
+        """
+
     def fileno(self) -> int:
         """Return the descriptor to poll for readability."""
 
@@ -82,22 +94,26 @@ class FramePort(Protocol):
 
 
 class PackedPort:
-    """Packed frames on a SEQPACKET (simbus) or raw CAN (socketcan) socket."""
+    """Packed frames on a SEQPACKET socket; the one for raw CAN sockets is derived from it."""
 
-    def __init__(self, url: BusUrl, sock: socket.socket, status: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        url: BusUrl,
+        sock: socket.socket,
+        status: dict[str, Any],
+        health: BusHealth | None = None,
+    ) -> None:
         self.url = url
         self.status = status
+        self.health = health if health is not None else BusHealth()
         self._sock = sock
         self._scratch = bytearray(FRAME_BYTES)
-        seconds, fraction = int(_SEND_TIMEOUT_S), 0
-        timeval = struct.pack("ll", seconds, fraction)
+        timeval = struct.pack("ll", int(SEND_TIMEOUT_S), 0)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
         self.recv_into: Callable[[bytearray | memoryview], int] = sock.recv_into
         self.fileno: Callable[[], int] = sock.fileno
         self.close: Callable[[], None] = sock.close
         self.send: Callable[[Bytes], int] = sock.send
-        if url.interface == "socketcan":
-            self.send = self._send_patiently
 
     def settimeout(self, seconds: float | None) -> None:
         """Limit the wait of `recv_into`; None waits for ever, 0 does not wait.
@@ -122,27 +138,21 @@ class PackedPort:
             pass
         return count
 
+    def arrival_s(self) -> float:
+        """Return the time now: these sockets keep no time of arrival."""
+        return time.time()
+
     def lost(self, error: OSError | None = None) -> BusError:
         """Return the BusError that tells why the bus cannot be used any more."""
         if isinstance(error, BlockingIOError):
             return BusError(f"{self.url}: the bus takes or gives no frames (time-out)")
-        reason = error.strerror if error else "connection closed"
+        reason = (error.strerror or error) if error else "connection closed"
         return BusError(f"{self.url}: the bus has gone away ({reason})")
 
-    def _send_patiently(self, frame: Bytes) -> int:
-        """Send, waiting while the interface's transmit queue is full, which CAN does not block."""
-        attempts = 1000
-        while True:
-            try:
-                return self._sock.send(frame)
-            except OSError as error:
-                attempts -= 1
-                if error.errno != errno.ENOBUFS or not attempts:
-                    raise
-            select.select([], [], [], _SEND_TIMEOUT_S / 1000)
 
-
-def open_simbus(url: BusUrl, filters: Filters | None) -> PackedPort:
+def open_simbus(
+    url: BusUrl, filters: Filters | None, health: BusHealth | None = None
+) -> PackedPort:
     """Join the simulated bus `url`.
 
     Raises:
@@ -151,34 +161,8 @@ def open_simbus(url: BusUrl, filters: Filters | None) -> PackedPort:
     sock = simbus_socket.connect(url.channel)
     try:
         status = simbus_socket.exchange(sock, filters)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
     except BaseException:
         sock.close()
         raise
-    return PackedPort(url, sock, status)
-
-
-def open_socketcan(url: BusUrl, filters: Filters | None) -> PackedPort:
-    """Open a raw CAN socket on the network interface that `url` names.
-
-    Raises:
-        BusError: the kernel has no SocketCAN, or no such interface, or it is down.
-    """
-    try:
-        sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-    except OSError as error:
-        raise BusError(f"{url}: this kernel has no SocketCAN ({error.strerror})") from None
-    try:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
-        if filters is not None:
-            packed = b"".join(struct.pack("=II", can_id, mask) for can_id, mask in filters)
-            sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, packed)
-        sock.bind((url.channel,))
-    except OSError as error:
-        sock.close()
-        raise BusError(
-            f"{url}: cannot use the network interface {url.channel!r} "
-            f"({os.strerror(error.errno or 0)}); `ip link show type can` and `type vcan` list "
-            "what there is"
-        ) from None
-    return PackedPort(url, sock, {})
+    return PackedPort(url, sock, status, health)

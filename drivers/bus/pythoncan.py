@@ -1,36 +1,95 @@
-"""Any other CAN interface: packed frames on top of python-can."""
+"""Any CAN interface that python-can knows, by URL."""
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import can
 
-from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG, Bytes
-from drivers.bus.simbus_socket import FRAME_BYTES, Filters
+from drivers.bus.health import BusHealth
+from drivers.bus.line import Line, LineBus, LinePort
+from drivers.bus.packed import EFF_FLAG, Bytes
+from drivers.bus.packet_bus import message_of, packet_of
+from drivers.bus.simbus_socket import Filters
+from drivers.bus.slcan import open_slcan
+from drivers.bus.socketcan import interface_problem
+from drivers.bus.socketcand import open_socketcand
 from drivers.bus.url import BusUrl
 from drivers.errors import BusError
 
 _EFF_MASK = 0x1FFFFFFF
-_SFF_MASK = 0x7FF
+_LOOK_S = 0.05
+"""How often the reading thread looks whether it is to end."""
+
+
+class PythonCanLine:
+    """A python-can bus as a line of packed frames."""
+
+    def __init__(self, url: BusUrl) -> None:
+        """Open it; raises BusError."""
+        self._bus = _open(url)
+        self._sending = threading.Lock()
+
+    def read(self, wake: int, /) -> list[bytes]:  # noqa: ARG002  # not all interfaces can be polled
+        """Return the next frame, if one comes within a short time."""
+        message = self._bus.recv(_LOOK_S)
+        return [] if message is None or message.is_fd else [packet_of(message)]
+
+    def write(self, frame: Bytes, /) -> None:
+        """Send a frame; raises OSError."""
+        message = message_of(bytes(frame))
+        message.is_rx = False
+        try:
+            with self._sending:
+                self._bus.send(message)
+        except can.CanError as error:
+            raise OSError(str(error)) from error
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._bus.shutdown()
+
+
+def open_line_port(
+    url: BusUrl, filters: Filters | None = None, health: BusHealth | None = None
+) -> LinePort:
+    """Return packed frames on an interface without a packed socket of its own; raises BusError."""
+    return LinePort(url, _LINES.get(url.interface, PythonCanLine), filters, health)
 
 
 def open_python_can(url: BusUrl, filters: Filters | None = None) -> can.BusABC:
     """Return a python-can bus for `url`, for acyclic work; `filters` None lets all through.
 
+    Error frames come through whatever the filters, where the interface tells of errors. What
+    opens only once (a serial port) is shared with every other port of this process on it.
+
     Raises:
-        BusError: the interface cannot be opened; the message holds python-can's reason.
+        BusError: the interface cannot be opened; the message holds the reason.
     """
+    if url.interface in ("simbus", "socketcan"):
+        bus = _open(url)
+    else:
+        bus = LineBus(url, _LINES.get(url.interface, PythonCanLine))
+    bus.set_filters(_python_can_filters(filters))
+    return bus
+
+
+def _open(url: BusUrl) -> can.BusABC:
+    if url.interface == "socketcan":
+        problem = interface_problem(url)
+        if problem:
+            raise BusError(f"{url}: {problem}")
     try:
         options: dict[str, Any] = dict(url.options)
         options.pop("lockstep", None)  # ours, not the interface's
-        bus = can.Bus(url.channel, url.interface, ignore_config=True, **options)
-        bus.set_filters(_python_can_filters(filters))
-    except BusError:
-        raise
-    except (can.CanError, OSError, ValueError, TypeError, ImportError) as error:
-        raise BusError(f"{url}: cannot be opened: {error}") from error
-    return bus
+        return can.Bus(url.channel, url.interface, ignore_config=True, **options)
+    except Exception as error:
+        # vendors' modules raise whatever comes, a NameError where their library is missing
+        if isinstance(error.__cause__, BusError):
+            raise error.__cause__ from None  # it names the bus already
+        raise BusError(f"{url}: cannot be opened: {error or type(error).__name__}") from error
 
 
 def _python_can_filters(filters: Filters | None) -> list[can.typechecking.CanFilter] | None:
@@ -48,68 +107,4 @@ def _python_can_filters(filters: Filters | None) -> list[can.typechecking.CanFil
     return result
 
 
-class PythonCanPort:
-    """A FramePort on a python-can bus, for the interfaces that have no packed socket."""
-
-    def __init__(self, url: BusUrl, filters: Filters | None) -> None:
-        self.url = url
-        self.status: dict[str, object] = {}
-        self._bus = open_python_can(url, filters)
-        self._timeout_s: float | None = None
-
-    def send(self, frame: Bytes, /) -> int:
-        """Send one 16-byte frame."""
-        can_id, length, data = FRAME.unpack(frame)
-        extended = bool(can_id & EFF_FLAG)
-        message = can.Message(
-            arbitration_id=can_id & (_EFF_MASK if extended else _SFF_MASK),
-            is_extended_id=extended,
-            is_remote_frame=bool(can_id & RTR_FLAG),
-            dlc=length,
-            data=None if can_id & RTR_FLAG else data[:length],
-        )
-        try:
-            self._bus.send(message)
-        except can.CanError as error:
-            raise OSError(str(error)) from error
-        return FRAME_BYTES
-
-    def recv_into(self, buffer: bytearray | memoryview, /) -> int:
-        """Wait for a frame up to the time-out, write it into `buffer`, return its length."""
-        try:
-            message = self._bus.recv(self._timeout_s)
-        except can.CanError as error:
-            raise OSError(str(error)) from error
-        if message is None:
-            raise BlockingIOError
-        can_id = message.arbitration_id
-        can_id |= EFF_FLAG if message.is_extended_id else 0
-        can_id |= RTR_FLAG if message.is_remote_frame else 0
-        can_id |= ERR_FLAG if message.is_error_frame else 0
-        FRAME.pack_into(buffer, 0, can_id, message.dlc, bytes(message.data))
-        return FRAME_BYTES
-
-    def settimeout(self, seconds: float | None) -> None:
-        """Limit the wait of `recv_into`; None waits for ever, 0 does not wait."""
-        self._timeout_s = seconds
-
-    def drain(self) -> int:
-        """Throw away the frames that wait; return how many."""
-        count = 0
-        while self._bus.recv(0) is not None:
-            count += 1
-        return count
-
-    def fileno(self) -> int:
-        """Return the descriptor to poll, -1 where the interface has none."""
-        return self._bus.fileno()
-
-    def lost(self, error: OSError | None = None) -> BusError:
-        """Return the BusError that tells why the bus cannot be used any more."""
-        if isinstance(error, BlockingIOError):
-            return BusError(f"{self.url}: the bus takes or gives no frames (time-out)")
-        return BusError(f"{self.url}: the bus has gone away ({error or 'connection closed'})")
-
-    def close(self) -> None:
-        """Leave the bus."""
-        self._bus.shutdown()
+_LINES: dict[str, Callable[[BusUrl], Line]] = {"slcan": open_slcan, "socketcand": open_socketcand}

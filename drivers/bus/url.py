@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qsl, quote
 
 import can
 
@@ -76,10 +76,13 @@ class BusUrl:
         return self.options.get("lockstep") is True
 
     def __str__(self) -> str:
+        options = dict(self.options)
+        start = f"{self.interface}:"
         if self.interface == "socketcand":
-            return f"socketcand://{self.options['host']}:{self.options['port']}/{self.channel}"
-        query = "&".join(f"{key}={value}" for key, value in self.options.items())
-        return f"{self.interface}:{self.channel}" + (f"?{query}" if query else "")
+            host = str(options.pop("host"))
+            start += f"//{f'[{host}]' if ':' in host else host}:{options.pop('port')}/"
+        query = "&".join(f"{key}={_text(value)}" for key, value in options.items())
+        return start + self.channel + (f"?{query}" if query else "")
 
 
 def _simbus_name(text: str, rest: str, options: dict[str, Option]) -> str:
@@ -107,6 +110,10 @@ def _options(text: str, query: str) -> dict[str, Option]:
     except ValueError:
         raise BusError(f"bus {text!r}: options are written ?key=value&key=value") from None
     return {key: _value(value) for key, value in pairs}
+
+
+def _text(value: Option) -> str:
+    return str(value).lower() if isinstance(value, bool) else quote(str(value), safe="/:@,;")
 
 
 def _value(text: str) -> Option:

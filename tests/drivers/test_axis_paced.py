@@ -13,7 +13,7 @@ import pytest
 from axis_rig import DRIVE, Rig, open_network
 
 from drivers import axis_exchange
-from drivers.bus import PythonCanPort
+from drivers.bus import open_line_port
 from drivers.cia402 import Mode, State, state_of
 
 PERIOD_S = 10e-3
@@ -39,7 +39,7 @@ def rig(
     paced_bus: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Rig]:
     if request.param == "python-can":
-        monkeypatch.setattr(axis_exchange, "open_port", PythonCanPort)
+        monkeypatch.setattr(axis_exchange, "open_port", open_line_port)
     with open_network(paced_bus, [1, 2]) as network:
         for node in (1, 2):
             network.reset(node)

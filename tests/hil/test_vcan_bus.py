@@ -8,7 +8,7 @@ import time
 import can
 import pytest
 
-from drivers.bus.packed import open_socketcan
+from drivers.bus.socketcan import open_socketcan
 from drivers.bus.url import BusUrl
 from drivers.errors import BusError
 
