@@ -175,7 +175,7 @@ class SimDrive(SlaveApplication):
             self._log_idle_at = math.inf
         self._slave.advance(now)
         if self.misbehaviour.active:
-            self.misbehaviour.spoil_outbox()
+            self.misbehaviour.spoil_outbox(now)
 
     def receive(self, frame: bytes, now: float) -> None:
         """Take a frame seen on the bus."""
@@ -184,9 +184,10 @@ class SimDrive(SlaveApplication):
                 self._log.append(self.sync_count, now, self.axis.sample[4:])
                 self._log_idle_at = now + _ASLEEP_S
             self.sync_count += 1
-        self._slave.receive(frame, now)
+        if not (self.misbehaviour.active and self.misbehaviour.deaf(now)):
+            self._slave.receive(frame, now)
         if self.misbehaviour.active:
-            self.misbehaviour.spoil_outbox()
+            self.misbehaviour.spoil_outbox(now)
 
     def next_event(self) -> float:
         """Return the bus time at which `advance` is due at the latest."""
