@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import canopen
-import typer
 
 from cdpr_rt.cogging_profile import DriveIdentity
 from cdpr_rt.errors import TripError
@@ -30,9 +27,11 @@ from drivers.errors import BusError, DriveFaultError, SdoError
 from drivers.homing import Homing
 from drivers.network import CanNetwork
 from profiles import Winch
+from tools.consent import require_consent
 from tools.errors import BadInputError
 from tools.output import Output
 from tools.safety import SessionSafety, open_safety
+from tools.signals import stop_on_signals
 from tools.simulator import OwnSimulator
 
 _SPEED_SHARE = 0.2
@@ -186,24 +185,6 @@ def _fault_of(network: CanNetwork, node_id: int) -> str:
     return fault_text(code) if code else "no code given (603Fh = 0)"
 
 
-@contextmanager
-def _stop_on_signals() -> Iterator[Callable[[], bool]]:
-    """Turn Ctrl-C and SIGTERM into a flag that the executive looks at."""
-    wanted: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        if wanted:
-            raise KeyboardInterrupt  # asked twice: leave at once, the drive is still disabled
-        wanted.append(number)
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: bool(wanted)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def open_bus(text: str) -> BusUrl:
     """Return the bus that `text` names; raises BadInputError."""
     try:
@@ -214,14 +195,7 @@ def open_bus(text: str) -> BusUrl:
 
 def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
     """Ask before a real motor is energised; raises BadInputError when nobody agrees."""
-    if url.is_simulated or yes:
-        return
-    try:
-        agreed = typer.confirm(f"{what} on {url}: the motor will turn. Go on?", err=True)
-    except typer.Abort:  # nobody there to answer
-        agreed = False
-    if not agreed:
-        raise BadInputError("not confirmed (--yes does it beforehand); nothing was energised")
+    require_consent(f"{what} on {url}: the motor will turn.", yes or url.is_simulated)
 
 
 @contextmanager
@@ -267,7 +241,7 @@ def open_winch(
     and `open_safety` raise and the drivers' errors for a drive that does not boot.
     """
     with ExitStack() as stack:
-        stop_requested = stack.enter_context(_stop_on_signals())
+        stop_requested = stack.enter_context(stop_on_signals())
         safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id]))
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
         limit = winch.motor.rated_torque_Nm
