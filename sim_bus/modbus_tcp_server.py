@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -72,6 +73,16 @@ class Panel:
             self._registers[address + offset](int(value))
 
 
+def _nobody() -> SimDevice:
+    """Return what answers for every other unit, as a gateway does."""
+
+    async def refuse(*_: object) -> ExcCodes:
+        return ExcCodes.GATEWAY_NO_RESPONSE
+
+    everything = SimData(0, values=[0] * 0x10000, datatype=DataType.REGISTERS)
+    return SimDevice(0, everything, action=refuse)
+
+
 def serve_units(
     units: list[SimDevice],
     line: Line,
@@ -102,6 +113,8 @@ async def _serve(
         loop.add_signal_handler(number, ended.set)
     if until_stdin_ends:
         _end_with_stdin(loop, ended)
+    if not any(unit.id == 0 for unit in units):
+        units = [*units, _nobody()]
     server = ModbusTcpServer(units, address=("127.0.0.1", port), trace_packet=line.spoil)
     try:
         await server.serve_forever(background=True)

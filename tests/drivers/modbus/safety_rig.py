@@ -1,0 +1,123 @@
+"""A simulated safety I/O in a process of its own, with a physics board, for tests."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pymodbus.client import ModbusTcpClient
+
+from profiles.safety_io import SHIPPED, SafetyIoProfile, load_safety_io
+from sim_bus.physics_board import PhysicsBoard
+from sim_bus.safety_twin import Fault
+
+PANEL = 247
+DEADLINE_S = 10.0
+
+
+class Twin:
+    """The running twin; the stranger's client here is pymodbus alone."""
+
+    def __init__(self, profile: Path, *options: str | Path) -> None:
+        self.file = profile
+        self.process = start("safety-io", profile, "--port", "0", *options)
+        self.ready = ready(self.process)
+        self.port = int(self.ready["port"])
+        self.reference = f"{profile}@127.0.0.1:{self.port}"
+        self._client = ModbusTcpClient("127.0.0.1", port=self.port, timeout=5)
+
+    def profile(self, **changes: Any) -> SafetyIoProfile:
+        return load_safety_io(self.reference).model_copy(update=changes)
+
+    def press(self, pressed: bool = True) -> None:
+        assert not self._client.write_register(0, int(pressed), device_id=PANEL).isError()
+
+    def break_(self, fault: Fault) -> None:
+        assert not self._client.write_register(1, int(fault), device_id=PANEL).isError()
+
+    def mend(self) -> None:
+        """Have everything as it was at the start."""
+        self.press(False)
+        self.break_(Fault(0))
+        for coil in (0, 1, 2, 8, 9, 10):
+            self.set(coil, False)
+        wait_until(lambda: not self.coil(0) and self.input(1))
+
+    def coil(self, address: int) -> bool:
+        return bool(self._client.read_coils(address, count=1, device_id=1).bits[0])
+
+    def input(self, address: int) -> bool:
+        return bool(self._client.read_discrete_inputs(address, count=1, device_id=1).bits[0])
+
+    def set(self, coil: int, on: bool) -> None:
+        assert not self._client.write_coil(coil, on, device_id=1).isError()
+
+    def close(self) -> None:
+        self._client.close()
+        self.process.communicate(b"", timeout=10)
+
+
+def start(*arguments: str | Path) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "tools.cli", "sim", *map(str, arguments)]
+    return subprocess.Popen(
+        [*command, "--exit-with-stdin"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+
+
+def ready(process: subprocess.Popen[bytes]) -> dict[str, Any]:
+    assert process.stdout is not None
+    told: dict[str, Any] = json.loads(process.stdout.readline())["ready"]
+    return told
+
+
+def wait_until(done: Callable[[], object], timeout_s: float = DEADLINE_S) -> float:
+    """Return how long it took; fails after the time-out."""
+    began = time.monotonic()
+    while not done():
+        assert time.monotonic() - began < timeout_s, "did not come about"
+        time.sleep(0.005)
+    return time.monotonic() - began
+
+
+def patient_profile(folder: Path) -> Path:
+    """Return the shipped profile with times that suit a busy machine."""
+    text = (SHIPPED / "modbus-remote-io.toml").read_text()
+    for key, value in (("answer_timeout_s", 0.2), ("trip_timeout_s", 0.4)):
+        line = next(line for line in text.splitlines() if line.startswith(key))
+        text = text.replace(line, f"{key} = {value}")
+    text = text.replace("[watchdog]                   # of", "[watchdog] # of")
+    text = text.replace("timeout_s = 0.25", "timeout_s = 1.0")
+    path = folder / "io.toml"
+    path.write_text(text)
+    return path
+
+
+@contextmanager
+def board_file() -> Iterator[Path]:
+    path = Path(f"/dev/shm/cdpr-test-{os.getpid()}-{uuid.uuid4().hex[:6]}")
+    try:
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
+
+
+@contextmanager
+def twin_on_board(folder: Path, axes: int = 2) -> Iterator[tuple[Twin, PhysicsBoard]]:
+    """A twin whose board is the test's own, with limit switches at -90 and 90 deg."""
+    plant = folder / "safety-plant.toml"
+    switches = "[[axes]]\nlimit_negative_deg = -90.0\nlimit_positive_deg = 90.0\n"
+    plant.write_text(switches)
+    with board_file() as path, PhysicsBoard.create(path, axes) as board:
+        twin = Twin(patient_profile(folder), "--board", path, "--plant", plant)
+        try:
+            yield twin, board
+        finally:
+            twin.close()

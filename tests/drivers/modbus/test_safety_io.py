@@ -1,0 +1,215 @@
+"""The safety I/O's driver against a simulated one in a process of its own."""
+
+from __future__ import annotations
+
+import math
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from safety_rig import Twin, twin_on_board, wait_until
+
+from drivers.modbus.io_link import IoLink
+from drivers.modbus.safety_io import SafetyIo, SafetyIoError
+from drivers.modbus.tcp import ModbusError
+from sim_bus.physics_board import BoardAxis, PhysicsBoard
+from sim_bus.safety_twin import Fault
+
+TRIP_S = 0.4
+SLACK_S = 1.0  # of a busy machine
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Twin, PhysicsBoard]]:
+    with twin_on_board(tmp_path_factory.mktemp("safety")) as both:
+        yield both
+
+
+@pytest.fixture
+def winch(lab: tuple[Twin, PhysicsBoard]) -> BoardAxis:
+    return lab[1].axis(0)
+
+
+@pytest.fixture
+def twin(lab: tuple[Twin, PhysicsBoard], winch: BoardAxis) -> Iterator[Twin]:
+    """The twin, whole and at rest, its winch in the middle."""
+    winch.publish(0.0, 0.0, 0.0, 0.0, False)
+    lab[0].mend()
+    yield lab[0]
+    lab[0].mend()
+
+
+def test_the_contactor_closes_when_asked_and_opens_at_the_end(twin: Twin, winch: BoardAxis) -> None:
+    with SafetyIo(twin.profile()) as io:
+        assert not winch.power_allowed
+        assert not io.state.contactor_closed
+        io.energise()
+        assert winch.power_allowed
+        assert not winch.brake_released
+        io.release_brakes("winch 1")
+        io.await_brakes(True, "winch 1")
+        assert winch.brake_released
+        assert io.state.brakes_released == {"winch 1": True, "rail 1": False}
+        assert (io.alarm(), io.stop_reason()) == ("", "")
+        wait_until(lambda: io.state.lights == {"red": False, "yellow": True, "green": False})
+    assert not winch.power_allowed
+    assert not winch.brake_released
+    assert not twin.coil(0)
+
+
+def test_an_open_chain_refuses_power(twin: Twin, winch: BoardAxis) -> None:
+    twin.press()
+    with SafetyIo(twin.profile()) as io, pytest.raises(SafetyIoError, match="chain is open"):
+        io.energise()
+    assert not twin.coil(0)
+
+
+def test_the_emergency_stop_trips_until_it_is_acknowledged(
+    twin: Twin, winch: BoardAxis, tmp_path: Path
+) -> None:
+    latch = tmp_path / "trip.json"
+    with SafetyIo(twin.profile(), latch) as io:
+        io.energise()
+        io.release_brakes()
+        io.await_brakes(True)
+        twin.press()
+        assert wait_until(io.alarm) < SLACK_S
+        assert "emergency-stop chain is open (input 0 reads 0)" in io.alarm()
+        wait_until(lambda: not twin.coil(0) and not twin.coil(1))
+        wait_until(lambda: not winch.brake_released)
+        with pytest.raises(SafetyIoError, match="chain is open"):
+            io.acknowledge()
+        twin.press(False)
+        time.sleep(0.1)
+        assert io.alarm()  # stays
+    with SafetyIo(twin.profile(), latch) as later:  # another command, after the buttons were pulled
+        with pytest.raises(SafetyIoError, match=r"tripped on .*chain is open.*io ack"):
+            later.energise()
+        later.acknowledge()
+        later.energise()
+        assert winch.power_allowed
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (Fault.SILENT, r"no good poll for 0\.\d+ s, 0\.4 s allowed .*no answer within 0\.2 s"),
+        (Fault.TRUNCATED, r"no good poll .*the answer was cut off after \d+ bytes"),
+        (Fault.WRONG_UNIT, r"no good poll .*unit 2 answered, unit 1 was asked"),
+        (Fault.EXCEPTIONS, r"no good poll .*refused with exception 4 \(device failure\)"),
+    ],
+)
+def test_answers_that_are_no_answers_stop_the_motion(twin: Twin, fault: Fault, text: str) -> None:
+    io = SafetyIo(twin.profile()).open()
+    try:
+        io.energise()
+        twin.break_(fault)
+        assert TRIP_S / 2 < wait_until(io.stop_reason) < TRIP_S + SLACK_S
+        assert not io.alarm()  # braked under control: nothing says that the power is gone
+        twin.break_(Fault(0))
+        time.sleep(0.1)
+        with pytest.raises(SafetyIoError, match=text):
+            io.energise()
+    finally:
+        twin.break_(Fault(0))
+        io.close()
+
+
+def test_a_polling_thread_that_hangs_trips_as_well(twin: Twin) -> None:
+    """The thread waits for an answer much longer than the trip time-out allows."""
+    io = SafetyIo(twin.profile(answer_timeout_s=3.0)).open()
+    try:
+        io.energise()
+        twin.break_(Fault.SILENT)
+        assert wait_until(io.stop_reason) < TRIP_S + SLACK_S
+        assert "no answer has come" in io.stop_reason()
+    finally:
+        twin.break_(Fault(0))
+        assert "no good poll" in io.close()
+
+
+def test_a_welded_contactor_is_noticed(twin: Twin) -> None:
+    io = SafetyIo(twin.profile()).open()
+    io.energise()
+    twin.break_(Fault.CONTACTOR_WELDED)
+    assert "the contactor is closed (input 1) though output 0 is 0; is it welded?" in io.close()
+    with SafetyIo(twin.profile()) as io:
+        with pytest.raises(SafetyIoError, match="welded"):
+            io.energise()
+        twin.break_(Fault(0))
+        wait_until(lambda: not io.state.contactor_closed)
+
+
+def test_a_contactor_without_feedback_is_noticed(twin: Twin, winch: BoardAxis) -> None:
+    twin.break_(Fault.FEEDBACK_STUCK)
+    with SafetyIo(twin.profile()) as io:
+        with pytest.raises(SafetyIoError, match=r"contactor is not closed 0\.\d+ s after output 0"):
+            io.energise()
+        wait_until(lambda: not twin.coil(0))
+
+
+def test_a_brake_that_does_not_follow_is_noticed(twin: Twin) -> None:
+    with SafetyIo(twin.profile()) as io:
+        io.energise()
+        twin.break_(Fault.BRAKES_STUCK)
+        io.release_brakes("winch 1")
+        with pytest.raises(SafetyIoError, match=r"brake of winch 1 is not released .* output 1"):
+            io.await_brakes(True, "winch 1")
+        assert "brake of winch 1" in io.alarm()
+
+
+def test_an_output_that_somebody_else_changes_is_noticed(twin: Twin) -> None:
+    with SafetyIo(twin.profile()) as io:
+        io.energise()
+        # the contactor follows too, so that either may be told first
+        twin.set(0, False)
+        wait_until(io.alarm)
+        assert "output 0 was set to 1 and reads 0" in io.alarm() or "contactor" in io.alarm()
+
+
+def test_a_limit_switch_stops_the_motion(twin: Twin, winch: BoardAxis) -> None:
+    with SafetyIo(twin.profile()) as io:
+        io.energise()
+        winch.publish(0.0, 0.0, math.radians(91.0), 0.0, True)
+        wait_until(io.stop_reason)
+        assert "winch 1 stands on its positive limit switch (input 4 reads 0)" in io.stop_reason()
+        assert not io.alarm()
+        assert winch.power_allowed  # for the controlled stop
+        wait_until(lambda: not winch.power_allowed)  # which may not take for ever
+    with SafetyIo(twin.profile()) as io, pytest.raises(SafetyIoError, match="limit switch"):
+        io.energise()
+
+
+def test_the_device_drops_its_outputs_when_the_master_falls_silent(
+    twin: Twin, winch: BoardAxis
+) -> None:
+    link = IoLink(twin.profile())
+    link.set_watchdog()
+    link.feed_watchdog()
+    link.write(0, True)
+    wait_until(lambda: winch.power_allowed)
+    wait_until(lambda: not winch.power_allowed, timeout_s=3.0)
+    assert not link.state().contactor_asked
+    link.close()
+
+
+def test_a_device_that_is_not_there_or_another_one_is_said_in_words(twin: Twin) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+        with pytest.raises(ModbusError, match=rf"127.0.0.1:{port}: cannot connect: Connection ref"):
+            SafetyIo(twin.profile(port=port)).open()
+        # takes the connection and says nothing
+        free.listen()
+        with pytest.raises(ModbusError, match=r"no answer within 0\.2 s from unit 1"):
+            SafetyIo(twin.profile(port=port)).open()
+    with pytest.raises(ModbusError, match=r"no-such-host\.invalid:\d+: cannot connect"):
+        SafetyIo(twin.profile(host="no-such-host.invalid")).open()
+    with pytest.raises(ModbusError, match=r"exception 11 \(gateway target .* is the unit id right"):
+        SafetyIo(twin.profile(unit=9)).open()
+    assert not twin.coil(0)
