@@ -1,0 +1,305 @@
+"""CiA 402 axes on several buses, exchanged once per cycle as one device."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.exchange import AxisCommand, AxisFeedback, BoolArray
+from drivers.axis_group import AxisGroup
+from drivers.axis_layout import AxisConfig
+from drivers.axis_state import StateArrays
+from drivers.cia402 import POWER_OFF, State
+from drivers.errors import BusError, DriveFaultError, ModeRefusedError
+from drivers.network import CanNetwork
+
+_STOP_TIMEOUT_S = 1.0
+
+
+@dataclass(frozen=True)
+class BusAxes:
+    """The axes on one bus; `places` are their numbers in the whole device, 0 to n - 1."""
+
+    name: str
+    network: CanNetwork
+    axes: Sequence[AxisConfig]
+    places: Sequence[int]
+    heartbeat_s: float
+    """How often the cycle sends the master's heartbeat."""
+
+
+class AxisBuses:
+    """n axes on several buses; implements `cdpr_rt.exchange.AxisDevice` as `AxisGroup` does.
+
+    Where the axes are numbered bus by bus, the arrays of each bus are slices of the whole, and
+    nothing is copied; otherwise their values are moved once a cycle. What goes wrong on one bus
+    keeps none of the others from being exchanged, or from being switched off at the end. As a
+    context manager it leaves the drives without power, however the block ends.
+
+    Raises BusError when a bus cannot be opened, or when some keep time in lockstep and some do
+    not, and DriverError for a PDO map that does not serve torque control.
+    """
+
+    def __init__(self, buses: Sequence[BusAxes], period_s: float, master_node_id: int) -> None:
+        self.buses = tuple(buses)
+        self.period_s = period_s
+        order = [place for bus in buses for place in bus.places]
+        self.n = len(order)
+        room = StateArrays(self.n)
+        self.groups: list[AxisGroup] = []
+        self._where: dict[int, tuple[AxisGroup, int]] = {}
+        try:
+            first = 0
+            for bus in buses:
+                part = room.part(first, first + len(bus.axes))
+                url, network = bus.network.url, bus.network
+                group = AxisGroup(
+                    url, network, bus.axes, period_s, master_node_id, bus.heartbeat_s, part
+                )
+                self.groups.append(group)
+                self._where |= {place: (group, i) for i, place in enumerate(bus.places)}
+                first += group.n
+            self.lockstep = self._common_clock()
+        except BaseException:
+            for group in self.groups:
+                group.close()
+            raise
+        self.axes = tuple(group.axes[i] for group, i in self._in_order())
+        self.feedback, self.command = room.feedback(), room.command()
+        self._moves = _Moves(order, self.feedback, self.command)
+        if self._moves.needed:
+            self.feedback, self.command = self._moves.feedback, self._moves.command
+        self._closed = False
+
+    def _common_clock(self) -> bool:
+        for group, bus in zip(self.groups, self.buses, strict=True):
+            if group.lockstep != self.groups[0].lockstep:
+                clocks = ("paced", "lockstep")
+                raise BusError(
+                    f"bus {bus.name} ({group.network.url}) is {clocks[group.lockstep]}, bus "
+                    f"{self.buses[0].name} is {clocks[self.groups[0].lockstep]}: all buses of a "
+                    "robot keep time alike"
+                )
+        return self.groups[0].lockstep
+
+    def locate(self, axis: int) -> tuple[AxisGroup, int]:
+        """Return the group that an axis belongs to, and its number there."""
+        return self._where[axis]
+
+    # -- one cycle
+
+    def sync(self) -> None:
+        """Send the SYNC that opens the cycle, on one bus right after the other."""
+        self.feedback.cycle += 1
+        self.feedback.time_s = self.feedback.cycle * self.period_s
+        failure: BusError | None = None
+        for group in self.groups:
+            try:
+                group.sync()
+            except BusError as error:
+                failure = failure or error
+        if failure is not None:
+            raise failure
+
+    def receive(self) -> int:
+        """Wait for the answers on all buses and decode them; return how many axes answered."""
+        deadline_s = 0.0 if self.lockstep else time.monotonic() + self.groups[0].paced_wait_s
+        answered = 0
+        failure: BusError | None = None
+        for group in self.groups:
+            try:
+                answered += group.receive(deadline_s)
+            except BusError as error:
+                failure = failure or error
+        if self._moves.needed:
+            self._moves.gather()
+        if failure is not None:
+            raise failure
+        return answered
+
+    def transmit(self) -> None:
+        """Send controlwords and torques on all buses, to act from the next SYNC on."""
+        if self._moves.needed:
+            self._moves.scatter()
+        failure: BusError | None = None
+        for group in self.groups:
+            try:
+                group.transmit()
+            except BusError as error:
+                failure = failure or error
+        if self._moves.needed:
+            self._moves.gather_sent()
+        if failure is not None:
+            raise failure
+
+    def alarm(self) -> str:
+        """Return why no drive on any bus must go on being driven, or an empty text."""
+        for group, bus in zip(self.groups, self.buses, strict=True):
+            text = group.alarm()
+            if text:
+                return f"bus {bus.name}: {text}"
+        return ""
+
+    @property
+    def missed(self) -> int:
+        """Answers that did not come in time since the beginning, over all axes."""
+        return sum(group.missed for group in self.groups)
+
+    # -- between cycles
+
+    def stop_cycling(self) -> None:
+        """Tell that no cycles run for a while; see `AxisGroup.stop_cycling`."""
+        for group in self.groups:
+            group.stop_cycling()
+
+    def request(self, state: State) -> None:
+        """Ask all axes for a state; see `AxisGroup.request`. Where one refuses, none is enabled."""
+        try:
+            for group in self.groups:
+                group.request(state)
+        except (DriveFaultError, ModeRefusedError):
+            for group in self.groups:
+                group.request(State.SWITCH_ON_DISABLED)
+            raise
+
+    def reached(self, state: State) -> bool:
+        """Return whether all axes report `state`."""
+        return all(group.reached(state) for group in self.groups)
+
+    def states(self) -> list[State]:
+        """Return the state each axis reported last."""
+        by_group = {id(group): group.states() for group in self.groups}
+        return [by_group[id(group)][i] for group, i in self._in_order()]
+
+    def faulted(self) -> BoolArray:
+        """Return which axes have been in fault since the last acknowledgement, (n,)."""
+        by_group = {id(group): group.faulted() for group in self.groups}
+        return np.array([by_group[id(group)][i] for group, i in self._in_order()])
+
+    def acknowledge_fault(self) -> None:
+        """Forget latched alarms and reset drives in fault; see `AxisGroup.acknowledge_fault`."""
+        for group in self.groups:
+            group.acknowledge_fault()
+
+    @property
+    def torque_modes(self) -> list[int]:
+        """Return the mode in which each drive obeys a torque, by its profile."""
+        by_group = {id(group): group.torque_modes for group in self.groups}
+        return [by_group[id(group)][i] for group, i in self._in_order()]
+
+    def ask_mode(self, modes: int | Sequence[int]) -> None:
+        """Ask for a mode of operation, one for all or one each; see `AxisGroup.ask_mode`."""
+        each = [modes] * self.n if isinstance(modes, int) else list(modes)
+        for group, bus in zip(self.groups, self.buses, strict=True):
+            group.ask_mode([each[place] for place in bus.places])
+
+    def mode_confirmed(self) -> bool:
+        """Return whether every axis reports the mode it was asked for; raises SdoError."""
+        return all(group.mode_confirmed() for group in self.groups)
+
+    def unconfirmed_mode(self) -> ModeRefusedError:
+        """Return the error that names the first axis whose mode is not what was asked for."""
+        groups = (group for group in self.groups if not group.mode_confirmed())
+        return next(groups, self.groups[0]).unconfirmed_mode()
+
+    def _in_order(self) -> list[tuple[AxisGroup, int]]:
+        return [self._where[place] for place in range(self.n)]
+
+    # -- the end
+
+    def close(self) -> str:
+        """Take torque and power from the drives of all buses; a second time does nothing.
+
+        Returns what could not be made sure of, empty when every drive has told that its power
+        stage is off.
+        """
+        if self._closed:
+            return ""
+        self._closed = True
+        try:
+            self._stop_together()
+        finally:
+            doubts = [group.close() for group in self.groups]
+        return "; ".join(doubt for doubt in doubts if doubt)
+
+    def _stop_together(self) -> None:
+        """Disable on all buses in the same cycles: none waits until another has stopped."""
+        live = list(self.groups)
+        for group in live:
+            group.request(State.SWITCH_ON_DISABLED)
+        until = time.monotonic() + _STOP_TIMEOUT_S
+        while live and time.monotonic() < until:
+            self.command.torque_Nm[:] = 0.0
+            for step in (AxisGroup.sync, AxisGroup.receive, _transmit_zero):
+                live = [group for group in live if _lives(group, step)]
+            if all(state in POWER_OFF for group in live for state in group.states()):
+                return
+            if not self.lockstep:
+                time.sleep(self.period_s)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        doubt = self.close()
+        if not doubt:
+            return
+        if error is None:
+            raise DriveFaultError(doubt)
+        error.add_note(doubt)
+
+
+def _transmit_zero(group: AxisGroup) -> None:
+    group.command.torque_Nm[:] = 0.0
+    group.transmit()
+
+
+def _lives(group: AxisGroup, step: Any) -> bool:
+    try:
+        step(group)
+    except BusError:
+        return False
+    return True
+
+
+class _Moves:
+    """Moves values between arrays in the order of the buses and arrays in the device's order."""
+
+    def __init__(self, order: Sequence[int], feedback: AxisFeedback, command: AxisCommand) -> None:
+        n = len(order)
+        self.needed = list(order) != sorted(order)
+        self.feedback, self.command = AxisFeedback(n), AxisCommand(n)
+        self._places: NDArray[np.intp] = np.array(order, np.intp)
+        self._columns: NDArray[np.intp] = np.argsort(self._places)
+        self._pairs = [
+            (value, getattr(self.feedback, name))
+            for name, value in vars(feedback).items()
+            if isinstance(value, np.ndarray)
+        ]
+        self._inner = command
+
+    def gather(self) -> None:
+        """Take the feedback over."""
+        for inner, whole in self._pairs:
+            np.take(inner, self._columns, out=whole, mode="clip")
+
+    def scatter(self) -> None:
+        """Hand the torques to the buses."""
+        wanted, inner = self.command.torque_Nm, self._inner.torque_Nm
+        np.take(wanted, self._places, out=inner, mode="clip")
+
+    def gather_sent(self) -> None:
+        """Take over which torques have gone out."""
+        sent, whole = self._inner.sent_torque_Nm, self.command.sent_torque_Nm
+        np.take(sent, self._columns, out=whole, mode="clip")
