@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Final
 
 from cdpr_rt.executive import Executive
 from cdpr_rt.state_file import state_path
@@ -23,7 +24,7 @@ class SessionSafety:
     def __init__(self, io: SafetyIo, node_ids: Iterable[int]) -> None:
         self.io = io
         nodes = set(node_ids)
-        self._braked = tuple(
+        self.braked: Final = tuple(
             axis.axis
             for axis in io.profile.axes
             if axis.brake is not None and axis.node_id in nodes
@@ -31,14 +32,14 @@ class SessionSafety:
 
     def release_brakes(self, executive: Executive) -> None:
         """Release the brakes once the drives hold the axes; raises TripError, SafetyIoError."""
-        if self._braked:
-            self.io.release_brakes(*self._braked)
+        if self.braked:
+            self.io.release_brakes(*self.braked)
             executive.step(lambda: self._are(True), _FOR_EVER_S, "the release of the brakes")
 
     def apply_brakes(self, executive: Executive) -> None:
         """Apply the brakes before the drives let go; raises TripError, SafetyIoError."""
-        if self._braked:
-            self.io.apply_brakes(*self._braked)
+        if self.braked:
+            self.io.apply_brakes(*self.braked)
             executive.step(lambda: self._are(False), _FOR_EVER_S, "the brakes to be applied")
 
     @property
@@ -59,7 +60,7 @@ class SessionSafety:
 
     def _are(self, released: bool) -> bool:
         told = self.io.state.brakes_released
-        return all(told[axis] == released for axis in self._braked)
+        return all(told[axis] == released for axis in self.braked)
 
 
 def trip_file(reference: str) -> Path:
@@ -88,4 +89,6 @@ def open_safety(
         io.energise()
         session = SessionSafety(io, node_ids)
         out.note(f"{io.name}: the chain is closed, the contactor is on")
+        if any(axis.brake for axis in io.profile.axes) and not session.braked:
+            out.note("none of its brakes belongs to this session's nodes (key node_id): none moves")
         yield session

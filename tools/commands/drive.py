@@ -110,12 +110,16 @@ def enable(
 
 @app.command()
 def reset(
-    winch: WinchArgument, bus: BusOption, plant: PlantOption = None, as_json: JsonOption = False
+    winch: WinchArgument,
+    bus: BusOption,
+    plant: PlantOption = None,
+    safety_io: SafetyIoOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Acknowledge the drive's fault; nothing is enabled by it."""
     out = Output(as_json)
     profile = load_winch(winch)
-    with open_winch(profile, open_bus(bus), out, plant) as session:
+    with open_winch(profile, open_bus(bus), out, plant, safety_io=safety_io) as session:
         session.reset_fault()
         state = session.device.states()[0].label
     out.say(state)
