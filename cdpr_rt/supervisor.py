@@ -14,12 +14,12 @@ _OK, _MISSED, _SPEED, _FOLLOWING, _NOT_FINITE = 0, 1, 2, 3, 4
 
 @dataclass(frozen=True)
 class Limits:
-    """What the supervisor tolerates on every axis."""
+    """What the supervisor tolerates: one figure for every axis, or (n,) for each its own."""
 
-    torque_Nm: float
+    torque_Nm: float | FloatArray
     """Torque is clamped to this."""
-    speed_rad_s: float
-    following_error_rad: float
+    speed_rad_s: float | FloatArray
+    following_error_rad: float | FloatArray
     missed_cycles: int = 3
     """Consecutive cycles without an answer that are bridged."""
 
@@ -34,14 +34,15 @@ def _check(
     valid: BoolArray,
     torque: FloatArray,
 ) -> tuple[int, int, float]:
-    # state columns: last position, low-passed speed, consecutive misses, started
+    # columns of limits: torque, speed, following error, misses
+    # columns of state: last position, low-passed speed, consecutive misses, started
     for i in range(torque.size):
         if not np.isfinite(torque[i]):
             return _NOT_FINITE, i, torque[i]
-        torque[i] = min(max(torque[i], -limits[0]), limits[0])
+        torque[i] = min(max(torque[i], -limits[i, 0]), limits[i, 0])
         if not valid[i]:
             state[i, 2] += 1.0
-            if state[i, 2] > limits[3]:
+            if state[i, 2] > limits[i, 3]:
                 return _MISSED, i, state[i, 2]
             continue
         if state[i, 3] == 0.0:
@@ -53,10 +54,10 @@ def _check(
         weight = elapsed / (elapsed + 0.01)
         state[i, 1] += weight * ((position[i] - state[i, 0]) / elapsed - state[i, 1])
         state[i, 0] = position[i]
-        if abs(state[i, 1]) > limits[1]:
+        if abs(state[i, 1]) > limits[i, 1]:
             return _SPEED, i, state[i, 1]
         error = reference[i] - position[i]
-        if abs(error) > limits[2]:
+        if abs(error) > limits[i, 2]:
             return _FOLLOWING, i, error
     return _OK, 0, 0.0
 
@@ -66,9 +67,13 @@ class Supervisor:
 
     def __init__(self, limits: Limits, n: int, period_s: float) -> None:
         self.limits = limits
-        self._limits = np.array(
-            [limits.torque_Nm, limits.speed_rad_s, limits.following_error_rad, limits.missed_cycles]
+        columns = (
+            limits.torque_Nm,
+            limits.speed_rad_s,
+            limits.following_error_rad,
+            float(limits.missed_cycles),
         )
+        self._limits = np.stack([np.broadcast_to(c, (n,)) for c in columns], axis=1).astype(float)
         self._state = np.zeros((n, 4))
         self._period_s = period_s
 
@@ -90,19 +95,17 @@ class Supervisor:
         return self._reason(code, axis, value) if code != _OK else ""
 
     def _reason(self, code: int, axis: int, value: float) -> str:
-        limits = self.limits
+        _, speed, following, misses = self._limits[axis]
         if code == _MISSED:
-            return (
-                f"axis {axis}: no feedback for {value:.0f} cycles, {limits.missed_cycles} allowed"
-            )
+            return f"axis {axis}: no feedback for {value:.0f} cycles, {misses:.0f} allowed"
         if code == _SPEED:
             return (
                 f"axis {axis}: speed {np.degrees(value):.0f} deg/s, "
-                f"{np.degrees(limits.speed_rad_s):.0f} deg/s allowed"
+                f"{np.degrees(speed):.0f} deg/s allowed"
             )
         if code == _FOLLOWING:
             return (
                 f"axis {axis}: following error {np.degrees(value):.1f} deg, "
-                f"{np.degrees(limits.following_error_rad):.1f} deg allowed"
+                f"{np.degrees(following):.1f} deg allowed"
             )
         return f"axis {axis}: the controller's torque is {value}, a finite number is required"

@@ -22,11 +22,13 @@ from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootSettings, boot
 from drivers.bus import BusUrl, query_status
+from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
 from drivers.cia402 import Mode, State, fault_text
 from drivers.errors import BusError, DriveFaultError, SdoError
 from drivers.homing import Homing
 from drivers.network import CanNetwork
 from profiles import Winch
+from tools.bus_fit import require_fit
 from tools.consent import require_consent
 from tools.errors import BadInputError
 from tools.output import Output
@@ -208,8 +210,9 @@ def open_network(
 ) -> Iterator[CanNetwork]:
     """Join the bus for acyclic work, with a simulator of its own where `simbus:` has no name.
 
-    Raises BadInputError for a bus that cannot be opened.
+    Raises BadInputError for a cycle that does not fit the bus, and for a bus that cannot be opened.
     """
+    require_fit(winch)
     with ExitStack() as stack:
         if url.starts_own_simulator:
             url = _own_simulator(stack, winch, out, plant, truth_log)
@@ -280,8 +283,8 @@ def open_winch(
 
 
 def _heartbeat_s(winch: Winch) -> float:
-    """Return how often the master is heard: four times within what the drive tolerates."""
-    return winch.drive.heartbeat_consumer_s / 4
+    """Return how often the master is heard within what the drive tolerates."""
+    return winch.drive.heartbeat_consumer_s / HEARTBEATS_IN_TOLERANCE
 
 
 def _axis(winch: Winch, network: CanNetwork, report: BootReport, limit_Nm: float) -> AxisGroup:
