@@ -1,8 +1,8 @@
 #!/bin/sh
-# First process of the guest kernel: bring up vcan0, run the command, leave its exit code, power off.
+# First process of the guest kernel: bring up vcan0 and vcan1, run the command, leave its exit code, power off.
 #
 # RUN_DIR (from the kernel's command line) holds busybox, modules/, command.sh; into it go `ready`
-# once vcan0 is up, `output.txt`, and `exit_code` (the kernel itself always ends with 0).
+# once they are up, `output.txt`, and `exit_code` (the kernel itself always ends with 0).
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 bb="$RUN_DIR/busybox"
 root=/run/root
@@ -18,7 +18,7 @@ say_and_stop() {
 "$bb" mount -t hostfs -o "$RUN_DIR" none "$RUN_DIR" || say_and_stop "no writable result folder"
 
 for module in fs/overlayfs/overlay net/can/can net/can/can-raw net/can/can-bcm net/can/can-gw \
-        drivers/net/can/dev/can-dev drivers/net/can/vcan; do
+        drivers/net/can/dev/can-dev drivers/net/can/vcan drivers/net/can/slcan/slcan; do
     "$bb" insmod "$RUN_DIR/modules/kernel/$module.ko" || say_and_stop "no module $module"
 done
 
@@ -36,7 +36,9 @@ mkdir -p "$root/dev/shm" "$root/dev/pts"
 "$bb" mount -t hostfs -o "$RUN_DIR" none "$root$RUN_DIR"
 
 "$bb" ip link set lo up
-"$bb" ip link add vcan0 type vcan && "$bb" ip link set vcan0 up || say_and_stop "no vcan0"
+for bus in vcan0 vcan1; do
+    "$bb" ip link add "$bus" type vcan && "$bb" ip link set "$bus" up || say_and_stop "no $bus"
+done
 # Or frames are lost when many sockets listen.
 echo 33554432 > /proc/sys/net/core/rmem_max
 echo 8388608 > /proc/sys/net/core/rmem_default

@@ -82,7 +82,7 @@ def test_the_packed_port_filters_waits_and_drains():
 
 
 def test_an_interface_that_is_not_there_is_named():
-    with pytest.raises(BusError, match="cannot use the network interface 'vcan77'"):
+    with pytest.raises(BusError, match="there is no network interface 'vcan77'"):
         open_socketcan(BusUrl.parse("socketcan:vcan77"), None)
 
 

@@ -1,7 +1,8 @@
-"""A real SocketCAN `vcan0`: the machine's own, or one in a guest kernel that runs as a process.
+"""Real SocketCAN buses, `vcan0` and `vcan1`: the machine's own, or those of a guest kernel.
 
-The guest is Debian's user-mode-linux with the machine's files as its root, so that it runs the very
-same tree and environment. Its packages are downloaded and unpacked into a cache, never installed.
+The guest is Debian's user-mode-linux, an ordinary process with the machine's files as its root, so
+that it runs the very same tree and environment. Its packages are downloaded and unpacked into a
+cache, never installed.
 """
 
 import contextlib
@@ -15,7 +16,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-INTERFACE = "vcan0"
+INTERFACES = ("vcan0", "vcan1")
 PACKAGES = ("user-mode-linux", "busybox-static")
 MEMORY_MB = 2048
 DOWNLOAD_TIMEOUT_S = 240
@@ -45,21 +46,22 @@ class GuestRun:
 
 
 def own_vcan() -> bool:
-    """Tell whether this machine's kernel has `vcan0`; as root, add it where it is missing."""
-    if _is_up():
-        return True
+    """Tell whether this machine's kernel has both buses; as root, add what is missing."""
+    if not hasattr(socket, "AF_CAN"):
+        return False
     ip = shutil.which("ip", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")
-    if os.geteuid() == 0 and ip and hasattr(socket, "AF_CAN"):
-        for words in (("add", INTERFACE, "type", "vcan"), ("set", INTERFACE, "up")):
-            subprocess.run([ip, "link", *words], check=False, capture_output=True)
-    return _is_up()
+    for name in INTERFACES:
+        if os.geteuid() == 0 and ip and not _is_up(name):
+            for words in (("add", name, "type", "vcan"), ("set", name, "up")):
+                subprocess.run([ip, "link", *words], check=False, capture_output=True)
+    return all(map(_is_up, INTERFACES))
 
 
-def _is_up() -> bool:
+def _is_up(name: str) -> bool:
     try:
-        flags = Path(f"/sys/class/net/{INTERFACE}/flags").read_text(encoding="ascii")
+        flags = Path(f"/sys/class/net/{name}/flags").read_text(encoding="ascii")
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
-    except (OSError, AttributeError):
+    except OSError:
         return False
     return bool(int(flags, 16) & 1)
 
