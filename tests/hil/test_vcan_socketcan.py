@@ -1,0 +1,201 @@
+"""What SocketCAN has besides frames: error frames, time stamps, full queues, links that go down."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import pty
+import socket
+import struct
+import termios
+import time
+import tty
+from collections.abc import Iterator
+
+import can
+import pytest
+import vcan_replay
+
+from drivers.bus import BusHealth, BusState, BusUrl, open_port, open_python_can
+from drivers.bus.packed import ERR_FLAG, FRAME
+from drivers.bus.socketcan import SocketCanPort
+from drivers.errors import BusError
+
+pytestmark = pytest.mark.vcan
+
+VCAN0, VCAN1 = BusUrl.parse("socketcan:vcan0"), BusUrl.parse("socketcan:vcan1")
+N_SLCAN, SIOCGIFNAME, SIOCGIFFLAGS, SIOCSIFFLAGS = 17, 0x8910, 0x8913, 0x8914
+
+
+def set_link(name: str, *, up: bool) -> None:
+    """Bring a network interface up or down."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        request = struct.pack("16sH22x", name.encode(), 0)
+        (flags,) = struct.unpack_from("H", fcntl.ioctl(sock, SIOCGIFFLAGS, request), 16)
+        flags = flags | 1 if up else flags & ~1
+        fcntl.ioctl(sock, SIOCSIFFLAGS, struct.pack("16sH22x", name.encode(), flags))
+
+
+def test_two_buses_at_once_keep_apart() -> None:
+    with contextlib.ExitStack() as stack:
+        ports = [open_port(url) for url in (VCAN0, VCAN1)]
+        peers = [open_python_can(url) for url in (VCAN0, VCAN1)]
+        for port in ports:
+            stack.callback(port.close)
+            port.settimeout(2.0)
+        for peer in peers:
+            stack.callback(peer.shutdown)
+        buffer = bytearray(16)
+        for k in range(50):
+            for bus, peer in enumerate(peers):
+                peer.send(can.Message(arbitration_id=0x181, data=[bus, k], is_extended_id=False))
+        for k in range(50):
+            for bus, port in enumerate(ports):
+                assert port.recv_into(buffer) == 16
+                assert FRAME.unpack(buffer) == (0x181, 2, bytes([bus, k]).ljust(8, b"\0"))
+        assert [port.drain() for port in ports] == [0, 0]
+
+
+def test_the_kernel_stamps_when_a_frame_came() -> None:
+    port, peer = open_port(VCAN0, [(0x181, 0x7FF)]), open_port(VCAN0, [])
+    port.settimeout(2.0)
+    before = time.time()
+    peer.send(FRAME.pack(0x181, 0, b""))
+    after = time.time()
+    time.sleep(0.3)
+    buffer = bytearray(16)
+    port.recv_into(buffer)
+    assert before - 0.01 <= port.arrival_s() <= after + 0.01
+    port.close()
+    peer.close()
+
+
+def test_error_frames_tell_the_health_and_disturb_no_cycle() -> None:
+    """A vcan carries error frames that a program sends, as a driver would make them."""
+    cyclic, source = open_port(VCAN0), open_port(VCAN0, [])
+    cyclic.settimeout(0.05)
+    acyclic = open_python_can(VCAN0, [(0x701, 0x7FF)])
+    health = BusHealth()
+    told = [
+        (ERR_FLAG | 0x004, bytes([0, 0x08]), BusState.WARNING),
+        (ERR_FLAG | 0x004, bytes([0, 0x20]), BusState.PASSIVE),
+        (ERR_FLAG | 0x040, b"", BusState.BUS_OFF),
+        (ERR_FLAG | 0x100, b"", BusState.ACTIVE),
+    ]
+    for can_id, data, state in told:
+        source.send(FRAME.pack(can_id, 8, data))
+        message = acyclic.recv(2.0)
+        assert message is not None
+        assert message.is_error_frame
+        assert health.take_message(message)
+        assert health.state is state
+    assert (health.bus_offs, health.restarts) == (1, 1)
+    with pytest.raises(BlockingIOError):
+        cyclic.recv_into(bytearray(16))
+    acyclic.shutdown()
+    cyclic.close()
+    source.close()
+
+
+@pytest.fixture
+def down() -> Iterator[None]:
+    set_link("vcan1", up=False)
+    yield
+    set_link("vcan1", up=True)
+
+
+def test_an_interface_that_is_down_is_told_so(down: None) -> None:
+    for opened in (open_port, open_python_can):
+        with pytest.raises(BusError, match=r"'vcan1' is down; .* sudo ip link set vcan1 up"):
+            opened(VCAN1)
+    with pytest.raises(BusError, match="'lo' is no CAN interface"):
+        open_port(BusUrl.parse("socketcan:lo"))
+
+
+def test_an_interface_that_goes_down_in_motion_is_noticed_by_readers_and_senders() -> None:
+    port, peer = open_port(VCAN1), open_port(VCAN1, [])
+    acyclic = open_python_can(VCAN1)
+    port.settimeout(2.0)
+    peer.send(FRAME.pack(0x181, 0, b""))
+    assert port.recv_into(bytearray(16)) == 16
+    set_link("vcan1", up=False)
+    try:
+        with pytest.raises(OSError, match="down") as caught:
+            port.recv_into(bytearray(16))
+        assert "bus has gone away: the network interface 'vcan1' is down" in str(
+            port.lost(caught.value)
+        )
+        with pytest.raises(OSError, match=r".") as caught:
+            peer.send(FRAME.pack(0x181, 0, b""))
+        assert "'vcan1' is down" in str(peer.lost(caught.value))
+        with pytest.raises(can.CanError):
+            for _ in range(2):  # the frame of before may come first
+                acyclic.recv(2.0)
+    finally:
+        set_link("vcan1", up=True)
+        acyclic.shutdown()
+        port.close()
+        peer.close()
+
+
+@pytest.fixture
+def stalled_adapter() -> Iterator[tuple[int, str]]:
+    """A real CAN driver, the kernel's slcan, on a terminal that nobody reads."""
+    host, terminal = pty.openpty()
+    tty.setraw(terminal)
+    try:
+        fcntl.ioctl(terminal, termios.TIOCSETD, struct.pack("i", N_SLCAN))
+    except OSError as error:
+        if vcan_replay.REPORTS_VARIABLE in os.environ:
+            raise
+        pytest.skip(f"this kernel has no slcan or lets only root use it ({error.strerror})")
+    name = fcntl.ioctl(terminal, SIOCGIFNAME, bytes(40))[:16].rstrip(b"\0").decode()
+    set_link(name, up=True)
+    yield host, name
+    os.close(terminal)
+    os.close(host)
+
+
+def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, str]) -> None:
+    host, name = stalled_adapter
+    health = BusHealth()
+    port = open_port(BusUrl.parse(f"socketcan:{name}"), [], health)
+    assert isinstance(port, SocketCanPort)
+    frame = FRAME.pack(0x201, 8, bytes(8))
+    started = time.monotonic()
+    with pytest.raises(OSError, match="buffer space") as caught:
+        for _ in range(2000):
+            port.send(frame)
+    assert caught.value.errno == errno.ENOBUFS
+    assert time.monotonic() - started < 20.0
+    assert health.tx_full > 100
+    assert f"transmit queue of {name} has been full" in str(port.lost(caught.value))
+    # as soon as the adapter takes frames again the bus is usable
+    os.set_blocking(host, False)
+    deadline = time.monotonic() + 5.0
+    while time.monotonic() < deadline:
+        with contextlib.suppress(BlockingIOError):
+            os.read(host, 65536)
+        with contextlib.suppress(OSError):
+            port.send(frame)
+            break
+    else:
+        raise AssertionError("no frame got out again")
+    port.close()
+
+
+def test_an_adapter_pulled_out_takes_its_interface_away(stalled_adapter: tuple[int, str]) -> None:
+    host, name = stalled_adapter
+    port = open_port(BusUrl.parse(f"socketcan:{name}"))
+    port.settimeout(2.0)
+    os.write(host, b"t18121234\r")
+    buffer = bytearray(16)
+    port.recv_into(buffer)
+    assert bytes(buffer) == FRAME.pack(0x181, 2, b"\x12\x34")
+    set_link(name, up=False)
+    with pytest.raises(OSError, match=r"down|such") as caught:
+        port.recv_into(buffer)
+    assert "gone away" in str(port.lost(caught.value))
+    port.close()
