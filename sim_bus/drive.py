@@ -33,6 +33,13 @@ from sim_bus.motor_state import MotorRatings, Transmission
 from sim_bus.physics_board import BoardAxis
 from sim_bus.plant import Plant
 from sim_bus.truth_log import TruthLog
+from sim_bus.twins import (
+    IN_ACCELERATION_UNITS,
+    IN_VELOCITY_UNITS,
+    Twin,
+    complete,
+    twin_of,
+)
 
 TICK_S = 1e-3
 """Longest step between two looks of the state machine."""
@@ -50,11 +57,7 @@ _CONFIGURATION = (
     *(0x6083, 0x6084, 0x6087, 0x609A, 0x60C5, 0x60C6, 0x60E0, 0x60E1),
 )
 _FIXED = (0x607E, 0x608F, 0x6091, 0x6092)
-_IN_COUNTS = (
-    *((index, 0) for index in (0x6065, 0x6067, 0x606D, 0x606F, 0x607F, 0x6081)),
-    *((index, 0) for index in (0x6083, 0x6084, 0x6085, 0x609A, 0x60C5, 0x60C6)),
-    *((0x6092, 1), (0x6099, 1), (0x6099, 2)),
-)
+_POSITIONS = ((0x6065, 0), (0x6067, 0), (0x6092, 1))
 
 
 class SimDrive(SlaveApplication):
@@ -81,14 +84,16 @@ class SimDrive(SlaveApplication):
         """
         ratings = ratings or MotorRatings()
         self.od = od = ObjectDictionary.from_eds(eds, node_id)
-        _adapt(od, plant, ratings)
+        twin = twin_of(od)
+        complete(od, twin)
+        _adapt(od, twin, plant, ratings)
         if serial is not None:
             od.set_default(0x1018, 4, serial)
         self._slave = CanopenSlave(
             od, node_id, self, store=ParameterStore(store, PROCESS_DATA), bitrate=bitrate
         )
         self.outbox = self._slave.outbox
-        self.axis = Axis(od, plant, ratings, transmission)
+        self.axis = Axis(od, plant, ratings, transmission, twin)
         self.probes = TouchProbes(self.axis)
         self.machine = Machine(self.axis, self._slave)
         self.misbehaviour = Misbehaviour(od, self.machine, self.outbox)
@@ -240,7 +245,7 @@ class SimDrive(SlaveApplication):
                 entry.hook = self._change_noter(entry)
             elif entry.index in _FIXED and entry.writable:
                 entry.hook = _fixed(entry)
-        known = frozenset(METHODS) | IN_PLACE
+        known = self.axis.twin.homing_methods or frozenset(METHODS) | IN_PLACE
         self.od.on_write(0x6098, 0, _only(lambda value: value in known))
 
     def _change_noter(self, entry: Entry) -> Callable[[Value], None]:
@@ -263,19 +268,20 @@ def _fixed(entry: Entry) -> Callable[[Value], None]:
     return _only(lambda value: value == entry.value)
 
 
-def _adapt(od: ObjectDictionary, plant: Plant, ratings: MotorRatings) -> None:
+def _adapt(od: ObjectDictionary, twin: Twin, plant: Plant, ratings: MotorRatings) -> None:
     """Give the dictionary the defaults that follow from motor and encoder."""
     counts = plant.encoder.counts_per_turn
-    for index, sub in _IN_COUNTS:
+    rates = () if twin.speaks_rpm else IN_VELOCITY_UNITS + IN_ACCELERATION_UNITS
+    for index, sub in (*_POSITIONS, *rates):
         entry = od.entry(index, sub)
         scaled = max(1, round(od.get_int(index, sub) * counts / _EDS_COUNTS_PER_TURN))
         _default(entry, min(scaled, entry.codec.high or scaled))
     _default(od.entry(0x608F, 1), counts)
     _default(od.entry(0x6075), round(ratings.rated_current_Arms * 1e3))
     _default(od.entry(0x6076), round(ratings.rated_torque_Nm * 1e3))
-    peak = round(1e3 * ratings.peak_torque_Nm / ratings.rated_torque_Nm)
+    unit = twin.torque_unit_Nm or 1e-3 * ratings.rated_torque_Nm
     for index in (0x6072, 0x60E0, 0x60E1):
-        _default(od.entry(index), peak)
+        _default(od.entry(index), round(ratings.peak_torque_Nm / unit))
     _default(od.entry(0x6073), round(1e3 * ratings.peak_current_Arms / ratings.rated_current_Arms))
     _default(od.entry(0x6080), round(ratings.rated_speed_rad_s * 60.0 / (2.0 * math.pi)))
 

@@ -24,8 +24,8 @@ class Sample(NamedTuple):
     """Flags of `rotor` (index edges) and `servo`, or-ed."""
     counts: int
     """Encoder counter from power-up, `feedback_delay_s` old, with noise."""
-    torque_permille: int
-    """Measured torque in per mille of rated torque, at the nominal torque constant."""
+    torque_units: int
+    """Measured torque in the drive's unit, at the nominal torque constant."""
     velocity_counts_s: int
     """Displayed velocity."""
     angle_rad: float
@@ -66,7 +66,7 @@ def run(
     return (
         flags,
         rotor.read_counter(m, rotor.delayed_angle(m)),
-        math.floor(1000.0 * m.sensed / m.rated_torque + 0.5),
+        math.floor(m.sensed / m.torque_unit + 0.5),
         math.floor(m.displayed_velocity + 0.5),
         m.angle,
         m.velocity,

@@ -98,7 +98,7 @@ _SERVO = [
     ("position_gain", _F8),  # 1/s
     ("observer_rate", _F8),  # rad/s
     ("display_rate", _F8),  # rad/s, filter of the displayed velocity
-    ("rated_torque", _F8),  # Nm
+    ("torque_unit", _F8),  # Nm, of one unit of target and measured torque
     ("limit_positive", _F8),  # Nm
     ("limit_negative", _F8),  # Nm, a positive figure
     ("torque_slope", _F8),  # Nm/s
@@ -266,7 +266,7 @@ def _set_servo(m: Any, plant: Plant, ratings: MotorRatings) -> None:
     m["observer_rate"] = 6.0 * crossover
     m["display_rate"] = crossover
     nominal = ratings.torque_constant_Nm_per_Arms
-    m["rated_torque"] = ratings.rated_torque_Nm
+    m["torque_unit"] = 1e-3 * ratings.rated_torque_Nm
     m["limit_positive"] = m["limit_negative"] = ratings.peak_torque_Nm
     m["rated_current"] = ratings.rated_current_Arms * nominal
     m["overcurrent"] = drive.overcurrent_Arms * nominal

@@ -13,7 +13,7 @@ from sim_bus.jit import jit
 OFF = 0
 """Power stage off: the motor coasts."""
 TORQUE = 1
-"""Target in per mille of rated torque, along the torque slope."""
+"""Target in torque units, along the torque slope."""
 VELOCITY = 2
 """Target in counts/s, along acceleration and deceleration."""
 PROFILE_POSITION = 3
@@ -134,7 +134,7 @@ def motion_torque(m: Any, kind: int, h: float) -> float:
 @jit
 def torque_mode_torque(m: Any, target: float, h: float) -> float:
     """Return the torque demand along the slope, held back at the speed limit, Nm."""
-    goal = target * 1e-3 * m.rated_torque
+    goal = target * m.torque_unit
     m.torque_demand = _approach(m.torque_demand, goal, m.torque_slope * h)
     gain = m.velocity_gain / m.counts_per_rad
     upper = gain * (m.speed_limit - m.observed_velocity)
@@ -198,7 +198,7 @@ def watch(m: Any, kind: int, target: float, h: float) -> int:
     if abs(m.observed_velocity) > m.overspeed:
         flags |= OVERSPEED
     if kind == TORQUE:
-        done = near = m.torque_demand == target * 1e-3 * m.rated_torque
+        done = near = m.torque_demand == target * m.torque_unit
     elif kind == VELOCITY:
         done = m.reference_velocity == target
         near = done and abs(m.displayed_velocity - target) <= m.target_window

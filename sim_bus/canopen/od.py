@@ -36,6 +36,7 @@ class Entry:
         "codec",
         "default",
         "getter",
+        "hidden",
         "high",
         "hook",
         "index",
@@ -60,6 +61,8 @@ class Entry:
         self.high: int | None = codec.high
         self.mappable = False
         self.relative = False
+        self.hidden = False
+        """Whether only the device itself knows of it."""
         self.base_default: Value = codec.zero
         self.default: Value = codec.zero
         self.stored: Value | None = None
@@ -169,7 +172,8 @@ class ObjectDictionary:
     def add(self, entry: Entry) -> None:
         """Add an object."""
         self._entries[entry.index, entry.sub] = entry
-        self._indexes.add(entry.index)
+        if not entry.hidden:
+            self._indexes.add(entry.index)
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self._entries.values())
@@ -187,7 +191,7 @@ class ObjectDictionary:
     def find(self, index: int, sub: int) -> Entry:
         """Entry a client named; raises SdoAbort when there is none."""
         entry = self._entries.get((index, sub))
-        if entry is None:
+        if entry is None or entry.hidden:
             known = index in self._indexes
             raise SdoAbort(Abort.NO_SUBINDEX if known else Abort.NO_OBJECT)
         return entry

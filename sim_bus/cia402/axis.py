@@ -11,6 +11,7 @@ from sim_bus.motor import run
 from sim_bus.motor_state import MotorRatings, Transmission, build_motor
 from sim_bus.plant import Plant
 from sim_bus.rotor import restart_counter
+from sim_bus.twins import Twin
 
 _WINDOW_OFF = 0xFFFFFFFF
 
@@ -24,7 +25,8 @@ class Axis:
     """Power stage, inner loops and feedback of one motor.
 
     Positions here are encoder counts from power-up; `position_offset` leads to those of the
-    dictionary (position actual = counter + offset).
+    dictionary (position actual = counter + offset). Inner loops work in counts; `velocity` reads
+    objects in the unit that the drive's `twin` speaks.
     """
 
     def __init__(
@@ -33,10 +35,14 @@ class Axis:
         plant: Plant,
         ratings: MotorRatings,
         transmission: Transmission | None = None,
+        twin: Twin | None = None,
     ) -> None:
         self.od = od
         self.plant = plant
         self.ratings = ratings
+        self.twin = twin or Twin()
+        self.velocity_unit = plant.encoder.counts_per_turn / 60.0 if self.twin.speaks_rpm else 1.0
+        """Counts/s of one velocity unit, counts/s² of one acceleration unit."""
         self.motor = build_motor(plant, ratings, transmission)
         self.kind = servo.OFF
         self.target = 0.0
@@ -95,24 +101,28 @@ class Axis:
         """Return an integer object."""
         return self.od.get_int(index, sub)
 
+    def velocity(self, index: int, sub: int = 0) -> float:
+        """Return an object that holds a velocity or an acceleration, in counts/s or counts/s²."""
+        return self.od.get_int(index, sub) * self.velocity_unit
+
     def configure(self) -> None:
         """Take limits and windows from the dictionary."""
         get, m = self.od.get_int, self.motor
-        rated = get(0x6076) * 1e-3
-        m["rated_torque"] = rated
+        unit = self.twin.torque_unit_Nm or get(0x6076) * 1e-6
+        m["torque_unit"] = unit
         constant = self.ratings.torque_constant_Nm_per_Arms
         m["rated_current"] = get(0x6075) * 1e-3 * constant
         peak = min(self.ratings.peak_torque_Nm, get(0x6073) * get(0x6075) * 1e-6 * constant)
-        most = min(peak, get(0x6072) * 1e-3 * rated)
-        m["limit_positive"] = min(most, get(0x60E0) * 1e-3 * rated)
-        m["limit_negative"] = min(most, get(0x60E1) * 1e-3 * rated)
+        most = min(peak, get(0x6072) * unit)
+        m["limit_positive"] = min(most, get(0x60E0) * unit)
+        m["limit_negative"] = min(most, get(0x60E1) * unit)
         speed = get(0x6080) / 60.0 * self.plant.encoder.counts_per_turn
         m["speed_limit"] = speed
         m["overspeed"] = self.plant.drive.overspeed_ratio * speed
         window = get(0x6065)
         m["following_window"] = math.inf if window == _WINDOW_OFF else window
         m["following_time"] = get(0x6066) * 1e-3
-        m["standstill_velocity"] = get(0x606F)
+        m["standstill_velocity"] = self.velocity(0x606F)
         m["standstill_time"] = get(0x6070) * 1e-3
         low, high = get(0x607D, 1), get(0x607D, 2)
         self._lowest, self._highest = (low, high) if low < high else (-math.inf, math.inf)
@@ -120,20 +130,20 @@ class Axis:
     @property
     def speed_limit(self) -> float:
         """Highest velocity a profile may ask for, counts/s."""
-        return min(float(self.object(0x607F)), self.read("speed_limit"))
+        return min(self.velocity(0x607F), self.read("speed_limit"))
 
     def set_ramps(self, acceleration: float, deceleration: float) -> None:
         """Set the ramps of the velocity and position profile, counts/s², within 60C5h, 60C6h."""
-        self.motor["acceleration"] = min(acceleration, self.object(0x60C5))
-        self.motor["deceleration"] = min(deceleration, self.object(0x60C6))
+        self.motor["acceleration"] = min(acceleration, self.velocity(0x60C5))
+        self.motor["deceleration"] = min(deceleration, self.velocity(0x60C6))
 
     def set_steps(self) -> None:
         """Let velocity references act without a ramp."""
         self.motor["acceleration"] = self.motor["deceleration"] = math.inf
 
-    def set_torque_slope(self, permille_s: float) -> None:
-        """Set the torque slope, per mille of rated torque per second."""
-        self.motor["torque_slope"] = permille_s * 1e-3 * self.read("rated_torque")
+    def set_torque_slope(self, units_s: float) -> None:
+        """Set the torque slope, torque units per second."""
+        self.motor["torque_slope"] = units_s * self.read("torque_unit")
 
     def set_window(self, window: float, time_s: float) -> None:
         """Set the window around the target and how long the value must stay in it."""
@@ -150,8 +160,8 @@ class Axis:
         """Return 60FDh: bit 0 negative limit, 1 positive limit, 2 home switch."""
         return (self.flags // servo.SWITCH_NEGATIVE) & 0b111
 
-    def _permille(self, torque_Nm: float) -> int:
-        return round(1000.0 * torque_Nm / self.read("rated_torque"))
+    def _velocity_units(self, counts_s: float) -> int:
+        return round(counts_s / self.velocity_unit)
 
     def _bind_feedback(self) -> None:
         od = self.od
@@ -159,9 +169,9 @@ class Axis:
             0x6062: lambda: to_int32(round(self.read("reference_position")) + self.position_offset),
             0x6063: lambda: to_int32(self.sample[1]),
             0x6069: lambda: round(self.read("observed_velocity")),
-            0x606B: lambda: round(self.read("reference_velocity")),
-            0x606C: lambda: self.sample[3],
-            0x6074: lambda: self._permille(self.read("torque_demand")),
+            0x606B: lambda: self._velocity_units(self.read("reference_velocity")),
+            0x606C: lambda: self._velocity_units(self.sample[3]),
+            0x6074: lambda: round(self.read("torque_demand") / self.read("torque_unit")),
             0x6078: lambda: round(1000.0 * self.read("sensed") / self.read("rated_current")),
             0x60F4: lambda: round(self.read("reference_position") - self.read("observed_position")),
             0x60FC: lambda: to_int32(round(self.read("reference_position"))),

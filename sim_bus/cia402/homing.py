@@ -6,7 +6,7 @@ and the first index pulse beyond it is home. The table says on which side and ho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 from typing_extensions import override
@@ -33,6 +33,11 @@ class Method:
     """Whether that crossing leaves the switch (else it enters it)."""
     reverses: bool = False
     """Whether a limit switch met while searching turns the search round."""
+
+    def mirrored(self) -> Method:
+        """Return the same method with all directions the other way."""
+        switch = {_NEG: _POS, _POS: _NEG}.get(self.switch, self.switch)
+        return replace(self, switch=switch, search=-self.search, final=-self.final)
 
 
 _NEG, _POS, _HOME = servo.SWITCH_NEGATIVE, servo.SWITCH_POSITIVE, servo.SWITCH_HOME
@@ -78,6 +83,8 @@ class Homing(Mode):
 
     def __init__(self, axis: Axis) -> None:
         super().__init__(axis)
+        self._reversed = axis.twin.homing_reversed
+        self._shows_rest = axis.twin.bit_10_in_homing
         self._phase = _Phase.IDLE
         self._method = METHODS[33]
         self._direction = 0
@@ -101,7 +108,7 @@ class Homing(Mode):
 
     @override
     def reconfigure(self) -> None:
-        ramp = self.axis.object(0x609A)
+        ramp = self.axis.velocity(0x609A)
         self.axis.set_ramps(ramp, ramp)
 
     @override
@@ -123,7 +130,7 @@ class Homing(Mode):
         if method is None:
             self._fail()
             return
-        self._method = method
+        self._method = method = method.mirrored() if self._reversed else method
         self._turned = False
         if method.switch == 0:
             self._seek_index()
@@ -137,8 +144,8 @@ class Homing(Mode):
     def _move(self, phase: _Phase, direction: int, *, fast: bool) -> None:
         self._phase = phase
         self._direction = direction
-        speed = self.axis.object(0x6099, 1 if fast else 2)
-        self.axis.drive(servo.VELOCITY, direction * min(float(speed), self.axis.speed_limit))
+        speed = self.axis.velocity(0x6099, 1 if fast else 2)
+        self.axis.drive(servo.VELOCITY, direction * min(speed, self.axis.speed_limit))
 
     def _seek_index(self) -> None:
         self._sought_from = self.axis.sample[1]
@@ -212,6 +219,14 @@ class Homing(Mode):
 
     @override
     def status(self) -> int:
+        word = self._progress()
+        if self._shows_rest:
+            return word
+        if self._phase is _Phase.STOPPING:
+            word &= ~BIT_12
+        return word & ~TARGET_REACHED
+
+    def _progress(self) -> int:
         if self._phase is _Phase.FAILED:
             return BIT_13 | (TARGET_REACHED if self.axis.flags & servo.STANDSTILL else 0)
         if self._phase is _Phase.STOPPING:
@@ -222,7 +237,8 @@ class Homing(Mode):
 
     @override
     def idle_status(self) -> int:
-        return TARGET_REACHED | (BIT_12 if self.homed else 0)
+        rest = TARGET_REACHED if self._shows_rest else 0
+        return rest | (BIT_12 if self.homed else 0)
 
 
 def _stands(flags: int) -> bool:

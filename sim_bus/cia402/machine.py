@@ -75,11 +75,14 @@ class Machine:
         self.power_allowed = True
         """Whether the safe-torque-off input lets the power stage work."""
         self._reporter = reporter
-        self._plant = axis.plant.drive
+        self._twin = axis.twin
+        plant = axis.plant.drive
+        self._mode_delay_s = max(plant.mode_display_delay_s, axis.twin.mode_display_delay_s)
+        self._enable_delay_s = max(plant.enable_delay_s, axis.twin.enable_delay_s)
         self._status = od.entry(0x6041)
         self._display = od.entry(0x6061)
         self._error = od.entry(0x603F)
-        self._supported = od.get_int(0x6502)
+        self._supported = axis.twin.supported_modes(od.get_int(0x6502))
         self.restart()
         od.on_write(0x6040, 0, self.command)
         od.on_write(0x6060, 0, self.request_mode)
@@ -97,7 +100,7 @@ class Machine:
         self.homing.forget()
         self.axis.reboot()
         wanted = self.axis.object(0x6060)
-        self._wanted_mode = wanted if wanted in self._modes else 0
+        self._wanted_mode = wanted if wanted in self._supported else 0
         self.mode = self._modes[self._wanted_mode]
         self._error.value = 0
         self.configuration_changed = True
@@ -174,8 +177,8 @@ class Machine:
         if self.state is State.READY_TO_SWITCH_ON:
             self._enter(State.SWITCHED_ON)
         if self.state is State.SWITCHED_ON:
-            self._enable_due = self.axis.time + self._plant.enable_delay_s
-            if self._plant.enable_delay_s == 0.0:
+            self._enable_due = self.axis.time + self._enable_delay_s
+            if self._enable_delay_s == 0.0:
                 self._enable()
         elif self.state is State.QUICK_STOP_ACTIVE:
             if self.axis.object(0x605A) >= 5:
@@ -224,10 +227,10 @@ class Machine:
             axis.drive(servo.TORQUE, 0.0)
             return
         if option == 1:
-            ramp = axis.object(self.mode.ramp)
+            ramp = axis.velocity(self.mode.ramp)
             axis.set_ramps(ramp, ramp)
         elif option == 2:
-            axis.set_ramps(axis.object(0x6085), axis.object(0x6085))
+            axis.set_ramps(axis.velocity(0x6085), axis.velocity(0x6085))
         else:
             axis.set_steps()
         axis.motor["torque_offset"] = 0.0
@@ -240,13 +243,12 @@ class Machine:
         number: Any = value
         if number == self._wanted_mode:
             return
-        if number not in self._modes or self.ignore_modes == 1:
+        if number not in self._supported or self.ignore_modes == 1:
             raise SdoAbort(Abort.INVALID_VALUE)
-        if number > 0 and not self._supported >> number - 1 & 1:
-            raise SdoAbort(Abort.INVALID_VALUE)
-        if self.ignore_modes == 0:
+        enabled, halted = self.state is State.OPERATION_ENABLED, bool(self.word & HALT)
+        if self._twin.takes_mode(enabled, halted) and self.ignore_modes == 0:
             self._wanted_mode = number
-            self._mode_due = self.axis.time + self._plant.mode_display_delay_s
+            self._mode_due = self.axis.time + self._mode_delay_s
             self._pending = True
 
     def _change_mode(self) -> None:
@@ -387,7 +389,7 @@ class Machine:
         self._pending = min(self._boot_due, self._mode_due, self._enable_due) < math.inf or (
             self._running and self.mode.busy
         )
-        self._status.value = word
+        self._status.value = (word | self._twin.statusword_set) & ~self._twin.statusword_clear
         self._display.value = self.shown_mode or self.mode.number.value
 
     def _operation_bits(self, flags: int) -> int:

@@ -32,6 +32,10 @@ class Mode:
 
     def __init__(self, axis: Axis) -> None:
         self.axis = axis
+        self._limit = 0.0
+
+    def _limited(self, velocity: float) -> float:
+        return max(-self._limit, min(self._limit, velocity))
 
     def start(self) -> None:
         """Take the axis over, from rest or from motion."""
@@ -128,14 +132,14 @@ class ProfileVelocity(Mode):
         axis.drive(servo.VELOCITY, 0.0)
         target: Any = axis.od.entry(0x60FF)
         self.reconfigure()
-        axis.setpoint = lambda: max(-self._limit, min(self._limit, float(target.value)))
+        axis.setpoint = lambda: self._limited(target.value * axis.velocity_unit)
 
     @override
     def reconfigure(self) -> None:
         axis = self.axis
         self._limit = axis.speed_limit
-        axis.set_ramps(axis.object(0x6083), axis.object(0x6084))
-        axis.set_window(axis.object(0x606D), axis.object(0x606E) * 1e-3)
+        axis.set_ramps(axis.velocity(0x6083), axis.velocity(0x6084))
+        axis.set_window(axis.velocity(0x606D), axis.object(0x606E) * 1e-3)
         axis.motor["torque_offset"] = 0.0
 
     @override
@@ -162,9 +166,7 @@ class CyclicVelocity(Mode):
         self._limit = axis.speed_limit
         target: Any = axis.od.entry(0x60FF)
         offset: Any = axis.od.entry(0x60B1)
-        axis.setpoint = lambda: max(
-            -self._limit, min(self._limit, float(target.value + offset.value))
-        )
+        axis.setpoint = lambda: self._limited((target.value + offset.value) * axis.velocity_unit)
 
     @override
     def sync(self) -> None:
@@ -265,8 +267,8 @@ class ProfilePosition(Mode):
 
     def _go(self) -> None:
         axis = self.axis
-        axis.set_ramps(axis.object(0x6083), axis.object(0x6084))
-        axis.motor["profile_velocity"] = min(float(axis.object(0x6081)), axis.speed_limit)
+        axis.set_ramps(axis.velocity(0x6083), axis.velocity(0x6084))
+        axis.motor["profile_velocity"] = min(axis.velocity(0x6081), axis.speed_limit)
         axis.motor["torque_offset"] = 0.0
         self.reconfigure()
         axis.drive(servo.PROFILE_POSITION, axis.clip_position(self._goal))
@@ -287,4 +289,4 @@ def _follows(axis: Axis) -> int:
 
 
 def _feed_torque_offset(axis: Axis) -> None:
-    axis.motor["torque_offset"] = axis.object(0x60B2) * 1e-3 * axis.read("rated_torque")
+    axis.motor["torque_offset"] = axis.object(0x60B2) * axis.read("torque_unit")

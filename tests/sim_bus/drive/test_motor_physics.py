@@ -219,7 +219,7 @@ def test_torque_constant_error_shows_in_the_motion_and_not_in_the_drive() -> Non
     p = plant(cogging=(), motor={"torque_constant_error": 0.2, "inertia_kg_m2": 0.1})
     motor = Motor(p)
     sample = motor.step_torque(0.05, 1.5)
-    assert sample.torque_permille == 500
+    assert sample.torque_units == 500
     assert sample.motor_Nm == pytest.approx(1.8)
 
 
