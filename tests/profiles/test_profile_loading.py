@@ -23,6 +23,8 @@ from profiles.winch import WinchFile
 FILES: dict[Path, type[Profile]] = {
     SHIPPED / "motors" / "parker-mpp-mpj.series.toml": MotorSeries,
     SHIPPED / "drives" / "generic-cia402.toml": DriveProfile,
+    SHIPPED / "drives" / "mnm-profile-torque.toml": DriveProfile,
+    SHIPPED / "drives" / "parker-compax3-canopen.toml": DriveProfile,
     SHIPPED / "cables" / "barry-dyneema.series.toml": CableSeries,
     SHIPPED / "cables" / "dyneema-4.8mm.toml": Cable,
     SHIPPED / "winches" / "winch-mpp0923d.toml": WinchFile,
