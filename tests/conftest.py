@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import pytest
 from xdist.scheduler import LoadScopeScheduling
+
+# before anything loads numpy: threads that spin for work take the cores of the other processes
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 class _ByFile(LoadScopeScheduling):
