@@ -30,6 +30,10 @@ class AxisFeedback:
         self.statusword: WordArray = np.zeros(n, np.uint16)
         self.valid: BoolArray = np.zeros(n, np.bool_)
         """Whether the axis answered this SYNC."""
+        self.alive: BoolArray = np.zeros(n, np.bool_)
+        """Whether its drive is heard and operational, as of the end of the last cycle."""
+        self.rate_ok: BoolArray = np.zeros(n, np.bool_)
+        """Whether its answers come once to each SYNC: just now, and hardly ever not before."""
         self.index_rad: FloatArray = np.zeros(n)
         self.index_known: BoolArray = np.zeros(n, np.bool_)
 

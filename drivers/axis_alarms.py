@@ -10,6 +10,7 @@ from drivers import axis_codec as codec
 from drivers.axis_codec import Ints
 from drivers.axis_layout import AxisConfig
 from drivers.cia402 import State, fault_text, mode_name
+from drivers.error_control import STATE_NAMES
 
 
 def alarm_text(axes: Sequence[AxisConfig], ints: Ints) -> str:
@@ -31,15 +32,38 @@ def _of_axis(axis: AxisConfig, column: Ints) -> str:
             "the drive left operation enabled by itself and is "
             f"{State(int(column[codec.STATE])).label}",
         ),
-        (codec.SILENT, f"no answer to SYNC for {column[codec.SILENT_CYCLES]} cycles"),
+        (codec.FLOODING, "it floods the bus with frames: switch it off and find out why"),
+        (codec.SILENT, _silence(column)),
+        (codec.UNSTEADY, _unsteadiness(column)),
         (
             codec.NO_HEARTBEAT,
             f"no heartbeat, expected every {axis.drive.heartbeat_producer_s * 1e3:.0f} ms",
         ),
         (
             codec.NOT_OPERATIONAL,
-            f"the drive left the NMT state operational (state {column[codec.NMT_STATE]})",
+            "the drive left the NMT state operational and is "
+            f"{STATE_NAMES.get(int(column[codec.NMT_STATE]), 'in an unknown state')} "
+            f"(state {column[codec.NMT_STATE]})",
         ),
         (codec.NOT_FINITE, "a torque that is not a finite number was asked for; 0 was sent"),
     )
     return ", ".join(text for bit, text in texts if bits & bit)
+
+
+def _silence(column: Ints) -> str:
+    return (
+        f"no answer to SYNC for {column[codec.SILENT_CYCLES]} cycles, the last heartbeat "
+        f"{column[codec.HEARTBEAT_AGE]} cycles ago (without heartbeats it lacks power or cable; "
+        "with them its TPDOs are off or changed: boot it anew)"
+    )
+
+
+def _unsteadiness(column: Ints) -> str:
+    missed, repeated = int(column[codec.MISSED]), int(column[codec.REPEATED])
+    text = (
+        f"its answers to SYNC are unsteady: {missed} missing and {repeated} double since the first "
+        "cycle"
+    )
+    if repeated > missed:
+        return f"{text}; two devices may have this node id"
+    return f"{text}; look at the load of the bus"

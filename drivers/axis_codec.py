@@ -50,8 +50,14 @@ CONTROLWORD_FRAME, CONTROLWORD, TORQUE_FRAME, TARGET_TORQUE = range(4)
     MISSED,
     AWAITED,
     SEEN,
-) = range(26)
-INT_ROWS = 26
+    EXTRA,
+    REPEATED,
+    LATE,
+    FRAMES,
+    FRAMES_ALLOWED,
+    FLOOD,
+) = range(32)
+INT_ROWS = 32
 
 # rows of `floats`
 (
@@ -64,24 +70,31 @@ INT_ROWS = 26
     NM_PER_UNIT,
     LIMIT_UNITS,
     RESIDUAL_UNITS,
-) = range(9)
-FLOAT_ROWS = 9
+    IRREGULAR,
+) = range(10)
+FLOAT_ROWS = 10
 
 # rows of `flags`
-VALID, INDEX_KNOWN = range(2)
-FLAG_ROWS = 2
+VALID, INDEX_KNOWN, ALIVE, RATE_OK = range(4)
+FLAG_ROWS = 4
 
 # bits of ALARM, latched until they are acknowledged
 FAULT, LEFT_ENABLED, WRONG_MODE, NOT_FINITE, SILENT, NO_HEARTBEAT, RESTARTED, NOT_OPERATIONAL = (
     1 << bit for bit in range(8)
 )
-EMERGENCY_MESSAGE = 1 << 8
+EMERGENCY_MESSAGE, UNSTEADY, FLOODING = 1 << 8, 1 << 9, 1 << 10
 
 _SWITCH_ON_DISABLED, _SWITCHED_ON, _ENABLED, _REACTION, _FAULT = 1, 3, 4, 6, 7
 _PROBE_LATCHED = 0x02
 _FAULT_RESET = 0x80
-_OPERATIONAL = 5
+_OPERATIONAL, _NOT_HEARD = 5, 0
 _DATA = 8
+_CYCLE_OVER = 1 << 62
+"""Bit of SEEN from the end of a cycle to the next SYNC."""
+_MEMORY_CYCLES = 64.0
+_FAIR_SHARE, _WORST_SHARE = 0.05, 0.4
+"""Share of cycles without exactly one answer, above which the rate is bad or a trip."""
+_MOST_EXTRA_FRAMES = 400
 
 
 @jit
@@ -129,6 +142,7 @@ def decode(
         i, kind = slots[identifier, 0], slots[identifier, 1]
         if i < 0:
             continue
+        ints[FRAMES, i] += 1
         if kind == HEARTBEAT:
             if frame[4]:
                 _take_heartbeat(i, int(frame[_DATA]) & 0x7F, ints, flags)
@@ -193,8 +207,13 @@ def _take_tpdo(
     if fields_came >> STATUSWORD & 1:
         words[0, i] = ints[STATUSWORD, i]
         _follow_state(i, state_table[ints[STATUSWORD, i] & 0x7F], ints)
+    # of two of the same the later one counts: the first may be late from the cycle before
+    ints[EXTRA, i] += (ints[SEEN, i] & ints[AWAITED, i]) >> pdo & 1
     ints[SEEN, i] |= 1 << pdo
     if flags[VALID, i] or ints[SEEN, i] & ints[AWAITED, i] != ints[AWAITED, i]:
+        return 0
+    if ints[SEEN, i] & _CYCLE_OVER:
+        ints[LATE, i] += 1
         return 0
     flags[VALID, i] = True
     return 1
@@ -237,12 +256,12 @@ def encode(
     """Write controlword and target torque of n axes into their RPDOs `frames` (k, 16).
 
     `answer` (n, 4) holds frame and first byte of either, `controlwords` (9, 9) the word by target
-    and present state. Counts silent cycles and heartbeat ages too. Returns the alarm bits of all
-    axes.
+    and present state. Also closes the cycle: counts silent cycles, irregular answers, frames
+    and heartbeat ages. Returns the alarm bits of all axes.
     """
     alarms = 0
     for i in range(ints.shape[1]):
-        _watch(i, ints, flags)
+        _watch(i, ints, floats, flags)
         units = _torque_units(i, ints, floats)
         floats[SENT_NM, i] = units * floats[NM_PER_UNIT, i]
         word = _controlword(i, controlwords, ints)
@@ -257,7 +276,19 @@ def encode(
 
 
 @jit
-def _watch(i: int, ints: Ints, flags: BoolArray) -> None:
+def _watch(i: int, ints: Ints, floats: FloatArray, flags: BoolArray) -> None:
+    regular = flags[VALID, i] and ints[EXTRA, i] == 0
+    ints[REPEATED, i] += ints[EXTRA, i]
+    ints[EXTRA, i] = 0
+    ints[SEEN, i] |= _CYCLE_OVER
+    floats[IRREGULAR, i] += ((0.0 if regular else 1.0) - floats[IRREGULAR, i]) / _MEMORY_CYCLES
+    flags[RATE_OK, i] = regular and floats[IRREGULAR, i] < _FAIR_SHARE
+    if floats[IRREGULAR, i] > _WORST_SHARE:
+        ints[ALARM, i] |= UNSTEADY
+    ints[FLOOD, i] = max(ints[FLOOD, i] + ints[FRAMES, i] - ints[FRAMES_ALLOWED, i], 0)
+    ints[FRAMES, i] = 0
+    if ints[FLOOD, i] > _MOST_EXTRA_FRAMES:
+        ints[ALARM, i] |= FLOODING
     if flags[VALID, i]:
         ints[SILENT_CYCLES, i] = 0
     else:
@@ -266,8 +297,11 @@ def _watch(i: int, ints: Ints, flags: BoolArray) -> None:
         if ints[SILENT_CYCLES, i] >= ints[SILENCE_LIMIT, i]:
             ints[ALARM, i] |= SILENT
     ints[HEARTBEAT_AGE, i] += 1
-    if ints[HEARTBEAT_AGE, i] > ints[HEARTBEAT_LIMIT, i]:
+    heard = ints[HEARTBEAT_AGE, i] <= ints[HEARTBEAT_LIMIT, i]
+    if not heard:
         ints[ALARM, i] |= NO_HEARTBEAT
+    operational = ints[NMT_STATE, i] == _OPERATIONAL or ints[NMT_STATE, i] == _NOT_HEARD
+    flags[ALIVE, i] = heard and operational and not ints[ALARM, i] & RESTARTED
 
 
 @jit

@@ -24,6 +24,7 @@ _OPERATIONAL_STATE = 5
 _PATIENCE_S, _SHORT_PATIENCE_S = 2.0, 0.02
 _PACED_SHARE = 0.6
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
+_LATE_PASSES = 8
 
 
 class AxisExchange:
@@ -56,7 +57,8 @@ class AxisExchange:
         operational = bytes([_OPERATIONAL_STATE]) + bytes(7)
         self._heartbeat_frame = FRAME.pack(_HEARTBEAT_ID + master_node_id, 1, operational)
         self._heartbeat_cycles = max(1, round(heartbeat_s / period_s))
-        self._port = open_port(url, [(i, 0x7FF) for i in self._layout.identifiers])
+        filters = [(i, 0x7FF) for i in self._layout.identifiers]
+        self._port = open_port(url, filters, network.health)
         self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
         self._pollable = _pollable(self._port)
         self._patience_s = _PATIENCE_S
@@ -88,8 +90,10 @@ class AxisExchange:
         """Send the SYNC that opens the cycle."""
         if not self._cycling:
             self._begin_cycling()
+        self._take_late()
         if self._late:
-            self._take_late()
+            self._late = False
+            self._be_patient(False)
         elif self._impatient:
             self._be_patient(True)
         feedback = self.feedback
@@ -168,22 +172,26 @@ class AxisExchange:
             self._port.settimeout(seconds)
 
     def _take_late(self) -> None:
-        """Decode what came after its cycle, so that it is not taken for the next one's answer."""
-        self._late = False
-        rows, last = self._rx.rows, 0
-        self._port.settimeout(0.0)
-        try:
-            for row in rows:
-                if not self._port.recv_into(row):
-                    raise self._port.lost()
-                last += 1
-        except BlockingIOError:
-            pass
-        except OSError as error:
-            raise self._port.lost(error) from error
-        finally:
-            self._be_patient(False)
-        self._decode(0, last)
+        """Decode what came after its cycle, so that it is not taken for the next one's answer.
+
+        A flood is cut short: what is left of it is thrown away.
+        """
+        recv_waiting, rows = self._port.recv_waiting, self._rx.rows
+        for _ in range(_LATE_PASSES):
+            last = 0
+            try:
+                for row in rows:
+                    if not recv_waiting(row):
+                        raise self._port.lost()
+                    last += 1
+            except BlockingIOError:
+                if last:
+                    self._decode(0, last)
+                return
+            except OSError as error:
+                raise self._port.lost(error) from error
+            self._decode(0, last)
+        self._port.drain()
 
     def _be_patient(self, patient: bool) -> None:
         if self.lockstep:
@@ -240,6 +248,16 @@ class AxisExchange:
         """Answers that did not come in time since the beginning, over all axes."""
         return int(self._ints[codec.MISSED].sum())
 
+    @property
+    def late(self) -> int:
+        """Answers that came after their cycle since the beginning, over all axes."""
+        return int(self._ints[codec.LATE].sum())
+
+    @property
+    def repeated(self) -> int:
+        """Answers that came more than once in a cycle since the beginning, over all axes."""
+        return int(self._ints[codec.REPEATED].sum())
+
     def _begin_cycling(self) -> None:
         """Take over the master's heartbeat and forget what came while no cycles ran."""
         self.network.claim_cycle()
@@ -253,7 +271,12 @@ class AxisExchange:
                 self._flags[codec.INDEX_KNOWN, i] = False
                 self._ints[codec.ALARM, i] |= codec.RESTARTED
         self._ints[codec.HEARTBEAT_AGE] = 0
+        self._forget_irregularities()
         self._cycling = True
+
+    def _forget_irregularities(self) -> None:
+        self._floats[codec.IRREGULAR] = 0.0
+        self._ints[codec.FRAMES] = self._ints[codec.FLOOD] = self._ints[codec.EXTRA] = 0
 
 
 def _as_bytes(buffer: FrameBuffer) -> NDArray[np.uint8]:

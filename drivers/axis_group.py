@@ -95,6 +95,7 @@ class AxisGroup(AxisExchange):
         ints[codec.ALARM] = 0
         ints[codec.SILENT_CYCLES] = 0
         ints[codec.HEARTBEAT_AGE] = 0
+        self._forget_irregularities()
         self._alarms = 0
         self.network.clear_alarm()
 

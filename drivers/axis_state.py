@@ -19,6 +19,9 @@ _PACED_SILENT_CYCLES = 3
 # a heartbeat that is most of a period late is lost: CAN repeats what was disturbed by itself
 _HEARTBEAT_PATIENCE = 1.75
 
+# what one drive may send; a bus of 1 Mbit/s carries some 9000 frames a second in all
+_FRAMES_A_CYCLE, _FRAMES_A_SECOND = 8, 4000
+
 
 class StateArrays:
     """Room for the state of n axes: the rows named in `axis_codec`, one column per axis."""
@@ -52,6 +55,8 @@ class StateArrays:
         feedback.index_rad = self.floats[codec.INDEX_RAD]
         feedback.valid = self.flags[codec.VALID]
         feedback.index_known = self.flags[codec.INDEX_KNOWN]
+        feedback.alive = self.flags[codec.ALIVE]
+        feedback.rate_ok = self.flags[codec.RATE_OK]
         feedback.statusword = self.words[0]
         return feedback
 
@@ -92,5 +97,6 @@ class GroupState:
             ints[codec.AWAITED, i] = axis.awaited_tpdos
             most = int(axis.torque_limit_Nm / abs(axis.Nm_per_unit) + 1e-9)
             floats[codec.LIMIT_UNITS, i] = min(most, 0x7FFF)
+            ints[codec.FRAMES_ALLOWED, i] = max(_FRAMES_A_CYCLE, round(_FRAMES_A_SECOND * period_s))
             patience_s = _HEARTBEAT_PATIENCE * axis.drive.heartbeat_producer_s
             ints[codec.HEARTBEAT_LIMIT, i] = max(2, round(patience_s / period_s))

@@ -71,6 +71,9 @@ class FramePort(Protocol):
     def recv_into(self, buffer: bytearray | memoryview, /) -> int:
         """Wait for a frame up to the time-out, write it into `buffer`, return its length."""
 
+    def recv_waiting(self, buffer: bytearray | memoryview, /) -> int:
+        """Write a frame that has come already into `buffer`, return its length; never wait."""
+
     def settimeout(self, seconds: float | None) -> None:
         """Limit the wait of `recv_into`; None waits for ever, 0 does not wait."""
 
@@ -114,6 +117,10 @@ class PackedPort:
         self.fileno: Callable[[], int] = sock.fileno
         self.close: Callable[[], None] = sock.close
         self.send: Callable[[Bytes], int] = sock.send
+
+    def recv_waiting(self, buffer: bytearray | memoryview, /) -> int:
+        """Write a frame that has come already into `buffer`, return its length; never wait."""
+        return self._sock.recv_into(buffer, FRAME_BYTES, socket.MSG_DONTWAIT)
 
     def settimeout(self, seconds: float | None) -> None:
         """Limit the wait of `recv_into`; None waits for ever, 0 does not wait.
