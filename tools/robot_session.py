@@ -1,0 +1,336 @@
+"""A whole robot on its buses, opened for a command and left without power, however it ends."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import canopen
+import numpy as np
+
+from cdpr_rt.errors import TripError
+from cdpr_rt.executive import Executive
+from cdpr_rt.realtime import one_core, paced_realtime
+from cdpr_rt.rehearsal import rehearse
+from cdpr_rt.supervisor import Limits, Supervisor
+from drivers.axis_buses import AxisBuses, BusAxes
+from drivers.axis_layout import AxisConfig
+from drivers.boot import BootReport, BootReports, BootSettings, boot_all
+from drivers.bus import BusUrl, query_status
+from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
+from drivers.cia402 import State, fault_text
+from drivers.errors import BootError, BusError, DriveFaultError, DriverError, SdoError
+from drivers.network import CanNetwork
+from profiles import Robot, RobotAxis
+from tools.bus_fit import require_fit
+from tools.consent import require_consent
+from tools.errors import BadInputError, WorkFailedError
+from tools.output import Output
+from tools.robot_buses import asks_for_own_simulator, robot_urls
+from tools.signals import stop_on_signals
+from tools.simulator import OwnSimulator
+
+_SPEED_SHARE = 0.2
+# a bare rotor may swing by turns without doing harm; its speed is what is limited
+_FOLLOWING_ERROR_RAD = 4.0 * math.tau
+
+
+class RobotSession:
+    """A booted robot and the executive that runs its axes.
+
+    `axes` are those which booted, in the order of the robot's file and of the device's arrays;
+    `absent` says of each optional axis that did not, by its number in the file, why.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        networks: Mapping[str, CanNetwork],
+        device: AxisBuses,
+        executive: Executive,
+        axes: Sequence[RobotAxis],
+        reports: Sequence[BootReport],
+        absent: Mapping[int, str],
+    ) -> None:
+        self.robot = robot
+        self.networks = networks
+        self.device = device
+        self.executive = executive
+        self.axes = tuple(axes)
+        self.reports = tuple(reports)
+        self.absent = dict(absent)
+        self.boot_s = 0.0
+        """Wall time from the first frame to the last drive being operational."""
+        self.simulator_pid: int | None = None
+        """Process of the simulator that the command has started."""
+        self._paused: list[tuple[RobotAxis, list[tuple[int, int]]]] = []
+
+    def set_mode(self, modes: int | Sequence[int]) -> None:
+        """Ask for a mode of operation, one for all or one each, and wait until all confirm it.
+
+        Raises ModeRefusedError when one does not.
+        """
+        self.device.ask_mode(modes)
+        timeout = max(axis.winch.drive.mode_display_timeout_s for axis in self.axes)
+        try:
+            self.executive.step(self.device.mode_confirmed, timeout, "the modes' confirmation")
+        except TripError as error:
+            if self.device.alarm() or self.device.mode_confirmed():
+                raise
+            raise self.device.unconfirmed_mode() from error
+
+    def set_torque_mode(self) -> None:
+        """Put each drive into the mode in which it obeys a torque; raises ModeRefusedError."""
+        self.set_mode(self.device.torque_modes)
+
+    def enable(self) -> None:
+        """Switch all power stages on; the torque is zero until a controller runs."""
+        for axis, entries in self._paused:
+            self.networks[axis.bus].resume_watch(axis.node_id, entries)
+        self._paused = []
+        self._lead_to(State.OPERATION_ENABLED)
+
+    def disable(self) -> None:
+        """Switch all power stages off, so that computation may take its time."""
+        self._lead_to(State.SWITCH_ON_DISABLED)
+        self.device.stop_cycling()
+        self._paused = [
+            (axis, self.networks[axis.bus].pause_watch(axis.node_id) or []) for axis in self.axes
+        ]
+
+    def idle(self, seconds: float) -> None:
+        """Run cycles without torque for a while."""
+        cycles = iter(range(round(seconds / self.device.period_s)))
+        self.executive.step(lambda: next(cycles, None) is None, seconds + 1.0, "the end")
+
+    def bus_status(self) -> dict[str, dict[str, Any]]:
+        """Return what each simulated bus tells of itself, by the robot's name of it."""
+        return {
+            name: query_status(network.url.channel)
+            for name, network in self.networks.items()
+            if network.url.is_simulated
+        }
+
+    def _lead_to(self, state: State) -> None:
+        self.device.request(state)
+        timeout = 4.0 * max(axis.winch.drive.state_timeout_s for axis in self.axes)
+        what = f"the state {state.label!r} of all drives"
+        try:
+            self.executive.step(lambda: self.device.reached(state), timeout, what)
+        except TripError as error:
+            left = [
+                f"bus {axis.bus} node {axis.node_id} is {now.label!r}"
+                for axis, now in zip(self.axes, self.device.states(), strict=True)
+                if now != state
+            ]
+            if self.device.alarm() or not left:
+                raise
+            raise TripError(f"{error}: {', '.join(left)}") from error
+
+
+def confirm_robot_motion(urls: Mapping[str, BusUrl], yes: bool, what: str) -> None:
+    """Ask before real motors are energised; raises BadInputError when nobody agrees."""
+    if not all(url.is_simulated for url in urls.values()):
+        where = ", ".join(str(url) for url in urls.values())
+        require_consent(f"{what} on {where}: the motors will turn.", yes)
+
+
+@contextmanager
+def open_robot(
+    robot: Robot,
+    buses: Sequence[str],
+    out: Output,
+    *,
+    plant: Path | None = None,
+    torque_share: float = 1.0,
+) -> Iterator[RobotSession]:
+    """Boot the drives of `robot`, all at the same time, and get ready to run its axes.
+
+    `buses` are what was given with --bus; `simbus:` alone starts a simulator of all buses, with
+    `plant`. Torques are limited to `torque_share` of each motor's rated torque. Whatever ends the
+    block, the drives' power stages are off afterwards. Raises BadInputError for a robot that does
+    not fit its buses (before anything is opened) and for buses that cannot be opened, WorkFailedError
+    for a mandatory drive that does not boot.
+    """
+    require_fit(robot)
+    with ExitStack() as stack:
+        stop_requested = stack.enter_context(stop_on_signals())
+        pid = None
+        if asks_for_own_simulator(buses):
+            pid, name = _own_simulator(stack, robot, out, plant)
+            buses = [name]
+        elif plant is not None:
+            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+        networks = _open_networks(stack, robot, robot_urls(robot, buses))
+        rehearse(len(robot.axes), robot.sync_period_s)
+        begin = time.monotonic()
+        booted, absent = _boot(stack, robot, networks, torque_share)
+        boot_s = time.monotonic() - begin
+        for i, reason in absent.items():
+            out.note(f"axis {i} (optional) is left out: {reason}")
+        axes = [robot.axes[i] for i in booted]
+        device = stack.enter_context(_device(robot, networks, booted, torque_share))
+        for network in networks.values():
+            network.start_heartbeat()
+        if not device.lockstep:
+            for notice in stack.enter_context(paced_realtime()):
+                out.note(notice)
+        executive = _executive(device, axes, torque_share, stop_requested)
+        session = RobotSession(
+            robot, networks, device, executive, axes, list(booted.values()), absent
+        )
+        session.boot_s, session.simulator_pid = boot_s, pid
+        try:
+            yield session
+        except TripError as error:
+            if device.faulted().any():
+                raise DriveFaultError(f"{error}: {_faults(session)}") from error
+            raise
+
+
+def _own_simulator(
+    stack: ExitStack, robot: Robot, out: Output, plant: Path | None
+) -> tuple[int, str]:
+    name = f"simbus:own-{os.getpid()}"
+    out.note(f"starting {len(robot.axes)} simulated drives ...")
+    simulator = OwnSimulator(robot.reference, name, plant)
+    stack.callback(simulator.stop)
+    stack.enter_context(one_core(simulator.process.pid))
+    return simulator.process.pid, name
+
+
+def _heartbeat_s(axes: Sequence[RobotAxis]) -> float:
+    """Return how often the master is heard within what the most impatient drive tolerates."""
+    return min(axis.winch.drive.heartbeat_consumer_s for axis in axes) / HEARTBEATS_IN_TOLERANCE
+
+
+def _open_networks(
+    stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl]
+) -> dict[str, CanNetwork]:
+    networks: dict[str, CanNetwork] = {}
+    for name, url in urls.items():
+        axes = [robot.axes[i] for i in robot.axes_on(name)]
+        nodes = [axis.node_id for axis in axes]
+        try:
+            network = CanNetwork(url, nodes, robot.master_node_id, _heartbeat_s(axes))
+        except BusError as error:
+            raise BadInputError(f"bus {name}: {error}") from error
+        stack.callback(network.close)
+        for axis in axes:
+            eds = str(axis.winch.drive.eds)
+            network.add_node(axis.node_id, canopen.import_od(eds, axis.node_id))
+        networks[name] = network
+    return networks
+
+
+def _boot(
+    stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_share: float
+) -> tuple[dict[int, BootReport], dict[int, str]]:
+    """Boot all buses at the same time; return reports, and why optional axes did not, by axis."""
+    with ThreadPoolExecutor(max_workers=len(networks)) as pool:
+        pending: dict[str, Future[BootReports]] = {}
+        for name, network in networks.items():
+            wanted = {
+                axis.node_id: (axis.winch.drive, _settings(robot, axis, torque_share))
+                for axis in (robot.axes[i] for i in robot.axes_on(name))
+            }
+            pending[name] = pool.submit(boot_all, network, wanted)
+    failures: list[DriverError] = []
+    booted: dict[int, BootReport] = {}
+    absent: dict[int, str] = {}
+    for name, job in pending.items():
+        try:
+            reports = job.result()
+        except (BootError, BusError) as error:
+            failures.append(error)
+            error.add_note(f"on bus {name}")
+            continue
+        for i in robot.axes_on(name):
+            node_id = robot.axes[i].node_id
+            if node_id in reports:
+                booted[i] = reports[node_id]
+                stack.callback(networks[name].release, node_id)
+            else:
+                absent[i] = str(reports.missing[node_id])
+    if failures:
+        raise WorkFailedError("; ".join(_told(error) for error in failures)) from failures[0]
+    if not booted:
+        raise WorkFailedError(f"{robot.name}: no drive booted; {'; '.join(absent.values())}")
+    return dict(sorted(booted.items())), absent
+
+
+def _told(error: DriverError) -> str:
+    *others, where = error.__notes__
+    return f"{where}: " + "; ".join([str(error), *others])
+
+
+def _settings(robot: Robot, axis: RobotAxis, torque_share: float) -> BootSettings:
+    motor = axis.winch.motor
+    return BootSettings(
+        robot.master_node_id,
+        robot.sync_period_s,
+        torque_share * motor.rated_torque_Nm,
+        rated_torque_Nm=motor.rated_torque_Nm,
+        counts_per_turn=axis.winch.encoder_counts_per_turn,
+        mandatory=axis.mandatory,
+    )
+
+
+def _device(
+    robot: Robot,
+    networks: Mapping[str, CanNetwork],
+    booted: Mapping[int, BootReport],
+    torque_share: float,
+) -> AxisBuses:
+    place_of = {i: place for place, i in enumerate(booted)}
+    buses = []
+    for name, network in networks.items():
+        here = [i for i in robot.axes_on(name) if i in booted]
+        if not here:
+            continue
+        configs = [
+            AxisConfig.from_boot(
+                robot.axes[i].winch.drive,
+                booted[i],
+                torque_share * robot.axes[i].winch.motor.rated_torque_Nm,
+            )
+            for i in here
+        ]
+        heartbeat_s = _heartbeat_s([robot.axes[i] for i in here])
+        buses.append(BusAxes(name, network, configs, [place_of[i] for i in here], heartbeat_s))
+    return AxisBuses(buses, robot.sync_period_s, robot.master_node_id)
+
+
+def _executive(
+    device: AxisBuses,
+    axes: Sequence[RobotAxis],
+    torque_share: float,
+    stop_requested: Callable[[], bool],
+) -> Executive:
+    limits = Limits(
+        torque_Nm=torque_share * np.array([axis.winch.motor.rated_torque_Nm for axis in axes]),
+        speed_rad_s=_SPEED_SHARE * np.array([axis.winch.motor.rated_speed_rad_s for axis in axes]),
+        following_error_rad=_FOLLOWING_ERROR_RAD,
+    )
+    return Executive(device, Supervisor(limits, device.n, device.period_s), stop_requested)
+
+
+def _faults(session: RobotSession) -> str:
+    """Return what each drive in fault says of it."""
+    texts = []
+    for axis, faulted in zip(session.axes, session.device.faulted(), strict=True):
+        if not faulted:
+            continue
+        try:
+            code = session.networks[axis.bus].read_int(axis.node_id, 0x603F)
+            why = fault_text(code) if code else "no code given (603Fh = 0)"
+        except (SdoError, BusError):
+            why = "the drive does not say why"
+        texts.append(f"bus {axis.bus} node {axis.node_id}: {why}")
+    return "; ".join(texts)
