@@ -13,10 +13,11 @@ from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings, MotorSeries
 from profiles.reader import closest, read_toml, read_toml_model
 from profiles.robot import Robot, RobotAxis, RobotFile
+from profiles.tension_sensor import load_tension_sensors
 from profiles.winch import Winch, WinchFile
 
-Kind = Literal["motors", "drives", "cables", "winches", "robots"]
-KINDS: tuple[Kind, ...] = ("motors", "drives", "cables", "winches", "robots")
+Kind = Literal["motors", "drives", "cables", "winches", "robots", "tension_sensors"]
+KINDS: tuple[Kind, ...] = ("motors", "drives", "cables", "winches", "robots", "tension_sensors")
 SHIPPED = Path(__file__).parent
 
 _SERIES = ".series.toml"
@@ -167,6 +168,7 @@ def load_all() -> dict[str, dict[str, object]]:
         ("cables", load_cable),
         ("winches", load_winch),
         ("robots", load_robot),
+        ("tension_sensors", load_tension_sensors),
     )
     for kind, load in loaders:
         for path in _files(kind):

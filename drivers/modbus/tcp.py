@@ -35,6 +35,11 @@ class ModbusError(DriverError):
     """A Modbus device cannot be reached, or did not do what was asked."""
 
 
+def exception_text(code: int) -> str:
+    """Return what an exception code of Modbus means."""
+    return _EXCEPTIONS.get(code, "unknown exception")
+
+
 class ModbusTcp:
     """Requests to one unit behind host:port; connects by itself, anew after every error.
 
@@ -102,7 +107,7 @@ class ModbusTcp:
             raise self._wrong(what, f"the answer makes no sense ({error})") from None
         if answer.isError():
             code = getattr(answer, "exception_code", 0)
-            reason = _EXCEPTIONS.get(code, "unknown exception")
+            reason = exception_text(code)
             raise ModbusError(f"{self.name}: {what}: refused with exception {code} ({reason})")
         return answer
 

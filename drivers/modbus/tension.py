@@ -1,0 +1,196 @@
+"""Load-cell amplifiers on one serial line, sampled by a thread beside the control cycle."""
+
+from __future__ import annotations
+
+import struct
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Self
+
+from cdpr_rt.tension import TensionExchange, TensionFault
+from drivers.modbus.line import LineError, ModbusLine
+from drivers.modbus.tcp import ModbusError
+from profiles.tension_sensor import (
+    MOST_REGISTERS,
+    REGISTERS,
+    Amplifier,
+    DataType,
+    RegisterKind,
+    TensionSensors,
+    ValueMap,
+)
+
+_FORMATS: Final[dict[DataType, str]] = {
+    "int16": ">h",
+    "uint16": ">H",
+    "int32": ">i",
+    "uint32": ">I",
+    "float32": ">f",
+}
+_REOPEN_S = 0.5
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One reading of one load cell."""
+
+    cable: str
+    tension_N: float
+    fault: TensionFault
+
+
+def raw_value(value: ValueMap, registers: list[int]) -> float:
+    """Return the number that registers hold, in the units of the amplifier."""
+    words = registers if value.word_order == "big" else registers[::-1]
+    packed = struct.pack(f">{len(words)}H", *words)
+    return float(struct.unpack(_FORMATS[value.type], packed)[0])
+
+
+class LoadCells:
+    """The load cells of a profile on an open line; reads and tares them one by one.
+
+    Methods raise ModbusError. Not for several threads at once.
+    """
+
+    def __init__(self, profile: TensionSensors, port: str) -> None:
+        self.profile = profile
+        self.line = ModbusLine(
+            port,
+            profile.baudrate,
+            parity=profile.parity,
+            stop_bits=profile.stop_bits,
+            timeout_s=profile.answer_timeout_s,
+            retries=profile.retries,
+        )
+        self._requests = _requests(profile.amplifier)
+
+    def read(self, number: int) -> Reading:
+        """Read one load cell, counted from 0."""
+        sensor, amplifier = self.profile.sensors[number], self.profile.amplifier
+        got = {
+            (kind, start + i): word
+            for kind, start, count in self._requests
+            for i, word in enumerate(self.line.registers(kind, sensor.unit, start, count))
+        }
+        value, status = amplifier.value, amplifier.status
+        words = [got[value.kind, value.address + i] for i in range(REGISTERS[value.type])]
+        raw = raw_value(value, words)
+        tension = sensor.gain * raw * value.scale_N - sensor.zero_N
+        bits = 0 if status is None else got[status.kind, status.address]
+        broken = None if status is None else status.broken_wire_bit
+        over = None if status is None else status.over_range_bit
+        fault = TensionFault.NONE
+        if raw != raw or raw in value.broken_wire_raw or _is_set(bits, broken):  # noqa: PLR0124
+            fault = TensionFault.BROKEN_WIRE  # a value that is no number is none of a load cell
+        elif _is_set(bits, over) or not amplifier.lowest_N <= tension <= amplifier.highest_N:
+            fault = TensionFault.OVER_RANGE
+        return Reading(sensor.cable, tension, fault)
+
+    def tare(self, number: int) -> None:
+        """Have one amplifier take its present reading as zero; needs `amplifier.tare`."""
+        tare = self.profile.amplifier.tare
+        assert tare is not None
+        self.line.write_register(self.profile.sensors[number].unit, tare.address, tare.value)
+
+    def close(self) -> None:
+        """Close the line."""
+        self.line.close()
+
+
+def _is_set(bits: int, bit: int | None) -> bool:
+    return bit is not None and bool(bits >> bit & 1)
+
+
+def _requests(amplifier: Amplifier) -> list[tuple[RegisterKind, int, int]]:
+    """Return (kind, start, count) of what must be read: one request where one reaches all."""
+    value, status = amplifier.value, amplifier.status
+    size = REGISTERS[value.type]
+    if status is None:
+        return [(value.kind, value.address, size)]
+    first = min(value.address, status.address)
+    count = max(value.address + size, status.address + 1) - first
+    if value.kind == status.kind and count <= MOST_REGISTERS:
+        return [(value.kind, first, count)]
+    return [(value.kind, value.address, size), (status.kind, status.address, 1)]
+
+
+class TensionSampler:
+    """Reads all load cells in turn in a thread of its own and publishes them.
+
+    `exchange` is what the cycle reads. A sensor that fails is asked again in the next round, a
+    port that is gone is opened again; what went wrong last stands in `errors`, by sensor.
+    """
+
+    def __init__(
+        self,
+        profile: TensionSensors,
+        port: str,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        names = [sensor.cable for sensor in profile.sensors]
+        self.exchange = TensionExchange(names, profile.stale_after_s, clock)
+        self.errors = [""] * len(names)
+        self.readings = [0] * len(names)
+        """Good answers of each sensor so far."""
+        self._cells = LoadCells(profile, port)
+        self._clock = clock
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"tension {port}", daemon=True)
+
+    def start(self) -> Self:
+        """Open the line and begin to sample. Raises LineError for a port that does not open."""
+        self._cells.line.open()
+        self._thread.start()
+        return self
+
+    def await_readings(self, timeout_s: float) -> None:
+        """Wait until every sensor was read at least once; raises ModbusError."""
+        until = time.monotonic() + timeout_s
+        while not all(self.readings):
+            if time.monotonic() > until:
+                missing = self.readings.index(0)
+                cable = self.exchange.cables[missing]
+                why = self.errors[missing] or f"no reading within {timeout_s:g} s"
+                raise ModbusError(f"{cable}: {why}")
+            time.sleep(0.005)
+
+    def stop(self) -> None:
+        """End the thread and close the line."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._cells.close()
+
+    def __enter__(self) -> Self:
+        return self.start()
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        while not self._stop.is_set():
+            pause = self._round()
+            due = max(due + self._cells.profile.period_s, time.monotonic())
+            self._stop.wait(max(due - time.monotonic(), pause))
+
+    def _round(self) -> float:
+        """Read every sensor once; return how long to wait at least before the next round."""
+        for number in range(self.exchange.n):
+            if self._stop.is_set():
+                break
+            asked = self._clock()
+            try:
+                reading = self._cells.read(number)
+            except LineError as error:
+                self.errors = [str(error)] * self.exchange.n
+                return _REOPEN_S
+            except ModbusError as error:
+                self.errors[number] = str(error)
+                continue
+            self.errors[number] = ""
+            self.exchange.publish(number, reading.tension_N, asked, reading.fault)
+            self.readings[number] += 1
+        return 0.0
