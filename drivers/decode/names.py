@@ -32,7 +32,9 @@ class ObjectNames:
             if isinstance(entry, ODVariable):
                 return str(entry.name)
             part = _part(entry, sub)
-            return f"{entry.name}: {part.name}" if part is not None else str(entry.name)
+            if part is None or str(part.name).startswith(str(entry.name)):
+                return str((part or entry).name)
+            return f"{entry.name}: {part.name}"
         return ""
 
     def is_signed(self, index: int, sub: int) -> bool:

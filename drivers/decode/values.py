@@ -24,6 +24,7 @@ _OWN_UNITS = {
     "per_mille_of_rated": "per mille of rated",
     "percent_of_rated": "percent of rated",
 }
+_SHOWN_BYTES = 32
 _MICRO, _MILLI = 1e-6, 1e-3
 _PDO_PARAMETERS = ((0x1400, 0x1600), (0x1800, 0x1A00))
 _PDO_MAPS = ((0x1600, 0x1800), (0x1A00, 0x1C00))
@@ -105,7 +106,8 @@ def _other(value: object) -> str:
     if isinstance(value, str):
         return repr(value)
     if isinstance(value, bytes | bytearray):
-        return value.hex(" ").upper() or "(nothing)"
+        shown = value[:_SHOWN_BYTES].hex(" ").upper() or "(nothing)"
+        return shown if len(value) <= _SHOWN_BYTES else f"{shown} ... ({len(value)} bytes)"
     return str(value)
 
 

@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
-from tools.commands import bus_budget
+from drivers.bus import Filters
+from drivers.errors import BusError
+from tools.busview.identifiers import filters, parse_identifiers
+from tools.busview.known import known_bus
+from tools.busview.monitor import LogFile, Viewer, watch
+from tools.busview.replay import Pacer, Sender, chosen, play, recorded
+from tools.busview.source import SimbusSource, named_bus, open_source
+from tools.busview.summary import Summary
+from tools.commands import bus_budget, bus_scan
+from tools.commands.options import JsonOption, YesOption
+from tools.consent import require_consent
+from tools.output import Output
+from tools.signals import stop_on_signals
 
 app = typer.Typer(help="Look at a CAN bus.", no_args_is_help=True)
+
+_LATE_S = 0.05
+"""For how long frames that the bus has counted may be under way to us."""
 
 
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
+    bus_scan.add(app)
     bus_budget.add(app)
     parent.add_typer(app, name="bus")
 
@@ -18,3 +39,141 @@ def register(parent: typer.Typer) -> None:
 @app.callback()
 def _group() -> None:
     """Look at a CAN bus."""
+
+
+_BusOption = Annotated[
+    str, typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
+]
+_ProfileOption = Annotated[
+    str | None, typer.Option("--profile", help="Every node is this drive.", metavar="DRIVE")
+]
+_WinchOption = Annotated[
+    str | None, typer.Option("--winch", help="The node of this winch, with its ratings.")
+]
+_RobotOption = Annotated[
+    str | None,
+    typer.Option("--robot", help="The nodes of this robot; ROBOT:BUS for one of its buses."),
+]
+_IdsOption = Annotated[
+    str | None,
+    typer.Option("--ids", help="Only these identifiers, hexadecimal: 181,700-77F", metavar="IDS"),
+]
+_RawOption = Annotated[
+    bool, typer.Option("--raw", help="Lines of candump instead of what they mean.")
+]
+
+
+@app.command()
+def monitor(
+    bus: _BusOption,
+    profile: _ProfileOption = None,
+    winch: _WinchOption = None,
+    robot: _RobotOption = None,
+    ids: _IdsOption = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="Keep all in this file, as candump does.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.1, help="End by itself.")
+    ] = None,
+    raw: _RawOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what is said on a bus, decoded, until Ctrl-C; only listens."""
+    out = Output(as_json)
+    url = named_bus(bus)
+    known = known_bus(url, profile, winch, robot)
+    summary = Summary(known.bitrate_bit_s)
+    viewer = Viewer(known.decoder(), summary, sys.stderr if as_json else sys.stdout, raw=raw)
+    source = open_source(url, _filters(ids))
+    try:
+        with stop_on_signals() as stop_wanted:
+            if log is None:
+                watch(source, viewer, None, seconds, stop_wanted)
+            else:
+                with LogFile(log) as file:
+                    watch(source, viewer, file, seconds, stop_wanted)
+        if isinstance(source, SimbusSource) and source.lost is None:
+            _ask_bus(source, summary)
+    finally:
+        source.close()
+        _tell(out, summary)
+    if source.lost is not None:
+        raise source.lost
+    out.result({"ok": True, "bus": str(url), "log": log, **summary.table()})
+
+
+@app.command()
+def replay(
+    file: Annotated[
+        Path, typer.Argument(help="Log of candump, or another that python-can reads; - for stdin.")
+    ],
+    profile: _ProfileOption = None,
+    winch: _WinchOption = None,
+    robot: _RobotOption = None,
+    ids: _IdsOption = None,
+    channel: Annotated[
+        str | None, typer.Option("--channel", help="Which bus, where the file holds several.")
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed",
+            min=0.001,
+            help="Times as fast as recorded; without it showing does not wait, sending takes 1.",
+        ),
+    ] = None,
+    to: Annotated[
+        str | None, typer.Option("--to", help="Also send all of it to this bus.", metavar="URL")
+    ] = None,
+    raw: _RawOption = False,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a recorded session as the monitor does, or send it to a bus again."""
+    out = Output(as_json)
+    known = known_bus(None, profile, winch, robot)
+    wanted = None if ids is None else parse_identifiers(ids)
+    url = None if to is None else named_bus(to)
+    if url is not None:
+        what = f"the recorded frames are sent to {url}, commands to motors among them."
+        require_consent(what, yes or url.is_simulated)
+    summary = Summary(known.bitrate_bit_s)
+    viewer = Viewer(known.decoder(), summary, sys.stderr if as_json else sys.stdout, raw=raw)
+    with ExitStack() as stack:
+        stack.callback(_tell, out, summary)
+        stop_wanted = stack.enter_context(stop_on_signals())
+        frames = chosen(recorded(file, channel), wanted)
+        if url is None:
+            play(frames, viewer, Pacer(speed, stop_wanted), stop_wanted)
+            told: dict[str, int] = {}
+        else:
+            sender = stack.enter_context(Sender(url, out.note))
+            play(frames, viewer, Pacer(speed or 1.0, stop_wanted), stop_wanted, sender)
+            told = {"sent": sender.sent, "not_sent": sender.not_sent}
+    out.result({"ok": True, "file": file, **told, **summary.table()})
+
+
+def _filters(ids: str | None) -> Filters | None:
+    return None if ids is None else filters(parse_identifiers(ids))
+
+
+def _ask_bus(source: SimbusSource, summary: Summary) -> None:
+    """Complete the summary by what a simulated bus tells: its time, and what we missed."""
+    try:
+        passed = source.ask()
+    except BusError:
+        return  # it has ended just now
+    summary.time_s = passed["bus_time_s"]
+    if source.seen is None:
+        return
+    before = -1
+    while before < source.seen < passed["frames"]:
+        before = source.seen
+        source.take_in(_LATE_S)
+    summary.missed = max(0, int(passed["frames"]) - source.seen)
+
+
+def _tell(out: Output, summary: Summary) -> None:
+    for line in summary.lines():
+        out.note(line)

@@ -1,0 +1,1 @@
+"""What the `cdpr bus` commands do: scan, monitor, replay."""

@@ -1,0 +1,179 @@
+"""Read objects of one node by raw SDO requests, watching for answers that nobody asked for."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+_CIA_402 = 402
+_INITIATE = struct.Struct("<BHB4s")
+_REFUSED = 0x80
+_TIMED_OUT = (0x05040000).to_bytes(4, "little")
+_TIMEOUT_S = 0.4
+_ATTEMPTS = 2
+_MOST_BYTES = 1024
+SETTLE_S = 0.15
+"""For how long a second node may answer what a first one has answered."""
+
+Object = tuple[int, int]
+FIRST: Object = (0x1000, 0)
+ALWAYS: tuple[Object, ...] = (
+    (0x1018, 1),
+    (0x1018, 2),
+    (0x1018, 3),
+    (0x1018, 4),
+    (0x1001, 0),
+    (0x1008, 0),
+    (0x1017, 0),
+)
+DRIVE: tuple[Object, ...] = ((0x6502, 0), (0x6041, 0), (0x6061, 0), (0x603F, 0))
+
+
+@dataclass
+class Found:
+    """What one node id has shown of itself."""
+
+    node_id: int
+    nmt_state: int | None = None
+    """Of its latest heartbeat."""
+    heartbeats: int = 0
+    answers: bool = False
+    objects: dict[Object, bytes] = field(default_factory=dict)
+    refused: dict[Object, int] = field(default_factory=dict)
+    """Abort codes of objects it does not give."""
+    twice: set[str] = field(default_factory=set)
+    """What came more often than asked for, in words: several nodes have this id."""
+
+    def number(self, index: int, sub: int = 0) -> int | None:
+        """Return an unsigned object, None where it was not given."""
+        raw = self.objects.get((index, sub))
+        return int.from_bytes(raw, "little") if raw else None
+
+    def text(self, index: int) -> str | None:
+        """Return a text object, None where it was not given."""
+        raw = self.objects.get((index, 0))
+        return None if raw is None else raw.decode("ascii", "replace").rstrip("\0 ")
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether its device type (1000h) is that of CiA 402."""
+        return (self.number(0x1000) or 0) & 0xFFFF == _CIA_402
+
+
+class _Turn(NamedTuple):
+    """What to send, if anything, and for how long to wait for its answer."""
+
+    data: bytes | None
+    wait_s: float
+
+
+_Dialogue = Generator[_Turn, bytes | None, None]
+"""Gets the answer to each turn, None when the time was up."""
+
+
+class Asking:
+    """The objects of one node, read one after the other; `done` after the last."""
+
+    def __init__(self, found: Found) -> None:
+        self.found = found
+        self.done = False
+        self._dialogue = self._talk()
+        self._deadline: float | None = None
+        self._asked: Object | None = None
+        """Whose answer is waited for."""
+        self._toggle: int | None = None
+        """Of the segment that is waited for; None while no value comes in segments."""
+        self._requests: dict[Object, int] = {}
+        self._answers: dict[Object, list[bytes]] = {}
+
+    def due(self, now_s: float) -> bytes | None:
+        """Return the SDO request to send now, if any."""
+        if self._deadline is not None and now_s < self._deadline:
+            return None
+        return self._go_on(None, now_s)
+
+    def take(self, data: bytes, now_s: float) -> bytes | None:
+        """Take in an SDO answer of 8 bytes; return the request to send next, if any."""
+        return self._go_on(data, now_s) if self._is_awaited(data) else None
+
+    def _go_on(self, answer: bytes | None, now_s: float) -> bytes | None:
+        if self.done:
+            return None
+        try:
+            begun = self._deadline is not None
+            turn = self._dialogue.send(answer) if begun else next(self._dialogue)
+        except StopIteration:
+            self.done = True
+            self._asked = self._toggle = None
+            return None
+        self._deadline = now_s + turn.wait_s
+        return turn.data
+
+    # -- what is said, turn by turn
+
+    def _talk(self) -> _Dialogue:
+        yield from self._read(FIRST)
+        if not self.found.answers:
+            return
+        yield _Turn(None, SETTLE_S)
+        for what in ALWAYS + (DRIVE if self.found.is_drive else ()):
+            yield from self._read(what)
+
+    def _read(self, what: Object) -> _Dialogue:
+        """Read one object; what is missing in the end is neither given nor refused."""
+        for _ in range(_ATTEMPTS):
+            self._asked = what
+            self._requests[what] = self._requests.get(what, 0) + 1
+            answer = yield _Turn(_INITIATE.pack(0x40, *what, bytes(4)), _TIMEOUT_S)
+            self._asked = None
+            if answer is None:
+                continue
+            self.found.answers = True
+            if answer[0] == _REFUSED:
+                self.found.refused[what] = int.from_bytes(answer[4:], "little")
+            elif answer[0] & 2:
+                unused = answer[0] >> 2 & 3 if answer[0] & 1 else 0
+                self.found.objects[what] = answer[4 : 8 - unused]
+            else:
+                yield from self._read_segments(what)
+            return
+
+    def _read_segments(self, what: Object) -> _Dialogue:
+        value = bytearray()
+        toggle = 0
+        while len(value) < _MOST_BYTES:
+            self._toggle = toggle
+            answer = yield _Turn(bytes([0x60 | toggle << 4]) + bytes(7), _TIMEOUT_S)
+            self._toggle = None
+            if answer is None or answer[0] == _REFUSED:
+                break
+            value += answer[1 : 8 - (answer[0] >> 1 & 7)]
+            toggle = 1 - toggle
+            if answer[0] & 1:
+                self.found.objects[what] = bytes(value)
+                return
+        yield _Turn(_INITIATE.pack(_REFUSED, *what, _TIMED_OUT), 0.0)
+
+    # -- whose answers come
+
+    def _is_awaited(self, data: bytes) -> bool:
+        """Return whether an answer is the one waited for; note one that nobody waits for."""
+        if data[0] >> 5 == 0:
+            if self._toggle is not None and data[0] >> 4 & 1 == self._toggle:
+                return True
+            self.found.twice.add("segments of values that were not asked for")
+            return False
+        what: Object = (data[1] | data[2] << 8, data[3])
+        if data[0] == _REFUSED and self._toggle is not None:
+            return True
+        if what not in self._requests or (data[0] >> 5 != 2 and data[0] != _REFUSED):
+            return False
+        answers = self._answers.setdefault(what, [])
+        answers.append(data)
+        if len(answers) > self._requests[what]:
+            name = f"{what[0]:04X}h:{what[1]}" if what[1] else f"{what[0]:04X}h"
+            kind = "differing" if len(set(answers)) > 1 else "equal"
+            self.found.twice.add(f"{kind} answers to one request for {name}")
+        return what == self._asked and self._toggle is None

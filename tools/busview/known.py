@@ -1,0 +1,67 @@
+"""Whom a monitor takes the nodes of a bus for: by a drive's, a winch's or a robot's profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from drivers.bus import BusUrl
+from drivers.decode import Decoder, KnownNode
+from profiles import Robot, load_drive, load_robot, load_winch
+from tools.errors import BadInputError
+
+_USUAL_BITRATE_bit_s = 1_000_000
+
+
+@dataclass(frozen=True)
+class KnownBus:
+    """What is known of a bus before anything was heard."""
+
+    nodes: dict[int, KnownNode] = field(default_factory=dict)
+    others: KnownNode | None = None
+    bitrate_bit_s: int = _USUAL_BITRATE_bit_s
+
+    def decoder(self) -> Decoder:
+        """Return a decoder for a session on this bus."""
+        return Decoder(self.nodes, self.others)
+
+
+def known_bus(
+    url: BusUrl | None, drive: str | None, winch: str | None, robot: str | None
+) -> KnownBus:
+    """Return what the profile that was named tells of a bus; `url` is None for a file's.
+
+    Raises BadInputError, ProfileError.
+    """
+    if sum(name is not None for name in (drive, winch, robot)) > 1:
+        raise BadInputError("--profile, --winch, --robot: one of them says who is on the bus")
+    if winch is not None:
+        one = load_winch(winch)
+        nodes = {one.node_id: KnownNode.of_winch(one)}
+        return KnownBus(nodes, bitrate_bit_s=_bitrate(url, one.bitrate_bit_s))
+    if robot is not None:
+        name, _, bus = robot.partition(":")
+        return _of_robot(load_robot(name), bus, url)
+    others = None if drive is None else KnownNode(load_drive(drive))
+    return KnownBus(others=others, bitrate_bit_s=_bitrate(url, _USUAL_BITRATE_bit_s))
+
+
+def _bitrate(url: BusUrl | None, otherwise: int) -> int:
+    told = url.options.get("bitrate") if url is not None else None
+    return told if isinstance(told, int) and told > 0 else otherwise
+
+
+def _of_robot(robot: Robot, name: str, url: BusUrl | None) -> KnownBus:
+    """Return one bus of a robot: the one of this name, of this URL, or its only one."""
+    names = [bus.name for bus in robot.buses]
+    if not name and url is not None:
+        name = next((bus.name for bus in robot.buses if bus.url == str(url)), "")
+    if not name and len(names) == 1:
+        name = names[0]
+    if name not in names:
+        raise BadInputError(
+            f"--robot {robot.reference}: which of its buses is meant: "
+            + " or ".join(f"--robot {robot.reference}:{one}" for one in names)
+        )
+    bus = next(bus for bus in robot.buses if bus.name == name)
+    nodes = {a.node_id: KnownNode.of_winch(a.winch) for a in robot.axes if a.bus == name}
+    return KnownBus(nodes, bitrate_bit_s=_bitrate(url, bus.bitrate_bit_s))

@@ -1,0 +1,122 @@
+"""Show, log and count the frames of a bus, live or from a file."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import TextIO
+
+from drivers.decode import Decoder, Frame, format_line
+from tools.busview.source import Source
+from tools.busview.summary import Summary
+from tools.errors import BadInputError, WorkFailedError
+
+_BATCH = 200
+_WAIT_S = 0.1
+
+
+class Viewer:
+    """Takes frames, writes a line for each that is shown, and keeps the summary.
+
+    SYNC without a counter says nothing and is counted only. Lines are written as whole lines, in
+    blocks when many come at once.
+    """
+
+    def __init__(self, decoder: Decoder, summary: Summary, out: TextIO, *, raw: bool) -> None:
+        self._decoder = decoder
+        self._out = out
+        self._raw = raw
+        self._start_s: float | None = None
+        self.summary = summary
+        self.closed = False
+        """Whether nobody reads the lines any more."""
+
+    def show(self, channel: str, frames: Iterable[Frame]) -> None:
+        """Decode frames of one bus and write their lines."""
+        lines = []
+        for frame in frames:
+            if self._start_s is None:
+                self._start_s = frame.time_s
+            record = self._decoder.decode(frame)
+            self.summary.add(record)
+            if self._raw:
+                lines.append(format_line(channel, frame))
+            elif record.text or record.problem:
+                lines.append(record.line(self._start_s))
+        if not lines or self.closed:
+            return
+        try:
+            self._out.write("\n".join(lines) + "\n")
+            self._out.flush()
+        except BrokenPipeError:
+            self.closed = True
+            # nothing is left to be written, so that the interpreter does not complain at its end
+            with suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class LogFile:
+    """A candump log that is written while frames come; raises BadInputError, WorkFailedError."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            self._file = path.open("w", encoding="ascii")
+        except OSError as error:
+            raise BadInputError(f"--log {path}: cannot be written: {error.strerror}") from error
+
+    def write(self, channel: str, frames: Iterable[Frame]) -> None:
+        """Append frames."""
+        try:
+            self._file.writelines(f"{format_line(channel, frame)}\n" for frame in frames)
+            self._file.flush()
+        except OSError as error:
+            raise self._full(error) from error
+
+    def _full(self, error: OSError) -> WorkFailedError:
+        return WorkFailedError(f"--log {self._path}: cannot be written: {error.strerror}")
+
+    def __enter__(self) -> LogFile:
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        with suppress(OSError):
+            self._file.close()
+
+
+def watch(
+    source: Source,
+    viewer: Viewer,
+    log: LogFile | None,
+    seconds: float | None,
+    stop_wanted: Callable[[], bool],
+) -> None:
+    """Show what comes until the time is up, the user wants an end, or the bus has gone.
+
+    Frames that have arrived are taken in before any is decoded, so that a fast bus fills our
+    memory and not the bus' buffer, where they would be lost.
+    """
+    deadline = None if seconds is None else time.monotonic() + seconds
+    more = False
+    while True:
+        left_s = _WAIT_S if deadline is None else min(_WAIT_S, deadline - time.monotonic())
+        ended = left_s <= 0.0 or stop_wanted() or viewer.closed or source.lost is not None
+        if not ended:
+            source.take_in(0.0 if more else left_s)
+        frames = source.next_frames(_BATCH)
+        if ended and not frames:
+            return
+        if log is not None:
+            log.write(source.name, frames)
+        viewer.show(source.name, frames)
+        more = len(frames) == _BATCH

@@ -1,0 +1,205 @@
+"""Recorded sessions: read from a file, paced as they were, sent to a bus."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+import can
+
+from drivers.bus import BusUrl, FramePort, open_port
+from drivers.decode import Frame, Logged, read_log
+from drivers.errors import BusError
+from tools.busview.monitor import Viewer
+from tools.busview.source import frame_of
+from tools.errors import BadInputError, WorkFailedError
+
+_LOOK_S = 0.1
+_BLOCK = 200
+_DISABLE_VOLTAGE = bytes.fromhex("2B40600000000000")
+"""SDO request that writes 0 to the controlword (6040h)."""
+_SDO_REQUEST, _NODE, _FUNCTION = 0x600, 0x07F, 0x780
+_COMMANDS = (0x200, 0x300, 0x400, 0x500, _SDO_REQUEST)
+_CANDUMP = (".log", ".txt", ".candump", "")
+
+
+def recorded(path: Path, channel: str | None) -> Iterator[Logged]:
+    """Yield the frames of one bus in a file; `-` is standard input.
+
+    Files of candump are read by their own format, others (.asc, .blf, .trc, ...) by python-can.
+    Raises BadInputError for a file that cannot be read or holds several buses, LogError.
+    """
+    wanted = channel
+    there: set[str] = set()
+    for logged in _frames(path):
+        there.add(logged.channel)
+        wanted = wanted or logged.channel
+        if logged.channel == wanted:
+            yield logged
+        elif channel is None:
+            names = ", ".join(sorted(there))
+            raise BadInputError(f"{path}: holds several buses ({names}): choose with --channel")
+    if channel is not None and channel not in there:
+        names = ", ".join(sorted(there)) or "nothing"
+        raise BadInputError(f"--channel {channel}: {path} holds {names}")
+
+
+def _frames(path: Path) -> Iterator[Logged]:
+    try:
+        if str(path) == "-":
+            yield from read_log("standard input", sys.stdin)
+        elif path.suffix.lower() in _CANDUMP:
+            with path.open(encoding="ascii", errors="replace") as lines:
+                yield from read_log(str(path), lines)
+        else:
+            yield from _foreign(path)
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _foreign(path: Path) -> Iterator[Logged]:
+    """Yield the frames of a file that python-can knows."""
+    try:
+        with can.LogReader(path) as reader:
+            for message in reader:
+                if not message.is_fd:
+                    yield Logged(str(message.channel), frame_of(message))
+    except OSError:
+        raise
+    except Exception as error:  # whatever a reader of python-can makes of a broken file
+        raise BadInputError(f"{path}: python-can cannot read it: {error}") from error
+
+
+class Pacer:
+    """Waits as long as passed between the frames when they were recorded."""
+
+    def __init__(self, speed: float | None, stop_wanted: Callable[[], bool]) -> None:
+        self._speed = speed
+        self._stop_wanted = stop_wanted
+        self._first: tuple[float, float] | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Whether it waits at all."""
+        return self._speed is not None
+
+    def wait_for(self, frame: Frame) -> None:
+        """Return when the frame is due, or the user wants an end."""
+        if self._speed is None:
+            return
+        if self._first is None:
+            self._first = frame.time_s, time.monotonic()
+        recorded_s, begun_s = self._first
+        due_s = begun_s + (frame.time_s - recorded_s) / self._speed
+        while (left_s := due_s - time.monotonic()) > 0.0 and not self._stop_wanted():
+            time.sleep(min(left_s, _LOOK_S))
+
+
+class Sender:
+    """Sends recorded frames to a bus; leaves no node under power that they may have enabled.
+
+    Power is asked off when the recording was not sent to its end, and on a real bus in any case.
+    """
+
+    def __init__(self, url: BusUrl, note: Callable[[str], None]) -> None:
+        self._url = url
+        self._note = note
+        self.sent = 0
+        self.not_sent = 0
+        """Error frames, which cannot be sent."""
+        self.complete = False
+        """Whether the recording was sent to its end."""
+        self._commanded: set[int] = set()
+        try:
+            self._port: FramePort = open_port(url, [])
+        except BusError as error:
+            raise BadInputError(str(error)) from error
+
+    def send(self, frame: Frame) -> None:
+        """Send a frame as it was; raises WorkFailedError when the bus does not take it."""
+        if frame.error:
+            self.not_sent += 1
+            return
+        try:
+            self._port.send(frame.pack())
+        except OSError as error:
+            raise WorkFailedError(str(self._port.lost(error))) from error
+        self.sent += 1
+        node_id = frame.can_id & _NODE
+        if not frame.extended and frame.can_id & _FUNCTION in _COMMANDS and node_id:
+            self._commanded.add(node_id)
+
+    def _power_off(self) -> None:
+        """Ask every node that was commanded to take its power off."""
+        told = []
+        for node_id in sorted(self._commanded):
+            # a bus that is gone carries nothing; the drives watch for that
+            with suppress(OSError):
+                self._port.send(Frame(0.0, _SDO_REQUEST + node_id, _DISABLE_VOLTAGE).pack())
+                told.append(str(node_id))
+        if told:
+            self._note(f"asked to switch their power off: node {', '.join(told)}")
+
+    def __enter__(self) -> Sender:
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        if not self.complete or not self._url.is_simulated:
+            self._power_off()
+        self._port.close()
+        self._note(f"sent {self.sent} frames to {self._url}")
+
+
+def chosen(log: Iterable[Logged], identifiers: frozenset[int] | None) -> Iterator[Logged]:
+    """Yield what of a log has one of these 11-bit identifiers; everything for None."""
+    for logged in log:
+        frame = logged.frame
+        if identifiers is None or (not frame.extended and frame.can_id in identifiers):
+            yield logged
+
+
+def play(
+    log: Iterable[Logged],
+    viewer: Viewer,
+    pacer: Pacer,
+    stop_wanted: Callable[[], bool],
+    sender: Sender | None = None,
+) -> None:
+    """Show, and send, a recording until its end or the user's.
+
+    Raises WorkFailedError when sending ended early.
+    """
+    # one by one where time matters, in blocks where a long file is to be read fast
+    block = _BLOCK if sender is None and not pacer.waits else 1
+    pending: list[Logged] = []
+    try:
+        for logged in log:
+            pacer.wait_for(logged.frame)
+            if stop_wanted() or viewer.closed:
+                if sender is not None:
+                    raise WorkFailedError("stopped on request, not all was sent")
+                return
+            if sender is not None:
+                sender.send(logged.frame)
+            pending.append(logged)
+            if len(pending) >= block:
+                _show(viewer, pending)
+    finally:
+        _show(viewer, pending)
+    if sender is not None:
+        sender.complete = True
+
+
+def _show(viewer: Viewer, pending: list[Logged]) -> None:
+    if pending:
+        viewer.show(pending[0].channel, [logged.frame for logged in pending])
+        pending.clear()

@@ -1,0 +1,183 @@
+"""Frames of a bus as they come, taken in before anything else is done with them."""
+
+from __future__ import annotations
+
+import select
+import time
+from collections import deque
+from typing import Protocol
+
+import can
+
+from drivers.bus import BusUrl, Filters, open_port, open_python_can, query_status
+from drivers.decode import Frame
+from drivers.errors import BusError
+from tools.errors import BadInputError
+
+_MOST_WAITING = 1 << 20
+"""Frames kept for decoding; what comes on top stays in the bus' own buffer."""
+_AT_ONCE = 1000
+_FRAME_BYTES = 16
+_CONTROL_BYTES = 64
+_LATEST_RELATIVE_s = 1e9
+"""A time stamp below this does not count from the epoch."""
+
+
+class Source(Protocol):
+    """A bus to listen to."""
+
+    name: str
+    """How log files name it."""
+    lost: BusError | None
+    """Why nothing comes any more."""
+
+    def take_in(self, timeout_s: float) -> None:
+        """Keep some of what has arrived, waiting up to `timeout_s` for the first.
+
+        At the end of the bus `lost` is set.
+        """
+
+    def next_frames(self, most: int) -> list[Frame]:
+        """Return frames that were taken in, the oldest first."""
+
+    def close(self) -> None:
+        """Leave the bus."""
+
+
+class SimbusSource:
+    """The simulated bus through its packed frames, which keeps up with lockstep cycles."""
+
+    def __init__(self, url: BusUrl, filters: Filters | None) -> None:
+        self.name = url.channel
+        self.lost: BusError | None = None
+        self._url = url
+        self._filtered = filters is not None
+        self._port = open_port(url, filters)
+        self._before = self._port.status
+        self._port.settimeout(0)
+        self._readable = select.poll()
+        self._readable.register(self._port.fileno(), select.POLLIN)
+        self._waiting: deque[tuple[float, bytes]] = deque()
+        self._seen = 0
+
+    def take_in(self, timeout_s: float) -> None:
+        """Keep what has arrived; see Source."""
+        if self.lost or len(self._waiting) >= _MOST_WAITING:
+            return
+        if not self._readable.poll(timeout_s * 1e3):
+            return
+        packet, receive, keep = (
+            bytearray(_CONTROL_BYTES),
+            self._port.recv_into,
+            self._waiting.append,
+        )
+        try:
+            for _ in range(_AT_ONCE):
+                length = receive(packet)
+                if length == 0:
+                    self.lost = self._port.lost()
+                    return
+                if length == _FRAME_BYTES:
+                    keep((time.time(), bytes(packet[:_FRAME_BYTES])))
+                    self._seen += 1
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self.lost = self._port.lost(error)
+
+    def next_frames(self, most: int) -> list[Frame]:
+        """Return frames that were taken in, the oldest first."""
+        count = min(most, len(self._waiting))
+        return [Frame.unpack(*self._waiting.popleft()) for _ in range(count)]
+
+    def ask(self) -> dict[str, float]:
+        """Return what the bus says has passed since we joined: frames and bus_time_s."""
+        now = query_status(self._url.channel)
+        return {key: now[key] - self._before[key] for key in ("frames", "bus_time_s")}
+
+    @property
+    def seen(self) -> int | None:
+        """Frames taken in so far; None where filters keep some away."""
+        return None if self._filtered else self._seen
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._port.close()
+
+
+class PythonCanSource:
+    """Any other bus through python-can, which brings time stamps and error frames along."""
+
+    def __init__(self, url: BusUrl, filters: Filters | None) -> None:
+        self.name = url.channel.rpartition("/")[2]
+        self.lost: BusError | None = None
+        self._url = url
+        self._bus = open_python_can(url, filters)
+        self._waiting: deque[can.Message] = deque()
+
+    def take_in(self, timeout_s: float) -> None:
+        """Keep what has arrived; see Source."""
+        try:
+            for i in range(_AT_ONCE):
+                if len(self._waiting) >= _MOST_WAITING:
+                    return
+                message = self._bus.recv(0.0 if i else timeout_s)
+                if message is None:
+                    return
+                self._waiting.append(message)
+        except (can.CanError, OSError) as error:
+            self.lost = BusError(f"{self._url}: the bus has gone away ({error})")
+
+    def next_frames(self, most: int) -> list[Frame]:
+        """Return frames that were taken in, the oldest first."""
+        count = min(most, len(self._waiting))
+        messages = [self._waiting.popleft() for _ in range(count)]
+        return [frame_of(message) for message in messages if not message.is_fd]
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._bus.shutdown()
+
+
+def frame_of(message: can.Message) -> Frame:
+    """Return a message of python-can as a frame."""
+    stamp = message.timestamp if message.timestamp > _LATEST_RELATIVE_s else time.time()
+    return Frame(
+        round(stamp, 6),
+        message.arbitration_id,
+        bytes(message.data or b""),
+        message.is_extended_id and not message.is_error_frame,
+        message.is_remote_frame,
+        message.is_error_frame,
+        message.dlc if message.is_remote_frame else 0,
+    )
+
+
+def open_source(url: BusUrl, filters: Filters | None = None) -> SimbusSource | PythonCanSource:
+    """Open a bus to listen to; raises BadInputError where that is not possible."""
+    try:
+        if url.interface == "simbus":
+            return SimbusSource(url, filters)
+        return PythonCanSource(url, filters)
+    except BusError as error:
+        raise BadInputError(str(error)) from error
+
+
+def named_bus(text: str) -> BusUrl:
+    """Return the bus that `text` names, one that is there already; raises BadInputError."""
+    try:
+        url = BusUrl.parse(text)
+    except BusError as error:
+        raise BadInputError(str(error)) from error
+    if url.starts_own_simulator:
+        running = ", ".join(_running_simbuses()) or "none"
+        raise BadInputError(
+            f"--bus {text}: the name is missing; running on this machine: {running}"
+        )
+    return url
+
+
+def _running_simbuses() -> list[str]:
+    """Return the simulated buses that run on this machine, as URLs."""
+    found = can.detect_available_configs(interfaces=["simbus"])
+    return [f"simbus:{config['channel']}" for config in found]
