@@ -60,7 +60,9 @@ class AxisExchange:
         filters = [(i, 0x7FF) for i in self._layout.identifiers]
         self._port = open_port(url, filters, network.health)
         self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
-        self._pollable = _pollable(self._port)
+        waiting = select.poll()
+        waiting.register(self._port, select.POLLIN)
+        self._waiting = waiting.poll
         self._patience_s = _PATIENCE_S
         self._port.settimeout(self._patience_s if self.lockstep else 0.0)
         self._cycling = self._closed = False
@@ -90,7 +92,8 @@ class AxisExchange:
         """Send the SYNC that opens the cycle."""
         if not self._cycling:
             self._begin_cycling()
-        self._take_late()
+        if self._waiting(0):
+            self._take_late()
         if self._late:
             self._late = False
             self._be_patient(False)
@@ -166,10 +169,7 @@ class AxisExchange:
 
     def _wait(self, seconds: float) -> None:
         """Wait for a frame; the kernel's own receive time-out is too coarse for a cycle."""
-        if self._pollable:
-            select.select([self._port], [], [], seconds)
-        else:
-            self._port.settimeout(seconds)
+        select.select([self._port], [], [], seconds)
 
     def _take_late(self) -> None:
         """Decode what came after its cycle, so that it is not taken for the next one's answer.
@@ -286,10 +286,3 @@ def _as_bytes(buffer: FrameBuffer) -> NDArray[np.uint8]:
 def has_deadline(axis: AxisConfig) -> bool:
     """Return whether the drive watches for RPDOs that are late (1400h:05)."""
     return any(pdo.event_timer_s > 0.0 for pdo in axis.drive.rpdos)
-
-
-def _pollable(port: FramePort) -> bool:
-    try:
-        return port.fileno() >= 0
-    except NotImplementedError:  # python-can's interfaces without a descriptor
-        return False
