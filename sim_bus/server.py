@@ -63,6 +63,8 @@ def serve(
         BusSetupError: the bus cannot be opened, or a gateway to it.
         SimulatorError: a real interface went away while running.
     """
+    if not bus.startswith("simbus:") and (slcan or socketcand_port is not None):
+        raise BusSetupError(f"bus {bus!r}: --slcan and --socketcand are for simbus:NAME only")
     with ExitStack() as stack:
         hub = open_hub(stack, nodes, bus, mode=mode, bitrate=bitrate, truth_log=truth_log)
         gateways = _open_gateways(stack, hub, slcan, socketcand_port)
