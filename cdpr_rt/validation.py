@@ -82,29 +82,6 @@ def evaluate(
     )
 
 
-def judged_turns(
-    setpoint_rad: FloatArray, setpoint_velocity_rad_s: FloatArray, lead_in_rad: float
-) -> BoolArray:
-    """Mark the whole turns at constant speed that follow the lead-in of one leg, (k,).
-
-    Raises ControlError where the leg does not hold a whole turn after the lead-in.
-    """
-    speed = np.abs(setpoint_velocity_rad_s)
-    cruise = np.flatnonzero(speed > (1.0 - 1e-9) * speed.max())
-    travelled = np.abs(setpoint_rad - setpoint_rad[cruise[0]])
-    turns = math.floor((travelled[cruise[-1]] - lead_in_rad) / (2.0 * math.pi) + 1e-3)
-    if turns < 1:
-        raise ControlError(
-            f"the leg travels {math.degrees(float(travelled[cruise[-1]])):.1f} deg at constant "
-            "speed, less than the lead-in and a whole turn"
-        )
-    marked = np.zeros(speed.size, np.bool_)
-    inside = travelled[cruise] >= lead_in_rad
-    inside &= travelled[cruise] < lead_in_rad + turns * 2.0 * math.pi
-    marked[cruise[inside]] = True
-    return marked
-
-
 def worst(runs: list[Metrics]) -> Metrics:
     """Return the larger of each figure over several runs, such as the two directions."""
     return Metrics(

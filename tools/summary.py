@@ -14,8 +14,9 @@ _NAMES = {"none": "no compensation", "thesis": "thesis' method", "better": "harm
 
 def show(out: Output, results: dict[str, Any]) -> None:
     """Print what was identified and how the methods compare."""
-    _show_identified(out, results["identification"])
-    _show_validation(out, results)
+    show_identified(out, results["identification"])
+    show_validation(out, results["validation"], results["bandwidth_Hz"])
+    _show_shortfall(out, results["validation"])
     bus = results["bus"]
     seconds = bus["cycles"] * bus["period_s"]
     out.say(
@@ -27,7 +28,8 @@ def show(out: Output, results: dict[str, Any]) -> None:
     out.say(f"profile: {results['files']['profile']}")
 
 
-def _show_identified(out: Output, found: dict[str, Any]) -> None:
+def show_identified(out: Output, found: dict[str, Any]) -> None:
+    """Print what was identified."""
     table = Table(title="identified cogging", title_justify="left")
     for name in ("order", "amplitude", "95 %", "likely cause"):
         table.add_column(name, justify="left" if name == "likely cause" else "right")
@@ -47,10 +49,10 @@ def _show_identified(out: Output, found: dict[str, Any]) -> None:
     )
 
 
-def _show_validation(out: Output, results: dict[str, Any]) -> None:
-    validation = results["validation"]
+def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float) -> None:
+    """Print how the methods compare on the ramps of one bandwidth."""
     title = (
-        f"ramp of 22 deg/s under one PID of {results['bandwidth_Hz']:g} Hz closed-loop bandwidth, "
+        f"ramp of 22 deg/s under one PID of {bandwidth_Hz:g} Hz closed-loop bandwidth, "
         f"judged on the {validation['judged_on']} (times smaller than without)"
     )
     table = Table(title=title, title_justify="left")
@@ -66,6 +68,9 @@ def _show_validation(out: Output, results: dict[str, Any]) -> None:
         gains = [f" ({ratio:.1f}x)" if method != "none" else "" for ratio in ratios.values()]
         table.add_row(_NAMES[method], *(c + g for c, g in zip(cells, gains, strict=True)))
     out.text.print(table)
+
+
+def _show_shortfall(out: Output, validation: dict[str, Any]) -> None:
     for method in ("thesis", "better"):
         ratios, wanted = validation[method]["ratios"], validation["targets"][method]
         missed = [

@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
 from cdpr_rt.exchange import BoolArray, FloatArray
 from cdpr_rt.identification.sweep import SweepData, period_s
+from cdpr_rt.jit import jit
 
 IntArray = NDArray[np.intp]
 
@@ -195,7 +196,18 @@ def _bump(stride: int, thin: int) -> FloatArray:
 def average(values: FloatArray, windows: Windows, first: int, last: int) -> FloatArray:
     """Return the windows' averages of values given at the thinned samples, (rows, columns)."""
     out = np.zeros((last - first, values.shape[1]))
-    for k, weight in enumerate(windows.bump):
-        place = np.arange(first, last) * windows.stride + k
-        out += weight * values[np.minimum(place, values.shape[0] - 1)]
+    _average(values, windows.bump, windows.stride, first, out)
     return out
+
+
+@jit
+def _average(
+    values: FloatArray, bump: FloatArray, stride: int, first: int, out: FloatArray
+) -> None:
+    last = values.shape[0] - 1
+    for row in range(out.shape[0]):
+        start = (first + row) * stride
+        for k in range(bump.size):
+            place = min(start + k, last)
+            for column in range(out.shape[1]):
+                out[row, column] += bump[k] * values[place, column]

@@ -7,7 +7,7 @@ import pytest
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.tuning import design_pid
-from cdpr_rt.validation import evaluate, floor, judged_turns, low_pass_velocity, ratios, worst
+from cdpr_rt.validation import evaluate, floor, low_pass_velocity, ratios, worst
 
 T = 1e-3
 SPEED = math.radians(22.0)
@@ -43,18 +43,6 @@ def test_velocity_is_low_passed_without_shift():
     assert np.max(np.abs(slow - want)) < 1e-3
     fast = low_pass_velocity(setpoint + 1e-3 * np.sin(2 * math.pi * 200 * time), T)[middle]
     assert np.max(np.abs(fast - SPEED)) < 0.02 * 1e-3 * 400 * math.pi
-
-
-def test_judged_are_whole_turns_after_the_lead_in():
-    time = np.arange(60000) * T
-    velocity = SPEED * np.clip(time / 1.0, 0, 1)
-    setpoint = np.cumsum(velocity) * T
-    judged = judged_turns(setpoint, velocity, 0.5)
-    travelled = setpoint[judged]
-    turns = (travelled[-1] - travelled[0]) / (2 * math.pi)
-    assert turns == pytest.approx(3.0, abs=1e-3)
-    with pytest.raises(ControlError, match="lead-in"):
-        judged_turns(setpoint[:10000], velocity[:10000], 0.5)
 
 
 def test_worst_and_ratios():

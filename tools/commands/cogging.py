@@ -12,6 +12,7 @@ from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError, DriveId
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import read_raw_log
 from profiles import Winch, load_winch
+from tools import summary
 from tools.commands.commission import keeping_raw_data, prepare
 from tools.commands.options import (
     BusOption,
@@ -24,7 +25,7 @@ from tools.commands.options import (
 from tools.commissioning import METHODS, Paths
 from tools.errors import BadInputError
 from tools.evaluation import compare
-from tools.output import Output, to_json
+from tools.output import Output
 from tools.procedure import (
     DEFAULT_BANDWIDTH_HZ,
     Commissioning,
@@ -95,8 +96,7 @@ def fit(
     found = identify(profile, latency_s(profile), paths)
     store_profile(profile, identity, found, paths)
     result = identification(found)
-    for key in ("orders", "amplitudes_Nm", "residual_rms_Nm", "repaired_fraction", "coverage"):
-        out.say(f"{key}: {result[key]}")
+    summary.show_identified(out, result)
     out.say(f"profile: {paths.profile}")
     out.result({"ok": True, "identification": result, "profile": str(paths.profile)})
 
@@ -149,10 +149,9 @@ def validate(
     truth = Truth(paths.truth) if paths.truth.exists() else None
     runs = {m: paths.passes(validation_name(m, bandwidth_Hz)) for m in METHODS}
     result = compare(runs, truth)
-    for method, figures in result.items():
-        out.say(f"{method}: {to_json(figures)}")
-    judged_on = "encoder" if truth is None else "true angle"
-    out.result({"ok": True, "validation": {"judged_on": judged_on, **result}})
+    validation = {"judged_on": "encoder" if truth is None else "true angle", **result}
+    summary.show_validation(out, validation, bandwidth_Hz)
+    out.result({"ok": True, "validation": validation})
 
 
 @app.command()

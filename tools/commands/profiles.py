@@ -50,7 +50,7 @@ def show(
         names = itertools.chain(*catalogue.list_profiles().values())
         meant = closest(name, names)
         hint = f"did you mean {meant!r}?" if meant else "`cdpr profiles list` shows what there is"
-        raise BadInputError(f"profile {name!r}: not shipped; {hint}")
+        raise BadInputError(f"profile {name!r}: not among the shipped ones; {hint}")
     content = _plain(catalogue.load_all()[kinds[0]][name])
     out.say(f"{kinds[0]}: {name}")
     for key, value in _flat(content):

@@ -86,10 +86,14 @@ def estimates(better: BetterResult) -> str:
         row("Coulomb friction, increasing angle (mNm)", better.coulomb_forward_Nm, 1e3),
         row("Coulomb friction, decreasing angle (mNm)", better.coulomb_backward_Nm, 1e3),
         ["Its rise towards standstill, increasing / decreasing (mNm)", rise, "–"],
-        ["Speed at which that rise is gone (rad/s)", number(f.stribeck_speed_rad_s), "–"],
+        [
+            "Stribeck speed, at which that rise is down to 37 % (rad/s)",
+            number(f.stribeck_speed_rad_s),
+            "–",
+        ],
         row("Viscous friction (mNm s/rad)", better.viscous_Nms_rad, 1e3),
         row("Rotor inertia (kg mm²)", better.inertia_kg_m2, 1e6),
-        row("Delay from angle to torque (ms)", better.latency_s, 1e3),
+        row("Delay from angle to torque, as identified (ms)", better.latency_s, 1e3),
         row("Static lag of each direction (deg)", better.lag_rad, math.degrees(1.0)),
         ["Change of the cogging with warmth (% a minute)", number(drift), "–"],
     ]

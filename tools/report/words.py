@@ -144,8 +144,9 @@ def loop_words(design: Mapping[str, Any]) -> str:
     """Say which PID was used and by which margins it was tuned."""
     return (
         "All three runs have one and the same PID, tuned by margins on the uncompensated motor "
-        f"(inertia {number(1e6 * design['inertia_kg_m2'])} kg mm², delay from angle to torque "
-        f"{number(1e3 * design['latency_s'])} ms): closed-loop bandwidth (−3 dB) "
+        f"(inertia {number(1e6 * design['inertia_kg_m2'])} kg mm², and by the drive’s profile "
+        f"{number(1e3 * design['latency_s'])} ms from an angle to the middle of the cycle in which "
+        "its torque acts): closed-loop bandwidth (−3 dB) "
         f"{number(design['bandwidth_Hz'])} Hz, crossover {number(design['crossover_Hz'])} Hz, "
         f"phase margin {number(design['phase_margin_deg'])} deg, gain margin "
         f"{number(design['gain_margin_dB'])} dB, peak of the sensitivity "

@@ -22,7 +22,7 @@ from cdpr_rt.identification import (
     identify_thesis,
 )
 from cdpr_rt.tuning import design_pid, sweep_gain
-from cdpr_rt.validation import Metrics, evaluate, judged_turns, worst
+from cdpr_rt.validation import Metrics, evaluate, worst
 
 T = 1e-3
 SUB = 20
@@ -333,6 +333,20 @@ def commission(plant):
             ]
         )
     return Commissioned(bench, identify_thesis(sweeps), second)
+
+
+def judged_turns(setpoint_rad, setpoint_velocity_rad_s, lead_in_rad):
+    """Mark the whole turns at constant speed that follow the lead-in of one leg, (k,)."""
+    speed = np.abs(setpoint_velocity_rad_s)
+    cruise = np.flatnonzero(speed > (1.0 - 1e-9) * speed.max())
+    travelled = np.abs(setpoint_rad - setpoint_rad[cruise[0]])
+    turns = math.floor((travelled[cruise[-1]] - lead_in_rad) / (2.0 * math.pi) + 1e-3)
+    assert turns >= 1
+    marked = np.zeros(speed.size, np.bool_)
+    inside = travelled[cruise] >= lead_in_rad
+    inside &= travelled[cruise] < lead_in_rad + turns * 2.0 * math.pi
+    marked[cruise[inside]] = True
+    return marked
 
 
 def validate(done: Commissioned) -> dict[str, Metrics]:
