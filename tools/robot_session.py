@@ -104,6 +104,16 @@ class RobotSession:
             (axis, self.networks[axis.bus].pause_watch(axis.node_id) or []) for axis in self.axes
         ]
 
+    def reset_fault(self) -> None:
+        """Acknowledge all faults; the drives are left without power. Raises TripError."""
+        device = self.device
+        device.sync()
+        device.receive()
+        device.transmit()
+        device.acknowledge_fault()
+        self._lead_to(State.SWITCH_ON_DISABLED)
+        device.stop_cycling()
+
     def idle(self, seconds: float) -> None:
         """Run cycles without torque for a while."""
         cycles = iter(range(round(seconds / self.device.period_s)))
@@ -155,8 +165,8 @@ def open_robot(
     `buses` are what was given with --bus; `simbus:` alone starts a simulator of all buses, with
     `plant`. Torques are limited to `torque_share` of each motor's rated torque. Whatever ends the
     block, the drives' power stages are off afterwards. Raises BadInputError for a robot that does
-    not fit its buses (before anything is opened) and for buses that cannot be opened, WorkFailedError
-    for a mandatory drive that does not boot.
+    not fit its buses (before anything is opened) and for buses that cannot be opened,
+    WorkFailedError for a mandatory drive that does not boot.
     """
     require_fit(robot)
     with ExitStack() as stack:

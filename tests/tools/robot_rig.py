@@ -1,0 +1,96 @@
+"""Simulated robots in a process of their own, for tests."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from cdpr_rt.controllers.proportional import Proportional
+from cdpr_rt.trajectory import Leg
+from tools.output import Output
+from tools.robot_session import RobotSession
+
+OUT = Output(as_json=True)
+ROOT = Path(__file__).parents[2]
+_names = itertools.count()
+
+
+def robot_file(
+    folder: Path, axes: Sequence[tuple[str, int]], *, period_s: float = 1e-3, optional: int = -1
+) -> Path:
+    """Write a robot with `axes` (bus, node id); the one numbered `optional` is not mandatory."""
+    lines = ['name = "test robot"', f"sync_period_s = {period_s}"]
+    for bus in dict.fromkeys(bus for bus, _ in axes):
+        lines += ["[[buses]]", f'name = "{bus}"']
+    for i, (bus, node) in enumerate(axes):
+        lines += ["[[axes]]", 'winch = "winch-mpp0923d"', f'bus = "{bus}"', f"node_id = {node}"]
+        lines += ["mandatory = false"] * (i == optional)
+    path = folder / f"robot-{next(_names)}.toml"
+    path.write_text("\n".join(lines))
+    return path
+
+
+class Simulator:
+    """A running `cdpr sim up`; `ready` is what it told."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tools.cli", "sim", "up", *arguments, "--exit-with-stdin"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+        )
+        assert self.process.stdout is not None
+        self.ready = json.loads(self.process.stdout.readline())["ready"]
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(10.0)
+
+    def close(self) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        try:
+            self.process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait(10.0)
+
+
+@contextmanager
+def simulated(machine: str | Path, *options: str, name: str = "") -> Iterator[str]:
+    """Run a simulated machine; yield the URL that stands for all of its buses."""
+    bus = f"simbus:{name or unique()}"
+    simulator = Simulator(str(machine), "--bus", bus, *options)
+    try:
+        yield bus
+    finally:
+        simulator.close()
+
+
+def unique() -> str:
+    return f"robot-{os.getpid()}-{next(_names)}"
+
+
+def hold(
+    session: RobotSession,
+    seconds: float,
+    speed_rad_s: Sequence[float] | None = None,
+    gain_Nm_rad: float = 3.0,
+) -> None:
+    """Run all axes under a proportional controller, at rest or on a leg of constant speed."""
+    n = session.device.n
+    speed = np.zeros(n) if speed_rad_s is None else np.array(speed_rad_s, float)
+    start = session.device.feedback.position_rad.copy()
+    controller = Proportional(np.full(n, gain_Nm_rad), np.full(n, 1.5))
+    session.executive.run(controller, Leg(start, speed, seconds - 0.2, 0.1))
