@@ -18,6 +18,7 @@ from profiles.drive import DriveProfile
 from profiles.motor import Motor, MotorRatings, MotorSeries
 from profiles.reader import Profile, read_toml_model
 from profiles.robot import RobotFile
+from profiles.tension_sensor import TensionSensors
 from profiles.winch import WinchFile
 
 FILES: dict[Path, type[Profile]] = {
@@ -29,6 +30,8 @@ FILES: dict[Path, type[Profile]] = {
     SHIPPED / "cables" / "dyneema-4.8mm.toml": Cable,
     SHIPPED / "winches" / "winch-mpp0923d.toml": WinchFile,
     SHIPPED / "robots" / "spatial-8.toml": RobotFile,
+    SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml": TensionSensors,
+    SHIPPED / "tension_sensors" / "rtu-load-cells-8.toml": TensionSensors,
 }
 repeatable = settings(
     derandomize=True,
