@@ -24,6 +24,8 @@ RPDO_TIMEOUT = 0x8250
 
 COMMUNICATION_BIT = 0x10
 """Communication error in 1001h."""
+COMMUNICATION = "communication"
+"""Who holds the errors that the communication part finds; the application's holder is ""."""
 
 _INVALID = 0x80000000
 _QUEUE_LENGTH = 16
@@ -37,6 +39,7 @@ class EmergencyProducer:
         self._slave = slave
         self._od = od = slave.od
         self._active: dict[int, int] = {}
+        self._holders: dict[int, set[str]] = {}
         self._queue: deque[bytes] = deque(maxlen=_QUEUE_LENGTH)
         self._history: list[int] = []
         self._history_length = len(od.subs(0x1003))
@@ -50,11 +53,14 @@ class EmergencyProducer:
         if (0x1014, 0) in od:
             od.on_write(0x1014, 0, self._check_cob_id)
 
-    def raise_error(self, code: int, register_bits: int, vendor: bytes = b"") -> None:
-        """Report an error once while it stands.
+    def raise_error(
+        self, code: int, register_bits: int, vendor: bytes = b"", holder: str = ""
+    ) -> None:
+        """Report an error once while it stands: until each `holder` that raised it took it back.
 
         `register_bits` are its bits in 1001h, `vendor` up to 5 bytes for the EMCY frame.
         """
+        self._holders.setdefault(code, set()).add(holder)
         if code in self._active:
             return
         self._active[code] = register_bits | 1
@@ -63,20 +69,28 @@ class EmergencyProducer:
         del self._history[self._history_length :]
         self._enqueue(code, vendor)
 
-    def clear(self, code: int | None = None) -> None:
-        """Take back one error or all; sends error code 0000h with the register that remains."""
+    def clear(self, code: int | None = None, holder: str = "") -> None:
+        """Take back one error of `holder`, or all errors of everybody.
+
+        Error code 0000h goes out, with the register that remains, once nobody holds it.
+        """
         if code is None:
             standing = bool(self._active)
             self._active.clear()
+            self._holders.clear()
         else:
-            standing = self._active.pop(code, None) is not None
+            holders = self._holders.get(code, set())
+            holders.discard(holder)
+            standing = not holders and self._active.pop(code, None) is not None
         if standing:
             self._update_register()
             self._enqueue(0, b"")
 
     def reset_communication(self) -> None:
         """Forget unsent frames and communication errors; the application's errors stand."""
-        self._active = {c: bits for c, bits in self._active.items() if not bits & COMMUNICATION_BIT}
+        for holders in self._holders.values():
+            holders.discard(COMMUNICATION)
+        self._active = {c: bits for c, bits in self._active.items() if self._holders.get(c)}
         self._queue.clear()
         self._timer.stop()
         self._free_at = 0.0
@@ -85,6 +99,7 @@ class EmergencyProducer:
     def reset_node(self) -> None:
         """Forget every error and the history."""
         self._active.clear()
+        self._holders.clear()
         self._history.clear()
         self._update_register()
 

@@ -130,7 +130,7 @@ class HeartbeatConsumers:
     def node_lost(self, node: int) -> None:
         """React to the loss of a node: EMCY, NMT state by 1029h:01, the application."""
         slave = self._slave
-        slave.emergency(emcy.HEARTBEAT, emcy.COMMUNICATION_BIT, bytes([node]))
+        slave.communication_error(emcy.HEARTBEAT, bytes([node]))
         # the application first: it knows the loss for what it is, not for a change of NMT state
         slave.app.on_heartbeat_lost(node)
         behaviour = slave.od.get_int(0x1029, 1, 0)
@@ -142,7 +142,7 @@ class HeartbeatConsumers:
     def recovered(self) -> None:
         """Take the error back once no node is missing."""
         if not any(consumer.lost for consumer in self._consumers):
-            self._slave.emergency_clear(emcy.HEARTBEAT)
+            self._slave.communication_error_clear(emcy.HEARTBEAT)
 
     def _write(self, consumer: _Consumer, value: Value) -> None:
         new = int(value)

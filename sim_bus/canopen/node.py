@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from sim_bus.canopen import wire
+from sim_bus.canopen import emcy, wire
 from sim_bus.canopen.application import NmtState, SlaveApplication
 from sim_bus.canopen.emcy import EmergencyProducer
 from sim_bus.canopen.heartbeat import HeartbeatConsumers, HeartbeatProducer
@@ -109,6 +109,14 @@ class CanopenSlave:
     def emergency_clear(self, code: int | None = None) -> None:
         """Take back one error, or all; sends the EMCY error reset if there was any."""
         self._emcy.clear(code)
+
+    def communication_error(self, code: int, vendor: bytes = b"") -> None:
+        """Report an error of the communication itself."""
+        self._emcy.raise_error(code, emcy.COMMUNICATION_BIT, vendor, emcy.COMMUNICATION)
+
+    def communication_error_clear(self, code: int) -> None:
+        """Take back an error of the communication; the application may hold it still."""
+        self._emcy.clear(code, emcy.COMMUNICATION)
 
     def trigger_tpdo(self, number: int) -> None:
         """Send an event-driven TPDO (number from 1) for a reason of the application's own."""

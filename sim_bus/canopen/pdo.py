@@ -116,9 +116,9 @@ class PdoService:
         for code in (emcy.PDO_TOO_SHORT, emcy.PDO_TOO_LONG, emcy.RPDO_TIMEOUT):
             numbers = [r.record.number for r in self._rpdos if r.fault == code]
             if numbers:
-                self._slave.emergency(code, emcy.COMMUNICATION_BIT, bytes(numbers[:1]))
+                self._slave.communication_error(code, bytes(numbers[:1]))
             else:
-                self._slave.emergency_clear(code)
+                self._slave.communication_error_clear(code)
 
 
 def _at_every_sync(tpdo: Tpdo, counted: bool) -> bool:

@@ -56,7 +56,7 @@ class SyncConsumer:
             return
         if self._length_error:
             self._length_error = False
-            self._slave.emergency_clear(emcy.SYNC_LENGTH)
+            self._slave.communication_error_clear(emcy.SYNC_LENGTH)
         slave = self._slave
         slave.app.before_sync(now)
         if self._operational:
@@ -64,7 +64,7 @@ class SyncConsumer:
 
     def _report_length(self) -> None:
         self._length_error = True
-        self._slave.emergency(emcy.SYNC_LENGTH, emcy.COMMUNICATION_BIT)
+        self._slave.communication_error(emcy.SYNC_LENGTH)
 
     def _write_cob_id(self, value: Value) -> None:
         new = int(value)
