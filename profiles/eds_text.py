@@ -46,6 +46,8 @@ class Section:
 
     name: str
     keys: dict[str, str] = field(default_factory=dict)
+    spelling: dict[str, str] = field(default_factory=dict)
+    """The keys as written."""
 
     def get(self, key: str) -> str:
         """Return the value of a key in any spelling, "" where it is missing or empty."""
@@ -53,7 +55,7 @@ class Section:
 
     def place(self, key: str = "") -> str:
         """Return how a message names this section, or a key in it."""
-        return f"[{self.name}] {key}".strip()
+        return f"[{self.name}] {self.spelling.get(key, key)}".strip()
 
     def numbered(self) -> Iterator[tuple[str, str]]:
         """Yield the keys that are plain numbers, with their values."""
@@ -159,6 +161,7 @@ def _take(line: str, line_number: int, section: Section, remarks: Remarks) -> No
         remarks.add(f"line {line_number}", f"{shown(line)} is not KEY=VALUE; left out")
     elif key.lower() not in section.keys:
         section.keys[key.lower()] = value
+        section.spelling[key.lower()] = key
     elif section.keys[key.lower()] != value:
         remarks.add(
             section.place(key), f"is there twice; the first value counts, not {shown(value)}"

@@ -226,9 +226,16 @@ def _entries(eds: EdsFile, mapping: int) -> tuple[Entry, ...]:
     for sub in range(1, min(count, _MOST_ENTRIES) + 1):
         value = eds.number(mapping, sub) or 0
         index, of, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
-        if bits not in (8, 16, 32) or bits != BITS.get(index, bits):
+        mapped = eds.get(index, of)
+        if mapped is None or mapped.bits != bits or bits not in (8, 16, 32):
+            eds.remarks.add(
+                f"[{mapping:04X}sub{sub:X}]",
+                f"maps {index:04X}h:{of} with {bits} bits, which the file does not have so",
+            )
             return ()
         entries.append((index, of, bits))
+    if sum(bits for *_, bits in entries) > _FRAME_BITS:
+        eds.remarks.add(f"[{mapping:04X}]", "maps more than the 64 bits of a frame")
     return tuple(entries) if sum(bits for *_, bits in entries) <= _FRAME_BITS else ()
 
 
