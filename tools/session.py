@@ -141,7 +141,8 @@ class WinchSession:
             self.safety.apply_brakes(self.executive)
         self._lead_to(State.SWITCH_ON_DISABLED)
         self.device.stop_cycling()
-        self._paused_watch = self.network.pause_watch(self.winch.node_id) or []
+        # a drive that was disabled before watches nothing now, and is to watch again all the same
+        self._paused_watch += self.network.pause_watch(self.winch.node_id) or []
 
     def _lead_to(self, state: State) -> None:
         self.device.request(state)

@@ -1,0 +1,369 @@
+"""Every shipped drive profile on its simulated twin: one suite, whatever the drive's peculiarities.
+
+The twins take their peculiarities from data of the simulator's own, so that a profile with a wrong
+unit, sign or mode fails here against the true motion.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import canopen
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from twin_rig import DRIVES, PLANT, MixedSimulator, Motion, bus_name, write_winch
+
+from cdpr_rt.measurement import both_ways, recording
+from cdpr_rt.rawlog import read_raw_log
+from cdpr_rt.tuning import design_pid
+from drivers import touch_probe
+from drivers.axis_group import AxisGroup
+from drivers.axis_layout import AxisConfig
+from drivers.boot import BootSettings, boot_all
+from drivers.bus import BusUrl
+from drivers.cia402 import POWER_OFF, Mode, State, state_of, supported_modes
+from drivers.errors import DriveFaultError, ModeRefusedError, SdoError
+from drivers.network import CanNetwork
+from profiles import DriveProfile, load_winch
+from tools.commissioning import Measurement, Paths
+from tools.output import Output
+from tools.procedure import Commissioning
+from tools.session import WinchSession, open_bus, open_winch
+from tools.simulator import OwnSimulator
+
+# the plant's truth, which the master does not know
+TRUE_OVER_NOMINAL, COGGING_NM = 1.04, 0.06
+RAD_PER_COUNT = math.tau / 8192
+# sin(4 angle + 17 deg), and the index lies at 123.4 deg
+_PHASE_AT_INDEX_DEG = (17.0 + 4 * 123.4 + 180.0) % 360.0 - 180.0
+UNITS_NM = {"generic-cia402": 3e-3, "mnm-profile-torque": 1e-3, "parker-compax3-canopen": 3e-3}
+MASTER, PERIOD_S, HEARTBEAT_S = 127, 1e-3, 0.1
+
+
+@dataclass
+class Twin:
+    """One drive type, simulated and booted, and what its tests need."""
+
+    name: str
+    session: WinchSession
+    motion: Motion
+
+    @property
+    def drive(self) -> DriveProfile:
+        return self.session.winch.drive
+
+    def shown(self, index: int, sub: int = 0) -> int:
+        return self.session.network.read_int(self.session.winch.node_id, index, sub)
+
+    def power(self) -> None:
+        """Enable it in its torque mode."""
+        self.session.set_mode(self.drive.mode_torque)
+        self.session.enable()
+
+
+@pytest.fixture(scope="module", params=DRIVES)
+def shared_twin(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Twin]:
+    folder = tmp_path_factory.mktemp(request.param)
+    plant, truth = folder / "plant.toml", folder / "truth.log"
+    plant.write_text(PLANT)
+    winch = write_winch(folder, request.param)
+    with ExitStack() as stack:
+        simulator = OwnSimulator(str(winch), bus_name(), plant, truth)
+        stack.callback(simulator.stop)
+        url = open_bus(simulator.bus)
+        session = stack.enter_context(open_winch(load_winch(winch), url, Output(True)))
+        yield Twin(request.param, session, Motion(session, truth))
+
+
+@pytest.fixture
+def twin(shared_twin: Twin) -> Iterator[Twin]:
+    yield shared_twin
+    session = shared_twin.session
+    session.reset_fault()
+    session.idle(0.3)
+    session.disable()
+
+
+def test_boots_as_its_profile_says(twin: Twin) -> None:
+    boot, drive = twin.session.boot, twin.drive
+    assert (boot.vendor_id, boot.product_code, boot.revision) == (
+        drive.vendor_id, drive.product_code, drive.revision,
+    )  # fmt: skip
+    assert (boot.rated_torque_Nm, boot.counts_per_turn) == (3.0, 8192)
+    assert supported_modes(boot.supported_modes) == sorted(drive.supported_modes)
+    assert twin.session.network.dictionary(1).device_information.vendor_number == boot.vendor_id
+
+
+def test_pdos_are_mapped_as_its_profile_says(twin: Twin) -> None:
+    assert any(" and " in change for change in twin.session.boot.changed), "nothing was mapped"
+    for base, pdos in ((0x1400, twin.drive.rpdos), (0x1800, twin.drive.tpdos)):
+        for pdo in pdos:
+            parameters, mapping = base + pdo.number - 1, base + 0x1FF + pdo.number
+            assert twin.shown(parameters, 1) & 0xBFFFFFFF == pdo.cob_id(1)
+            assert twin.shown(parameters, 2) == pdo.transmission_type
+            mapped = [twin.shown(mapping, i + 1) for i in range(twin.shown(mapping, 0))]
+            assert mapped == [entry.mapping for entry in pdo.entries]
+
+
+def test_every_mode_of_its_profile_is_confirmed(twin: Twin) -> None:
+    for mode in twin.drive.supported_modes:
+        twin.session.set_mode(mode)
+        assert twin.shown(0x6061) == mode
+
+
+def test_other_modes_are_refused_by_master_and_drive(twin: Twin) -> None:
+    foreign = sorted({*range(1, 11)} - {*twin.drive.supported_modes})
+    assert foreign
+    twin.session.set_mode(Mode.HOMING)
+    for mode in foreign:
+        with pytest.raises(ModeRefusedError, match="not among the modes the drive supports"):
+            twin.session.set_mode(mode)
+        with pytest.raises(SdoError, match="cannot be set"):
+            twin.session.network.write(1, 0x6060, 0, mode)
+        assert twin.shown(0x6061) == Mode.HOMING
+
+
+def test_is_enabled_and_disabled(twin: Twin) -> None:
+    twin.power()
+    assert twin.session.device.states() == [State.OPERATION_ENABLED]
+    assert twin.shown(0x6061) == twin.drive.mode_torque
+    assert state_of(twin.shown(0x6041)) == State.OPERATION_ENABLED
+    with pytest.raises(ModeRefusedError, match="while the drive is enabled"):
+        twin.session.set_mode(Mode.HOMING)
+    twin.session.disable()
+    assert state_of(twin.shown(0x6041)) in POWER_OFF
+
+
+@pytest.mark.parametrize("torque_Nm", [0.6, -0.6])
+def test_a_torque_turns_the_rotor_that_way_with_that_strength(twin: Twin, torque_Nm: float) -> None:
+    twin.power()
+    device = twin.session.device
+    before = float(device.feedback.position_rad[0])
+    true = twin.motion.push(torque_Nm, 14)
+    steady = true["motor_Nm"][8:14]
+    assert steady == pytest.approx(torque_Nm * TRUE_OVER_NOMINAL, rel=0.01)
+    assert np.sign(true["velocity"][-1]) == np.sign(torque_Nm)
+    assert abs(true["velocity"][-1]) > 20.0
+    # what the drive tells, against the truth it does not know
+    moved = float(device.feedback.position_rad[0]) - before
+    now = twin.motion.truth(device.feedback.cycle, device.feedback.cycle)
+    assert moved == pytest.approx(now["angle"][0] - true["angle"][0], abs=4 * RAD_PER_COUNT)
+
+
+def test_torques_are_told_and_sent_in_its_own_steps(twin: Twin) -> None:
+    twin.power()
+    device = twin.session.device
+    wanted, sent, told = 0.0437, [], []
+    for _ in range(400):
+        device.sync()
+        device.receive()
+        device.command.torque_Nm[:] = wanted
+        device.transmit()
+        sent.append(float(device.command.sent_torque_Nm[0]))
+        told.append(float(device.feedback.torque_Nm[0]))
+    unit = UNITS_NM.get(twin.name, abs(device.axes[0].Nm_per_unit))
+    steps = np.array(sent) / unit
+    assert steps == pytest.approx(np.round(steps), abs=1e-9)
+    assert np.ptp(np.round(steps)) == 1
+    assert np.mean(sent) == pytest.approx(wanted, abs=unit / 300)
+    assert np.mean(told[50:]) == pytest.approx(wanted, abs=unit / 4)
+
+
+@pytest.mark.parametrize(("method", "way"), [(34, 1), (33, -1)])
+def test_homing_goes_the_way_asked_and_finds_the_index(twin: Twin, method: int, way: int) -> None:
+    device = twin.session.device
+    twin.power()
+    twin.motion.push(-way * 0.6, 14)  # away from an index that an earlier test has found
+    twin.session.idle(0.3)
+    twin.session.disable()
+    first = device.feedback.cycle + 1
+    twin.session.find_index(method)
+    true = twin.motion.truth(first, device.feedback.cycle)
+    travelled = way * (true["angle"] - true["angle"][0])
+    assert travelled[-1] > 0.3
+    assert travelled.min() > -0.02
+    speed = np.median(true["velocity"][200:-50])
+    assert speed == pytest.approx(way * math.radians(30.0), rel=0.05)
+    assert device.feedback.index_known.all()
+    _index_is_right(twin)
+
+
+def _index_is_right(twin: Twin) -> None:
+    """Hold the angle from the index, as the master has it, against the truth."""
+    feedback = twin.session.device.feedback
+    now = twin.motion.truth(feedback.cycle, feedback.cycle)
+    known = float(feedback.position_rad[0] - feedback.index_rad[0])
+    error = (known - float(now["from_index"][0]) + math.pi) % math.tau - math.pi
+    assert abs(error) < 4 * RAD_PER_COUNT
+
+
+def test_touch_probe_finds_the_index_in_motion(twin: Twin) -> None:
+    session, device = twin.session, twin.session.device
+    if not any(entry.index == 0x60B9 for pdo in twin.drive.tpdos for entry in pdo.entries):
+        with pytest.raises((DriveFaultError, SdoError), match=r"60B[89]h"):
+            touch_probe.arm(device, 0)
+        return
+    twin.power()
+    session.expect_index()
+    assert not device.feedback.index_known[0]
+    twin.motion.push(0.6, 12)
+    session.idle(0.3)
+    assert device.feedback.index_known[0]
+    _index_is_right(twin)
+
+
+def test_quick_stop_brings_the_rotor_to_rest(twin: Twin) -> None:
+    twin.power()
+    device = twin.session.device
+    speed = twin.motion.push(0.6, 14)["velocity"][-1]
+    assert speed > 20.0
+    twin.motion.push(0.6, 14)
+    device.request(State.QUICK_STOP)
+    begin = device.feedback.cycle
+    twin.session.executive.step(
+        lambda: device.reached(State.SWITCH_ON_DISABLED), 1.0, "the end of a quick stop"
+    )
+    end = device.feedback.cycle
+    assert abs(twin.motion.truth(end, end)["velocity"][0]) < 1.0
+    assert end - begin < 500
+
+
+def test_a_fault_takes_the_torque_and_stays_until_it_is_acknowledged(twin: Twin) -> None:
+    twin.power()
+    device = twin.session.device
+    true = twin.motion.push(2.8, 8)
+    assert max(true["motor_Nm"]) > 2.0
+    assert device.states() == [State.FAULT]
+    assert "2310h" in device.alarm()
+    now = twin.motion.truth(device.feedback.cycle, device.feedback.cycle)
+    assert now["motor_Nm"][0] == pytest.approx(0.0, abs=1e-6)
+    with pytest.raises(DriveFaultError, match="acknowledge its fault"):
+        device.request(State.OPERATION_ENABLED)
+    twin.session.reset_fault()
+    assert twin.shown(0x603F) == 0
+    twin.power()
+    assert twin.motion.push(0.6, 14)["motor_Nm"][8:14] == pytest.approx(0.624, rel=0.01)
+
+
+def test_a_master_that_falls_silent_loses_the_torque(twin: Twin) -> None:
+    twin.power()
+    twin.motion.push(0.05, 50)  # too little to turn the rotor
+    deadline = time.monotonic() + 5.0
+    while state_of(twin.shown(0x6041)) not in POWER_OFF:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    assert "8130h" in twin.session.device.alarm()
+    twin.session.network.start(twin.session.winch.node_id)  # CiA 301, 1029h: it had left it
+
+
+def test_a_sweep_finds_the_cogging(twin: Twin, tmp_path: Path) -> None:
+    session, paths = twin.session, Paths(tmp_path)
+    (tmp_path / "raw").mkdir()
+    Commissioning(session, Output(True), paths).prepare()
+    inertia = session.winch.motor.rotor_inertia_kg_m2
+    design = design_pid(inertia, session.latency_s, 25.0, PERIOD_S)
+    session.enable()
+    passes = both_ways(math.radians(60.0), 0.5 * math.pi, 1)
+    recorded = Measurement(session, Output(True), paths).track("sweep", design, None, passes)
+    # half the sum of both directions: what does not turn round with the motion, as friction does
+    orders = np.arange(1, 13)
+    waves = np.mean([_waves(path, orders) for path in recorded], axis=0)
+    amplitudes = np.abs(waves)
+    assert orders[np.argmax(amplitudes)] == 4
+    # in the drive's torque, which is as much smaller as the true torque constant is larger
+    assert amplitudes[3] == pytest.approx(COGGING_NM / TRUE_OVER_NOMINAL, rel=0.05)
+    assert max(np.delete(amplitudes, 3)) < 0.1 * amplitudes[3]
+    assert math.degrees(np.angle(waves[3])) == pytest.approx(_PHASE_AT_INDEX_DEG, abs=4.0)
+
+
+def _waves(path: Path, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
+    """Return the complex amplitudes of a recorded pass' torque over the angle from the index."""
+    found = recording(read_raw_log(path))
+    angle, torque = found.sweep.angle_rad[found.judged], found.sweep.torque_Nm[found.judged]
+    turning = np.outer(angle, orders)
+    columns = np.hstack([np.ones((angle.size, 1)), np.sin(turning), np.cos(turning)])
+    solution = np.linalg.lstsq(columns, torque, rcond=None)[0]
+    return np.asarray(solution[1 : orders.size + 1] + 1j * solution[orders.size + 1 :])
+
+
+# -- different drives in one group
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AxisGroup]:
+    folder = tmp_path_factory.mktemp("mixed")
+    files = [write_winch(folder, name, node) for node, name in enumerate(DRIVES, 1)]
+    with ExitStack() as stack:
+        simulator = MixedSimulator(files)
+        stack.callback(simulator.stop)
+        winches = {winch.node_id: winch for winch in simulator.winches}
+        network = CanNetwork(BusUrl.parse(simulator.bus), list(winches), MASTER, HEARTBEAT_S)
+        stack.callback(network.close)
+        for node, winch in winches.items():
+            network.add_node(node, canopen.import_od(str(winch.drive.eds), node))
+        settings = BootSettings(MASTER, PERIOD_S, 3.0, 3.0, counts_per_turn=8192)
+        reports = boot_all(network, {node: (w.drive, settings) for node, w in winches.items()})
+        network.start_heartbeat()
+        axes = [AxisConfig.from_boot(w.drive, reports[n], 3.0) for n, w in winches.items()]
+        yield stack.enter_context(
+            AxisGroup(network.url, network, axes, PERIOD_S, MASTER, HEARTBEAT_S)
+        )
+
+
+def _cycles(group: AxisGroup, count: int, torques_Nm: list[float]) -> None:
+    for _ in range(count):
+        group.sync()
+        assert group.receive() == group.n
+        group.command.torque_Nm[:] = torques_Nm
+        group.transmit()
+        assert group.alarm() == ""
+
+
+def _until(group: AxisGroup, state: State) -> None:
+    group.request(state)
+    for _ in range(200):
+        _cycles(group, 1, [0.0] * group.n)
+        if group.reached(state):
+            return
+    raise AssertionError(group.states())
+
+
+def test_different_drives_work_in_one_group(mixed: AxisGroup) -> None:
+    modes = mixed.torque_modes
+    assert len(set(modes)) > 1
+    mixed.ask_mode(modes)
+    _cycles(mixed, 50, [0.0] * mixed.n)
+    assert mixed.mode_confirmed()
+    _until(mixed, State.OPERATION_ENABLED)
+    wanted = [0.5, -0.4, 0.3, -0.2][: mixed.n]
+    start = mixed.feedback.position_rad.copy()
+    _cycles(mixed, 10, wanted)
+    assert mixed.feedback.torque_Nm == pytest.approx(wanted, abs=0.02)
+    moved = mixed.feedback.position_rad - start
+    assert np.sign(moved).tolist() == np.sign(wanted).tolist()
+    _until(mixed, State.SWITCH_ON_DISABLED)
+
+
+def test_a_mode_that_one_of_them_lacks_is_refused_by_name(mixed: AxisGroup) -> None:
+    lacking = next(a for a in mixed.axes if Mode.CYCLIC_TORQUE not in a.drive.supported_modes)
+    with pytest.raises(ModeRefusedError, match=f"node {lacking.node_id}: mode 10"):
+        mixed.ask_mode(Mode.CYCLIC_TORQUE)
+
+
+def test_none_is_enabled_before_the_last_confirms_its_mode(mixed: AxisGroup) -> None:
+    asked = [Mode.HOMING] * mixed.n
+    mixed.ask_mode(asked)
+    _cycles(mixed, 1, [0.0] * mixed.n)
+    assert not mixed.mode_confirmed()
+    with pytest.raises(ModeRefusedError, match="but the drive reports"):
+        mixed.request(State.OPERATION_ENABLED)
+    _cycles(mixed, 50, [0.0] * mixed.n)
+    assert mixed.mode_confirmed()
