@@ -69,22 +69,27 @@ def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = Fal
 def light(
     io: _IoArgument,
     colour: Annotated[str, typer.Argument(help="red, yellow, green, blue or white.")],
-    on: Annotated[bool, typer.Option("--on/--off")] = True,
+    seconds: _Seconds = 3.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Switch one colour of the stack light."""
+    """Switch one colour of the stack light on for a while."""
     out = Output(as_json)
     with _link(io) as link:
-        lights = dict(link.profile.lights.items())
-        wanted = {str(known): output for known, output in lights.items()}.get(colour)
+        lights = {str(known): output for known, output in link.profile.lights.items()}
+        wanted = lights.get(colour)
         if wanted is None:
             raise BadInputError(f"colour {colour!r}; {io} has {', '.join(lights) or 'no lights'}")
-        link.write(wanted.coil, on != wanted.inverted)
-        state = link.state()
-    if state.lights[colour] != on:
-        raise WorkFailedError(f"{colour} was set, but output {wanted.coil} does not read so")
-    out.say(f"{colour} is {'on' if on else 'off'}")
-    out.result({"ok": True, "colour": colour, "on": on})
+        link.set_watchdog()
+        try:
+            _keep(link, wanted.coil, not wanted.inverted, seconds)
+            if not link.state().lights[colour]:
+                raise WorkFailedError(f"{colour} was set, but output {wanted.coil} reads otherwise")
+        except KeyboardInterrupt:
+            out.note("stopped on request")
+        finally:
+            link.write(wanted.coil, wanted.inverted)
+    out.say(f"{colour} was on, output {wanted.coil}")
+    out.result({"ok": True, "colour": colour})
 
 
 @app.command()
@@ -150,17 +155,23 @@ def _confirm_release(axis: str, yes: bool) -> None:
 
 def _hold(link: IoLink, axis: str, brake: Brake, released: bool, seconds: float) -> None:
     """Keep a brake's output for a while; raises WorkFailedError unless its feedback follows."""
-    link.write(brake.output.coil, released)
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        link.feed_watchdog()
-        time.sleep(link.profile.poll_period_s)
+    _keep(link, brake.output.coil, released, seconds)
     if link.state().brakes_released[axis] != released:
         wanted = "released" if released else "applied"
         raise WorkFailedError(
             f"the brake of {axis} is not {wanted} {brake.timeout_s:g} s after output "
             f"{brake.output.coil} was set to {int(released)} (input {brake.feedback.input})"
         )
+
+
+def _keep(link: IoLink, coil: int, on: bool, seconds: float) -> None:
+    """Set an output and keep the device's watchdog content for a while."""
+    link.feed_watchdog()  # a device whose watchdog has run out takes no outputs
+    link.write(coil, on)
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        link.feed_watchdog()
+        time.sleep(link.profile.poll_period_s)
 
 
 def _told(state: IoState) -> dict[str, Any]:

@@ -1,0 +1,201 @@
+"""A winch behind a safety I/O: each reaction seen on the physics board, not on what is told."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import canopen
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
+from safety_rig import Twin, board_file, patient_profile, ready, start, wait_until
+
+from profiles import load_winch
+from sim_bus.physics_board import BoardAxis, PhysicsBoard
+from sim_bus.safety_twin import Fault
+
+WINCH = "winch-mpp0923d"
+# what may pass from the reaction of a busy machine until the next look
+SLACK_S = 1.5
+
+
+@dataclass
+class Lab:
+    """One simulated winch and its safety I/O.
+
+    The bus is in lockstep: a busy machine makes it slow, and misses no cycle. The I/O goes by the
+    clock, so that many seconds of the bus pass until it is heard.
+    """
+
+    bus: str
+    board_path: Path
+    winch: BoardAxis
+    folder: Path
+    twin: Twin
+
+    def begin(self, *arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "tools.cli", *arguments, "--json"]
+        return subprocess.Popen(
+            command,
+            env={**os.environ, "XDG_STATE_HOME": str(self.folder)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def jog(self, seconds: float) -> subprocess.Popen[str]:
+        behind = ("--safety-io", self.twin.reference, "--seconds", str(seconds))
+        return self.begin("drive", "jog", WINCH, "--bus", self.bus, "--speed-deg-s", "600", *behind)
+
+    def drive(self, action: str) -> dict[str, Any]:
+        behind = ("--safety-io", self.twin.reference)
+        return result(self.begin("drive", action, WINCH, "--bus", self.bus, *behind))
+
+    def io(self, action: str) -> dict[str, Any]:
+        return result(self.begin("io", action, self.twin.reference))
+
+    def moving(self) -> bool:
+        return self.winch.state().motor_rad_s > 5.0
+
+
+def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
+    out, errors = command.communicate(timeout=60)
+    assert "Traceback" not in errors + out, errors
+    assert command.returncode == status, errors
+    told: dict[str, Any] = json.loads(out.splitlines()[-1])
+    return told
+
+
+@pytest.fixture(scope="module")
+def simulator() -> Iterator[tuple[str, Path]]:
+    bus = f"simbus:safety-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    with board_file() as board:
+        process = start("up", WINCH, "--bus", bus, "--lockstep", "--board", board)
+        ready(process)
+        yield bus, board
+        process.communicate(b"", timeout=10)
+
+
+@pytest.fixture(scope="module")
+def lasting_twin(
+    simulator: tuple[str, Path], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Twin]:
+    twin = Twin(patient_profile(tmp_path_factory.mktemp("io")), "--board", simulator[1])
+    yield twin
+    twin.close()
+
+
+@pytest.fixture
+def lab(simulator: tuple[str, Path], lasting_twin: Twin, tmp_path: Path) -> Iterator[Lab]:
+    bus, path = simulator
+    with PhysicsBoard.attach(path) as board:
+        lasting_twin.mend()
+        _mend_drive(bus)
+        yield Lab(bus, path, board.axis(0), tmp_path, lasting_twin)
+
+
+def _mend_drive(bus: str) -> None:
+    network = canopen.Network()
+    network.connect(interface="simbus", channel=bus.partition(":")[2])
+    try:
+        node = network.add_node(1, str(load_winch(WINCH).drive.eds))
+        node.sdo.RESPONSE_TIMEOUT = 2.0
+        if node.sdo[0x6041].raw & 0x08:
+            node.nmt.send_command(129)
+        wait_until(lambda: node.sdo[0x6041].raw & 0x4F == 0x40)
+    finally:
+        network.disconnect()
+
+
+def test_the_emergency_stop_takes_the_torque_in_motion(lab: Lab) -> None:
+    command = lab.jog(600)
+    wait_until(lab.moving, 30)
+    assert lab.winch.brake_released
+    lab.twin.press()
+    assert wait_until(lambda: not lab.winch.state().power_on) < SLACK_S
+    assert wait_until(lambda: not lab.winch.brake_released) < SLACK_S
+    error = result(command, status=1)["error"]
+    assert "the emergency-stop chain is open (input 0 reads 0)" in error
+    lab.twin.press(False)
+    assert "chain is open" in lab.io("ack")["acknowledged"]["reason"]
+    assert lab.drive("reset")["state"] == "switch on disabled"
+
+
+def test_an_io_that_falls_silent_for_longer_than_allowed_stops_the_motion(lab: Lab) -> None:
+    command = lab.jog(600)
+    wait_until(lab.moving, 30)
+    lab.twin.process.send_signal(signal.SIGSTOP)
+    time.sleep(0.1)
+    lab.twin.process.send_signal(signal.SIGCONT)  # shorter than the trip time-out: nothing
+    time.sleep(0.5)
+    wait_until(lab.moving)
+    assert command.poll() is None
+    lab.twin.break_(Fault.SILENT)
+    wait_until(lambda: not lab.winch.state().power_on)
+    assert "no good poll" in result(command, status=1)["error"]
+
+
+def test_an_open_chain_refuses_before_anything_is_energised(lab: Lab) -> None:
+    lab.twin.press()
+    error = result(lab.jog(1), status=1)["error"]
+    assert "the emergency-stop chain is open (input 0)" in error
+    assert "release the buttons" in error
+    assert lab.io("show")["chain_ok"] is False
+
+
+def test_a_welded_contactor_is_told_at_the_end(lab: Lab) -> None:
+    lab.twin.break_(Fault.CONTACTOR_WELDED)
+    assert "is it welded?" in result(lab.jog(0.1), status=1)["error"]
+    assert not lab.winch.brake_released
+
+
+def test_a_brake_that_stays_applied_ends_the_session(lab: Lab) -> None:
+    lab.twin.break_(Fault.BRAKES_STUCK)
+    error = result(lab.jog(1), status=1)["error"]
+    assert "the brake of winch 1 is not released" in error
+    wait_until(lambda: not lab.winch.state().power_on)
+
+
+def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
+    lamp = lab.begin("io", "light", lab.twin.reference, "green", "--seconds", "0.5")
+    wait_until(lambda: lab.twin.coil(10), 20)
+    assert result(lamp)["ok"]
+    assert not lab.twin.coil(10)
+    brake = ("io", "brake", lab.twin.reference, "winch 1", "--seconds", "0.5")
+    unasked = subprocess.run(
+        [sys.executable, "-m", "tools.cli", *brake],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        check=False,
+    )
+    assert unasked.returncode == 2 and b"not confirmed" in unasked.stderr
+    command = lab.begin(*brake, "--yes")
+    wait_until(lambda: lab.winch.brake_released, 20)
+    assert result(command)["ok"]
+    assert not lab.winch.brake_released
+    unknown = result(lab.begin("io", "light", lab.twin.reference, "pink"), status=2)["error"]
+    assert "pink" in unknown and "red, yellow, green" in unknown
+
+
+def test_a_lost_io_brakes_the_motion_under_control(lab: Lab) -> None:
+    """The last test here: its safety I/O does not come back."""
+    command = lab.jog(600)
+    wait_until(lab.moving, 30)
+    os.kill(lab.twin.process.pid, signal.SIGKILL)
+    # nobody can reach contactor or brake now: what stops the motor is its drive
+    assert lab.winch.brake_released
+    slowed = wait_until(lambda: lab.winch.state().motor_rad_s < 0.1)
+    assert slowed < 0.4 + SLACK_S  # trip time-out, and a ramp that is faster here
+    wait_until(lambda: not lab.winch.state().power_on)
+    error = result(command, status=1)["error"]
+    assert "no good poll for 0." in error and "0.4 s allowed" in error
