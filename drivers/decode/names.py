@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ class ObjectNames:
 
     def __init__(self, eds: Path | None = None) -> None:
         self._own = _dictionary(eds) if eds is not None else None
-        self._standard = _dictionary(load_drive(_STANDARD_DRIVE).eds)
+        self._standard = _standard()
 
     def name(self, index: int, sub: int) -> str:
         """Return an object's name, "" where no data sheet has it."""
@@ -77,3 +77,8 @@ def _part(entry: Any, sub: int) -> ODVariable | None:
 @lru_cache(maxsize=32)
 def _dictionary(eds: Path) -> Any:
     return canopen.import_od(str(eds), None)
+
+
+@cache
+def _standard() -> Any:
+    return _dictionary(load_drive(_STANDARD_DRIVE).eds)
