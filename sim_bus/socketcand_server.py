@@ -6,6 +6,7 @@ input or with the bus. Killing it is losing the connection.
 
 from __future__ import annotations
 
+import os
 import re
 import selectors
 import socket
@@ -199,12 +200,16 @@ def _text_of(frame: bytes, wall_s: float) -> bytes:
     return f"< frame {head} {wall_s:.6f} {data[:length].hex().upper()} >".encode("ascii")
 
 
+def _read_stdin(_events: int) -> bytes:
+    return os.read(sys.stdin.fileno(), _READ_BYTES)
+
+
 def serve(name: str, listener: socket.socket) -> None:
     """Serve the bus `name` to all who connect, until standard input ends or the bus goes away."""
     bus = join(name)  # a member that listens to nothing: it tells when the bus ends
     connections: list[Connection] = []
     with selectors.DefaultSelector() as selector:
-        selector.register(sys.stdin, selectors.EVENT_READ, lambda _: sys.stdin.buffer.read1())
+        selector.register(sys.stdin, selectors.EVENT_READ, _read_stdin)
         # frames of the moment before the hub knew that none are wanted are no end
         selector.register(bus, selectors.EVENT_READ, lambda _: bus.recv(FRAME_BYTES))
         selector.register(listener, selectors.EVENT_READ, None)

@@ -159,10 +159,18 @@ class _Frames:
         self.bare += bare_bits(n)
 
 
+def command_pdos(drive: DriveProfile) -> list[Pdo]:
+    """Return what the master sends to a drive in every cycle."""
+    return [p for p in drive.rpdos if any(e.index in _COMMANDS for e in p.entries)]
+
+
+def answer_pdos(drive: DriveProfile) -> list[Pdo]:
+    """Return what a drive answers to SYNC, to every one or to every so many."""
+    return [p for p in drive.tpdos if p.transmission_type in _AT_EVERY_SYNC]
+
+
 def _cyclic_pdos(drive: DriveProfile) -> list[Pdo]:
-    """Return what crosses the bus in every cycle: the master's commands and the answers to SYNC."""
-    commands = [p for p in drive.rpdos if any(e.index in _COMMANDS for e in p.entries)]
-    return commands + [p for p in drive.tpdos if p.transmission_type in _AT_EVERY_SYNC]
+    return command_pdos(drive) + answer_pdos(drive)
 
 
 def _pdos_on_change(drive: DriveProfile) -> list[Pdo]:

@@ -65,12 +65,13 @@ class _Member:
 class SharedLine:
     """A line, the thread that reads it, and its members."""
 
-    def __init__(self, url: BusUrl, line: Line) -> None:
+    def __init__(self, url: BusUrl, line: Line, first: _Member) -> None:
         self.url = url
         self.reason = ""
         """Why the line is lost; empty while it is not."""
         self._line = line
-        self._members: list[_Member] = []
+        # from the beginning: frames may have come with the line's greeting
+        self._members = [first]
         self._routes: dict[int, tuple[_Member, ...]] = {}
         self._lock = threading.Lock()
         self._stopping = False
@@ -152,6 +153,8 @@ class SharedLine:
             self.reason = reason or "connection closed"
             for member in self._members:
                 member.sock.close()
+        # at once, or a USB adapter that is plugged in again gets another name
+        self._close_line()
 
     def _close(self) -> None:
         if _registry.get(_key(self.url)) is self:
@@ -159,9 +162,13 @@ class SharedLine:
         self._stopping = True
         os.eventfd_write(self._wake, 1)
         self._thread.join()
+        if not self.reason:
+            self._close_line()
+        os.close(self._wake)
+
+    def _close_line(self) -> None:
         with contextlib.suppress(OSError, can.CanError):
             self._line.close()
-        os.close(self._wake)
 
 
 _registry: dict[tuple[object, ...], SharedLine] = {}
@@ -183,10 +190,11 @@ def _join(url: BusUrl, open_line: Callable[[BusUrl], Line], member: _Member) -> 
         if shared is not None and shared.reason:
             shared = None  # lost; those who still hold it leave by themselves
         if shared is None:
-            shared = _registry[_key(url)] = SharedLine(url, open_line(url))
+            shared = _registry[_key(url)] = SharedLine(url, open_line(url), member)
         elif _settings(shared.url) != _settings(url):
             raise BusError(f"{url}: is in use with other settings ({shared.url})")
-        shared.add(member)
+        else:
+            shared.add(member)
         return shared
 
 

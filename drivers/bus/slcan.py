@@ -215,7 +215,9 @@ class SlcanLine:
         try:
             self._put(b"C\r")
         finally:
-            self._serial.close()
+            with self._sending:  # nobody may write to a descriptor that is somebody else's by now
+                self._fd = -1
+                self._serial.close()
 
 
 def open_slcan(url: BusUrl) -> SlcanLine:

@@ -98,9 +98,12 @@ class SocketcandLine:
         ready, _, _ = select.select([self._sock.fileno(), wake], [], [])
         if self._sock.fileno() not in ready:
             return []
-        data = self._sock.recv(_READ_BYTES)
+        try:
+            data = self._sock.recv(_READ_BYTES)
+        except OSError as error:
+            raise OSError(error.errno, f"lost the socketcand server: {error.strerror}") from None
         if not data:
-            raise OSError(errno.ECONNRESET, "the socketcand server closed the connection")
+            raise OSError(errno.ECONNRESET, "lost the socketcand server: it closed the connection")
         return self._take(data)
 
     def _take(self, data: bytes) -> list[bytes]:
@@ -127,7 +130,8 @@ class SocketcandLine:
 
     def close(self) -> None:
         """Leave the server."""
-        self._sock.close()
+        with self._sending:
+            self._sock.close()
 
 
 def _frame_of(message: bytes) -> bytes | None:

@@ -1,0 +1,72 @@
+"""Error frames turned into a state and counts."""
+
+from __future__ import annotations
+
+import can
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.bus import BusHealth, BusState
+from drivers.bus.health import ERR_FLAG
+
+
+@pytest.mark.parametrize(
+    ("can_id", "data", "state", "errors", "words"),
+    [
+        (0x004, [0, 0x04], BusState.WARNING, 0, "error-warning"),
+        (0x004, [0, 0x20], BusState.PASSIVE, 0, "error-passive"),
+        (0x040, [], BusState.BUS_OFF, 0, "bus-off"),
+        (0x020, [], BusState.ACTIVE, 1, "nobody acknowledges"),
+        (0x008 | 0x080, [], BusState.ACTIVE, 1, "frame damaged on the wire, bus error"),
+        (0x004, [0, 0x01], BusState.ACTIVE, 1, "frames lost"),
+        (0x002, [], BusState.ACTIVE, 0, ""),  # lost arbitration is how a bus works
+    ],
+)
+def test_what_each_error_frame_tells(
+    can_id: int, data: list[int], state: BusState, errors: int, words: str
+) -> None:
+    health = BusHealth()
+    assert health.take_error(ERR_FLAG | can_id, bytes(data)) is (state is not BusState.ACTIVE)
+    assert (health.state, health.errors) == (state, errors)
+    assert words in health.text
+    assert health.usable is (state is not BusState.BUS_OFF)
+
+
+def test_a_bus_off_and_its_end_are_counted() -> None:
+    health = BusHealth()
+    health.take_error(0x004, bytes([0, 0x30]))
+    health.take_error(0x240, bytes([0, 0, 0, 0, 0, 0, 248, 3]))
+    assert (health.bus_offs, health.restarts, health.counters) == (1, 0, (248, 3))
+    changed_s = health.changed_s
+    assert health.take_message(can.Message(arbitration_id=0x100, is_error_frame=True))
+    assert (health.state, health.bus_offs, health.restarts) == (BusState.ACTIVE, 1, 1)
+    assert health.changed_s > changed_s > 0.0
+
+
+def test_back_to_active_by_the_controllers_own_word() -> None:
+    health = BusHealth()
+    health.take_error(0x004, bytes([0, 0x10]))
+    health.take_error(0x080, b"")
+    assert health.state is BusState.PASSIVE  # a bus error alone changes no state
+    assert health.take_error(0x004, bytes([0, 0x40]))
+    assert health.state is BusState.ACTIVE
+
+
+def test_losses_are_counted() -> None:
+    health = BusHealth()
+    health.note_tx_full()
+    health.note_rx_lost("too fast")
+    assert (health.tx_full, health.rx_lost, health.state) == (1, 1, BusState.ACTIVE)
+    assert "too fast" in health.text
+
+
+@given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.binary(max_size=12)), max_size=20))
+@settings(derandomize=True, max_examples=200, deadline=None)
+def test_any_frame_leaves_a_known_state(frames: list[tuple[int, bytes]]) -> None:
+    health = BusHealth()
+    for can_id, data in frames:
+        before = health.state
+        assert health.take_error(can_id, data) is (health.state is not before)
+    assert health.restarts <= health.bus_offs <= len(frames)
+    assert health.errors <= len(frames)

@@ -1,0 +1,485 @@
+"""Serial adapters, socketcand servers and python-can's interfaces that behave badly."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import select
+import socket
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.bus import BusHealth, BusState, BusUrl, open_port, open_python_can
+from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG, FramePort
+from drivers.bus.slcan import SlcanLine
+from drivers.bus.socketcand import SocketcandLine
+from drivers.errors import BusError
+
+
+def frame(can_id: int, data: bytes = b"") -> bytes:
+    return FRAME.pack(can_id, len(data), data)
+
+
+def receive(port: FramePort) -> bytes:
+    buffer = bytearray(16)
+    assert port.recv_into(buffer) == 16
+    return bytes(buffer)
+
+
+class Adapter:
+    """The far end of a serial line; a thread answers commands by a table, frames are kept."""
+
+    def __init__(self, answers: dict[bytes, bytes]) -> None:
+        self.host, self.terminal = pty.openpty()
+        tty.setraw(self.terminal)
+        self.path = os.ttyname(self.terminal)
+        self.answers = answers
+        self.lines: list[bytes] = []
+        self._out = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> BusUrl:
+        return BusUrl.parse(f"slcan:{self.path}?bitrate=1000000")
+
+    def _serve(self) -> None:
+        rest = b""
+        while not self._out.is_set():
+            if not select.select([self.host], [], [], 0.02)[0]:
+                continue
+            rest += os.read(self.host, 4096)
+            *lines, rest = rest.split(b"\r")
+            for line in lines:
+                self.lines.append(line)
+                answer = self.answers.get(line, self.answers.get(line[:1], b""))
+                os.write(self.host, answer)
+
+    def say(self, text: bytes) -> None:
+        os.write(self.host, text)
+
+    def pull_out(self) -> None:
+        """Take the adapter away: the end of the line."""
+        if self._out.is_set():
+            return
+        self._out.set()
+        self._thread.join()
+        os.close(self.terminal)
+        os.close(self.host)
+
+
+GOOD = {b"C": b"\r", b"S": b"\r", b"O": b"\r", b"V": b"V1013\r", b"F": b"\a", b"t": b"z\r"}
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[[dict[bytes, bytes]], Adapter]]:
+    started: list[Adapter] = []
+
+    def start(answers: dict[bytes, bytes]) -> Adapter:
+        started.append(Adapter(answers))
+        return started[-1]
+
+    yield start
+    for adapter in started:
+        adapter.pull_out()
+
+
+Start = Callable[[dict[bytes, bytes]], Adapter]
+
+
+def test_an_adapter_is_opened_step_by_step(start: Start) -> None:
+    adapter = start(GOOD)
+    port = open_port(adapter.url)
+    assert adapter.lines == [b"", b"C", b"S8", b"O", b"V", b"F"]
+    port.close()
+    deadline = time.monotonic() + 2.0
+    while adapter.lines[-1] != b"C":
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({b"S": b"\a"}, r"refuses bit rate 1000000 \(S8\)"),
+        ({b"O": b"\a"}, "refuses to open"),
+        (dict.fromkeys(GOOD, b""), "nothing there answers as a serial CAN adapter"),
+    ],
+)
+def test_an_adapter_that_will_not(start: Start, change: dict[bytes, bytes], message: str) -> None:
+    adapter = start(GOOD | change)
+    for opened in (open_port, open_python_can):
+        with pytest.raises(BusError, match=message) as caught:
+            opened(adapter.url)
+        assert str(caught.value).count(adapter.path) == 1
+
+
+def test_an_adapter_that_acknowledges_nothing_but_tells_its_version(start: Start) -> None:
+    adapter = start({b"V": b"V1013\r"})
+    port = open_port(adapter.url)
+    port.settimeout(2.0)
+    adapter.say(b"t1810\r")
+    assert receive(port) == frame(0x181)
+    port.close()
+
+
+def test_frames_of_before_do_not_come_in(start: Start) -> None:
+    adapter = start(GOOD)
+    adapter.say(b"t7770\rt77")
+    port = open_port(adapter.url)
+    port.settimeout(2.0)
+    adapter.say(b"t1811AA\r")
+    assert receive(port) == frame(0x181, b"\xaa")
+    assert port.drain() == 0
+    port.close()
+
+
+@given(st.lists(st.binary(max_size=30), max_size=10))
+@settings(derandomize=True, max_examples=200, deadline=None)
+def test_rubbish_on_the_line_yields_frames_or_nothing(chunks: list[bytes]) -> None:
+    line = SlcanLine.__new__(SlcanLine)
+    line._told_flags = 0
+    for chunk in chunks:
+        for kind in (b"", b"t", b"T", b"r", b"R", b"F"):
+            got = line._frame_of(kind + chunk, b"\r")
+            if got is not None:
+                can_id, length, _ = FRAME.unpack(got)
+                assert length <= 8
+                assert can_id & ERR_FLAG or can_id & EFF_FLAG or can_id & ~RTR_FLAG < 0x1000
+
+
+def test_rubbish_between_frames_loses_none(start: Start) -> None:
+    adapter = start(GOOD)
+    port = open_port(adapter.url)
+    port.settimeout(2.0)
+    adapter.say(b"t1810\r\xff\x00t99\rtXX81\rt1819\r\r\rhello\rt18")
+    adapter.say(b"22ABCD12F0\rT000001811EE\rr1813\r")
+    got = [receive(port) for _ in range(4)]
+    assert got == [
+        frame(0x181),
+        frame(0x182, b"\xab\xcd"),  # with a time stamp
+        frame(EFF_FLAG | 0x181, b"\xee"),
+        FRAME.pack(RTR_FLAG | 0x181, 3, b""),
+    ]
+    port.close()
+
+
+def test_trouble_the_adapter_tells_of_reaches_the_acyclic_side_only(start: Start) -> None:
+    adapter = start(GOOD | {b"F": b"F00\r", b"t": b"\a"})
+    cyclic, acyclic = open_port(adapter.url), open_python_can(adapter.url, [(0x701, 0x7FF)])
+    health = BusHealth()
+
+    def told() -> None:
+        message = acyclic.recv(3.0)
+        assert message is not None
+        assert message.is_error_frame
+        health.take_message(message)
+
+    cyclic.send(frame(0x201))
+    told()
+    assert "transmit buffer" in health.text
+    adapter.answers[b"F"] = b"FA4\r"
+    told()
+    assert health.state is BusState.PASSIVE
+    adapter.answers[b"F"] = b"F00\r"
+    told()
+    while health.state is not BusState.ACTIVE:
+        told()
+    assert health.errors >= 2
+    cyclic.settimeout(0.01)
+    with pytest.raises(BlockingIOError):
+        cyclic.recv_into(bytearray(16))
+    cyclic.close()
+    acyclic.shutdown()
+
+
+def test_one_adapter_serves_all_who_open_it(start: Start) -> None:
+    adapter = start(GOOD)
+    ports = [open_port(adapter.url, [(0x180, 0x780)]), open_port(adapter.url)]
+    bus = open_python_can(adapter.url, [(0x701, 0x7FF)])
+    for port in ports:
+        port.settimeout(2.0)
+    adapter.say(b"t7010\rt1810\r")
+    assert receive(ports[0]) == frame(0x181)
+    assert [receive(ports[1]) for _ in range(2)] == [frame(0x701), frame(0x181)]
+    message = bus.recv(2.0)
+    assert message is not None
+    assert message.arbitration_id == 0x701
+    ports[0].send(frame(0x701, b"\x05"))  # the others hear it, as on SocketCAN
+    message = bus.recv(2.0)
+    assert message is not None
+    assert bytes(message.data) == b"\x05"
+    assert receive(ports[1]) == frame(0x701, b"\x05")
+    assert ports[0].drain() == 0
+    with pytest.raises(BusError, match="is in use with other settings"):
+        open_port(BusUrl.parse(f"slcan:{adapter.path}?bitrate=500000"))
+    ports[0].close()
+    ports[0].close()
+    adapter.say(b"t1820\r")
+    assert receive(ports[1]) == frame(0x182)
+    with pytest.raises(OSError, match="closed"):
+        ports[0].send(frame(0x80))
+    ports[1].close()
+    bus.shutdown()
+    assert not [t for t in threading.enumerate() if t.name.startswith("reads slcan")]
+
+
+def test_pulled_out_it_is_noticed_by_all_and_can_come_back(start: Start) -> None:
+    adapter = start(GOOD)
+    port, bus = open_port(adapter.url), open_python_can(adapter.url)
+    port.settimeout(5.0)
+    started = time.monotonic()
+    adapter.pull_out()
+    assert port.recv_into(bytearray(16)) == 0
+    assert time.monotonic() - started < 1.0
+    told = f"{adapter.url}: the bus has gone away (the serial adapter has been pulled out"
+    assert told in str(port.lost())
+    with pytest.raises(OSError, match="pulled out") as caught:
+        port.send(frame(0x80))
+    assert told in str(port.lost(caught.value))
+    with pytest.raises(can.CanError, match="pulled out"):
+        bus.recv(1.0)
+    with pytest.raises(can.CanError, match="pulled out"):
+        bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+    # nothing holds its name, which the next one may be given
+    assert not [name for name in _open_files() if name.startswith(adapter.path)]
+    port.close()
+    bus.shutdown()
+
+
+def _open_files() -> list[str]:
+    names = []
+    for entry in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # the folder's own
+            names.append(str(entry.readlink()))
+    return names
+
+
+def test_a_lost_line_can_be_opened_again_while_the_old_port_is_held() -> None:
+    server = Server(*GREETING)
+    old = open_port(server.url)
+    old.settimeout(5.0)
+    server.client.close()
+    assert old.recv_into(bytearray(16)) == 0
+    server.serve()
+    new = open_port(server.url)
+    old.close()
+    new.settimeout(2.0)
+    server.client.sendall(b"< frame 181 1.0 AA >")
+    assert receive(new) == frame(0x181, b"\xaa")
+    new.close()
+    server.close()
+
+
+def test_a_port_in_use_by_another_program(start: Start) -> None:
+    adapter = start(GOOD)
+    with open(adapter.path, "rb", buffering=0) as other:  # noqa: PTH123  # a terminal
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with pytest.raises(BusError, match="is in use by another program"):
+            open_port(adapter.url)
+
+
+@pytest.mark.parametrize(
+    ("url", "message"),
+    [
+        ("slcan:/dev/ttyNOTHING?bitrate=1000000", "there is no serial port /dev/ttyNOTHING"),
+        ("slcan:/dev/null?bitrate=1000000", "/dev/null is no serial port"),
+        ("slcan:/tmp?bitrate=1000000", "/tmp is no serial port"),
+        ("slcan:/dev/ptmx?bitrate=123456", "bitrate 123456: allowed are 10000, "),
+        ("slcan:/dev/ptmx?bitrte=1000000", "unknown option 'bitrte'; allowed: bitrate, "),
+        ("slcan:/dev/ptmx?tty_baudrate=fast", "tty_baudrate 'fast': this port cannot be set"),
+        ("socketcand://127.0.0.1:1/can0", r"no socketcand server at 127\.0\.0\.1:1 \(Connection"),
+        ("socketcand://127.0.0.1:1/can0?speed=1", "unknown option 'speed'"),
+        ("simbus:nobody-is-home", "no simulated bus of that name is running"),
+        ("udp_multicast:no-address", "cannot be opened"),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_is_told_once(url: str, message: str) -> None:
+    for opened in (open_port, open_python_can):
+        with pytest.raises(BusError, match=message) as caught:
+            opened(BusUrl.parse(url))
+        assert str(caught.value).count(url.split("?", maxsplit=1)[0]) == 1 + url.startswith(
+            "simbus"
+        )
+
+
+def test_two_ports_on_any_other_interface_share_one_bus() -> None:
+    url = BusUrl.parse("virtual:line-adapters")
+    one, two = open_port(url), open_port(url, [(0x181, 0x7FF)])
+    with can.Bus("line-adapters", interface="virtual") as stranger:
+        two.settimeout(2.0)
+        one.send(frame(0x181, b"ours"))
+        stranger.send(can.Message(arbitration_id=0x181, data=b"theirs", is_extended_id=False))
+        assert [receive(two), receive(two)] == [frame(0x181, b"ours"), frame(0x181, b"theirs")]
+        message = stranger.recv(2.0)
+        assert message is not None
+        assert bytes(message.data) == b"ours"
+    one.close()
+    two.close()
+
+
+def test_frames_a_port_does_not_read_in_time_are_counted() -> None:
+    url, health = BusUrl.parse("virtual:line-overflow"), BusHealth()
+    slow, sender = open_port(url, None, health), open_port(url, [])
+    sent = 0
+    while not health.rx_lost:
+        assert sent < 500_000
+        sender.send(frame(0x181))
+        sent += 1
+    assert slow.drain() == sent - health.rx_lost
+    slow.close()
+    sender.close()
+
+
+# -- socketcand servers
+
+
+class Server:
+    """Plays a socketcand server that says what the test wants, in pieces as the test cuts them."""
+
+    def __init__(self, *greeting: bytes) -> None:
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.heard = b""
+        self.client: socket.socket
+        self._greeting = greeting
+        self.serve()
+
+    def serve(self) -> None:
+        """Greet one client."""
+        self._thread = threading.Thread(target=self._greet, daemon=True)
+        self._thread.start()
+
+    @property
+    def url(self) -> BusUrl:
+        return BusUrl.parse(f"socketcand://127.0.0.1:{self.listener.getsockname()[1]}/can0")
+
+    def _greet(self) -> None:
+        self.client, _ = self.listener.accept()
+        for text in self._greeting:
+            self.client.sendall(text)
+            if text != self._greeting[-1]:
+                self.heard += self.client.recv(4096)
+
+    def close(self) -> None:
+        self.listener.close()
+        self._thread.join(5.0)
+        self.client.close()
+
+
+GREETING = (b"< hi >", b"< ok >", b"< ok >")
+
+
+def test_a_conversation_in_pieces_and_glued_together() -> None:
+    server = Server(b"< hi >", b"< ok >", b"< ok >< frame 181 1.5 1122 >< fr")
+    port = open_port(server.url)
+    port.settimeout(2.0)
+    assert receive(port) == frame(0x181, b"\x11\x22")
+    for piece in (
+        b"ame 080 23.424",
+        b"242  >< frame 12345678 1.0 01 02 03 >",
+        b"< frame 7FF 1.0 >",
+    ):
+        server.client.sendall(piece)
+        time.sleep(0.02)
+    got = [receive(port) for _ in range(3)]
+    assert got == [frame(0x080), frame(EFF_FLAG | 0x12345678, b"\x01\x02\x03"), frame(0x7FF)]
+    port.send(frame(0x080))
+    port.send(frame(EFF_FLAG | 0x123, b"\x0f\xf4"))
+    assert server.heard == b"< open can0 >< rawmode >"
+    wanted = b"< send 080 0  >< send 00000123 2 0f f4 >"
+    heard = b""
+    while len(heard) < len(wanted):
+        heard += server.client.recv(4096)
+    assert heard == wanted
+    with pytest.raises(OSError, match="no remote frames"):
+        port.send(FRAME.pack(RTR_FLAG | 0x701, 1, b""))
+    port.close()
+    server.close()
+
+
+def test_rubbish_from_a_server_loses_no_frame() -> None:
+    server = Server(*GREETING)
+    port = open_port(server.url)
+    port.settimeout(2.0)
+    server.client.sendall(
+        b"< frame XYZ 1.0 11 >< frame 181 1.0 123 ><><   ><frame 182><< hello >"
+        b"< frame 183 1.0 112233445566778899 >" + b"\xff" * 9000 + b">< frame 184 1.0 AA >"
+    )
+    got = [receive(port)]
+    while got[-1] != frame(0x184, b"\xaa"):
+        got.append(receive(port))
+    assert got[:-1] in ([], [frame(0x182)])
+    port.close()
+    server.close()
+
+
+def test_error_frames_of_a_server() -> None:
+    server = Server(*GREETING)
+    bus = open_python_can(server.url, [(0x701, 0x7FF)])
+    server.client.sendall(b"< error 20000040 1.0 >")
+    message = bus.recv(2.0)
+    assert message is not None
+    health = BusHealth()
+    assert health.take_message(message)
+    assert health.state is BusState.BUS_OFF
+    bus.shutdown()
+    server.close()
+
+
+def test_the_end_of_the_connection_is_reported_soon() -> None:
+    server = Server(*GREETING)
+    port, bus = open_port(server.url), open_python_can(server.url)
+    port.settimeout(5.0)
+    server.close()
+    started = time.monotonic()
+    assert port.recv_into(bytearray(16)) == 0
+    assert time.monotonic() - started < 1.0
+    assert "the bus has gone away (lost the socketcand server: " in str(port.lost())
+    with pytest.raises(can.CanError, match="lost the socketcand server"):
+        bus.recv(1.0)
+    with pytest.raises(OSError, match="lost the socketcand server"):
+        port.send(frame(0x80))
+    port.close()
+    bus.shutdown()
+
+
+def test_a_peer_that_vanishes_without_a_word_is_given_up() -> None:
+    """Unplugged network cable: what the kernel is told to do about it."""
+    server = Server(*GREETING)
+    line = SocketcandLine(server.url)
+    options = [
+        line._sock.getsockopt(socket.IPPROTO_TCP, option)
+        for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
+    ]
+    assert line._sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    assert options[0] + options[1] * options[2] <= 5
+    line.close()
+    server.close()
+
+
+@pytest.mark.parametrize(
+    ("greeting", "message"),
+    [
+        ((b"< hi >", b"< error could not open bus >"), "could not open bus.*has it a bus 'can0'"),
+        ((b"SSH-2.0-OpenSSH", b""), "went away"),
+        ((b"< hello >",), "'hello' to 'the connection'"),
+    ],
+)
+def test_a_server_that_will_not(
+    greeting: tuple[bytes, ...], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivers.bus.socketcand._ANSWER_S", 0.3)
+    server = Server(*greeting)
+    with pytest.raises(BusError, match=message):
+        open_port(server.url)
+    server.close()
