@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import struct
+import termios
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final, Literal
 
 import serial  # type: ignore[import-untyped]
@@ -40,7 +43,8 @@ class ModbusLine:
         self.name = port
         self._settings: dict[str, Any] = {
             "baudrate": baudrate,
-            "parity": parity,
+            # a pseudo-terminal has no parity, and takes the wish for one badly
+            "parity": "N" if Path(port).resolve().is_relative_to("/dev/pts") else parity,
             "stopbits": stop_bits,
             "timeout": timeout_s,
             "write_timeout": max(timeout_s, 1.0),
@@ -51,6 +55,8 @@ class ModbusLine:
         self._received = b""
         self.repeated = 0
         """Requests that had to be repeated so far."""
+        self.patient = True
+        """Whether a request that failed is repeated."""
         self._client = ModbusSerialClient(
             port,
             baudrate=baudrate,
@@ -67,8 +73,9 @@ class ModbusLine:
             return
         try:
             self._client.socket = serial.Serial(self.name, **self._settings)
-        except (OSError, ValueError) as error:  # SerialException is an OSError
-            reason = getattr(error, "strerror", None) or str(error)
+        except (OSError, ValueError, termios.error) as error:  # SerialException is an OSError
+            number = getattr(error, "errno", None) or error.args[0]
+            reason = os.strerror(number) if isinstance(number, int) else str(error)
             raise LineError(
                 f"{self.name}: cannot be opened: {reason}; is the adapter plugged in, the port "
                 "yours to use, and no other program at it?"
@@ -102,7 +109,8 @@ class ModbusLine:
     def _ask(
         self, unit: int, what: str, code: int, request: Callable[..., Any], *args: Any, **named: Any
     ) -> Any:
-        for left in range(self._retries, -1, -1):
+        retries = self._retries if self.patient else 0
+        for left in range(retries, -1, -1):
             try:
                 return self._ask_once(unit, what, code, request, *args, **named)
             except LineError:

@@ -119,8 +119,8 @@ def _requests(amplifier: Amplifier) -> list[tuple[RegisterKind, int, int]]:
 class TensionSampler:
     """Reads all load cells in turn in a thread of its own and publishes them.
 
-    `exchange` is what the cycle reads. A sensor that fails is asked again in the next round, a
-    port that is gone is opened again; what went wrong last stands in `errors`, by sensor.
+    `exchange` is what the cycle reads. Sensors that fail are asked again in turn, a port that is
+    gone is opened again; what went wrong last stands in `errors`, by sensor.
     """
 
     def __init__(
@@ -136,6 +136,7 @@ class TensionSampler:
         """Good answers of each sensor so far."""
         self._cells = LoadCells(profile, port)
         self._clock = clock
+        self._rounds = 0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"tension {port}", daemon=True)
 
@@ -177,12 +178,22 @@ class TensionSampler:
             self._stop.wait(max(due - time.monotonic(), pause))
 
     def _round(self) -> float:
-        """Read every sensor once; return how long to wait at least before the next round."""
+        """Read every sensor once; return how long to wait at least before the next round.
+
+        Of those that failed last time only one is asked, and once, so that silent ones do not
+        make the readings of the others old.
+        """
+        failing = [number for number, error in enumerate(self.errors) if error]
+        again = failing[self._rounds % len(failing)] if failing else -1
+        self._rounds += 1
         for number in range(self.exchange.n):
             if self._stop.is_set():
                 break
+            if number in failing and number != again:
+                continue
             asked = self._clock()
             try:
+                self._cells.line.patient = number not in failing
                 reading = self._cells.read(number)
             except LineError as error:
                 self.errors = [str(error)] * self.exchange.n
