@@ -58,7 +58,7 @@ _VENDORS_OWN = 255
 _SEARCHES = 4
 _MOST_DEVICES = 127
 _SETTLE_S = 0.005
-_SDO_TIMEOUT_S = 0.3
+_SDO_PATIENCE = 3.0
 _ALL = (0, 0xFFFFFFFF)
 
 
@@ -150,8 +150,12 @@ class LssMaster:
         product_code: int,
         revisions: tuple[int, int] = _ALL,
         serials: tuple[int, int] = _ALL,
+        usual_revision: int | None = None,
     ) -> list[LssAddress]:
-        """Return the devices of one type, with a node id or without, in inclusive ranges."""
+        """Return the devices of one type, with a node id or without, in inclusive ranges.
+
+        `usual_revision` is asked for first, which saves a search for each device that has it.
+        """
         kind = vendor_id, product_code
         found = []
         for serial in self._bisect(serials, lambda part: self._identify(*kind, revisions, part)):
@@ -160,6 +164,9 @@ class LssMaster:
             def of_one(part: tuple[int, int], one: tuple[int, int] = one) -> bool:
                 return self._identify(*kind, part, one)
 
+            if usual_revision is not None and of_one((usual_revision, usual_revision)):
+                found.append(LssAddress(*kind, usual_revision, serial))
+                continue
             found += [
                 LssAddress(*kind, revision, serial) for revision in self._bisect(revisions, of_one)
             ]
@@ -326,7 +333,7 @@ class LssMaster:
         for _ in range(2):
             self._collect(_IDENTIFIED, 0.0)
             self._send(question, _SDO_REQUEST + node_id)
-            deadline = time.monotonic() + _SDO_TIMEOUT_S
+            deadline = time.monotonic() + _SDO_PATIENCE * self.timeout_s
             while (frame := self._receive(deadline)) is not None:
                 if frame[0] == _SDO_ANSWER + node_id and len(frame[1]) == 8:
                     return frame[1]

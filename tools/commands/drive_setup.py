@@ -36,6 +36,8 @@ class _Device:
     address: LssAddress
     node_id: int
     profile: str | None
+    alone: bool = False
+    """Whether it was not searched for, as the only one on the bus."""
 
     @property
     def told(self) -> dict[str, Any]:
@@ -149,7 +151,9 @@ def _search(
         addresses = [a for a in master.unconfigured() if serial in (None, a.serial)]
     else:
         serials = (0, 0xFFFFFFFF) if serial is None else (serial, serial)
-        addresses = master.find(kind.vendor_id, kind.product_code, serials=serials)
+        addresses = master.find(
+            kind.vendor_id, kind.product_code, serials=serials, usual_revision=kind.revision
+        )
     known = {} if name is None or kind is None else {_type(kind): name}
     known = _shipped() | known
     return [
@@ -159,7 +163,16 @@ def _search(
 
 def _only_device(master: LssMaster) -> _Device:
     address, node_id = master.select_only()
-    return _Device(address, node_id, _shipped().get((address.vendor_id, address.product_code)))
+    kind = address.vendor_id, address.product_code
+    return _Device(address, node_id, _shipped().get(kind), alone=True)
+
+
+def _select(master: LssMaster, device: _Device) -> None:
+    """Put the device into the configuration state; old ones know the switch for all only."""
+    if device.alone:
+        master.select_only()
+    else:
+        master.select(device.address)
 
 
 def _shipped() -> dict[tuple[int, int], str]:
@@ -214,7 +227,7 @@ def _confirm(url: BusUrl, yes: bool, what: str) -> None:
 
 
 def _set(master: LssMaster, device: _Device, wish: _Wish, out: Output) -> None:
-    master.select(device.address)
+    _select(master, device)
     if wish.node_id is not None:
         master.set_node_id(wish.node_id)
     if wish.bitrate_bit_s is not None:
@@ -230,7 +243,7 @@ def _set(master: LssMaster, device: _Device, wish: _Wish, out: Output) -> None:
     if wish.node_id is not None:
         _restart(master, device.node_id, wish.node_id, out)
     if wish.bitrate_bit_s is not None:
-        _change_over(master, device.address, wish, out)
+        _change_over(master, device, wish, out)
 
 
 def _restart(master: LssMaster, old: int, new: int, out: Output) -> None:
@@ -245,7 +258,7 @@ def _restart(master: LssMaster, old: int, new: int, out: Output) -> None:
     out.say(f"node {new} is there")
 
 
-def _change_over(master: LssMaster, address: LssAddress, wish: _Wish, out: Output) -> None:
+def _change_over(master: LssMaster, device: _Device, wish: _Wish, out: Output) -> None:
     """Change the bit rate now, or say when it will change."""
     rate = f"{(wish.bitrate_bit_s or 0) // 1000} kbit/s"
     if wish.activate_delay_s is None:
@@ -254,7 +267,7 @@ def _change_over(master: LssMaster, address: LssAddress, wish: _Wish, out: Outpu
             "drive, the adapter, and bitrate_bit_s in the winch's file"
         )
         return
-    master.select(address)
+    _select(master, device)
     master.activate_bitrate(wish.activate_delay_s)
     out.say(
         f"the device falls silent, changes to {rate} after {wish.activate_delay_s:g} s and speaks "
