@@ -1,0 +1,114 @@
+"""Whole sessions with a simulated drive over a serial adapter and over socketcand."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from typing import Any
+
+import canopen
+import pytest
+
+from profiles import load_winch
+
+WINCH = "winch-mpp0923d"
+EDS = load_winch(WINCH).drive.eds
+OFF, ENABLED, FAULT = 0x40, 0x27, 0x08
+CDPR = (sys.executable, "-m", "tools.cli")
+
+
+class Lab:
+    """A simulated drive reachable three ways, and a stranger's master on the simulated bus."""
+
+    def __init__(self) -> None:
+        name = f"adapters-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+        options = ("--bus", f"simbus:{name}", "--slcan", "--socketcand", "0", "--exit-with-stdin")
+        self.process = subprocess.Popen(
+            [*CDPR, "sim", "up", WINCH, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        assert self.process.stdout is not None
+        self.ready: dict[str, Any] = json.loads(self.process.stdout.readline())["ready"]
+        self._network = canopen.Network()
+        self._network.NOTIFIER_CYCLE = 0.05
+        self._network.connect(interface="simbus", channel=name)
+        self.node = self._network.add_node(1, str(EDS))
+        self.node.sdo.RESPONSE_TIMEOUT = 1.0
+
+    def bus(self, gateway: str) -> str:
+        """Return the URL of one of the gateways, for a simulation whose time waits for SYNC."""
+        if gateway == "slcan":
+            return f"slcan:{self.ready['slcan']}?bitrate=1000000&lockstep=true"
+        return f"{self.ready['socketcand']}?lockstep=true"
+
+    def state(self) -> int:
+        return int(self.node.sdo[0x6041].raw) & 0x6F
+
+    def close(self) -> None:
+        self._network.disconnect()
+        self.process.communicate(timeout=20)
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Lab]:
+    lab = Lab()
+    yield lab
+    lab.close()
+
+
+def cdpr(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*CDPR, *words, "--json"], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+@pytest.mark.parametrize("gateway", ["slcan", "socketcand"])
+def test_a_session(lab: Lab, gateway: str) -> None:
+    """Boot, mode, power, a second of cycles in closed loop, power off."""
+    words = ("drive", "jog", WINCH, "--bus", lab.bus(gateway), "--seconds", "1")
+    result = cdpr(*words, "--speed-deg-s", "30", "--yes")
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout.splitlines()[-1])["moved_deg"] > 10.0
+    assert lab.state() == OFF
+
+
+def test_it_asks_before_a_motor_turns_that_could_be_a_real_one(lab: Lab) -> None:
+    result = cdpr("drive", "jog", WINCH, "--bus", lab.bus("slcan"))
+    assert result.returncode == 2
+    assert "--yes" in result.stderr
+
+
+@pytest.mark.parametrize("gateway", ["slcan", "socketcand"])
+def test_pulled_out_in_motion(gateway: str) -> None:
+    """One message and status 1; the drive, left alone, takes its power away by itself."""
+    lab = Lab()
+    words = ("drive", "jog", WINCH, "--bus", lab.bus(gateway), "--seconds", "300", "--yes")
+    command = subprocess.Popen(
+        [*CDPR, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 30.0
+    while lab.state() != ENABLED:
+        assert time.monotonic() < deadline
+        assert command.poll() is None
+        time.sleep(0.05)
+    time.sleep(0.3)
+    os.kill(lab.ready[f"{gateway}_pid"], signal.SIGKILL)
+    pulled_at = time.monotonic()
+    _, errors = command.communicate(timeout=20)
+    assert command.returncode == 1
+    assert time.monotonic() - pulled_at < 10.0
+    last = errors.strip().splitlines()[-1]
+    assert last.startswith("cdpr: ")
+    assert "the bus has gone away" in last
+    assert "Traceback" not in errors
+    # bus time runs by itself again after half a second, and the heartbeat is missed
+    while lab.state() == ENABLED:
+        assert time.monotonic() - pulled_at < 10.0
+        time.sleep(0.02)
+    assert lab.state() in (OFF, FAULT)
+    lab.close()
