@@ -134,11 +134,24 @@ def _prepare(
     store_configuration: bool,
 ) -> BootReport:
     """Lead one drive as far as it goes without being started."""
+    try:
+        return _lead(network, node_id, profile, want, store_configuration)
+    except BootError:
+        _refuse_twins(network, node_id)  # what explains the rest comes first
+        raise
+
+
+def _lead(
+    network: CanNetwork,
+    node_id: int,
+    profile: DriveProfile,
+    want: BootSettings,
+    store_configuration: bool,
+) -> BootReport:
     report = BootReport(node_id)
     _refuse_a_driven_node(network, node_id)
     network.reset_communication(node_id, _BOOT_UP_TIMEOUT_S)  # one that is silent may yet answer
     _check_identity(network, node_id, profile, report)
-    _refuse_twins(network, node_id)
     _configure(network, node_id, profile, want, report)
     patience_s = 5.0 * profile.heartbeat_producer_s + _QUIET_DRIVE_S
     if network.wait_for_heartbeat(node_id, patience_s) is None:

@@ -1,0 +1,111 @@
+"""Booting several nodes: optional ones, what is started when, and two devices with one id."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from dataclasses import replace
+
+import pytest
+from axis_rig import DRIVE, MASTER, SETTINGS, open_network
+from scripted_node import ScriptedNode, expedited, scripted
+
+from drivers.boot import boot, boot_all
+from drivers.errors import BootError
+
+OPTIONAL = replace(SETTINGS, mandatory=False)
+WRONG = DRIVE.model_copy(update={"product_code": 0x1234})
+
+
+def test_an_optional_node_that_is_missing_is_told_and_nothing_else(bus: str) -> None:
+    drives = {1: (DRIVE, SETTINGS), 2: (DRIVE, OPTIONAL), 9: (DRIVE, OPTIONAL)}
+    with open_network(bus, [1, 2, 9]) as network:
+        reports = boot_all(network, drives)
+        assert sorted(reports) == [1, 2]
+        assert reports[2].counts_per_turn == 8192
+        assert list(reports.missing) == [9]
+        assert reports.missing[9].letter == "B"
+        assert [network.wait_for_heartbeat(node, 2.0) for node in (1, 2)] == [5, 5]
+        assert network.alarm_text == ""
+
+
+def test_an_optional_node_that_is_another_device_is_not_started(bus: str) -> None:
+    with open_network(bus, [1, 2]) as network:
+        reports = boot_all(network, {1: (DRIVE, SETTINGS), 2: (WRONG, OPTIONAL)})
+        assert reports.missing[2].letter == "M"
+        network.write(2, 0x1017, 0, 100)
+        assert network.wait_for_heartbeat(2, 2.0) == 127
+        assert network.wait_for_heartbeat(1, 2.0) == 5
+
+
+def test_nobody_is_started_when_a_mandatory_node_fails(bus: str) -> None:
+    with open_network(bus, [1, 2]) as network:
+        with pytest.raises(BootError) as caught:
+            boot_all(network, {1: (DRIVE, SETTINGS), 2: (WRONG, SETTINGS)})
+        assert (caught.value.letter, caught.value.node_id) == ("M", 2)
+        assert network.wait_for_heartbeat(1, 2.0) == 127
+
+
+def test_a_node_booted_alone_is_mandatory(bus: str) -> None:
+    with open_network(bus, [9]) as network, pytest.raises(BootError) as caught:
+        boot(network, 9, DRIVE, OPTIONAL)
+    assert caught.value.letter == "B"
+
+
+def test_another_master_is_told_for_all_at_once(bus: str) -> None:
+    with (
+        open_network(bus, [1, 2]) as network,
+        scripted(bus, 9, lambda _request: []) as other,
+    ):
+        other.send(0x700 + MASTER, b"\x05")
+        assert network.foreign_master.wait(2.0)
+        with pytest.raises(BootError) as caught:
+            boot_all(network, {1: (DRIVE, OPTIONAL), 2: (DRIVE, OPTIONAL)})
+    assert caught.value.letter == "L"
+
+
+# -- two devices with one node id
+
+
+def test_two_answers_to_each_request_are_two_devices(bus: str) -> None:
+    """The second device has another serial number, and answers a little later."""
+
+    def answer(request: bytes) -> list[bytes]:
+        time.sleep(0.0005)
+        return [expedited(request, 0x00020192)] if request[0] == 0x40 else []
+
+    with (
+        scripted(bus, 1, answer),
+        open_network(bus, [1]) as network,
+        pytest.raises(BootError) as caught,
+    ):
+        boot(network, 1, DRIVE, SETTINGS)
+    assert caught.value.letter == "B"
+    assert "two devices have this node id" in str(caught.value)
+
+
+class _Second(ScriptedNode):
+    """A device that boots with the first one, and says nothing else."""
+
+    def boot_with(self) -> None:
+        self.bus.set_filters([{"can_id": 0, "can_mask": 0x7FF, "extended": False}])
+
+    def _serve(self) -> None:
+        self.boot_with()
+        for _ in itertools.takewhile(lambda _: not self._stop.is_set(), itertools.count()):
+            message = self.bus.recv(0.05)
+            if message is not None and message.arbitration_id == 0 and message.data[0] == 130:
+                time.sleep(0.02)
+                self.send(0x700 + self.node_id, b"\0")
+
+
+def test_two_boot_ups_after_one_reset_are_two_devices(bus: str) -> None:
+    second = _Second(bus, 1, lambda _request: [])
+    try:
+        with open_network(bus, [1]) as network, pytest.raises(BootError) as caught:
+            boot(network, 1, DRIVE, SETTINGS)
+    finally:
+        second.close()
+    assert caught.value.letter == "B"
+    assert "2 boot-up messages followed one reset" in str(caught.value)
+    assert "a node id of its own" in str(caught.value)
