@@ -25,8 +25,10 @@ class SdoRefusedError(Exception):
 class Rig:
     """Master's side of the frames of one drive: SDO, default PDOs, SYNC."""
 
-    def __init__(self, plant: Plant | None = None, truth_log: Path | None = None) -> None:
-        self.drive = SimDrive(EDS, NODE, plant or Plant(), truth_log=truth_log)
+    def __init__(
+        self, plant: Plant | None = None, truth_log: Path | None = None, eds: Path = EDS
+    ) -> None:
+        self.drive = SimDrive(eds, NODE, plant or Plant(), truth_log=truth_log)
         self.now = 0.0
         self.word = 0
         self.torque = 0

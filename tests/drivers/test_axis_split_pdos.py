@@ -1,0 +1,134 @@
+"""Drives whose commands and feedback lie in several PDOs, beside one whose fit in one each."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from axis_rig import DRIVE, PERIOD_S
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers import axis_codec as codec
+from drivers.axis_layout import AxisConfig, GroupLayout
+from drivers.axis_state import GroupState
+from drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE, State
+from drivers.errors import DriverError
+from profiles import load_drive
+
+CAN_FRAME = struct.Struct("=IB3x8s")
+SPLIT = load_drive("mnm-profile-torque")
+ENABLED = 0x27
+I16 = st.integers(-(1 << 15), (1 << 15) - 1)
+I32 = st.integers(-(1 << 31), (1 << 31) - 1)
+
+
+class Pair:
+    """Axis 0 with split PDOs (node 1), axis 1 with one PDO each way (node 2), without a bus."""
+
+    def __init__(self) -> None:
+        axes = [
+            AxisConfig(1, SPLIT, 3.0, 8192, 0x2D, 2.0),
+            AxisConfig(2, DRIVE, 3.0, 8192, 0x3AD, 2.0),
+        ]
+        self.layout = GroupLayout(axes)
+        self.state = GroupState(axes, PERIOD_S, lockstep=True)
+
+    def take(self, *frames: tuple[int, bytes]) -> int:
+        raw = b"".join(CAN_FRAME.pack(i, len(data), data) for i, data in frames)
+        array = np.frombuffer(bytearray(raw), np.uint8).reshape(-1, 16)
+        s = self.state
+        return codec.decode(
+            array, 0, len(array), self.layout.slots, self.layout.fields, STATE_TABLE,
+            s.ints, s.floats, s.words, s.flags,
+        )  # fmt: skip
+
+    def give(self) -> dict[int, bytes]:
+        s, rpdos = self.state, self.layout.rpdos
+        codec.encode(
+            rpdos.array.view(np.uint8).reshape(-1, 16), self.layout.answer, CONTROLWORD_TABLE,
+            s.ints, s.floats, s.flags,
+        )  # fmt: skip
+        frames = [CAN_FRAME.unpack(row) for row in rpdos.rows]
+        return {identifier: data[:length] for identifier, length, data in frames}
+
+    def next_cycle(self) -> None:
+        self.state.feedback.valid.fill(False)
+        self.state.ints[codec.SEEN].fill(0)
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(st.integers(0, 0xFFFF), I32, I16, st.permutations(["word", "torque", "whole"]))
+def test_an_axis_has_answered_when_all_its_pdos_are_in(
+    word: int, counts: int, torque: int, order: list[str]
+) -> None:
+    frames = {
+        "word": (0x181, struct.pack("<Hi", word, counts)),
+        "torque": (0x381, struct.pack("<hi", torque, 77)),
+        "whole": (0x182, struct.pack("<Hih", word, counts, torque)),
+    }
+    pair = Pair()
+    answered = [pair.take(frames[which]) for which in order]
+    last_of_split = max(order.index("word"), order.index("torque"))
+    assert [k for k, n in enumerate(answered) if n] == sorted([last_of_split, order.index("whole")])
+    feedback = pair.state.feedback
+    assert feedback.valid.all()
+    assert feedback.statusword.tolist() == [word, word]
+    assert feedback.position_rad[0] == feedback.position_rad[1]
+    assert feedback.torque_Nm == pytest.approx([torque * 1e-3, torque * 3e-3])
+
+
+def test_half_an_answer_is_none_and_does_not_count_in_the_next_cycle() -> None:
+    pair = Pair()
+    assert pair.take((0x381, struct.pack("<hi", 1, 0))) == 0
+    pair.next_cycle()
+    assert pair.take((0x181, struct.pack("<Hi", ENABLED, 0))) == 0
+    assert not pair.state.feedback.valid[0]
+    assert pair.take((0x381, struct.pack("<hi", 1, 0))) == 1
+
+
+def test_a_frame_shorter_than_its_map_is_no_answer() -> None:
+    pair = Pair()
+    assert pair.take((0x381, struct.pack("<h", 1)), (0x181, struct.pack("<Hh", ENABLED, 0))) == 0
+    assert pair.take((0x182, struct.pack("<Hi", ENABLED, 0))) == 0
+
+
+def test_each_axis_is_commanded_in_its_own_frames_and_units() -> None:
+    pair = Pair()
+    ints = pair.state.ints
+    ints[codec.MODE_WANTED] = ints[codec.MODE_SHOWN] = [4, 10]
+    ints[codec.TARGET] = State.OPERATION_ENABLED
+    pair.take((0x181, struct.pack("<Hi", ENABLED, 0)), (0x182, struct.pack("<Hih", ENABLED, 0, 0)))
+    pair.state.command.torque_Nm[:] = [0.123, -0.123]
+    assert pair.give() == {
+        0x201: struct.pack("<H", 0x0F),
+        0x301: struct.pack("<h", 123),
+        0x202: struct.pack("<Hh", 0x0F, -41),
+    }
+    # torque limits are those of each axis' unit as well
+    pair.state.command.torque_Nm[:] = 50.0
+    frames = pair.give()
+    assert frames[0x301] == struct.pack("<h", 2000)
+    assert frames[0x202][2:] == struct.pack("<h", 666)
+
+
+def test_one_axis_waits_for_its_own_mode_while_the_other_goes_on() -> None:
+    pair = Pair()
+    ints = pair.state.ints
+    ints[codec.MODE_WANTED] = [4, 10]
+    ints[codec.MODE_SHOWN] = [4, 4]
+    ints[codec.TARGET] = State.OPERATION_ENABLED
+    pair.take((0x181, struct.pack("<Hi", 0x23, 0)), (0x182, struct.pack("<Hih", 0x23, 0, 0)))
+    frames = pair.give()
+    assert frames[0x201] == struct.pack("<H", 0x0F)
+    assert frames[0x202][:2] == struct.pack("<H", 0x07)
+
+
+def test_feedback_that_does_not_come_at_every_sync_is_refused() -> None:
+    late = tuple(
+        p.model_copy(update={"transmission_type": 0 if p.number == 3 else 1}) for p in SPLIT.tpdos
+    )
+    drive = SPLIT.model_copy(update={"tpdos": late})
+    with pytest.raises(DriverError, match="no TPDO of transmission_type 1 holds 6077h"):
+        GroupLayout([AxisConfig(1, drive, 3.0, 8192, 0x2D, 2.0)])
