@@ -28,6 +28,7 @@ class OwnSimulator:
         plant: Path | None = None,
         truth_log: Path | None = None,
         nodes: int = 1,
+        board: Path | None = None,
     ) -> None:
         command = [sys.executable, "-m", "tools.cli", "sim", "up", winch, "--bus", bus]
         command += ["--lockstep", "--exit-with-stdin", "--nodes", str(nodes)]
@@ -35,6 +36,8 @@ class OwnSimulator:
             command += ["--plant", str(plant)]
         if truth_log is not None:
             command += ["--truth-log", str(truth_log)]
+        if board is not None:
+            command += ["--board", str(board)]
         self.bus = bus
         self.process = subprocess.Popen(
             command,
