@@ -75,6 +75,8 @@ class AxisBuses:
         self._moves = _Moves(order, self.feedback, self.command)
         if self._moves.needed:
             self.feedback, self.command = self._moves.feedback, self._moves.command
+        self.transmits = 0
+        """How often commands went out on all buses."""
         self._closed = False
 
     def _common_clock(self) -> bool:
@@ -137,6 +139,7 @@ class AxisBuses:
             self._moves.gather_sent()
         if failure is not None:
             raise failure
+        self.transmits += 1
 
     def alarm(self) -> str:
         """Return why no drive on any bus must go on being driven, or an empty text."""

@@ -1,0 +1,226 @@
+"""Hours of bus time with a whole robot in lockstep: nothing may leak and no frame be lost."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.controllers.proportional import Proportional
+from cdpr_rt.errors import ControlError
+from cdpr_rt.trajectory import Leg
+from drivers.bus.budget import answer_pdos, command_pdos
+from drivers.errors import DriverError
+from profiles import Robot
+from tools.errors import WorkFailedError
+from tools.output import Output
+from tools.robot_session import RobotSession, open_robot
+
+MEMORY_LIMIT_KiB = 2048
+"""What each process may gain after it has warmed up: the allocator's own coming and going."""
+_HOUR_S = 3600.0
+_LEG_S, _RAMP_S = 60.0, 0.5
+_WARM_UP_CYCLES = 12_000  # until every row of the recorder's ring has been written once
+_SPEED_RAD_S = 1.0
+_TORQUE_SHARE = 0.5
+# of the loop's own frequency over the delay of one and a half cycles, in rad
+_PHASE = 0.25
+
+
+@dataclass(frozen=True)
+class Process:
+    """What one process holds at one moment."""
+
+    resident_KiB: int
+    open_files: int
+
+    @classmethod
+    def of(cls, pid: int) -> Process:
+        """Look at a process of this machine."""
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+        page_KiB = os.sysconf("SC_PAGE_SIZE") // 1024
+        return cls(pages * page_KiB, sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir()))
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Frames as one bus counts them, and as they follow from what the master has done."""
+
+    cycles: int
+    transmits: int
+    missed: int
+    bus_time_s: float
+    bus: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, session: RobotSession, name: str, status: Mapping[str, Any]) -> Counts:
+        """Take the counts of the robot's bus `name`."""
+        device = session.device
+        group = device.groups[[bus.name for bus in device.buses].index(name)]
+        return cls(
+            group.feedback.cycle, device.transmits, group.missed, status["bus_time_s"], status
+        )
+
+
+@dataclass(frozen=True)
+class BusVerdict:
+    """How a bus fared between two counts."""
+
+    bus: str
+    syncs_lost: int
+    answers_missed: int
+    dropped: int
+    malformed: int
+    frames_expected: int
+    frames_counted: int
+    tolerance: int
+    """Heartbeats whose moment lies just inside or outside."""
+
+    @property
+    def lost(self) -> int:
+        """Frames that one side has sent and the other has not seen."""
+        gap = max(0, self.frames_expected - self.frames_counted - self.tolerance)
+        return abs(self.syncs_lost) + self.answers_missed + self.dropped + self.malformed + gap
+
+
+def compare(name: str, session: RobotSession, before: Counts, after: Counts) -> BusVerdict:
+    """Hold what the master has done on a bus against what the bus has counted."""
+    device = session.device
+    here = next(bus for bus in device.buses if bus.name == name)
+    cycles, transmits = after.cycles - before.cycles, after.transmits - before.transmits
+    missed = after.missed - before.missed
+    elapsed_s = after.bus_time_s - before.bus_time_s
+    frames = cycles - missed + cycles / max(1, round(here.heartbeat_s / device.period_s))
+    for drive in (axis.drive for axis in here.axes):
+        frames += transmits * len(command_pdos(drive))
+        frames += sum(cycles / pdo.transmission_type for pdo in answer_pdos(drive))
+        frames += elapsed_s / drive.heartbeat_producer_s
+    return BusVerdict(
+        bus=name,
+        syncs_lost=cycles - (after.bus["sync_count"] - before.bus["sync_count"]),
+        answers_missed=missed,
+        dropped=after.bus["dropped"] - before.bus["dropped"],
+        malformed=after.bus["malformed"] - before.bus["malformed"],
+        frames_expected=round(frames),
+        frames_counted=after.bus["frames"] - before.bus["frames"],
+        tolerance=2 * (len(here.axes) + 1),
+    )
+
+
+def growth(samples: Sequence[Process]) -> Process:
+    """Return what a process has gained: the least of its later half over its first sample."""
+    later = samples[len(samples) // 2 :]
+    return Process(
+        min(sample.resident_KiB for sample in later) - samples[0].resident_KiB,
+        min(sample.open_files for sample in later) - samples[0].open_files,
+    )
+
+
+class Soak:
+    """Runs an enabled robot to and fro for hours, and looks at both processes as it goes."""
+
+    def __init__(self, session: RobotSession) -> None:
+        self.session = session
+        pids = {"master": os.getpid()}
+        if session.simulator_pid is not None:
+            pids["simulator"] = session.simulator_pid
+        self._pids = pids
+        self.samples: dict[str, list[Process]] = {name: [] for name in pids}
+        device = session.device
+        motors = [axis.winch.motor for axis in session.axes]
+        frequency = _PHASE / (1.5 * device.period_s)
+        gain = frequency**2 * np.array([motor.rotor_inertia_kg_m2 for motor in motors])
+        limit = _TORQUE_SHARE * np.array([motor.rated_torque_Nm for motor in motors])
+        self._controller = Proportional(gain, limit)
+        self._speed = _SPEED_RAD_S * np.where(np.arange(device.n) % 2, -1.0, 1.0)
+        self.bus_s = self.wall_s = 0.0
+        self._before = self._counts()
+
+    def _counts(self) -> dict[str, Counts]:
+        status = self.session.bus_status()
+        return {name: Counts.of(self.session, name, told) for name, told in status.items()}
+
+    def run(self, seconds: float, advance: Callable[[float], None]) -> None:
+        """Move for `seconds` of bus time; raises WorkFailedError when the motion ends early."""
+        self._before = self._counts()
+        self._sample()
+        begin, cycle = time.monotonic(), self.session.device.feedback.cycle
+        period_s = self.session.device.period_s
+        try:
+            while self.bus_s < seconds - period_s:
+                self._leg(min(_LEG_S, seconds - self.bus_s))
+                self.bus_s = (self.session.device.feedback.cycle - cycle) * period_s
+                self.wall_s = time.monotonic() - begin
+                advance(self.bus_s)
+                self._sample()
+        except (ControlError, DriverError) as error:
+            hours = (self.session.device.feedback.cycle - cycle) * period_s / _HOUR_S
+            raise WorkFailedError(f"after {hours:.4f} h of bus time: {error}") from error
+
+    def _leg(self, seconds: float) -> None:
+        start = self.session.device.feedback.position_rad.copy()
+        cruise_s = max(0.0, seconds - 2.0 * _RAMP_S)
+        self.session.executive.run(self._controller, Leg(start, self._speed, cruise_s, _RAMP_S))
+        self._speed = -self._speed
+
+    def _sample(self) -> None:
+        for name, pid in self._pids.items():
+            self.samples[name].append(Process.of(pid))
+
+    def figures(self) -> dict[str, Any]:
+        """Return what was measured, and whether all is well."""
+        after = self._counts()
+        buses = [
+            compare(name, self.session, before, after[name])
+            for name, before in self._before.items()
+        ]
+        grown = {name: growth(samples) for name, samples in self.samples.items()}
+        cycles = round(self.bus_s / self.session.device.period_s)
+        lost = sum(verdict.lost for verdict in buses)
+        leaks = [
+            name
+            for name, gain in grown.items()
+            if gain.resident_KiB > MEMORY_LIMIT_KiB or gain.open_files > 0
+        ]
+        return {
+            "bus_hours": self.bus_s / _HOUR_S,
+            "wall_s": round(self.wall_s, 1),
+            "cycles": cycles,
+            "us_per_cycle": round(1e6 * self.wall_s / max(1, cycles), 1),
+            "bus_hours_in_10_minutes": round(self.bus_s / max(self.wall_s, 1e-9) / 6.0, 2),
+            "wall_hours_for_24_bus_hours": round(24.0 * self.wall_s / max(self.bus_s, 1e-9), 2),
+            "memory_growth_KiB": {name: gain.resident_KiB for name, gain in grown.items()},
+            "open_files_growth": {name: gain.open_files for name, gain in grown.items()},
+            "resident_KiB": {name: s[-1].resident_KiB for name, s in self.samples.items()},
+            "buses": {verdict.bus: asdict(verdict) | {"lost": verdict.lost} for verdict in buses},
+            "missed_answers": sum(verdict.answers_missed for verdict in buses),
+            "lost_frames": lost,
+            "leaks": leaks,
+            "ok": not lost and not leaks,
+        }
+
+
+def measure(robot: Robot, hours: float, rate_Hz: float | None, out: Output) -> dict[str, Any]:
+    """Run `robot` on a simulator of its own for `hours` of bus time; return the figures.
+
+    `rate_Hz` is another rate of cycles than the robot's: a lower one lets more bus time pass for
+    the same frames. Raises WorkFailedError when the motion ends early.
+    """
+    if rate_Hz is not None:
+        robot = replace(robot, sync_period_s=1.0 / rate_Hz)
+    seconds = hours * _HOUR_S
+    with open_robot(robot, ["simbus:"], out, torque_share=_TORQUE_SHARE) as session:
+        session.set_torque_mode()
+        session.enable()
+        Soak(session).run(_WARM_UP_CYCLES * robot.sync_period_s, lambda _: None)
+        soak = Soak(session)
+        with out.progress(f"{hours:g} h of bus time", seconds) as advance:
+            soak.run(seconds, advance)
+        figures = soak.figures()
+        session.disable()
+    return {"robot": robot.reference, "rate_Hz": 1.0 / robot.sync_period_s, **figures}
