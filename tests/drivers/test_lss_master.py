@@ -213,12 +213,15 @@ def sluggish_device(name: str, serial: int, delay_s: float) -> Iterator[None]:
         thread.join()
 
 
-def test_answers_that_run_into_the_next_question_are_no_bits() -> None:
-    """A quick device and a slow one: the slow one's answer comes after the quick one's settled."""
+def test_answers_that_run_into_the_next_question_are_no_bits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A quick device and a slow one, whose answer comes when the next question is out."""
+    monkeypatch.setattr("drivers.lss._SETTLE_S", 0.001)
     with ExitStack() as stack:
         name = stack.enter_context(bus_with(device(0x7FFFFFFF)))
-        stack.enter_context(sluggish_device(name, 0x55555555, 0.007))
-        master = stack.enter_context(LssMaster(BusUrl.parse(f"simbus:{name}"), 0.03))
+        stack.enter_context(sluggish_device(name, 0x55555555, 0.002))
+        master = stack.enter_context(LssMaster(BusUrl.parse(f"simbus:{name}"), 0.02))
         assert master.unconfigured() == [address(0x55555555), address(0x7FFFFFFF)]
 
 
