@@ -13,7 +13,7 @@ from drivers import axis_codec as codec
 from drivers.axis_alarms import alarm_text
 from drivers.axis_layout import AxisConfig, GroupLayout
 from drivers.axis_state import GroupState, StateArrays
-from drivers.bus import BusUrl, FrameBuffer, FramePort, open_port
+from drivers.bus import BusUrl, FrameBuffer, open_port
 from drivers.bus.packed import FRAME
 from drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE
 from drivers.network import CanNetwork

@@ -69,8 +69,7 @@ def test_segments_lost_from_a_block_are_sent_again(network: CanNetwork, bus: str
         if kind == 2:
             acknowledged.append(request[1])
             if len(acknowledged) == 1:
-                left = [bytes([k + 1 | s[0] & 0x80]) + s[1:] for k, s in enumerate(segments[4:])]
-                return left
+                return [bytes([k + 1 | s[0] & 0x80]) + s[1:] for k, s in enumerate(segments[4:])]
             return [b"\xc1"]
         return []
 
@@ -95,9 +94,11 @@ def test_segments_lost_from_a_block_are_sent_again(network: CanNetwork, bus: str
 def test_abort_codes_are_told_in_words_and_as_a_number(
     network: CanNetwork, bus: str, code: int, words: str
 ) -> None:
-    with scripted(bus, SCRIPTED, lambda request: [abort(request, code)]):
-        with pytest.raises(SdoAbortError) as caught:
-            network.read_int(SCRIPTED, 0x1000)
+    with (
+        scripted(bus, SCRIPTED, lambda request: [abort(request, code)]),
+        pytest.raises(SdoAbortError) as caught,
+    ):
+        network.read_int(SCRIPTED, 0x1000)
     assert caught.value.code == code
     assert f"node {SCRIPTED}: object 1000h:0 cannot be read: " in str(caught.value)
     assert words in str(caught.value)
@@ -105,13 +106,51 @@ def test_abort_codes_are_told_in_words_and_as_a_number(
 
 
 def test_every_code_of_the_standard_has_words_of_its_own() -> None:
-    codes = (
-        "05030000 05040000 05040001 05040002 05040003 05040004 05040005 06010000 06010001 06010002 "
-        "06020000 06040041 06040042 06040043 06040047 06060000 06070010 06070012 06070013 06090011 "
-        "06090030 06090031 06090032 06090036 060A0023 08000000 08000020 08000021 08000022 08000023 "
-        "08000024"
-    ).split()  # CiA 301, table of SDO abort codes
-    texts = {abort_text(int(code, 16)) for code in codes}
+    # CiA 301, table of SDO abort codes
+    codes = [
+        *(
+            0x05030000,
+            0x05040000,
+            0x05040001,
+            0x05040002,
+            0x05040003,
+            0x05040004,
+        ),
+        *(
+            0x05040005,
+            0x06010000,
+            0x06010001,
+            0x06010002,
+            0x06020000,
+            0x06040041,
+        ),
+        *(
+            0x06040042,
+            0x06040043,
+            0x06040047,
+            0x06060000,
+            0x06070010,
+            0x06070012,
+        ),
+        *(
+            0x06070013,
+            0x06090011,
+            0x06090030,
+            0x06090031,
+            0x06090032,
+            0x06090036,
+        ),
+        *(
+            0x060A0023,
+            0x08000000,
+            0x08000020,
+            0x08000021,
+            0x08000022,
+            0x08000023,
+        ),
+        *(0x08000024,),
+    ]
+    texts = {abort_text(code) for code in codes}
     assert len(texts) == len(codes) == 31
     assert not any("no standard" in text for text in texts)
 
