@@ -53,7 +53,7 @@ class BusHealth:
         self.tx_full = 0
         """Times the transmit queue had no room for a frame."""
         self.rx_lost = 0
-        """Times the controller or adapter told that it lost received frames."""
+        """Received frames that were lost; one for each report where nobody knows how many."""
         self.bus_offs = 0
         """Times the controller went bus-off."""
         self.restarts = 0
@@ -125,7 +125,7 @@ class BusHealth:
         self.tx_full += 1
         self.text = f"{self.state}: transmit queue full"
 
-    def note_rx_lost(self, reason: str) -> None:
-        """Count one report that received frames were lost."""
-        self.rx_lost += 1
+    def note_rx_lost(self, reason: str, count: int = 1) -> None:
+        """Count received frames that were lost."""
+        self.rx_lost += count
         self.text = f"{self.state}: {reason}"

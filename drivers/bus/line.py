@@ -11,6 +11,7 @@ import contextlib
 import errno
 import os
 import socket
+import struct
 import threading
 from collections.abc import Callable
 from typing import Protocol
@@ -18,13 +19,16 @@ from typing import Protocol
 import can
 
 from drivers.bus.health import BusHealth
-from drivers.bus.packed import BUFFER_BYTES, ERR_FLAG, FRAME, FRAME_BYTES, Bytes, PackedPort
+from drivers.bus.packed import BUFFER_BYTES, ERR_FLAG, FRAME_BYTES, Bytes, PackedPort
 from drivers.bus.packet_bus import PacketBus, pair_of
 from drivers.bus.simbus_socket import Filters
 from drivers.bus.url import BusUrl, Option
 from drivers.errors import BusError
 
 _MOST_ROUTES = 4096
+_BATCH = 256
+"""Frames handed on at once: 4096 bytes go through a local socket whole or not at all."""
+_CAN_ID = struct.Struct("=I")
 
 
 class Line(Protocol):
@@ -47,7 +51,7 @@ class _Member:
     """One who takes part: the socket that leads to it, and what it wants to hear."""
 
     def __init__(self, filters: Filters | None, health: BusHealth, *, hears_errors: bool) -> None:
-        self.sock, self.own_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.sock, self.own_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
         self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
         self.sock.setblocking(False)
         self.filters = None if filters is None else list(filters)
@@ -114,30 +118,37 @@ class SharedLine:
             raise OSError(errno.EBADF, "the port is closed")
         self._line.write(frame)
         if len(self._members) > 1:
-            self._hand_out(bytes(frame), source)
+            self._hand_out([bytes(frame)], source)
 
     def _run(self) -> None:
         try:
             while not self._stopping:
-                for frame in self._line.read(self._wake):
-                    self._hand_out(frame, None)
+                frames = self._line.read(self._wake)
+                for start in range(0, len(frames), _BATCH):
+                    self._hand_out(frames[start : start + _BATCH], None)
         except Exception as error:
             # whatever a vendor's driver raises: there is nothing to hear any more
             self._end(str(getattr(error, "strerror", None) or error))
 
-    def _hand_out(self, frame: bytes, source: _Member | None) -> None:
-        can_id = FRAME.unpack_from(frame)[0]
-        members = self._routes.get(can_id)
-        if members is None:
-            members = self._route(can_id)
-        for member in members:
-            if member is not source:
-                try:
-                    member.sock.send(frame)
-                except BlockingIOError:
-                    member.health.note_rx_lost("frames came faster than they were read")
-                except OSError:
-                    continue  # it is about to leave
+    def _hand_out(self, frames: list[bytes], source: _Member | None) -> None:
+        """Give each member what it wants in one piece, which goes whole or not at all."""
+        batches: dict[_Member, list[bytes]] = {}
+        routes = self._routes
+        for frame in frames:
+            can_id = _CAN_ID.unpack_from(frame)[0]
+            members = routes.get(can_id)
+            for member in self._route(can_id) if members is None else members:
+                if member in batches:
+                    batches[member].append(frame)
+                elif member is not source:
+                    batches[member] = [frame]
+        for member, batch in batches.items():
+            try:
+                member.sock.send(b"".join(batch))
+            except BlockingIOError:
+                member.health.note_rx_lost("frames came faster than they were read", len(batch))
+            except OSError:
+                continue  # it is about to leave
 
     def _route(self, can_id: int) -> tuple[_Member, ...]:
         with self._lock:
@@ -238,6 +249,8 @@ class LinePort(PackedPort):
 
 class LineBus(PacketBus):
     """A python-can bus on a shared line."""
+
+    _RECV_BYTES = FRAME_BYTES
 
     def __init__(
         self,

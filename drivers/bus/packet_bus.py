@@ -13,7 +13,6 @@ from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, FRAME_BYTES, RTR_FLAG
 
 _EFF_MASK = 0x1FFFFFFF
 _SFF_MASK = 0x7FF
-_PACKET_BYTES = 4096
 
 
 def message_of(packet: bytes | memoryview, channel: str | None = None) -> can.Message:
@@ -56,6 +55,8 @@ def pair_of(entry: can.typechecking.CanFilter) -> tuple[int, int]:
 class PacketBus(can.BusABC):
     """What the buses on such a socket have in common; a subclass says how frames go out."""
 
+    _RECV_BYTES = 4096
+
     def __init__(
         self,
         channel: str,
@@ -78,7 +79,7 @@ class PacketBus(can.BusABC):
         if not self._readable.poll(limit_ms):
             return None, False
         try:
-            packet = self._sock.recv(_PACKET_BYTES)
+            packet = self._sock.recv(self._RECV_BYTES)
         except BlockingIOError:
             return None, False
         except OSError as error:

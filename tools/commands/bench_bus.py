@@ -1,0 +1,66 @@
+"""`cdpr bench bus`: frames per second and cost per frame on each kind of bus."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from tools.output import Output
+
+_ORDER = ("simbus", "socketcan", "socketcand", "slcan")
+
+
+def add(parent: typer.Typer) -> None:
+    """Add the command."""
+    parent.command("bus")(bus)
+
+
+def bus(
+    exchanges: Annotated[
+        int, typer.Option(min=1, help="So many times 8 frames out and 8 in, of each way.")
+    ] = 500,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON line.")] = False,
+) -> None:
+    """Measure frames per second and host cost per frame, beside plain python-can.
+
+    On simbus, on SocketCAN (vcan0, where there is one), through socketcand and through a serial
+    adapter, each with a node in a process of its own that answers every frame.
+    """
+    from tools.bench import bus as bus_bench  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    figures = bus_bench.measure(exchanges, out)
+    for line in _table(figures):
+        out.say(line)
+    out.result({"ok": True, **figures})
+
+
+def _table(figures: dict[str, Any]) -> list[str]:
+    lines = [
+        f"{figures['frames_per_exchange']} frames of 8 bytes an exchange, half of them answers; "
+        f"{figures['exchanges']} exchanges of each way",
+        f"{'':24}{'':>10}{'host CPU us a frame':>20}{'wall us a frame':>20}{'python-can':>14}",
+        f"{'':24}{'frames/s':>10}" + f"{'p50':>10}{'p99.9':>10}" * 2 + f"{'/ ours':>14}",
+    ]
+    for name in _ORDER:
+        told = figures["buses"][name]
+        if "missing" in told:
+            lines.append(f"{name}: not measured: {told['missing']}")
+            continue
+        for way in ("ours", "python-can"):
+            one = told[way]
+            numbers = "".join(
+                f"{one[key][p]:10.1f}"
+                for key in ("cpu_us_per_frame", "wall_us_per_frame")
+                for p in ("p50", "p99.9")
+            )
+            ratio = f"{told['python_can_over_ours']:14.2f}" if way == "ours" else ""
+            lines.append(f"{name + ' ' + way:24}{one['frames_per_s']:10}{numbers}{ratio}")
+        if "delivery_us" in told:
+            late = told["delivery_us"]
+            lines.append(
+                f"{'':24}from the kernel's time stamp to the program: "
+                f"p50 {late['p50']:.1f} us, p99.9 {late['p99.9']:.1f} us"
+            )
+    return lines
