@@ -18,6 +18,8 @@ from tools.bench import soak as soak_bench
 from tools.bench.soak import Process, Soak, growth
 from tools.robot_session import RobotSession, open_robot
 
+SHORT = ("--hours", "0.05", "--rate", "250")
+
 
 def test_minutes_of_bus_time_leak_nothing_and_lose_nothing():
     """Eight drives, three minutes: the command itself, as for 24 hours."""
