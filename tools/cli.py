@@ -23,7 +23,19 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-_COMMANDS = ("bench", "bus", "cogging", "commission", "doctor", "drive", "io", "profiles", "sim")
+_COMMANDS = (
+    "bench",
+    "bus",
+    "cogging",
+    "commission",
+    "doctor",
+    "drive",
+    "io",
+    "profiles",
+    "rail",
+    "sim",
+    "tension",
+)
 _INTERRUPTED = 130
 
 

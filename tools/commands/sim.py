@@ -20,7 +20,7 @@ from sim_bus.drive import SimDrive
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
-from tools.commands import sim_robot, sim_safety_io, sim_tension
+from tools.commands import sim_rail, sim_robot, sim_safety_io, sim_tension
 from tools.errors import BadInputError
 
 app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
@@ -30,6 +30,7 @@ def register(parent: typer.Typer) -> None:
     """Add the command group."""
     parent.add_typer(app, name="sim")
     sim_safety_io.add(app)
+    sim_rail.add(app)
     sim_tension.add(app)
 
 

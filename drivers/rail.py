@@ -1,0 +1,174 @@
+"""Moving a rail: cables slack, brake tried, the robot's calibration void, braked at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from cdpr_rt.calibration_state import mark_not_calibrated
+from drivers.errors import DriverError
+from profiles.rail import RailProfile
+
+_LOOK_S: Final = 0.01
+_SETTLE_S: Final = 0.3
+_SPARE_S: Final = 3.0
+"""What a move may take beyond twice its nominal time."""
+
+
+class RailError(DriverError):
+    """A rail was not moved, or not to its end; says why."""
+
+
+class RailStoppedError(RailError):
+    """The operator asked for a stop; the rail was stopped and braked."""
+
+
+class RailAxis(Protocol):
+    """One position axis with a holding brake; methods raise DriverError."""
+
+    def check(self) -> None:
+        """Raise when the axis has a fault, or whoever watches it does not answer."""
+
+    def position_m(self) -> float:
+        """Return where the carriage is."""
+
+    def enable(self) -> None:
+        """Switch the power stage on, standing still."""
+
+    def disable(self) -> None:
+        """Take the power away."""
+
+    def push(self, share: float) -> bool:
+        """Push with a share of the rated torque, 0 to end; return False where it cannot."""
+
+    def start(self, target_m: float) -> None:
+        """Begin to move to a position; the axis is enabled."""
+
+    def arrived(self) -> bool:
+        """Return whether the move has come to its end."""
+
+    def halt(self) -> None:
+        """Stop on the drive's ramp and wait until it stands still."""
+
+    def set_brake(self, released: bool) -> None:
+        """Release or apply the brake, and wait for its feedback."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """What a move did."""
+
+    from_m: float
+    to_m: float
+    brake_moved_m: float | None
+    """How far the applied brake let the carriage be pushed; None where the drive cannot push."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What is asked before a move and all along it."""
+
+    tight: Callable[[], str]
+    """Why the cables do not count as slack, or an empty text."""
+    stop_requested: Callable[[], bool]
+    progress: Callable[[float], None]
+    """Told the position in m."""
+
+
+def move(rail: RailProfile, axis: RailAxis, target_m: float, ask: Conditions) -> Move:
+    """Move the rail to `target_m`; however it ends, the axis is braked and without power.
+
+    The robot is written down as not calibrated before the carriage moves. Raises RailError for
+    cables that are tight, a brake that does not hold, a target beyond the travel or a move that
+    does not arrive, RailStoppedError on request, StateFileError and what the axis raises.
+    """
+    if not rail.travel_min_m <= target_m <= rail.travel_max_m:
+        raise RailError(
+            f"{rail.name}: target {target_m:g} m; allowed: {rail.travel_min_m:g} to "
+            f"{rail.travel_max_m:g} m"
+        )
+    _refuse_tight(rail, ask)
+    axis.check()
+    start_m = axis.position_m()
+    try:
+        axis.set_brake(False)
+        pushed_m = _try_brake(rail, axis)
+        mark_not_calibrated(rail.robot, f"{rail.name} was moved from {start_m:.4f} m")
+        axis.enable()
+        axis.set_brake(True)
+        try:
+            axis.start(target_m)
+            _follow(rail, axis, abs(target_m - start_m), ask)
+        except BaseException:
+            with contextlib.suppress(DriverError):
+                axis.halt()
+            raise
+    finally:
+        _hold(axis)
+    end_m = axis.position_m()
+    if abs(end_m - target_m) > rail.tolerance_m:
+        raise RailError(
+            f"{rail.name}: stands at {end_m:.4f} m after it was braked, {target_m:.4f} m was "
+            f"wanted ({rail.tolerance_m:g} m allowed): does the brake hold?"
+        )
+    return Move(start_m, end_m, pushed_m)
+
+
+def _refuse_tight(rail: RailProfile, ask: Conditions) -> None:
+    tight = ask.tight()
+    if tight:
+        raise RailError(f"{rail.name}: not moved unless the cables are slack: {tight}")
+
+
+def _try_brake(rail: RailProfile, axis: RailAxis) -> float | None:
+    """Push against the applied brake, both ways; return the movement, None where none can push."""
+    check = rail.brake_check
+    before, moved = axis.position_m(), 0.0
+    for way in (1.0, -1.0):
+        if not axis.push(way * check.torque_percent / 100.0):
+            return None
+        deadline = time.monotonic() + check.seconds
+        while time.monotonic() < deadline:
+            moved = max(moved, abs(axis.position_m() - before))
+            if moved > check.allowed_m:
+                break
+            time.sleep(_LOOK_S)
+    axis.push(0.0)
+    if moved > check.allowed_m:
+        raise RailError(
+            f"{rail.name}: the applied brake does not hold: pushed with {check.torque_percent:g} % "
+            f"of the rated torque the carriage moved {moved * 1e3:.2f} mm "
+            f"({check.allowed_m * 1e3:g} mm allowed)"
+        )
+    return moved
+
+
+def _follow(rail: RailProfile, axis: RailAxis, distance_m: float, ask: Conditions) -> None:
+    nominal_s = distance_m / rail.speed_m_s + rail.speed_m_s / rail.acceleration_m_s2
+    allowed_s = 2.0 * nominal_s + _SPARE_S
+    began = time.monotonic()
+    while not axis.arrived():
+        axis.check()
+        ask.progress(axis.position_m())
+        if ask.stop_requested():
+            raise RailStoppedError(
+                f"{rail.name}: stopped on request; the robot is not calibrated any more"
+            )
+        tight = ask.tight()
+        if tight:
+            raise RailError(f"{rail.name}: stopped, for the cables are not slack any more: {tight}")
+        if time.monotonic() - began > allowed_s:
+            raise RailError(f"{rail.name}: did not arrive within {allowed_s:.1f} s")
+        time.sleep(_LOOK_S)
+
+
+def _hold(axis: RailAxis) -> None:
+    """Apply the brake before the drive lets go; the power goes even if the brake does not."""
+    try:
+        axis.set_brake(False)
+    finally:
+        axis.disable()
+    time.sleep(_SETTLE_S)  # a brake that slips does so now

@@ -1,0 +1,103 @@
+"""`cdpr rail`: where a rail is, and moving it; after a move the robot is not calibrated."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Annotated
+
+import typer
+
+from cdpr_rt.calibration_state import calibration_state
+from drivers.rail import Conditions, move
+from profiles.rail import load_rail
+from tools.commands.options import JsonOption, SafetyIoOption, YesOption
+from tools.consent import require_consent
+from tools.errors import BadInputError
+from tools.output import Output
+from tools.rail_session import open_rail, position_of, slack_watch
+from tools.signals import stop_on_signals
+
+app = typer.Typer(help="The rails on which winches stand.", no_args_is_help=True)
+
+_RailArgument = Annotated[
+    str, typer.Argument(help="Rail profile: a name or the path of a file.", metavar="RAIL")
+]
+_BusOption = Annotated[
+    str | None,
+    typer.Option("--bus", help="CAN bus of a rail on CiA 402: simbus:NAME, socketcan:can0, ..."),
+]
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the command group."""
+    parent.add_typer(app, name="rail")
+
+
+@app.command()
+def show(rail: _RailArgument, bus: _BusOption = None, as_json: JsonOption = False) -> None:
+    """Say where the carriage is and whether the robot is calibrated; moves nothing."""
+    out = Output(as_json)
+    profile = load_rail(rail)
+    position = position_of(rail, profile, bus)
+    state = calibration_state(profile.robot)
+    out.say(f"{profile.name}: {position:.4f} m")
+    known = "calibrated" if state.calibrated else "NOT calibrated"
+    since = f" since {state.date}" if state.date else ""
+    out.say(f"robot {state.robot}: {known}{since}: {state.why}")
+    told = dataclasses.asdict(state)
+    out.result({"ok": True, "position_m": position, "calibration": told})
+
+
+@app.command("move")
+def move_(
+    rail: _RailArgument,
+    to_m: Annotated[float, typer.Option("--to", help="Where to, in m.", metavar="M")],
+    bus: _BusOption = None,
+    safety_io: SafetyIoOption = None,
+    tension: Annotated[
+        str | None,
+        typer.Option(help="Tension sensors that tell whether the cables are slack."),
+    ] = None,
+    tension_port: Annotated[
+        str | None, typer.Option(help="Serial line of the tension sensors.", metavar="TTY")
+    ] = None,
+    cables_slack_checked: Annotated[
+        bool,
+        typer.Option("--cables-slack-checked", help="You have looked: all cables hang slack."),
+    ] = False,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Move a rail, with cables slack and its brake tried; the robot is not calibrated then."""
+    out = Output(as_json)
+    profile = load_rail(rail)
+    if not profile.travel_min_m <= to_m <= profile.travel_max_m:
+        raise BadInputError(
+            f"--to {to_m:g}: allowed are {profile.travel_min_m:g} to {profile.travel_max_m:g} m"
+        )
+    if bus is None or not bus.startswith("simbus:"):
+        question = f"{profile.name} moves to {to_m:g} m; robot {profile.robot} must be calibrated"
+        require_consent(f"{question} again.", yes)
+    with (
+        stop_on_signals() as stop_requested,
+        slack_watch(profile, tension, tension_port, cables_slack_checked) as tight,
+        open_rail(rail, profile, bus, safety_io, out) as axis,
+    ):
+        travel_s = abs(to_m - axis.position_m()) / profile.speed_m_s
+        begun = axis.position_m()
+        with out.progress(f"moving {profile.name}", travel_s) as advance:
+            done = move(
+                profile,
+                axis,
+                to_m,
+                Conditions(
+                    tight,
+                    stop_requested,
+                    lambda here: advance(abs(here - begun) / profile.speed_m_s),
+                ),
+            )
+    out.say(f"{profile.name}: from {done.from_m:.4f} m to {done.to_m:.4f} m, braked")
+    if done.brake_moved_m is None:
+        out.say("the brake could not be tried: this drive cannot push")
+    out.say(f"robot {profile.robot} is not calibrated any more")
+    out.result({"ok": True, **dataclasses.asdict(done), "robot": profile.robot})

@@ -1,0 +1,75 @@
+"""`cdpr sim rail`: a simulated rail, on a CAN bus or as a Modbus TCP server."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from profiles.rail import RailProfile, load_rail, load_rail_drive
+from sim_bus.clock import ClockMode
+from sim_bus.drive import SimDrive
+from sim_bus.modbus_tcp_server import serve_units
+from sim_bus.physics_board import PhysicsBoard
+from sim_bus.plant import Plant
+from sim_bus.rail_twin import RailTwin
+from sim_bus.server import serve
+from tools.errors import BadInputError
+
+
+def add(app: typer.Typer) -> None:
+    """Add the command to the group `sim`."""
+    app.command("rail")(rail)
+
+
+def rail(
+    rail_name: Annotated[
+        str, typer.Argument(help="Rail profile: a name or a file.", metavar="RAIL")
+    ],
+    bus: Annotated[
+        str | None, typer.Option(help="For CiA 402: simbus:NAME, opened here, or socketcan:IFACE.")
+    ] = None,
+    board: Annotated[
+        Path | None, typer.Option(help="For CiA 402: make this physics board, for its brake.")
+    ] = None,
+    plant: Annotated[
+        Path | None, typer.Option(help="For CiA 402: the truth about motor and drive.")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="For Modbus: port of 127.0.0.1; 0: any.")
+    ] = None,
+    exit_with_stdin: Annotated[
+        bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
+    ] = False,
+) -> None:
+    """Run a simulated rail until Ctrl-C; tells on standard output when it is up."""
+    profile = load_rail(rail_name)
+    if profile.modbus is not None:
+        twin = RailTwin(profile)
+        told = {"unit": profile.modbus.unit, "panel_unit": twin.panel.unit}
+        where = profile.modbus.port if port is None else port
+        serve_units(twin.units(), twin.line, twin.step, where, told, exit_with_stdin)
+        return
+    if bus is None:
+        raise BadInputError(f"--bus: {profile.name} is on a CAN bus; name it")
+    _serve_drive(rail_name, profile, bus, board, plant, exit_with_stdin)
+
+
+def _serve_drive(
+    name: str,
+    rail: RailProfile,
+    bus: str,
+    board: Path | None,
+    plant: Path | None,
+    exit_with_stdin: bool,
+) -> None:
+    assert rail.cia402 is not None  # its kind says so
+    truth = Plant() if plant is None else Plant.load_file(plant)
+    drive = SimDrive(load_rail_drive(name, rail.cia402).eds, rail.cia402.node_id, truth)
+    with ExitStack() as stack:
+        stack.callback(drive.close)
+        if board is not None:
+            drive.connect(stack.enter_context(PhysicsBoard.create(board, 1)).axis(0))
+        serve([drive], bus, mode=ClockMode.PACED, until_stdin_ends=exit_with_stdin)

@@ -1,0 +1,139 @@
+"""A rail opened for a command: its drive on CAN or Modbus, its brake, its cables' tensions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+import canopen
+
+from drivers.boot import BootSettings, boot
+from drivers.bus import BusUrl
+from drivers.errors import BusError
+from drivers.modbus.rail import ModbusRailAxis
+from drivers.modbus.tension import TensionSampler
+from drivers.network import CanNetwork
+from drivers.rail import RailAxis
+from drivers.rail_cia402 import Cia402RailAxis
+from profiles import DriveProfile
+from profiles.rail import Cia402Rail, RailProfile, load_rail_drive
+from profiles.tension_sensor import load_tension_sensors
+from tools.errors import BadInputError
+from tools.output import Output
+from tools.safety import open_safety
+from tools.session import open_bus
+
+# nothing is exchanged with SYNC; the drive only has to be told some period
+_SYNC_PERIOD_S = 0.01
+_FIRST_READINGS_S = 3.0
+
+
+@contextmanager
+def open_rail(
+    reference: str, rail: RailProfile, bus: str | None, safety_io: str | None, out: Output
+) -> Iterator[RailAxis]:
+    """Get a rail ready to move; however the block ends, its drive has no power afterwards.
+
+    Raises BadInputError for what the rail's kind needs and was not given, and the drivers' errors.
+    """
+    with ExitStack() as stack:
+        if rail.cia402 is None:
+            axis = ModbusRailAxis(rail)
+            stack.callback(axis.close)
+            axis.open()
+            yield axis
+            return
+        url = _bus_of(rail, bus)
+        if safety_io is None:
+            raise BadInputError(
+                f"--safety-io: {rail.name} needs the one that has its brake, "
+                f"{rail.cia402.brake_axis!r}"
+            )
+        safety = stack.enter_context(open_safety(safety_io, out, []))
+        assert safety is not None  # one was named
+        drive = load_rail_drive(reference, rail.cia402)
+        network = stack.enter_context(_network(rail.cia402, drive, url))
+        settings = BootSettings(
+            rail.cia402.master_node_id, _SYNC_PERIOD_S, rail.cia402.torque_limit_Nm
+        )
+        report = boot(network, rail.cia402.node_id, drive, settings)
+        stack.callback(network.release, rail.cia402.node_id)
+        network.start_heartbeat()  # should we die, the drive stops
+        yield Cia402RailAxis(rail, drive, network, report, safety.io)
+
+
+def position_of(reference: str, rail: RailProfile, bus: str | None) -> float:
+    """Return where the carriage is, in m; nothing is written to the drive."""
+    if rail.cia402 is None:
+        axis = ModbusRailAxis(rail)
+        try:
+            return axis.position_m()
+        finally:
+            axis.close()
+    there = rail.cia402
+    drive = load_rail_drive(reference, there)
+    with _network(there, drive, _bus_of(rail, bus)) as network:
+        turn = network.read_int(there.node_id, 0x608F, 1)
+        counts = network.read_int(there.node_id, 0x6064) - there.zero_counts
+        sign = there.direction * drive.position_sign
+        return sign * counts * there.travel_per_turn_m / turn
+
+
+@contextmanager
+def slack_watch(
+    rail: RailProfile, sensors: str | None, port: str | None, checked: bool
+) -> Iterator[Callable[[], str]]:
+    """Yield what tells which cable is tight: by load cells, or never where the user has looked.
+
+    Raises BadInputError where neither is given, ModbusError for load cells that do not answer.
+    """
+    if sensors is None:
+        if not checked:
+            raise BadInputError(
+                "the cables must be slack: name load cells that measure it (--tension, "
+                "--tension-port), or look, and say so with --cables-slack-checked"
+            )
+        yield lambda: ""
+        return
+    if port is None:
+        raise BadInputError("--tension: also name the serial line, --tension-port")
+    with TensionSampler(load_tension_sensors(sensors), port) as sampler:
+        sampler.await_readings(_FIRST_READINGS_S)
+        exchange = sampler.exchange
+
+        def tight() -> str:
+            exchange.update()
+            if reason := exchange.reason():
+                return reason
+            most = int(exchange.feedback.tension_N.argmax())
+            tension = float(exchange.feedback.tension_N[most])
+            if tension < rail.slack_below_N:
+                return ""
+            return f"{exchange.cables[most]} has {tension:.1f} N ({rail.slack_below_N:g} N allowed)"
+
+        yield tight
+
+
+def _bus_of(rail: RailProfile, bus: str | None) -> BusUrl:
+    if bus is None:
+        raise BadInputError(f"--bus: {rail.name} is on a CAN bus; name it")
+    url = open_bus(bus)
+    if url.starts_own_simulator:
+        raise BadInputError(
+            "--bus simbus: has no rails; cdpr sim rail starts one, then simbus:NAME"
+        )
+    return url
+
+
+@contextmanager
+def _network(there: Cia402Rail, drive: DriveProfile, url: BusUrl) -> Iterator[CanNetwork]:
+    heartbeat_s = drive.heartbeat_consumer_s / 4
+    try:
+        network = CanNetwork(url, [there.node_id], there.master_node_id, heartbeat_s)
+    except BusError as error:
+        raise BadInputError(str(error)) from error
+    try:
+        network.add_node(there.node_id, canopen.import_od(str(drive.eds), there.node_id))
+        yield network
+    finally:
+        network.close()
