@@ -1,0 +1,162 @@
+"""Identify the gain from cable tension to motor torque, and the winch's friction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.exchange import FloatArray
+
+CONFIDENCE = 0.95
+MOST_UNCERTAINTY = 0.05
+"""Relative half-width of the gain beyond which a calibration is refused."""
+_LEAST_LEVELS = 3
+_LEAST_SPAN = 2.0
+_FARTHEST_FROM_NOMINAL = 0.5
+
+
+class CalibrationRefusedError(ControlError):
+    """The measurements do not support a calibration; the message says why and what would help."""
+
+
+@dataclass(frozen=True)
+class TorquePoint:
+    """The winding torque at one tension while the winch moved in one direction, or came from it."""
+
+    tension_N: float
+    torque_Nm: float
+    """Positive where it winds the cable in."""
+    winding_in: bool
+    angle_rad: float = math.nan
+    """Motor angle, where the torque was measured at one and not over whole turns."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with the half-width of its confidence interval."""
+
+    value: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class TensionGain:
+    """Winding torque = gain·tension + bias ± (friction + friction_per_N·tension)."""
+
+    gain_m: Estimate
+    bias_Nm: Estimate
+    friction_Nm: Estimate
+    friction_per_N_m: Estimate
+    residual_rms_Nm: float
+    cogging_Nm: float
+    """Amplitude of the order that was fitted along with it, 0 where none was."""
+    lowest_N: float
+    highest_N: float
+
+
+def identify_tension_gain(
+    points: Sequence[TorquePoint], nominal_m: float, cogging_order: int | None = None
+) -> TensionGain:
+    """Fit both directions' lines through the points by least squares.
+
+    The mean of the two slopes is the gain K_t by which tensions become torques (Tremblay, section
+    3.6.2, after eq. (3.80)); half their difference is the part of friction that grows with
+    tension, half the difference of the intercepts the part that does not. Friction that differs
+    with direction goes into the bias and leaves the gain alone. With `cogging_order`, cogging of
+    that many periods per motor turn is fitted too. Raises CalibrationRefusedError.
+    """
+    _refuse_few(points)
+    tension = np.array([p.tension_N for p in points])
+    torque = np.array([p.torque_Nm for p in points])
+    side = np.array([1.0 if p.winding_in else -1.0 for p in points])
+    columns = [tension, np.ones_like(tension), side, side * tension]
+    if cogging_order is not None:
+        angle = cogging_order * np.array([p.angle_rad for p in points])
+        columns += [np.cos(angle), np.sin(angle)]
+    found, half, rms = _least_squares(np.column_stack(columns), torque)
+    gain, bias, friction, per_N = (Estimate(float(found[i]), float(half[i])) for i in range(4))
+    result = TensionGain(
+        gain,
+        bias,
+        friction,
+        per_N,
+        residual_rms_Nm=rms,
+        cogging_Nm=float(np.hypot(*found[4:])) if cogging_order is not None else 0.0,
+        lowest_N=float(tension.min()),
+        highest_N=float(tension.max()),
+    )
+    _refuse_unsound(result, nominal_m)
+    return result
+
+
+def _least_squares(matrix: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return the solution, the half-widths of its confidence intervals and the residual's rms."""
+    samples, unknowns = matrix.shape
+    freedom = samples - unknowns
+    if freedom < 1:
+        raise CalibrationRefusedError(
+            f"{samples} measurements for {unknowns} unknowns; measure at more tensions"
+        )
+    scale = np.maximum(np.abs(matrix).max(axis=0), 1e-12)
+    scaled = matrix / scale
+    if np.linalg.cond(scaled) > 1e6:
+        raise CalibrationRefusedError(
+            "the measurements cannot tell gain, friction and cogging apart; use more and more "
+            "different tensions"
+        )
+    solution, *_ = np.linalg.lstsq(scaled, wanted, rcond=None)
+    residual = wanted - scaled @ solution
+    spread = float(residual @ residual) / freedom
+    variance = spread * np.diag(np.linalg.inv(scaled.T @ scaled))
+    width = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * np.sqrt(variance)
+    return solution / scale, width / scale, math.sqrt(float(np.mean(residual**2)))
+
+
+def _refuse_few(points: Sequence[TorquePoint]) -> None:
+    for winding_in, name in ((True, "winding in"), (False, "paying out")):
+        levels = {round(p.tension_N, 1) for p in points if p.winding_in is winding_in}
+        if len(levels) < _LEAST_LEVELS:
+            raise CalibrationRefusedError(
+                f"{len(levels)} tensions were measured {name}; at least {_LEAST_LEVELS} different "
+                "ones are needed to tell the gain from friction"
+            )
+        if max(levels) < _LEAST_SPAN * min(levels):
+            raise CalibrationRefusedError(
+                f"the tensions measured {name} reach from {min(levels):.1f} to "
+                f"{max(levels):.1f} N; "
+                f"the highest must be at least {_LEAST_SPAN:g} times the lowest"
+            )
+
+
+def _refuse_unsound(found: TensionGain, nominal_m: float) -> None:
+    gain, half = found.gain_m.value, found.gain_m.half_width
+    if gain <= 0.0:
+        raise CalibrationRefusedError(
+            f"torque falls with tension (gain {gain * 1e3:.2f} mNm/N); is cable_sign of the "
+            "winch's profile right, and did the cable carry the load?"
+        )
+    if half > MOST_UNCERTAINTY * gain:
+        raise CalibrationRefusedError(
+            f"the gain is uncertain by {100 * half / gain:.1f} % ({gain * 1e3:.2f} ± "
+            f"{half * 1e3:.2f} mNm/N), {100 * MOST_UNCERTAINTY:g} % are allowed; use a wider range "
+            "of tensions, and let the motor turn further (whole turns, or a spring at the anchor)"
+        )
+    if abs(gain - nominal_m) > _FARTHEST_FROM_NOMINAL * nominal_m:
+        raise CalibrationRefusedError(
+            f"the gain, {gain * 1e3:.2f} mNm/N, is far from the geometry's {nominal_m * 1e3:.2f} "
+            "(drum_radius_m / gear_ratio); are gear, drum, masses or sensor scale what they are "
+            "said to be?"
+        )
+    middle = 0.5 * (found.lowest_N + found.highest_N)
+    friction = found.friction_Nm.value + found.friction_per_N_m.value * middle
+    slack = found.friction_Nm.half_width + found.friction_per_N_m.half_width * middle
+    if friction < -slack:
+        raise CalibrationRefusedError(
+            f"winding in takes less torque than paying out (friction {friction:.3f} Nm); is the "
+            "torque's or the cable's sign exchanged?"
+        )

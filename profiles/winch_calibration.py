@@ -1,0 +1,74 @@
+"""The calibration of one winch: what torque its motor needs for a cable tension."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from profiles.errors import ProfileError
+from profiles.reader import Profile, read_toml_model
+
+
+class WinchCalibration(Profile):
+    """Winding torque = gain × tension + bias ± (friction + friction_per_N × tension).
+
+    Plus while the cable is wound in, minus while it is paid out. Torques are those asked of the
+    drive, so an error of its torque constant is within the gain. Half-widths are of 95 %
+    confidence intervals.
+    """
+
+    winch: str
+    motor: str
+    drive_serial: int
+    date: datetime
+    method: Literal["masses", "sensors"]
+    gain_m: float = Field(gt=0)
+    """K_t in Nm of motor torque per N of cable tension (Tremblay, section 3.6.2)."""
+    gain_half_width_m: float = Field(ge=0)
+    nominal_gain_m: float = Field(gt=0)
+    """drum_radius_m / gear_ratio of the winch's profile."""
+    bias_Nm: float
+    bias_half_width_Nm: float = Field(ge=0)
+    friction_Nm: float
+    friction_half_width_Nm: float = Field(ge=0)
+    friction_per_N_m: float
+    friction_per_N_half_width_m: float = Field(ge=0)
+    residual_rms_Nm: float = Field(ge=0)
+    lowest_tension_N: float
+    highest_tension_N: float
+    raw_data: tuple[str, ...]
+
+    def torque_Nm(self, tension_N: float) -> float:
+        """Return the winding torque that balances a tension, without friction."""
+        return self.gain_m * tension_N + self.bias_Nm
+
+    def friction_at_Nm(self, tension_N: float) -> float:
+        """Return the friction torque at a tension."""
+        return self.friction_Nm + self.friction_per_N_m * tension_N
+
+    def to_toml(self) -> str:
+        """Return the text of the file that `load_winch_calibration` reads."""
+        lines = ["# Tension-to-torque gain and friction of one winch, as measured."]
+        for key, value in self.model_dump().items():
+            # JSON writes strings, numbers and lists of them as TOML does
+            text = value.isoformat() if isinstance(value, datetime) else json.dumps(value)
+            lines.append(f"{key} = {text}")
+        return "\n".join(lines) + "\n"
+
+    def save(self, path: Path) -> None:
+        """Write the file; raises ProfileError naming it."""
+        part = path.with_suffix(path.suffix + ".part")
+        try:
+            part.write_text(self.to_toml(), encoding="utf-8")
+            part.replace(path)
+        except OSError as error:
+            raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None
+
+
+def load_winch_calibration(path: Path) -> WinchCalibration:
+    """Return the calibration in a file; raises ProfileError."""
+    return read_toml_model(path, WinchCalibration)

@@ -1,0 +1,311 @@
+"""`cdpr tension`: load cells on a serial line, and the calibration of a winch by tension."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdpr_rt.errors import ControlError
+from drivers.bus import BusUrl
+from drivers.errors import DriverError
+from drivers.modbus.tension import LoadCells, TensionSampler
+from profiles import Winch, load_winch
+from profiles.tension_sensor import TensionSensors, load_tension_sensors
+from tools.commands.options import (
+    BusOption,
+    JsonOption,
+    PlantOption,
+    SafetyIoOption,
+    WinchArgument,
+    YesOption,
+)
+from tools.errors import BadInputError, WorkFailedError
+from tools.output import Output
+from tools.session import confirm_motion, open_bus, open_winch
+from tools.signals import stop_on_signals
+from tools.simulator import OwnSimulator
+from tools.tension import calibration
+from tools.tension import watch as watching
+from tools.tension.anchor import AnchorPlan, check_plan, measure_anchored
+from tools.tension.masses import (
+    Hang,
+    by_prompt,
+    check_masses,
+    measure_masses,
+    on_board,
+    plan_hoist,
+)
+
+app = typer.Typer(help="Cable tensions: watch, tare, calibrate.", no_args_is_help=True)
+
+_SensorsOption = Annotated[
+    str, typer.Option("--sensors", help="Tension sensors: a name or a file.", metavar="SENSORS")
+]
+_PortOption = Annotated[
+    str, typer.Option("--port", help="Serial port of the RS-485 line, as /dev/ttyUSB0.")
+]
+_OutOption = Annotated[Path | None, typer.Option("--out", help="Folder for raw data and result.")]
+_FIRST_READING_S = 2.0
+_STANDARD_GRAVITY = 9.80665
+_MASS_PLANT = '[load]\nkind = "hung_mass"\n'
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the command group."""
+    parent.add_typer(app, name="tension")
+
+
+@app.command()
+def watch(
+    sensors: _SensorsOption,
+    port: _PortOption,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.1, help="How long; until Ctrl-C by default.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the tensions as they come, and their figures at the end; reads only."""
+    out = Output(as_json)
+    profile = load_tension_sensors(sensors)
+    with stop_on_signals() as stop_requested, TensionSampler(profile, port) as sampler:
+        figures = watching.watch(sampler, out, seconds or float("inf"), stop_requested)
+    for one in figures:
+        state = "" if one["valid"] else f"  {one['error'] or one['fault']}"
+        out.say(
+            f"{one['cable']:12} {one['mean_N']:8.2f} N ± {one['std_N']:.2f}, "
+            f"{one['rate_Hz']:.0f} readings/s{state}"
+        )
+    out.result({"ok": all(one["valid"] for one in figures), "cables": figures})
+    if not all(one["valid"] for one in figures):
+        raise typer.Exit(WorkFailedError.exit_status)
+
+
+@app.command()
+def tare(
+    sensors: _SensorsOption,
+    port: _PortOption,
+    cable: Annotated[
+        list[str] | None, typer.Option(help="Only this cable; may be repeated.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, max=60.0, help="Averaging time.")] = 2.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Make the present readings zero; every cable must be slack.
+
+    By the amplifiers where the profile says how, otherwise the zeros to write into the sensors'
+    file are shown.
+    """
+    out = Output(as_json)
+    profile = load_tension_sensors(sensors)
+    chosen = [_number_of(profile, name) for name in cable or [s.cable for s in profile.sensors]]
+    cells = LoadCells(profile, port)
+    try:
+        before = _means(cells, chosen, seconds)
+        if profile.amplifier.tare is not None:
+            for number in chosen:
+                cells.tare(number)
+            time.sleep(profile.amplifier.tare.settle_s)
+        after = _means(cells, chosen, seconds) if profile.amplifier.tare else before
+    finally:
+        cells.close()
+    told = []
+    for number, was, now in zip(chosen, before, after, strict=True):
+        sensor = profile.sensors[number]
+        told.append({"cable": sensor.cable, "before_N": was, "after_N": now})
+        if profile.amplifier.tare is not None:
+            out.say(f"{sensor.cable:12} {was:8.2f} N  ->  {now:8.2f} N")
+        else:
+            told[-1]["zero_N"] = zero = sensor.zero_N + was
+            out.say(f'{sensor.cable:12} write zero_N = {zero:.3f} beside cable = "{sensor.cable}"')
+    out.result({"ok": True, "cables": told})
+
+
+def _means(cells: LoadCells, chosen: list[int], seconds: float) -> list[float]:
+    sums, rounds, until = [0.0] * len(chosen), 0, time.monotonic() + seconds
+    while rounds == 0 or time.monotonic() < until:
+        for i, number in enumerate(chosen):
+            reading = cells.read(number)
+            if reading.fault:
+                raise WorkFailedError(f"{reading.cable}: {reading.fault.label}; nothing was tared")
+            sums[i] += reading.tension_N
+        rounds += 1
+    return [total / rounds for total in sums]
+
+
+def _number_of(profile: TensionSensors, cable: str | None) -> int:
+    names = [sensor.cable for sensor in profile.sensors]
+    if cable is None:
+        return 0
+    if cable not in names:
+        raise BadInputError(f"--cable {cable!r}; allowed: {', '.join(names)}")
+    return names.index(cable)
+
+
+@app.command()
+def calibrate(
+    winch: WinchArgument,
+    bus: BusOption,
+    masses: Annotated[
+        str | None, typer.Option(help="Masses to hang, in kg, as 2,5,10: at least three.")
+    ] = None,
+    sensors: Annotated[
+        str | None, typer.Option(help="Load cells in place of masses: a name or a file.")
+    ] = None,
+    port: Annotated[
+        str | None, typer.Option(help="Serial port of the load cells' line, as /dev/ttyUSB0.")
+    ] = None,
+    cable: Annotated[
+        str | None, typer.Option(help="The load cell's cable; the first by default.")
+    ] = None,
+    out_dir: _OutOption = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
+    speed_mm_s: Annotated[
+        float, typer.Option("--speed-mm-s", min=5.0, max=200.0, help="Speed of a mass.")
+    ] = 40.0,
+    lead_mm: Annotated[
+        float, typer.Option("--lead-mm", min=20.0, max=2000.0, help="Wound in before measuring.")
+    ] = 160.0,
+    turns: Annotated[int, typer.Option(min=1, max=20, help="Motor turns measured each way.")] = 2,
+    gravity: Annotated[
+        float, typer.Option(min=9.7, max=9.9, help="Local gravity, m/s2.")
+    ] = _STANDARD_GRAVITY,
+    lowest_N: Annotated[float, typer.Option("--lowest-n", help="Lowest torque step.")] = 10.0,
+    highest_N: Annotated[float, typer.Option("--highest-n", help="Highest torque step.")] = 80.0,
+    steps: Annotated[int, typer.Option(min=4, max=100, help="Torque steps each way.")] = 16,
+    plant: PlantOption = None,
+    board: Annotated[
+        Path | None,
+        typer.Option(help="Physics board of a simulator: masses are hung there, not asked for."),
+    ] = None,
+    safety_io: SafetyIoOption = None,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify a winch's tension-to-torque gain and friction, from masses or from a load cell."""
+    out = Output(as_json)
+    profile, url = load_winch(winch), open_bus(bus)
+    folder = out_dir or Path("out") / f"tension-{profile.profile}"
+    if (masses is None) == (sensors is None):
+        raise BadInputError("give either --masses or --sensors")
+    with ExitStack() as stack:
+        if masses is not None:
+            kilograms = _masses(masses)
+            check_masses(profile, kilograms, gravity)
+            hoist = plan_hoist(profile, speed_mm_s * 1e-3, lead_mm * 1e-3, turns)
+            _fresh(folder, overwrite)
+            confirm_motion(url, yes, "masses are raised and lowered by the winch")
+            url, hang = _hands(stack, profile, url, out, plant, board)
+            with _keeping(folder), open_winch(profile, url, out, safety_io=safety_io) as session:
+                session.set_mode(profile.drive.mode_torque)
+                raw = calibration.raw_folder(folder)
+                measure_masses(session, out, raw, hoist, kilograms, hang, gravity)
+        else:
+            cells = load_tension_sensors(sensors or "")
+            number = _number_of(cells, cable)
+            steps_plan = AnchorPlan(lowest_N, highest_N, steps)
+            check_plan(profile, steps_plan)
+            if port is None:
+                raise BadInputError("--sensors needs --port, the serial port of the load cells")
+            _fresh(folder, overwrite)
+            confirm_motion(url, yes, "the made-fast cable is pulled by the winch")
+            sampler = stack.enter_context(TensionSampler(cells, port))
+            sampler.await_readings(_FIRST_READING_S)
+            with (
+                _keeping(folder),
+                open_winch(profile, url, out, plant, safety_io=safety_io) as session,
+            ):
+                session.set_mode(profile.drive.mode_torque)
+                path = calibration.steps_file(folder)
+                measure_anchored(session, out, path, steps_plan, sampler, number)
+    _finish(out, folder, profile)
+
+
+@app.command()
+def fit(
+    folder: Annotated[Path, typer.Argument(help="The --out folder of a calibration.")],
+    winch: Annotated[
+        str | None, typer.Option(help="Winch profile; the one recorded by default.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify again from recorded masses or torque steps."""
+    out = Output(as_json)
+    _finish(out, folder, load_winch(winch or calibration.recorded_winch(folder)))
+
+
+def _finish(out: Output, folder: Path, winch: Winch) -> None:
+    with _keeping(folder):
+        found, _ = calibration.calibrate(folder, winch)
+    path = folder / calibration.FILE_NAME
+    calibration.show(out, found, path)
+    result = found.model_dump(mode="json")
+    out.result({"ok": True, "calibration": str(path), **result})
+
+
+def _masses(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise BadInputError(f"--masses {text}: numbers in kg are wanted, as 2,5,10") from None
+
+
+def _fresh(folder: Path, overwrite: bool) -> None:
+    """Make room for recordings; raises BadInputError where earlier ones would be lost."""
+    raw = calibration.raw_folder(folder)
+    if raw.exists() and any(raw.iterdir()):
+        if not overwrite:
+            raise BadInputError(
+                f"--out {folder}: holds the data of an earlier run; choose another folder, or "
+                "replace it with --overwrite"
+            )
+        shutil.rmtree(raw)
+        (folder / calibration.FILE_NAME).unlink(missing_ok=True)
+    try:
+        raw.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInputError(f"--out {folder}: cannot be created: {error.strerror}") from error
+
+
+@contextmanager
+def _keeping(folder: Path) -> Iterator[None]:
+    """Add to an error's message where the recordings are."""
+    raw = calibration.raw_folder(folder)
+    try:
+        yield
+    except (ControlError, DriverError) as error:
+        if not any(raw.glob("*.raw")):
+            raise
+        raise WorkFailedError(f"{error} (recorded so far: {raw})") from error
+
+
+def _hands(
+    stack: ExitStack,
+    winch: Winch,
+    url: BusUrl,
+    out: Output,
+    plant: Path | None,
+    board: Path | None,
+) -> tuple[BusUrl, Hang]:
+    """Return the bus and who hangs masses there, with a simulator of our own for `simbus:`."""
+    if not url.starts_own_simulator:
+        if plant is not None:
+            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+        return url, by_prompt if board is None else on_board(board)
+    place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-tension-")))
+    board = place / "board"
+    if plant is None:
+        plant = place / "plant.toml"
+        plant.write_text(_MASS_PLANT)
+    url = open_bus(f"simbus:own-{os.getpid()}")
+    out.note("starting the simulated drive ...")
+    simulator = OwnSimulator(winch.reference, str(url), plant, board=board)
+    stack.callback(simulator.stop)
+    return url, on_board(board)

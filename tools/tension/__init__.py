@@ -1,0 +1,1 @@
+"""Work with cable tensions: watch them, calibrate a winch by them."""

@@ -1,0 +1,137 @@
+"""Calibrate a winch by masses that somebody hangs on its cable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from cdpr_rt.rawlog import RawLogWriter, read_raw_log
+from cdpr_rt.recorder import column_names
+from cdpr_rt.tension_gain import TorquePoint
+from profiles import Winch
+from sim_bus.physics_board import PhysicsBoard
+from tools.errors import BadInputError
+from tools.output import Output
+from tools.session import WinchSession
+from tools.tension.hoist import Hoist, HoistPlan, hoist_controller, hoist_points
+
+_TORQUE_SHARE = 0.9
+# beyond what the geometry says the heaviest mass needs
+_LIMIT_RATIO, _LIMIT_MORE_Nm = 1.3, 0.4
+_SPEED_RATIO, _LEAST_SPEED_RAD_S = 5.0, 30.0
+
+Hang = Callable[[float], None]
+"""Sees to it that a mass hangs on the cable, in kg; returns when it does."""
+
+
+def plan_hoist(winch: Winch, speed_m_s: float, lead_m: float, turns: int) -> HoistPlan:
+    """Return the plan for a cable speed and a lead-in along the cable."""
+    per_rad = abs(winch.cable_m_per_motor_rad)
+    return HoistPlan(speed_m_s / per_rad, lead_m / per_rad, turns)
+
+
+def check_masses(winch: Winch, masses_kg: Sequence[float], gravity: float) -> None:
+    """Raise BadInputError for masses that are too heavy for the motor or of no use."""
+    if len(set(masses_kg)) < 3 or min(masses_kg) <= 0.0:
+        raise BadInputError("--masses: at least three different masses in kg, as 2,5,10")
+    gain = abs(winch.cable_m_per_motor_rad)
+    most = _TORQUE_SHARE * winch.motor.rated_torque_Nm / (gain * gravity)
+    if max(masses_kg) > most:
+        raise BadInputError(
+            f"--masses: {max(masses_kg):g} kg; allowed: up to {most:.1f} kg, which takes "
+            f"{100 * _TORQUE_SHARE:g} % of the motor's rated torque"
+        )
+
+
+def by_prompt(mass_kg: float) -> None:
+    """Ask the person at the winch."""
+    try:
+        typer.prompt(
+            f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
+            "press Enter",
+            default="",
+            show_default=False,
+            err=True,
+        )
+    except typer.Abort:
+        raise BadInputError("nobody there to hang the masses; nothing was energised") from None
+
+
+def on_board(board: Path) -> Hang:
+    """Return what hangs masses on the first cable of a simulator, by its physics board."""
+
+    def hang(mass_kg: float) -> None:
+        with PhysicsBoard.attach(board) as shared:
+            shared.axis(0).hung_mass_kg = mass_kg
+
+    return hang
+
+
+def measure_masses(
+    session: WinchSession,
+    out: Output,
+    folder: Path,
+    plan: HoistPlan,
+    masses_kg: Sequence[float],
+    hang: Hang,
+    gravity: float,
+) -> list[Path]:
+    """Raise and lower each mass, recording into `folder`; the drive has no power in between."""
+    recorded = []
+    for mass_kg in masses_kg:
+        hang(mass_kg)
+        path = folder / f"mass-{mass_kg:g}kg.raw"
+        with out.progress(f"raising and lowering {mass_kg:g} kg", plan.duration_s) as advance:
+            session.executive.on_progress = advance
+            _hoist(session, path, plan, mass_kg, gravity)
+        recorded.append(path)
+    session.executive.on_progress = None
+    return recorded
+
+
+def _hoist(
+    session: WinchSession, path: Path, plan: HoistPlan, mass_kg: float, gravity: float
+) -> None:
+    winch, device = session.winch, session.device
+    per_rad = winch.cable_m_per_motor_rad
+    weight = mass_kg * gravity * abs(per_rad)
+    limit = min(_LIMIT_RATIO * weight + _LIMIT_MORE_Nm, winch.motor.rated_torque_Nm)
+    controller = hoist_controller(
+        winch.motor.rotor_inertia_kg_m2,
+        mass_kg * per_rad**2,
+        session.latency_s,
+        device.period_s,
+        limit,
+    )
+    meta: dict[str, Any] = {
+        "what": "hoist",
+        "identity": session.identity,
+        "period_s": device.period_s,
+        "mass_kg": mass_kg,
+        "gravity_m_s2": gravity,
+        "tension_N": mass_kg * gravity,
+        "wind_in": -winch.cable_sign,
+        "speed_rad_s": plan.speed_rad_s,
+        "lead_in_rad": plan.lead_in_rad,
+        "turns": plan.turns,
+    }
+    session.restrict(
+        max(_SPEED_RATIO * plan.speed_rad_s, _LEAST_SPEED_RAD_S), plan.lead_in_rad + math.tau
+    )
+    session.enable()
+    motion = Hoist(plan, device.feedback.position_rad, -winch.cable_sign)
+    log = RawLogWriter(path, column_names(device.n), meta)
+    try:
+        session.executive.run(controller, motion, log)
+    finally:
+        log.close()
+    session.disable()
+
+
+def mass_points(paths: Sequence[Path]) -> list[TorquePoint]:
+    """Return the points of recorded hoists; raises RawLogError and CalibrationRefusedError."""
+    return [point for path in paths for point in hoist_points(read_raw_log(path))]

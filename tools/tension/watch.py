@@ -1,0 +1,97 @@
+"""Show cable tensions as they come: bars at a terminal, figures at the end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from rich.console import Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.tension import TensionFault
+from drivers.modbus.tension import TensionSampler
+from tools.output import Output
+
+_LOOK_S = 0.02
+_SHOW_HZ = 8.0
+_LEAST_SCALE_N = 50.0
+
+
+class _Sums:
+    """Statistics of every new valid reading."""
+
+    def __init__(self, n: int) -> None:
+        self._seen: FloatArray = np.full(n, -np.inf)
+        self.values: list[list[float]] = [[] for _ in range(n)]
+
+    def take(self, sampler: TensionSampler) -> None:
+        told = sampler.exchange.feedback
+        for i in np.flatnonzero(told.valid & (told.time_s > self._seen)):
+            self.values[i].append(float(told.tension_N[i]))
+            self._seen[i] = told.time_s[i]
+
+
+def watch(
+    sampler: TensionSampler, out: Output, seconds: float, stop_requested: Callable[[], bool]
+) -> list[dict[str, Any]]:
+    """Look at the tensions for `seconds`, or until a stop is asked for; return their figures."""
+    exchange = sampler.exchange
+    sums = _Sums(exchange.n)
+    begun = shown = time.monotonic()
+    highest = _LEAST_SCALE_N
+    live = Live(console=out.notes, refresh_per_second=_SHOW_HZ, transient=True)
+    with live:
+        while time.monotonic() < begun + seconds and not stop_requested():
+            time.sleep(_LOOK_S)
+            exchange.update()
+            sums.take(sampler)
+            highest = max(highest, float(np.max(exchange.feedback.tension_N)))
+            if time.monotonic() > shown + 1.0 / _SHOW_HZ:
+                shown = time.monotonic()
+                live.update(_table(sampler, highest))
+    elapsed = time.monotonic() - begun
+    return [_figures(sampler, i, sums.values[i], elapsed) for i in range(exchange.n)]
+
+
+def _table(sampler: TensionSampler, highest_N: float) -> Group:
+    exchange, told = sampler.exchange, sampler.exchange.feedback
+    table = Table(box=None)
+    for title in ("cable", "N", "", "age ms", ""):
+        table.add_column(title, justify="right" if title in ("N", "age ms") else "left")
+    for i, cable in enumerate(exchange.cables):
+        valid = bool(told.valid[i])
+        bar = ProgressBar(total=highest_N, completed=max(0.0, float(told.tension_N[i])), width=40)
+        table.add_row(
+            cable,
+            f"{told.tension_N[i]:.1f}" if valid else "-",
+            bar if valid else "",
+            f"{1e3 * told.age_s[i]:.0f}" if np.isfinite(told.age_s[i]) else "-",
+            "" if valid else TensionFault(int(told.fault[i])).label,
+        )
+    errors = dict.fromkeys(error for error in sampler.errors if error)
+    return Group(table, *errors)
+
+
+def _figures(
+    sampler: TensionSampler, i: int, values: list[float], elapsed_s: float
+) -> dict[str, Any]:
+    told = sampler.exchange.feedback
+    read = np.array(values) if values else np.full(1, np.nan)
+    return {
+        "cable": sampler.exchange.cables[i],
+        "valid": bool(told.valid[i]),
+        "fault": TensionFault(int(told.fault[i])).label,
+        "error": sampler.errors[i],
+        "readings": len(values),
+        "rate_Hz": len(values) / elapsed_s,
+        "mean_N": float(read.mean()),
+        "std_N": float(read.std()),
+        "lowest_N": float(read.min()),
+        "highest_N": float(read.max()),
+        "age_s": float(told.age_s[i]),
+    }
