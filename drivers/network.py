@@ -59,7 +59,8 @@ class CanNetwork(ObjectAccess):
         filters += [(_HEARTBEAT + node, _EXACT) for node in (*ids, master_node_id)]
         self._bus = open_python_can(url, filters)
         self._send_lock = threading.Lock()
-        slack_s = _HELD_CLOCK_S if url.is_simulated else 0.0
+        held = url.is_simulated or url.asks_for_lockstep
+        slack_s = _HELD_CLOCK_S if held else 0.0
         self._errors = ErrorControl(self.raise_alarm, slack_s)
         self.restarted = self._errors.restarted
         """Nodes that booted unasked: their configuration and encoder positions are void."""
