@@ -138,6 +138,7 @@ def _try_brake(rail: RailProfile, axis: RailAxis) -> float | None:
             time.sleep(_LOOK_S)
     axis.push(0.0)
     if moved > check.allowed_m:
+        mark_not_calibrated(rail.robot, f"{rail.name} slipped by {moved * 1e3:.2f} mm on its brake")
         raise RailError(
             f"{rail.name}: the applied brake does not hold: pushed with {check.torque_percent:g} % "
             f"of the rated torque the carriage moved {moved * 1e3:.2f} mm "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -21,7 +21,7 @@ _FOR_EVER_S = 1e5
 class SessionSafety:
     """The safety I/O of a session and the axes whose brakes belong to it."""
 
-    def __init__(self, io: SafetyIo, node_ids: Iterable[int]) -> None:
+    def __init__(self, io: SafetyIo, node_ids: Collection[int]) -> None:
         self.io = io
         nodes = set(node_ids)
         self.braked: Final = tuple(
@@ -75,9 +75,11 @@ def connect(reference: str) -> SafetyIo:
 
 @contextmanager
 def open_safety(
-    reference: str | None, out: Output, node_ids: Iterable[int]
+    reference: str | None, out: Output, node_ids: Collection[int]
 ) -> Iterator[SessionSafety | None]:
     """Connect to a safety I/O and close its contactor, for as long as the block runs.
+
+    The brakes of `node_ids` go with the session; others are left to the caller.
 
     None where none is named. Raises ModbusError for an I/O that does not answer and SafetyIoError
     where it forbids to energise, or did not open its contactor at the end.
@@ -89,6 +91,6 @@ def open_safety(
         io.energise()
         session = SessionSafety(io, node_ids)
         out.note(f"{io.name}: the chain is closed, the contactor is on")
-        if any(axis.brake for axis in io.profile.axes) and not session.braked:
+        if node_ids and any(axis.brake for axis in io.profile.axes) and not session.braked:
             out.note("none of its brakes belongs to this session's nodes (key node_id): none moves")
         yield session
