@@ -175,6 +175,7 @@ class Commissioning:
             "date": datetime.now(UTC).isoformat(timespec="seconds"),
             "encoder_counts_per_turn": boot.counts_per_turn,
             "rated_torque_Nm": boot.rated_torque_Nm,
+            "torque_step_Nm": abs(device.axes[0].Nm_per_unit),
             "inertia_kg_m2": found.better.inertia_kg_m2.value,
             "pid": [dataclasses.asdict(design) for design in designs],
             "bandwidth_Hz": bandwidth_Hz,

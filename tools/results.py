@@ -34,6 +34,8 @@ def read_run(paths: Paths) -> dict[str, Any]:
 def assemble(paths: Paths, run: dict[str, Any], found: Identified) -> dict[str, Any]:
     """Return everything the report tells; raises RawLogError and BadInputError."""
     truth = Truth(paths.truth) if paths.truth.exists() else None
+    # runs from before this was noted are all of drives that take per mille
+    run = {"torque_step_Nm": run["rated_torque_Nm"] / 1000.0, **run}
     return {
         "ok": True,
         **run,
@@ -80,7 +82,7 @@ def identification(found: Identified) -> dict[str, Any]:
 
 def _validation(paths: Paths, run: dict[str, Any], truth: Truth | None) -> dict[str, Any]:
     counts, period = run["encoder_counts_per_turn"], run["bus"]["period_s"]
-    step_Nm = run["rated_torque_Nm"] / 1000.0
+    step_Nm = run["torque_step_Nm"]
     default: float = run["bandwidth_Hz"]
     rows = []
     for wanted in run["bandwidths_Hz"]:

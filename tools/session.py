@@ -40,6 +40,8 @@ _SPEED_SHARE = 0.2
 # a bare rotor may swing by turns without doing harm; its speed is what is limited
 _FOLLOWING_ERROR_RAD = 4.0 * math.tau
 _INDEX_TIMEOUT_S = 30.0
+# what makes a drive stop by itself once nobody leads it, and bounds its torque until then
+_GUARDS = ("1016h", "6007h", "605Ah", "6072h")
 
 
 class WinchSession:
@@ -260,9 +262,10 @@ def open_winch(
         report = boot(network, winch.node_id, winch.drive, settings)
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
-        if report.absent:
+        lacking = [name for name in report.absent if name.startswith(_GUARDS)]
+        if lacking:
             out.note(
-                f"node {winch.node_id} lacks {', '.join(report.absent)}: check what stops it "
+                f"node {winch.node_id} lacks {', '.join(lacking)}: check what stops it "
                 "when its master falls silent"
             )
         network.start_heartbeat()

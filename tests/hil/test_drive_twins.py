@@ -6,6 +6,7 @@ unit, sign or mode fails here against the true motion.
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Iterator
@@ -31,6 +32,7 @@ from drivers.cia402 import POWER_OFF, Mode, State, state_of, supported_modes
 from drivers.errors import DriveFaultError, ModeRefusedError, SdoError
 from drivers.network import CanNetwork
 from profiles import DriveProfile, load_winch
+from tools.commands.drive import info
 from tools.commissioning import Measurement, Paths
 from tools.output import Output
 from tools.procedure import Commissioning
@@ -117,6 +119,18 @@ def test_every_mode_of_its_profile_is_confirmed(twin: Twin) -> None:
     for mode in twin.drive.supported_modes:
         twin.session.set_mode(mode)
         assert twin.shown(0x6061) == mode
+
+
+def test_info_tells_what_the_drive_cannot(twin: Twin, capsys: pytest.CaptureFixture[str]) -> None:
+    """The ratings and modes for which a drive has no objects come from the files."""
+    winch = twin.session.winch
+    info(winch.reference, str(twin.session.url), None, as_json=True)
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (told["rated_torque_Nm"], told["encoder_counts_per_turn"]) == (3.0, 8192)
+    assert [int(name.split()[0]) for name in told["supported_modes"]] == sorted(
+        twin.drive.supported_modes
+    )
+    assert told["profile_fits"] is True
 
 
 def test_other_modes_are_refused_by_master_and_drive(twin: Twin) -> None:

@@ -11,7 +11,7 @@ import typer
 from cdpr_rt.controllers.pid import Pid
 from cdpr_rt.trajectory import Leg
 from cdpr_rt.tuning import design_pid
-from drivers.cia402 import fault_text, mode_name, state_of, supported_modes
+from drivers.cia402 import fault_text, mode_bits, mode_name, state_of, supported_modes
 from drivers.errors import SdoError
 from profiles import load_winch
 from tools.commands import drive_setup
@@ -58,6 +58,12 @@ def info(
             )
         except SdoError as error:
             raise WorkFailedError(f"node {node} does not answer: {error}") from error
+        rated_Nm = profile.motor.rated_torque_Nm
+
+        def read_if_there(index: int, sub: int, otherwise: int) -> int:
+            there = index in network.dictionary(node)
+            return network.read_int(node, index, sub) if there else otherwise
+
         told: dict[str, Any] = {
             "node_id": node,
             "device_name": str(network.read(node, 0x1008)),
@@ -69,11 +75,14 @@ def info(
             "error": fault_text(network.read_int(node, 0x603F)),
             "mode": mode_name(network.read_int(node, 0x6061)),
             "supported_modes": [
-                mode_name(mode) for mode in supported_modes(network.read_int(node, 0x6502))
+                mode_name(mode)
+                for mode in supported_modes(
+                    read_if_there(0x6502, 0, mode_bits(profile.drive.supported_modes))
+                )
             ],
             "position_counts": network.read_int(node, 0x6064),
-            "rated_torque_Nm": network.read_int(node, 0x6076) * 1e-3,
-            "encoder_counts_per_turn": network.read_int(node, 0x608F, 1),
+            "rated_torque_Nm": 1e-3 * read_if_there(0x6076, 0, round(1e3 * rated_Nm)),
+            "encoder_counts_per_turn": read_if_there(0x608F, 1, profile.encoder_counts_per_turn),
         }
     wanted = profile.drive
     told["profile_fits"] = (vendor, product) == (wanted.vendor_id, wanted.product_code)

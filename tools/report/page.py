@@ -226,7 +226,7 @@ class _Report:
         ]
 
     def _torque_step(self) -> float:
-        return float(self._results["rated_torque_Nm"]) / 1000.0
+        return float(self._results["torque_step_Nm"])
 
     def _methods(self, ramps: dict[str, Ramp]) -> list[str]:
         found = self._found

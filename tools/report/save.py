@@ -12,7 +12,7 @@ _FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error
 _RATIOS = ("rms_position_error", "peak_pid_effort", "peak_velocity_error")
 _TOP = (
     "winch", "drive", "date", "bus", "pid", "latency_s", "bandwidth_Hz", "bandwidths_Hz",
-    "encoder_counts_per_turn", "rated_torque_Nm",
+    "encoder_counts_per_turn", "rated_torque_Nm", "torque_step_Nm",
 )  # fmt: skip
 _IDENTIFICATION = (
     "orders", "amplitudes_Nm", "confidence_Nm", "phases_deg", "per_pole_pair", "hints",
