@@ -26,7 +26,8 @@ _OPTIONS = ("bitrate", "tty_baudrate", "lockstep")
 _DEFAULT_BAUD = 115_200  # as python-can; most USB adapters do not care
 _EFF_MASK = 0x1FFFFFFF
 _READ_BYTES = 4096
-_QUIET_S, _DRAIN_S, _ANSWER_S = 0.03, 0.5, 0.3
+_SYNCHRONISE_S, _ANSWER_S = 0.6, 0.3
+_FRAME_LETTERS = (b"t", b"T", b"r", b"R", b"z", b"Z")
 _FLAGS_EVERY_S = 0.5
 _ENDS = re.compile(rb"([^\r\a]*)([\r\a])")
 _LONGEST_LINE = 64
@@ -66,10 +67,9 @@ class SlcanLine:
     def _begin(self, url: BusUrl, code: str | None, baud: object) -> None:
         """Bring the adapter from whatever was done with it before to an open channel."""
         self._serial.reset_input_buffer()
+        # what is answered before the version belongs to what was done before
         self._put(b"\rC\r")
-        deadline = time.monotonic() + _DRAIN_S
-        while self._fetch(_QUIET_S) and time.monotonic() < deadline:
-            pass  # frames of before, and the answer of a channel that may have been open or not
+        version = self._command("V", _SYNCHRONISE_S, begins=b"V")
         self._rest = b""
         answers = []
         for command in ([code] if code else []) + ["O"]:
@@ -80,7 +80,6 @@ class SlcanLine:
                 )
                 advice = "" if code else "; it may need ?bitrate=1000000"
                 raise BusError(f"{url}: the adapter refuses {what}{advice}")
-        version = self._command("V")
         if version is None and not any(answers):
             raise BusError(
                 f"{url}: nothing there answers as a serial CAN adapter (slcan) at {baud} baud; "
@@ -89,16 +88,22 @@ class SlcanLine:
         if (self._command("F") or b"").startswith(b"F"):
             self._ask_at_s = time.monotonic() + _FLAGS_EVERY_S
 
-    def _command(self, text: str) -> bytes | None:
-        """Return the answer to a command, with its CR or BEL; None when none came."""
+    def _command(
+        self, text: str, patience_s: float = _ANSWER_S, begins: bytes = b""
+    ) -> bytes | None:
+        """Return the answer to a command, with its CR or BEL; None when none came in time.
+
+        Frames that come meanwhile are no answer, nor is what does not begin with `begins`.
+        """
         self._put(text.encode() + b"\r")
-        deadline = time.monotonic() + _ANSWER_S
+        deadline = time.monotonic() + patience_s
         while (left := deadline - time.monotonic()) > 0.0:
             self._rest += self._fetch(left)
             while match := _ENDS.match(self._rest):
                 self._rest = self._rest[match.end() :]
-                if match[1][:1] not in (b"t", b"T", b"r", b"R"):
-                    return match[0] if match[1] else match[2]
+                line = match[1]
+                if line[:1] not in _FRAME_LETTERS and line.startswith(begins):
+                    return match[0] if line else match[2]
         return None
 
     def _fetch(self, timeout_s: float) -> bytes:
