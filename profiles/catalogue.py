@@ -13,6 +13,7 @@ from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings, MotorSeries
 from profiles.reader import closest, read_toml, read_toml_model
 from profiles.robot import Robot, RobotAxis, RobotFile
+from profiles.safety_io import load_safety_io
 from profiles.tension_sensor import load_tension_sensors
 from profiles.winch import Winch, WinchFile
 
@@ -128,8 +129,35 @@ def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
         master_node_id=file.master_node_id,
         buses=file.buses,
         axes=tuple(axes),
+        safety_io=_device(path, "safety_io", load_safety_io, file.safety_io),
+        tension_sensors=_device(
+            path, "tension_sensors", load_tension_sensors, file.tension_sensors
+        ),
+        rails=tuple(_beside(path, name) for name in file.rails),
         notes=file.notes,
     )
+
+
+def _device(robot: Path, key: str, load: Callable[[str], object], name: str | None) -> str | None:
+    """Return what `load` finds a device by that a robot's file names; raises ProfileError."""
+    if name is None:
+        return None
+    reference = _beside(robot, name)
+    try:
+        load(reference)
+    except ProfileError as error:
+        if Path(error.file).is_absolute():
+            raise
+        raise ProfileError(robot, key, error.problem) from None
+    return reference
+
+
+def _beside(file: Path, name: str) -> str:
+    """Return `name`, or where it is a path that from the folder of `file` as an absolute one."""
+    text, at, place = name.partition("@")
+    if "/" not in text and not text.endswith(".toml"):
+        return name
+    return str((file.parent / Path(text).expanduser()).resolve()) + at + place
 
 
 def load_machine(name: str | Path) -> Winch | Robot:

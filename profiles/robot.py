@@ -37,6 +37,9 @@ class RobotFile(Profile):
     master_node_id: int = Field(default=127, ge=1, le=127)
     buses: tuple[RobotBus, ...] = Field(min_length=1, max_length=8)
     axes: tuple[AxisFile, ...] = Field(min_length=1, max_length=64)
+    safety_io: str | None = None
+    tension_sensors: str | None = None
+    rails: tuple[str, ...] = ()
 
     def faults(self) -> Iterator[tuple[str, str]]:
         """Yield (key, problem) for what contradicts itself."""
@@ -47,6 +50,7 @@ class RobotFile(Profile):
             elif all(axis.bus != bus.name for axis in self.axes):
                 yield f"buses[{i}].name", f"value {bus.name!r}; allowed: a bus that an axis is on"
         taken: dict[tuple[str, int], int] = {}
+        nodes: dict[int, int] = {}
         for i, axis in enumerate(self.axes):
             if axis.bus not in names:
                 yield f"axes[{i}].bus", f"value {axis.bus!r}; allowed: {', '.join(names)}"
@@ -58,6 +62,13 @@ class RobotFile(Profile):
                 problem = (
                     f"value {axis.node_id}; allowed: each node id once on a bus, "
                     f"axes[{first}] has it on {axis.bus!r}"
+                )
+                yield f"axes[{i}].node_id", problem
+            other = nodes.setdefault(axis.node_id, i)
+            if self.safety_io is not None and self.axes[other].bus != axis.bus:
+                problem = (
+                    f"value {axis.node_id}; allowed: each node id once on all buses where there is "
+                    f"a safety_io, which knows its brakes by it (axes[{other}] has it too)"
                 )
                 yield f"axes[{i}].node_id", problem
 
@@ -74,7 +85,10 @@ class RobotAxis:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot with the winches it names; axes keep the order of its file on whatever bus."""
+    """A robot with the winches it names; axes keep the order of its file on whatever bus.
+
+    `safety_io`, `tension_sensors` and `rails` are what their own loaders take.
+    """
 
     profile: str
     path: Path
@@ -83,6 +97,9 @@ class Robot:
     master_node_id: int
     buses: tuple[RobotBus, ...]
     axes: tuple[RobotAxis, ...]
+    safety_io: str | None = None
+    tension_sensors: str | None = None
+    rails: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property

@@ -15,7 +15,7 @@ import canopen
 import numpy as np
 
 from cdpr_rt.errors import TripError
-from cdpr_rt.executive import Executive
+from cdpr_rt.executive import Executive, Watch
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.rehearsal import rehearse
 from cdpr_rt.supervisor import Limits, Supervisor
@@ -33,6 +33,8 @@ from tools.consent import require_consent
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.robot_buses import asks_for_own_simulator, robot_urls
+from tools.safety import SessionSafety, open_safety
+from tools.session import note_lacking_guards
 from tools.signals import stop_on_signals
 from tools.simulator import OwnSimulator
 
@@ -57,6 +59,7 @@ class RobotSession:
         axes: Sequence[RobotAxis],
         reports: Sequence[BootReport],
         absent: Mapping[int, str],
+        safety: SessionSafety | None = None,
     ) -> None:
         self.robot = robot
         self.networks = networks
@@ -65,6 +68,7 @@ class RobotSession:
         self.axes = tuple(axes)
         self.reports = tuple(reports)
         self.absent = dict(absent)
+        self.safety = safety
         self.boot_s = 0.0
         """Wall time from the first frame to the last drive being operational."""
         self.simulator_pid: int | None = None
@@ -95,12 +99,17 @@ class RobotSession:
             self.networks[axis.bus].resume_watch(axis.node_id, entries)
         self._paused = []
         self._lead_to(State.OPERATION_ENABLED)
+        if self.safety is not None:
+            self.safety.release_brakes(self.executive)
 
     def disable(self) -> None:
         """Switch all power stages off, so that computation may take its time."""
+        if self.safety is not None:
+            self.safety.apply_brakes(self.executive)
         self._lead_to(State.SWITCH_ON_DISABLED)
         self.device.stop_cycling()
-        self._paused = [
+        # a drive that was disabled before watches nothing now, and is to watch again all the same
+        self._paused += [
             (axis, self.networks[axis.bus].pause_watch(axis.node_id) or []) for axis in self.axes
         ]
 
@@ -159,14 +168,18 @@ def open_robot(
     *,
     plant: Path | None = None,
     torque_share: float = 1.0,
+    safety_io: str | None = None,
 ) -> Iterator[RobotSession]:
     """Boot the drives of `robot`, all at the same time, and get ready to run its axes.
 
     `buses` are what was given with --bus; `simbus:` alone starts a simulator of all buses, with
     `plant`. Torques are limited to `torque_share` of each motor's rated torque. Whatever ends the
-    block, the drives' power stages are off afterwards. Raises BadInputError for a robot that does
+    block, the drives' power stages are off afterwards.
+
+    With `safety_io` there is power only while that safety I/O allows it; without, the robot's own
+    counts, unless all buses are simulated. Raises BadInputError for a robot that does
     not fit its buses (before anything is opened) and for buses that cannot be opened,
-    WorkFailedError for a mandatory drive that does not boot.
+    WorkFailedError for a mandatory drive that does not boot, and what `open_safety` raises.
     """
     require_fit(robot)
     with ExitStack() as stack:
@@ -177,13 +190,17 @@ def open_robot(
             buses = [name]
         elif plant is not None:
             raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-        networks = _open_networks(stack, robot, robot_urls(robot, buses))
+        urls = robot_urls(robot, buses)
+        real = not all(url.is_simulated for url in urls.values())
+        nodes = [axis.node_id for axis in robot.axes]
+        reference = safety_io or (robot.safety_io if real else None)
+        safety = stack.enter_context(open_safety(reference, out, nodes))
+        networks = _open_networks(stack, robot, urls)
         rehearse(len(robot.axes), robot.sync_period_s)
         begin = time.monotonic()
         booted, absent = _boot(stack, robot, networks, torque_share)
         boot_s = time.monotonic() - begin
-        for i, reason in absent.items():
-            out.note(f"axis {i} (optional) is left out: {reason}")
+        _note(robot, booted, absent, out)
         axes = [robot.axes[i] for i in booted]
         device = stack.enter_context(_device(robot, networks, booted, torque_share))
         for network in networks.values():
@@ -191,17 +208,29 @@ def open_robot(
         if not device.lockstep:
             for notice in stack.enter_context(paced_realtime()):
                 out.note(notice)
-        executive = _executive(device, axes, torque_share, stop_requested)
+        watches = () if safety is None else (safety.io,)
+        executive = _executive(device, axes, torque_share, stop_requested, watches)
         session = RobotSession(
-            robot, networks, device, executive, axes, list(booted.values()), absent
+            robot, networks, device, executive, axes, list(booted.values()), absent, safety
         )
         session.boot_s, session.simulator_pid = boot_s, pid
         try:
             yield session
         except TripError as error:
+            reason = str(error) if safety is None else safety.cause(str(error))
             if device.faulted().any():
-                raise DriveFaultError(f"{error}: {_faults(session)}") from error
-            raise
+                raise DriveFaultError(f"{reason}: {_faults(session)}") from error
+            raise TripError(reason) from error
+
+
+def _note(
+    robot: Robot, booted: Mapping[int, BootReport], absent: Mapping[int, str], out: Output
+) -> None:
+    for i, report in booted.items():
+        axis = robot.axes[i]
+        note_lacking_guards(f"bus {axis.bus} node {axis.node_id}", report, out)
+    for i, reason in absent.items():
+        out.note(f"axis {i} (optional) is left out: {reason}")
 
 
 def _own_simulator(
@@ -322,13 +351,15 @@ def _executive(
     axes: Sequence[RobotAxis],
     torque_share: float,
     stop_requested: Callable[[], bool],
+    watches: Sequence[Watch],
 ) -> Executive:
     limits = Limits(
         torque_Nm=torque_share * np.array([axis.winch.motor.rated_torque_Nm for axis in axes]),
         speed_rad_s=_SPEED_SHARE * np.array([axis.winch.motor.rated_speed_rad_s for axis in axes]),
         following_error_rad=_FOLLOWING_ERROR_RAD,
     )
-    return Executive(device, Supervisor(limits, device.n, device.period_s), stop_requested)
+    supervisor = Supervisor(limits, device.n, device.period_s)
+    return Executive(device, supervisor, stop_requested, watches)
 
 
 def _faults(session: RobotSession) -> str:

@@ -262,12 +262,7 @@ def open_winch(
         report = boot(network, winch.node_id, winch.drive, settings)
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
-        lacking = [name for name in report.absent if name.startswith(_GUARDS)]
-        if lacking:
-            out.note(
-                f"node {winch.node_id} lacks {', '.join(lacking)}: check what stops it "
-                "when its master falls silent"
-            )
+        note_lacking_guards(f"node {winch.node_id}", report, out)
         network.start_heartbeat()
         if not device.lockstep:
             for notice in stack.enter_context(paced_realtime()):
@@ -284,6 +279,15 @@ def open_winch(
                 code = _fault_of(network, winch.node_id)
                 raise DriveFaultError(f"{reason}: {code}") from error
             raise TripError(reason) from error
+
+
+def note_lacking_guards(node: str, report: BootReport, out: Output) -> None:
+    """Say so where a drive lacks what makes it stop by itself."""
+    lacking = [name for name in report.absent if name.startswith(_GUARDS)]
+    if lacking:
+        out.note(
+            f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
+        )
 
 
 def _heartbeat_s(winch: Winch) -> float:

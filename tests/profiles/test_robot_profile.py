@@ -95,3 +95,25 @@ def test_a_machine_is_a_winch_or_a_robot(tmp_path: Path):
     assert isinstance(load_machine(winch), Winch)
     with pytest.raises(ProfileError, match="did you mean 'spatial-8'"):
         load_machine("spatial8")
+
+
+def test_devices_beside_the_drives_are_found_from_anywhere(tmp_path: Path):
+    shipped = profiles.catalogue.SHIPPED / "safety_io/modbus-remote-io.toml"
+    (tmp_path / "io.toml").write_text(shipped.read_text())
+    top = 'safety_io = "./io.toml@127.0.0.1:1502"\nrails = ["rail-modbus", "sub/mine.toml"]'
+    robot = load_robot(robot_file(tmp_path, top=top, node=1))
+    assert robot.safety_io == f"{tmp_path / 'io.toml'}@127.0.0.1:1502"
+    assert robot.rails == ("rail-modbus", str(tmp_path / "sub/mine.toml"))
+    named = robot_file(tmp_path, top='tension_sensors = "rtu-load-cells-8"')
+    assert load_robot(named).tension_sensors == "rtu-load-cells-8"
+    wrong = robot_file(tmp_path, top='tension_sensors = "rtu-load-cell-8"')
+    with pytest.raises(ProfileError, match="did you mean 'rtu-load-cells-8'") as caught:
+        load_robot(wrong)
+    assert (caught.value.file, caught.value.key) == (str(wrong), "tension_sensors")
+
+
+def test_a_safety_io_needs_node_ids_of_their_own(tmp_path: Path):
+    path = robot_file(tmp_path, top='safety_io = "modbus-remote-io"')
+    with pytest.raises(ProfileError, match="which knows its brakes by it") as caught:
+        load_robot(path)
+    assert caught.value.key == "axes[1].node_id"
