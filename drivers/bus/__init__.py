@@ -7,6 +7,7 @@ from drivers.bus.packed import FrameBuffer, FramePort, open_simbus
 from drivers.bus.pythoncan import open_line_port, open_python_can
 from drivers.bus.simbus_socket import Filters, query_status
 from drivers.bus.socketcan import open_socketcan
+from drivers.bus.socketcand import SocketcandPort
 from drivers.bus.url import BusUrl
 
 __all__ = [
@@ -37,4 +38,6 @@ def open_port(
         return open_simbus(url, filters, health)
     if url.interface == "socketcan":
         return open_socketcan(url, filters, health)
+    if url.interface == "socketcand":
+        return SocketcandPort(url, filters, health)
     return open_line_port(url, filters, health)

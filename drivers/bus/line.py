@@ -21,7 +21,7 @@ import can
 from drivers.bus.health import BusHealth
 from drivers.bus.packed import BUFFER_BYTES, ERR_FLAG, FRAME_BYTES, Bytes, PackedPort
 from drivers.bus.packet_bus import PacketBus, pair_of
-from drivers.bus.simbus_socket import Filters
+from drivers.bus.simbus_socket import Filters, passes
 from drivers.bus.url import BusUrl, Option
 from drivers.errors import BusError
 
@@ -61,9 +61,7 @@ class _Member:
     def wants(self, can_id: int) -> bool:
         if can_id & ERR_FLAG:
             return self.hears_errors
-        if self.filters is None:
-            return True
-        return any((can_id & mask) == (wanted & mask) for wanted, mask in self.filters)
+        return passes(can_id, self.filters)
 
 
 class SharedLine:

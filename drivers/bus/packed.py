@@ -35,6 +35,7 @@ SEND_TIMEOUT_S = 1.0
 __all__ = [
     "BUFFER_BYTES", "EFF_FLAG", "ERR_FLAG", "FRAME", "FRAME_BYTES", "FRAME_DTYPE", "RTR_FLAG",
     "SEND_TIMEOUT_S", "Bytes", "FrameBuffer", "FramePort", "PackedPort", "open_simbus",
+    "set_receive_timeout",
 ]  # fmt: skip
 
 
@@ -129,11 +130,7 @@ class PackedPort:
         Python's would put before each receive.
         """
         self._sock.setblocking(seconds != 0)
-        fraction, whole = math.modf(seconds or 0.0)
-        # 0 would mean for ever
-        micro = max(int(fraction * 1e6), 1) if seconds else 0
-        timeval = struct.pack("ll", int(whole), micro)
-        self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+        set_receive_timeout(self._sock, seconds)
 
     def drain(self) -> int:
         """Throw away the frames that wait; return how many."""
@@ -155,6 +152,15 @@ class PackedPort:
             return BusError(f"{self.url}: the bus takes or gives no frames (time-out)")
         reason = (error.strerror or error) if error else "connection closed"
         return BusError(f"{self.url}: the bus has gone away ({reason})")
+
+
+def set_receive_timeout(sock: socket.socket, seconds: float | None) -> None:
+    """Have the kernel end the waits of a blocking socket; None and 0 end none."""
+    fraction, whole = math.modf(seconds or 0.0)
+    # 0 would mean for ever
+    micro = max(int(fraction * 1e6), 1) if seconds else 0
+    timeval = struct.pack("ll", int(whole), micro)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
 
 
 def open_simbus(

@@ -20,6 +20,13 @@ _CONTROL_BYTES = 65536
 _FILTERS_A_MESSAGE = 16
 
 
+def passes(can_id: int, filters: Filters | None) -> bool:
+    """Return whether a frame with this identifier, flags included, passes; None lets all pass."""
+    if filters is None:
+        return True
+    return any((can_id & mask) == (wanted & mask) for wanted, mask in filters)
+
+
 def connect(name: str) -> socket.socket:
     """Return a blocking socket connected to the bus `name`.
 

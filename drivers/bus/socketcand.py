@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import re
 import select
 import socket
+import sys
 import threading
 import time
+from collections import deque
 
-from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG, SEND_TIMEOUT_S, Bytes
+from drivers.bus.health import BusHealth
+from drivers.bus.packed import (
+    EFF_FLAG,
+    ERR_FLAG,
+    FRAME,
+    FRAME_BYTES,
+    RTR_FLAG,
+    SEND_TIMEOUT_S,
+    Bytes,
+    PackedPort,
+    set_receive_timeout,
+)
+from drivers.bus.simbus_socket import Filters, passes
 from drivers.bus.url import BusUrl
 from drivers.errors import BusError
 
@@ -17,6 +32,7 @@ _OPTIONS = ("host", "port", "lockstep")
 _ANSWER_S = 5.0
 _READ_BYTES = 1 << 16
 _LONGEST_MESSAGE = 4096
+_MOST_IDENTIFIERS = 4096
 _EFF_MASK = 0x1FFFFFFF
 # a peer that falls silent for good (power, cable) is given up after about 3 s
 _KEEPALIVE = (
@@ -38,27 +54,28 @@ class SocketcandLine:
                 raise BusError(f"{url}: unknown option {key!r}; allowed: lockstep")
         self._url = url
         self._rest = b""
+        self._lost = ""
         self._early: list[bytes] = []
         self._sending = threading.Lock()
         host, port = str(url.options["host"]), int(url.options["port"])
         try:
-            self._sock = socket.create_connection((host, port), _ANSWER_S)
+            self.sock = socket.create_connection((host, port), _ANSWER_S)
         except OSError as error:
             reason = error.strerror or error
             raise BusError(f"{url}: no socketcand server at {host}:{port} ({reason})") from None
         try:
-            self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            self.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
             for option, value in _KEEPALIVE:
-                self._sock.setsockopt(socket.IPPROTO_TCP, option, value)
+                self.sock.setsockopt(socket.IPPROTO_TCP, option, value)
             self._greet()
         except OSError as error:
-            self._sock.close()
+            self.sock.close()
             raise BusError(f"{url}: the socketcand server went away ({error})") from None
         except BusError:
-            self._sock.close()
+            self.sock.close()
             raise
-        self._sock.settimeout(SEND_TIMEOUT_S)
+        self.sock.settimeout(SEND_TIMEOUT_S)
         self._early = self._take(b"")
 
     def _greet(self) -> None:
@@ -66,7 +83,7 @@ class SocketcandLine:
         for command, wanted in (
             ("", b"hi"), (f"< open {channel} >", b"ok"), ("< rawmode >", b"ok")
         ):  # fmt: skip
-            self._sock.sendall(command.encode())
+            self.sock.sendall(command.encode())
             answer = self._answer()
             if answer != wanted:
                 said = answer.decode("ascii", "replace")
@@ -85,7 +102,7 @@ class SocketcandLine:
                 return match[1].strip()
             if time.monotonic() > deadline:
                 raise TimeoutError("no answer")
-            data = self._sock.recv(_READ_BYTES)
+            data = self.sock.recv(_READ_BYTES)
             if not data:
                 raise OSError("connection closed")
             self._rest = (self._rest + data)[-_LONGEST_MESSAGE:]
@@ -93,18 +110,31 @@ class SocketcandLine:
     def read(self, wake: int, /) -> list[bytes]:
         """Return the frames that came in; raises OSError when the connection has ended."""
         if self._early:
-            frames, self._early = self._early, []
-            return frames
-        ready, _, _ = select.select([self._sock.fileno(), wake], [], [])
-        if self._sock.fileno() not in ready:
-            return []
+            return self.early()
+        ready, _, _ = select.select([self.sock.fileno(), wake], [], [])
+        return self.receive() if self.sock.fileno() in ready else []
+
+    def early(self) -> list[bytes]:
+        """Return the frames that came with the greeting, once."""
+        frames, self._early = self._early, []
+        return frames
+
+    def receive(self, flags: int = 0) -> list[bytes]:
+        """Return the frames that came in; raises OSError, BlockingIOError at the time-out."""
         try:
-            data = self._sock.recv(_READ_BYTES)
+            data = self.sock.recv(_READ_BYTES, flags)
+        except BlockingIOError:
+            raise
         except OSError as error:
-            raise OSError(error.errno, f"lost the socketcand server: {error.strerror}") from None
+            raise self._lose(error.strerror) from None
         if not data:
-            raise OSError(errno.ECONNRESET, "lost the socketcand server: it closed the connection")
+            raise self._lose("it closed the connection")
         return self._take(data)
+
+    def _lose(self, reason: str | None) -> OSError:
+        """Note that the connection is of no use any more; return the error to raise."""
+        self._lost = self._lost or f"lost the socketcand server: {reason}"
+        return OSError(errno.ECONNRESET, self._lost)
 
     def _take(self, data: bytes) -> list[bytes]:
         text = self._rest + data
@@ -125,13 +155,21 @@ class SocketcandLine:
         head = f"{can_id & _EFF_MASK:08X}" if can_id & EFF_FLAG else f"{can_id & 0x7FF:03X}"
         # without data two spaces, as python-can's own client sends it
         text = f"< send {head} {length} {data[:length].hex(' ')} >".encode()
-        with self._sending:
-            self._sock.sendall(text)
+        if self._lost:
+            raise OSError(errno.ECONNRESET, self._lost)
+        try:
+            with self._sending:
+                self.sock.sendall(text)
+        except (BlockingIOError, TimeoutError):
+            # half a message may have gone: nothing that followed would be understood
+            raise self._lose("it takes no frames") from None
+        except OSError as error:
+            raise self._lose(error.strerror) from None
 
     def close(self) -> None:
         """Leave the server."""
         with self._sending:
-            self._sock.close()
+            self.sock.close()
 
 
 def _frame_of(message: bytes) -> bytes | None:
@@ -156,6 +194,61 @@ def _frame_of(message: bytes) -> bytes | None:
     return FRAME.pack(
         can_id & _EFF_MASK | EFF_FLAG if extended else can_id & 0x7FF, len(data), data
     )
+
+
+class SocketcandPort(PackedPort):
+    """Packed frames on a connection of its own, read by the caller: no thread stands between."""
+
+    def __init__(self, url: BusUrl, filters: Filters | None, health: BusHealth | None) -> None:
+        """Connect; raises BusError."""
+        self._line = SocketcandLine(url)
+        super().__init__(url, self._line.sock, {}, health)
+        self._line.sock.setblocking(True)  # time-outs are the kernel's
+        self._filters = None if filters is None else list(filters)
+        self._wanted: dict[int, bool] = {}
+        self._flags = 0
+        self._pending: deque[bytes] = deque()
+        self._keep(self._line.early())
+        self.send = self._send
+        self.recv_into = self._recv_into
+        self.close = self._line.close
+
+    def settimeout(self, seconds: float | None) -> None:
+        """Limit the wait of `recv_into`; None waits for ever, 0 does not wait."""
+        self._flags = socket.MSG_DONTWAIT if seconds == 0 else 0
+        set_receive_timeout(self._line.sock, seconds)
+
+    def drain(self) -> int:
+        """Throw away the frames that wait; return how many."""
+        count = 0
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                count += len(self._pending)
+                self._pending.clear()
+                self._keep(self._line.receive(socket.MSG_DONTWAIT))
+        return count
+
+    def _send(self, frame: Bytes) -> int:
+        self._line.write(frame)
+        return FRAME_BYTES
+
+    def _recv_into(self, buffer: bytearray | memoryview) -> int:
+        while not self._pending:
+            self._keep(self._line.receive(self._flags))
+        buffer[:FRAME_BYTES] = self._pending.popleft()
+        return FRAME_BYTES
+
+    def _keep(self, frames: list[bytes]) -> None:
+        """Put aside those that pass the filters; error frames are for the acyclic side."""
+        for frame in frames:
+            can_id = int.from_bytes(frame[:4], sys.byteorder)
+            wanted = self._wanted.get(can_id)
+            if wanted is None:
+                wanted = not can_id & ERR_FLAG and passes(can_id, self._filters)
+                if len(self._wanted) < _MOST_IDENTIFIERS:
+                    self._wanted[can_id] = wanted
+            if wanted:
+                self._pending.append(frame)
 
 
 def open_socketcand(url: BusUrl) -> SocketcandLine:

@@ -273,17 +273,18 @@ def _open_files() -> list[str]:
 
 def test_a_lost_line_can_be_opened_again_while_the_old_port_is_held() -> None:
     server = Server(*GREETING)
-    old = open_port(server.url)
-    old.settimeout(5.0)
+    old = open_python_can(server.url)
     server.client.close()
-    assert old.recv_into(bytearray(16)) == 0
+    with pytest.raises(can.CanError, match="lost the socketcand server"):
+        old.recv(5.0)
     server.serve()
-    new = open_port(server.url)
-    old.close()
-    new.settimeout(2.0)
+    new = open_python_can(server.url)
+    old.shutdown()
     server.client.sendall(b"< frame 181 1.0 AA >")
-    assert receive(new) == frame(0x181, b"\xaa")
-    new.close()
+    message = new.recv(2.0)
+    assert message is not None
+    assert bytes(message.data) == b"\xaa"
+    new.shutdown()
     server.close()
 
 
@@ -444,19 +445,61 @@ def test_error_frames_of_a_server() -> None:
 
 def test_the_end_of_the_connection_is_reported_soon() -> None:
     server = Server(*GREETING)
-    port, bus = open_port(server.url), open_python_can(server.url)
+    port = open_port(server.url)
     port.settimeout(5.0)
     server.close()
     started = time.monotonic()
-    assert port.recv_into(bytearray(16)) == 0
+    with pytest.raises(OSError, match="lost the socketcand server") as caught:
+        port.recv_into(bytearray(16))
     assert time.monotonic() - started < 1.0
-    assert "the bus has gone away (lost the socketcand server: " in str(port.lost())
-    with pytest.raises(can.CanError, match="lost the socketcand server"):
-        bus.recv(1.0)
+    assert "the bus has gone away (lost the socketcand server: " in str(port.lost(caught.value))
     with pytest.raises(OSError, match="lost the socketcand server"):
         port.send(frame(0x80))
     port.close()
+
+
+def test_and_on_the_acyclic_side() -> None:
+    server = Server(*GREETING)
+    bus = open_python_can(server.url)
+    server.close()
+    with pytest.raises(can.CanError, match="lost the socketcand server"):
+        bus.recv(5.0)
+    with pytest.raises(can.CanError, match="lost the socketcand server"):
+        bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
     bus.shutdown()
+
+
+def test_a_server_that_takes_nothing_is_given_up_in_bounded_time() -> None:
+    server = Server(*GREETING)
+    port = open_port(server.url, [])
+    longest = 0.0
+    with pytest.raises(OSError, match="takes no frames"):
+        while True:
+            started = time.monotonic()
+            port.send(frame(0x181, bytes(8)))
+            longest = max(longest, time.monotonic() - started)
+    assert longest < 3.0
+    port.close()
+    server.close()
+
+
+def test_a_ports_filters_and_time_outs_hold_on_a_connection_of_its_own() -> None:
+    server = Server(*GREETING)
+    port = open_port(server.url, [(0x181, 0x7FF)])
+    server.client.sendall(b"< frame 182 1.0 >< error 20000040 1.0 >< frame 181 1.0 55 >" * 3)
+    port.settimeout(2.0)
+    assert receive(port) == frame(0x181, b"\x55")
+    assert port.drain() == 2
+    assert port.drain() == 0
+    for timeout_s in (0, 0.1):
+        port.settimeout(timeout_s)
+        started = time.monotonic()
+        with pytest.raises(BlockingIOError) as caught:
+            port.recv_into(bytearray(16))
+        assert timeout_s <= time.monotonic() - started < timeout_s + 0.5
+    assert "time-out" in str(port.lost(caught.value))
+    port.close()
+    server.close()
 
 
 def test_a_peer_that_vanishes_without_a_word_is_given_up() -> None:
@@ -464,10 +507,10 @@ def test_a_peer_that_vanishes_without_a_word_is_given_up() -> None:
     server = Server(*GREETING)
     line = SocketcandLine(server.url)
     options = [
-        line._sock.getsockopt(socket.IPPROTO_TCP, option)
+        line.sock.getsockopt(socket.IPPROTO_TCP, option)
         for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT)
     ]
-    assert line._sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+    assert line.sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
     assert options[0] + options[1] * options[2] <= 5
     line.close()
     server.close()
