@@ -7,7 +7,16 @@ import time
 from typing import Final
 
 from drivers.boot import BootReport
-from drivers.cia402 import CONTROLWORD_TABLE, HALT, POWER_OFF, Mode, State, fault_text, state_of
+from drivers.cia402 import (
+    CONTROLWORD_TABLE,
+    FAULT_RESET,
+    HALT,
+    POWER_OFF,
+    Mode,
+    State,
+    fault_text,
+    state_of,
+)
 from drivers.drive_units import acceleration_unit_rad_s2, torque_unit_Nm, velocity_unit_rad_s
 from drivers.modbus.safety_io import SafetyIo
 from drivers.network import CanNetwork
@@ -74,9 +83,10 @@ class Cia402RailAxis:
         self._lead_to(State.OPERATION_ENABLED)
 
     def disable(self) -> None:
-        """Take the power away."""
+        """Take the power away; a drive in fault has none."""
         self._pushing = False
-        self._lead_to(State.SWITCH_ON_DISABLED)
+        if state_of(self._statusword()) not in (State.FAULT, State.FAULT_REACTION):
+            self._lead_to(State.SWITCH_ON_DISABLED)
 
     def push(self, share: float) -> bool:
         """Push with a share of the rated torque in profile torque mode."""
@@ -112,10 +122,12 @@ class Cia402RailAxis:
         return bool(word & _TARGET_REACHED)
 
     def halt(self) -> None:
-        """Stop on the profile's ramp (605Dh) and wait until it stands."""
+        """Stop on the profile's ramp (605Dh) and wait until it stands, or has no power any more."""
         self._write(0x6040, _ENABLED | HALT)
         deadline = time.monotonic() + _STOP_S
-        while not self._statusword() & _TARGET_REACHED:
+        while not (word := self._statusword()) & _TARGET_REACHED:
+            if state_of(word) != State.OPERATION_ENABLED:
+                return
             if time.monotonic() > deadline:
                 raise self._wrong("does not stop")
             time.sleep(_LOOK_S)
@@ -125,6 +137,13 @@ class Cia402RailAxis:
         axis = self._map.brake_axis
         (self._safety.release_brakes if released else self._safety.apply_brakes)(axis)
         self._safety.await_brakes(released, axis)
+
+    def acknowledge_fault(self) -> None:
+        """Reset the drive's fault by the rising edge of bit 7; nothing is enabled by it."""
+        self._write(0x6040, 0)
+        self._write(0x6040, FAULT_RESET)
+        self._write(0x6040, 0)
+        self._lead_to(State.SWITCH_ON_DISABLED)
 
     def _profile(self) -> tuple[int, int]:
         """Return profile velocity and acceleration in the drive's units."""
@@ -148,7 +167,7 @@ class Cia402RailAxis:
         deadline = time.monotonic() + 4.0 * self._drive.state_timeout_s
         while True:
             state = state_of(self._statusword())
-            if state == target or (target == State.SWITCH_ON_DISABLED and state == State.FAULT):
+            if state == target:
                 return
             if time.monotonic() > deadline or state == State.FAULT:
                 code = fault_text(self._network.read_int(self._node, 0x603F))

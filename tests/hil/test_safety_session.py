@@ -16,6 +16,7 @@ from typing import Any
 
 import canopen
 import pytest
+from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
 from safety_rig import Twin, board_file, patient_profile, ready, start, wait_until
@@ -23,6 +24,8 @@ from safety_rig import Twin, board_file, patient_profile, ready, start, wait_unt
 from profiles import load_winch
 from sim_bus.physics_board import BoardAxis, PhysicsBoard
 from sim_bus.safety_twin import Fault
+from tools.commands import io as io_commands
+from tools.errors import BadInputError
 
 WINCH = "winch-mpp0923d"
 # what may pass from the reaction of a busy machine until the next look
@@ -171,20 +174,20 @@ def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
     wait_until(lambda: lab.twin.coil(10), 20)
     assert result(lamp)["ok"]
     assert not lab.twin.coil(10)
-    brake = ("io", "brake", lab.twin.reference, "winch 1", "--seconds", "0.5")
-    unasked = subprocess.run(
-        [sys.executable, "-m", "tools.cli", *brake],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        check=False,
-    )
-    assert unasked.returncode == 2 and b"not confirmed" in unasked.stderr
-    command = lab.begin(*brake, "--yes")
+    brake = ("brake", lab.twin.reference, "winch 1", "--seconds", "0.5")
+    refused(*brake, said="not confirmed")
+    command = lab.begin("io", *brake, "--yes")
     wait_until(lambda: lab.winch.brake_released, 20)
     assert result(command)["ok"]
     assert not lab.winch.brake_released
-    unknown = result(lab.begin("io", "light", lab.twin.reference, "pink"), status=2)["error"]
-    assert "pink" in unknown and "red, yellow, green" in unknown
+    refused("light", lab.twin.reference, "pink", said="red, yellow, green")
+    refused("brake", lab.twin.reference, "winch 9", said="'winch 1', 'rail 1'")
+
+
+def refused(*arguments: str, said: str) -> None:
+    outcome = CliRunner().invoke(io_commands.app, [*arguments])
+    assert isinstance(outcome.exception, BadInputError)
+    assert said in str(outcome.exception)
 
 
 def test_a_lost_io_brakes_the_motion_under_control(lab: Lab) -> None:

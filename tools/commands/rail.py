@@ -9,6 +9,7 @@ import typer
 
 from cdpr_rt.calibration_state import calibration_state
 from drivers.rail import Conditions, move
+from drivers.rail_cia402 import Cia402RailAxis
 from profiles.rail import load_rail
 from tools.commands.options import JsonOption, SafetyIoOption, YesOption
 from tools.consent import require_consent
@@ -46,6 +47,24 @@ def show(rail: _RailArgument, bus: _BusOption = None, as_json: JsonOption = Fals
     out.say(f"robot {state.robot}: {known}{since}: {state.why}")
     told = dataclasses.asdict(state)
     out.result({"ok": True, "position_m": position, "calibration": told})
+
+
+@app.command()
+def reset(
+    rail: _RailArgument,
+    bus: _BusOption = None,
+    safety_io: SafetyIoOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Acknowledge the fault of a rail's CiA 402 drive; nothing is enabled by it."""
+    out = Output(as_json)
+    profile = load_rail(rail)
+    with open_rail(rail, profile, bus, safety_io, out) as axis:
+        if not isinstance(axis, Cia402RailAxis):
+            raise BadInputError(f"{profile.name}: acknowledge its fault at the drive itself")
+        axis.acknowledge_fault()
+    out.say(f"{profile.name}: no fault")
+    out.result({"ok": True})
 
 
 @app.command("move")

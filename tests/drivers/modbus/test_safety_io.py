@@ -122,7 +122,7 @@ def test_answers_that_are_no_answers_stop_the_motion(twin: Twin, fault: Fault, t
 
 def test_a_polling_thread_that_hangs_trips_as_well(twin: Twin) -> None:
     """The thread waits for an answer much longer than the trip time-out allows."""
-    io = SafetyIo(twin.profile(answer_timeout_s=3.0)).open()
+    io = SafetyIo(twin.profile(answer_timeout_s=1.5)).open()
     try:
         io.energise()
         twin.break_(Fault.SILENT)

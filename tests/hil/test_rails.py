@@ -1,0 +1,241 @@
+"""Rails moved by command: what is refused, what an interrupted move leaves behind."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymodbus.client import ModbusTcpClient
+from typer.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
+from safety_rig import PANEL, Twin, board_file, patient_profile, ready, start, wait_until
+
+from profiles.rail import SHIPPED
+from sim_bus.physics_board import BoardAxis, PhysicsBoard
+from sim_bus.rail_twin import RailFault
+from sim_bus.safety_twin import Fault
+from tools.commands import rail as rail_commands
+from tools.errors import BadInputError
+
+FAILED = 1
+M_PER_RAD = 0.02 / math.tau
+
+
+@dataclass
+class Rails:
+    """A rail on CiA 402 with its safety I/O, one on Modbus, and the load cell of a winch."""
+
+    bus: str
+    twin: Twin
+    winch: BoardAxis
+    rail: BoardAxis
+    modbus: Path
+    modbus_port: int
+    tension_port: str
+    home: Path
+
+    def begin(self, *arguments: str | Path) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "tools.cli", "rail", *map(str, arguments), "--json"],
+            env={**os.environ, "XDG_STATE_HOME": str(self.home)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def move(self, kind: str, to_m: float, *slack: str) -> subprocess.Popen[str]:
+        slack = slack or ("--cables-slack-checked",)
+        if kind == "modbus":
+            return self.begin("move", self.modbus, "--to", str(to_m), "--yes", *slack)
+        where = ("--bus", self.bus, "--safety-io", self.twin.reference)
+        return self.begin("move", "rail-cia402", "--to", str(to_m), *where, *slack)
+
+    def position_m(self, kind: str) -> float:
+        """The truth, and not what a command tells."""
+        if kind == "cia402":
+            return self.rail.state().motor_rad * M_PER_RAD
+        low = self._modbus().read_holding_registers(104, count=2, device_id=1).registers
+        return (low[0] << 16 | low[1]) * 1e-5
+
+    def braked(self, kind: str) -> bool:
+        """Whether the rail stands without power on an applied brake."""
+        if kind == "cia402":
+            return not self.rail.brake_released and not self.rail.state().power_on
+        status = self._modbus().read_holding_registers(111, count=1, device_id=1).registers[0]
+        return not status & 0b10011
+
+    def wear_brake(self, kind: str, worn: bool) -> None:
+        if kind == "cia402":
+            self.twin.break_(Fault.BRAKES_WORN if worn else Fault(0))
+        else:
+            fault = RailFault.BRAKE_WORN if worn else 0
+            self._modbus().write_register(1, int(fault), device_id=PANEL)
+
+    def calibration(self) -> dict[str, Any]:
+        held: dict[str, Any] = json.loads(self._state_file().read_text())
+        return held
+
+    def forget(self) -> None:
+        """Have the robot calibrated."""
+        self._state_file().parent.mkdir(parents=True, exist_ok=True)
+        told = {"robot": "spatial-8", "calibrated": True, "why": "camera", "date": "2020-01-01"}
+        self._state_file().write_text(json.dumps(told))
+
+    def acknowledge_trip(self) -> None:
+        (self.home / "cdpr-rt" / "safety-io.io.json").unlink()
+
+    def _state_file(self) -> Path:
+        return self.home / "cdpr-rt" / "calibration.spatial-8.json"
+
+    def _modbus(self) -> ModbusTcpClient:
+        return ModbusTcpClient("127.0.0.1", port=self.modbus_port, timeout=5)
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rails]:
+    folder = tmp_path_factory.mktemp("rails")
+    bus = f"simbus:rails-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    modbus = folder / "rail-modbus.toml"
+    with board_file() as on_rail, board_file() as on_winch:
+        drive = start("rail", "rail-cia402", "--bus", bus, "--board", on_rail)
+        other = start("rail", "rail-modbus", "--port", "0")
+        with PhysicsBoard.create(on_winch, 1) as winch:
+            ready(drive)
+            cells = start("tension", "rtu-load-cell-1", "--board", on_winch)
+            port = int(ready(other)["port"])
+            text = (SHIPPED / "rail-modbus.toml").read_text()
+            modbus.write_text(text.replace("port = 502", f"port = {port}"))
+            twin = Twin(patient_profile(folder), "--board", on_winch, "--board", on_rail)
+            with PhysicsBoard.attach(on_rail) as rail:
+                tty = ready(cells)["port"]
+                axes = winch.axis(0), rail.axis(0)
+                yield Rails(bus, twin, *axes, modbus, port, tty, folder / "state")
+            twin.close()
+            for process in (drive, other, cells):
+                process.communicate(b"", timeout=10)
+
+
+@pytest.fixture
+def rails(parts: Rails) -> Rails:
+    parts.winch.publish(0.0, 0.0, 0.0, 0.0, False)
+    parts.twin.mend()
+    parts.wear_brake("modbus", False)
+    parts.forget()
+    return parts
+
+
+def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
+    out, errors = command.communicate(timeout=60)
+    assert "Traceback" not in errors + out, errors
+    assert command.returncode == status, errors
+    told: dict[str, Any] = json.loads(out.splitlines()[-1])
+    return told
+
+
+@pytest.mark.parametrize("kind", ["cia402", "modbus"])
+def test_a_move_arrives_and_voids_the_calibration(rails: Rails, kind: str) -> None:
+    target = rails.position_m(kind) + 0.01
+    told = result(rails.move(kind, target))
+    assert abs(rails.position_m(kind) - target) < 5e-4
+    assert abs(told["to_m"] - target) < 5e-4 and told["brake_moved_m"] < 2e-4
+    assert rails.braked(kind)
+    state = rails.calibration()
+    assert state["calibrated"] is False and "was moved from" in state["why"]
+
+
+@pytest.mark.parametrize("kind", ["cia402", "modbus"])
+def test_a_brake_that_does_not_hold_is_found_before_the_move(rails: Rails, kind: str) -> None:
+    before = rails.position_m(kind)
+    rails.wear_brake(kind, True)
+    error = result(rails.move(kind, before + 0.3), FAILED)["error"]
+    assert "the applied brake does not hold: pushed with 10 % of the rated torque" in error
+    assert abs(rails.position_m(kind) - before) < 0.05
+    assert "slipped by" in rails.calibration()["why"]
+
+
+def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
+    before = rails.position_m("cia402")
+    cells = ("--tension", "rtu-load-cell-1", "--tension-port", rails.tension_port)
+    rails.winch.publish(0.0, 40.0, 0.0, 0.0, False)
+    error = result(rails.move("cia402", before + 0.3, *cells), FAILED)["error"]
+    assert "not moved unless the cables are slack: winch 1 has 4" in error
+    assert "(5 N allowed)" in error
+    assert abs(rails.position_m("cia402") - before) < 1e-4
+    assert rails.calibration()["calibrated"] is True
+    rails.winch.publish(0.0, 0.0, 0.0, 0.0, False)
+    command = rails.move("cia402", before + 0.5, *cells)
+    wait_until(lambda: rails.position_m("cia402") > before + 0.01, 20)
+    rails.winch.publish(0.0, 40.0, 0.0, 0.0, False)
+    assert "the cables are not slack any more" in result(command, FAILED)["error"]
+    assert rails.braked("cia402")
+    assert before + 0.01 < rails.position_m("cia402") < before + 0.3
+
+
+@pytest.mark.parametrize("kind", ["cia402", "modbus"])
+def test_an_interrupted_move_is_stopped_and_braked_and_voids_the_calibration(
+    rails: Rails, kind: str
+) -> None:
+    before = rails.position_m(kind)
+    command = rails.move(kind, before + 0.5)
+    wait_until(lambda: rails.position_m(kind) > before + 0.005, 20)
+    command.send_signal(signal.SIGINT)
+    assert "stopped on request" in result(command, FAILED)["error"]
+    assert rails.braked(kind)
+    assert rails.position_m(kind) < before + 0.4
+    assert rails.calibration()["calibrated"] is False
+
+
+@pytest.mark.parametrize("kind", ["cia402", "modbus"])
+def test_a_command_that_dies_leaves_no_rail_that_moves(rails: Rails, kind: str) -> None:
+    before = rails.position_m(kind)
+    command = rails.move(kind, before + 0.5)
+    wait_until(lambda: rails.position_m(kind) > before + 0.005, 20)
+    command.kill()
+    command.communicate()
+    wait_until(lambda: rails.braked(kind), 5)
+    assert rails.position_m(kind) < before + 0.4
+    assert rails.calibration()["calibrated"] is False
+
+
+def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
+    before = rails.position_m("cia402")
+    command = rails.move("cia402", before + 0.5)
+    wait_until(lambda: rails.position_m("cia402") > before + 0.005, 20)
+    rails.twin.press()
+    wait_until(lambda: rails.braked("cia402"), 2)
+    assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
+    rails.twin.press(False)
+    where = ("--bus", rails.bus, "--safety-io", rails.twin.reference)
+    assert "tripped on" in result(rails.begin("reset", "rail-cia402", *where), FAILED)["error"]
+    rails.acknowledge_trip()
+    assert result(rails.begin("reset", "rail-cia402", *where))["ok"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--to", "1.5", "--cables-slack-checked"), "--to 1.5: allowed are 0 to 1.2 m"),
+        (("--to", "0.1"), "the cables must be slack"),
+        (("--to", "0.1", "--cables-slack-checked"), "--safety-io: Rail 1"),
+        (("--to", "0.1", "--tension", "rtu-load-cell-1"), "--tension-port"),
+    ],
+)
+def test_what_a_move_needs_is_said_before_anything_moves(
+    arguments: tuple[str, ...], said: str
+) -> None:
+    command = ["move", "rail-cia402", "--bus", "simbus:nobody", *arguments]
+    outcome = CliRunner().invoke(rail_commands.app, command)
+    assert isinstance(outcome.exception, BadInputError)
+    assert said in str(outcome.exception)
