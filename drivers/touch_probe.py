@@ -19,6 +19,11 @@ def arm(group: AxisGroup, axis: int) -> None:
     PDOs do not carry the result, SdoError when it refuses.
     """
     node = group.axes[axis].node_id
+    if 0x60B8 not in group.network.dictionary(node):
+        raise DriveFaultError(
+            f"node {node}: the drive has no touch probe (60B8h is not in its EDS); find its index "
+            "by homing"
+        )
     write = group.network.write
     group.expect_index(axis, False)
     write(node, 0x60B8, 0, _OFF)
