@@ -5,10 +5,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import json
 import os
 import pty
+import signal
 import socket
 import struct
+import subprocess
+import sys
 import termios
 import time
 import tty
@@ -16,6 +20,7 @@ from collections.abc import Iterator
 
 import can
 import pytest
+import serial
 import vcan_replay
 
 from drivers.bus import BusHealth, BusState, BusUrl, open_port, open_python_can
@@ -140,11 +145,8 @@ def test_an_interface_that_goes_down_in_motion_is_noticed_by_readers_and_senders
         peer.close()
 
 
-@pytest.fixture
-def stalled_adapter() -> Iterator[tuple[int, str]]:
-    """A real CAN driver, the kernel's slcan, on a terminal that nobody reads."""
-    host, terminal = pty.openpty()
-    tty.setraw(terminal)
+def kernel_slcan(terminal: int) -> str:
+    """Give a terminal to the kernel's own slcan driver; return its network interface, up."""
     try:
         fcntl.ioctl(terminal, termios.TIOCSETD, struct.pack("i", N_SLCAN))
     except OSError as error:
@@ -153,6 +155,15 @@ def stalled_adapter() -> Iterator[tuple[int, str]]:
         pytest.skip(f"this kernel has no slcan or lets only root use it ({error.strerror})")
     name = fcntl.ioctl(terminal, SIOCGIFNAME, bytes(40))[:16].rstrip(b"\0").decode()
     set_link(name, up=True)
+    return name
+
+
+@pytest.fixture
+def stalled_adapter() -> Iterator[tuple[int, str]]:
+    """A real CAN driver, the kernel's slcan, on a terminal that nobody reads."""
+    host, terminal = pty.openpty()
+    tty.setraw(terminal)
+    name = kernel_slcan(terminal)
     yield host, name
     os.close(terminal)
     os.close(host)
@@ -199,3 +210,52 @@ def test_an_adapter_pulled_out_takes_its_interface_away(stalled_adapter: tuple[i
         port.recv_into(buffer)
     assert "gone away" in str(port.lost(caught.value))
     port.close()
+
+
+SIMULATOR = """
+import math
+from sim_bus.frame import pack_frame
+from sim_bus.server import serve
+
+class Node:
+    node_id, sync_period_s, accepts = 1, 0.001, frozenset((0x80, 0x201))
+    def __init__(self): self.outbox, self.data = [], bytes(8)
+    def receive(self, frame, now):
+        if frame[:2] == b"\\x80\\x00":
+            self.outbox.append(pack_frame(0x181, self.data))
+        else:
+            self.data = frame[8:16]
+    def advance(self, now): pass
+    def next_event(self): return math.inf
+    def close(self): pass
+
+serve([Node()], "simbus:kernel-slcan", until_stdin_ends=True, slcan=True)
+"""
+
+
+def test_the_kernels_own_driver_takes_the_simulated_adapter_for_a_real_one() -> None:
+    simulator = subprocess.Popen(
+        [sys.executable, "-c", SIMULATOR], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert simulator.stdout is not None
+    ready = json.loads(simulator.stdout.readline())["ready"]
+    with serial.Serial(ready["slcan"], timeout=2.0) as terminal:
+        terminal.write(b"S8\rO\r")
+        assert terminal.read(2) == b"\r\r"
+        url = BusUrl.parse(f"socketcan:{kernel_slcan(terminal.fileno())}")
+        port = open_port(url, [(0x181, 0x7FF)])
+        port.settimeout(5.0)
+        buffer = bytearray(16)
+        for k in range(100):
+            port.send(FRAME.pack(0x201, 8, bytes([k, 1, 2, 3, 4, 5, 6, 255])))
+            port.send(FRAME.pack(0x080, 0, b""))
+            port.recv_into(buffer)
+            assert FRAME.unpack(buffer) == (0x181, 8, bytes([k, 1, 2, 3, 4, 5, 6, 255]))
+        # pulled out: the driver takes its interface away
+        os.kill(ready["slcan_pid"], signal.SIGKILL)
+        with pytest.raises(OSError, match=r".") as caught:
+            port.recv_into(buffer)
+        assert "gone away" in str(port.lost(caught.value))
+        assert not isinstance(caught.value, BlockingIOError)
+        port.close()
+    simulator.communicate(timeout=30)
