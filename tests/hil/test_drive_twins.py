@@ -222,7 +222,7 @@ def _index_is_right(twin: Twin) -> None:
 def test_touch_probe_finds_the_index_in_motion(twin: Twin) -> None:
     session, device = twin.session, twin.session.device
     if not any(entry.index == 0x60B9 for pdo in twin.drive.tpdos for entry in pdo.entries):
-        with pytest.raises(DriveFaultError, match="60B8h is not in its EDS.*by homing"):
+        with pytest.raises(DriveFaultError, match=r"60B8h is not in its EDS.*by homing"):
             touch_probe.arm(device, 0)
         return
     twin.power()
