@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-import sys
+import queue
+import threading
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -18,26 +19,75 @@ from tools.errors import BadInputError, WorkFailedError
 
 _BATCH = 200
 _WAIT_S = 0.1
+_MOST_BLOCKS = 10_000
+"""Blocks of lines that may wait for a reader before the monitor waits for it too."""
+
+
+class LineWriter:
+    """Writes blocks of lines from a thread of its own, so that a slow reader delays nobody else.
+
+    Use it as a context; at its end all that was handed over is written.
+    """
+
+    def __init__(self, out: TextIO) -> None:
+        self._out = out
+        self._blocks: queue.Queue[str | None] = queue.Queue(_MOST_BLOCKS)
+        self._thread = threading.Thread(target=self._run, name="lines", daemon=True)
+        self.closed = False
+        """Whether nobody reads the lines any more."""
+
+    def write(self, lines: list[str]) -> None:
+        """Hand lines over."""
+        if lines and not self.closed:
+            self._blocks.put("\n".join(lines) + "\n")
+
+    def _run(self) -> None:
+        while (block := self._blocks.get()) is not None:
+            if self.closed:
+                continue
+            try:
+                self._out.write(block)
+                self._out.flush()
+            except OSError:
+                self.closed = True
+                # what is left in the buffer is not to be complained of at the interpreter's end
+                with suppress(OSError, ValueError):
+                    os.dup2(os.open(os.devnull, os.O_WRONLY), self._out.fileno())
+
+    def __enter__(self) -> LineWriter:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        self._blocks.put(None)
+        self._thread.join()
 
 
 class Viewer:
-    """Takes frames, writes a line for each that is shown, and keeps the summary.
+    """Decodes frames, hands on a line for each that is shown, and keeps the summary.
 
-    SYNC without a counter says nothing and is counted only. Lines are written as whole lines, in
-    blocks when many come at once.
+    SYNC without a counter says nothing and is counted only.
     """
 
-    def __init__(self, decoder: Decoder, summary: Summary, out: TextIO, *, raw: bool) -> None:
+    def __init__(self, decoder: Decoder, summary: Summary, out: LineWriter, *, raw: bool) -> None:
         self._decoder = decoder
         self._out = out
         self._raw = raw
         self._start_s: float | None = None
         self.summary = summary
-        self.closed = False
+
+    @property
+    def closed(self) -> bool:
         """Whether nobody reads the lines any more."""
+        return self._out.closed
 
     def show(self, channel: str, frames: Iterable[Frame]) -> None:
-        """Decode frames of one bus and write their lines."""
+        """Decode frames of one bus and show them."""
         lines = []
         for frame in frames:
             if self._start_s is None:
@@ -48,16 +98,7 @@ class Viewer:
                 lines.append(format_line(channel, frame))
             elif record.text or record.problem:
                 lines.append(record.line(self._start_s))
-        if not lines or self.closed:
-            return
-        try:
-            self._out.write("\n".join(lines) + "\n")
-            self._out.flush()
-        except BrokenPipeError:
-            self.closed = True
-            # nothing is left to be written, so that the interpreter does not complain at its end
-            with suppress(OSError, ValueError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        self._out.write(lines)
 
 
 class LogFile:

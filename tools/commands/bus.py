@@ -13,7 +13,7 @@ from drivers.bus import Filters
 from drivers.errors import BusError
 from tools.busview.identifiers import filters, parse_identifiers
 from tools.busview.known import known_bus
-from tools.busview.monitor import LogFile, Viewer, watch
+from tools.busview.monitor import LineWriter, LogFile, Viewer, watch
 from tools.busview.replay import Pacer, Sender, chosen, play, recorded
 from tools.busview.source import SimbusSource, named_bus, open_source
 from tools.busview.summary import Summary
@@ -24,6 +24,8 @@ from tools.output import Output
 from tools.signals import stop_on_signals
 
 app = typer.Typer(help="Look at a CAN bus.", no_args_is_help=True)
+bus_scan.add(app)
+bus_budget.add(app)
 
 _LATE_S = 0.05
 """For how long frames that the bus has counted may be under way to us."""
@@ -31,8 +33,6 @@ _LATE_S = 0.05
 
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
-    bus_scan.add(app)
-    bus_budget.add(app)
     parent.add_typer(app, name="bus")
 
 
@@ -84,22 +84,21 @@ def monitor(
     url = named_bus(bus)
     known = known_bus(url, profile, winch, robot)
     summary = Summary(known.bitrate_bit_s)
-    viewer = Viewer(known.decoder(), summary, sys.stderr if as_json else sys.stdout, raw=raw)
-    source = open_source(url, _filters(ids))
-    try:
-        with stop_on_signals() as stop_wanted:
-            if log is None:
-                watch(source, viewer, None, seconds, stop_wanted)
-            else:
-                with LogFile(log) as file:
-                    watch(source, viewer, file, seconds, stop_wanted)
+    with ExitStack() as stack:
+        stack.callback(_tell, out, summary)
+        lines = stack.enter_context(LineWriter(sys.stderr if as_json else sys.stdout))
+        viewer = Viewer(known.decoder(), summary, lines, raw=raw)
+        source = open_source(url, _filters(ids))
+        stack.callback(source.close)
+        file = None if log is None else stack.enter_context(LogFile(log))
+        stop_wanted = stack.enter_context(stop_on_signals())
+        watch(source, viewer, file, seconds, stop_wanted)
         if isinstance(source, SimbusSource) and source.lost is None:
             _ask_bus(source, summary)
-    finally:
-        source.close()
-        _tell(out, summary)
     if source.lost is not None:
         raise source.lost
+    if not summary.frames:
+        out.note("nothing was heard")
     out.result({"ok": True, "bus": str(url), "log": log, **summary.table()})
 
 
@@ -139,9 +138,10 @@ def replay(
         what = f"the recorded frames are sent to {url}, commands to motors among them."
         require_consent(what, yes or url.is_simulated)
     summary = Summary(known.bitrate_bit_s)
-    viewer = Viewer(known.decoder(), summary, sys.stderr if as_json else sys.stdout, raw=raw)
     with ExitStack() as stack:
         stack.callback(_tell, out, summary)
+        lines = stack.enter_context(LineWriter(sys.stderr if as_json else sys.stdout))
+        viewer = Viewer(known.decoder(), summary, lines, raw=raw)
         stop_wanted = stack.enter_context(stop_on_signals())
         frames = chosen(recorded(file, channel), wanted)
         if url is None:
@@ -175,5 +175,7 @@ def _ask_bus(source: SimbusSource, summary: Summary) -> None:
 
 
 def _tell(out: Output, summary: Summary) -> None:
+    if not summary.frames:
+        return
     for line in summary.lines():
         out.note(line)

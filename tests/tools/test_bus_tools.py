@@ -1,0 +1,528 @@
+"""`cdpr bus` as a user types it, beside simulated drives, a working master and strangers."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import can
+import canopen
+import pytest
+
+from profiles import load_winch
+from tools.cli import main
+
+WINCH = "winch-mpp0923d"
+EDS = str(load_winch(WINCH).drive.eds)
+Result = subprocess.CompletedProcess[str]
+Process = subprocess.Popen[str]
+MARK = can.Message(arbitration_id=0x7FE, is_extended_id=False)
+PROBE = can.Message(arbitration_id=0x7FF, data=[1], is_extended_id=False)
+
+
+def command(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+
+
+def cdpr(*arguments: str | Path, stdin: str = "") -> Result:
+    """Run a command in this process, which spares it the second that its libraries take to load."""
+    argv = ["cdpr", *map(str, arguments)]
+    out, errors = io.StringIO(), io.StringIO()
+    with (
+        mock.patch.multiple(sys, argv=argv, stdin=io.StringIO(stdin)),
+        redirect_stdout(out),
+        redirect_stderr(errors),
+        pytest.raises(SystemExit) as ended,
+    ):
+        main()
+    assert isinstance(ended.value.code, int)
+    return Result(argv, ended.value.code, out.getvalue(), errors.getvalue())
+
+
+def begin(*arguments: str | Path) -> Process:
+    return subprocess.Popen(
+        command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def last_json(text: str) -> dict[str, Any]:
+    return dict(json.loads(text.splitlines()[-1]))
+
+
+class Lab:
+    """Simulated drives on a bus of their own."""
+
+    def __init__(self, name: str, *options: str) -> None:
+        self.name = f"{name}-{os.getpid()}"
+        self.bus = f"simbus:{self.name}"
+        arguments = ["sim", "up", WINCH, "--bus", self.bus, "--exit-with-stdin", *options]
+        self.process = subprocess.Popen(
+            command(*arguments), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def ready(self) -> None:
+        assert self.process.stdout is not None
+        assert self.bus in self.process.stdout.readline()
+
+    def join(self) -> can.BusABC:
+        return can.Bus(self.name, "simbus")
+
+    def passed(self, ear: can.BusABC) -> list[can.Message]:
+        """Return what has come to a member since it was last asked."""
+        with self.join() as other:
+            other.send(MARK)
+        messages = []
+        while (message := ear.recv(10.0)) is not None and message.arbitration_id != 0x7FE:
+            messages.append(message)
+        assert message is not None
+        return messages
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.communicate("", timeout=20)
+
+
+@pytest.fixture(scope="module")
+def labs() -> Iterator[tuple[Lab, Lab]]:
+    two = Lab("bustools", "--nodes", "2"), Lab("bustools2")
+    for lab in two:
+        lab.ready()
+    yield two
+    for lab in two:
+        lab.close()
+
+
+@pytest.fixture(scope="module")
+def lab(labs: tuple[Lab, Lab]) -> Lab:
+    return labs[0]
+
+
+@contextmanager
+def stranger(lab: Lab, node_id: int, **objects: int) -> Iterator[canopen.LocalNode]:
+    """A slave of the canopen library on the bus; `x1018_1=7` sets an object."""
+    dictionary = canopen.import_od(EDS, node_id)
+    network = canopen.Network()
+    network.NOTIFIER_CYCLE = 0.02
+    network.connect(interface="simbus", channel=lab.name)
+    node = canopen.LocalNode(node_id, dictionary)
+    network.add_node(node)
+    for name, value in objects.items():
+        index, _, sub = name[1:].partition("_")
+        entry = dictionary[int(index, 16)]
+        variable = entry[int(sub)] if sub else entry
+        node.set_data(int(index, 16), int(sub or 0), variable.encode_raw(value))
+    try:
+        yield node
+    finally:
+        network.disconnect()
+
+
+def scan(lab: Lab, *arguments: str) -> dict[int, dict[str, Any]]:
+    result = cdpr("bus", "scan", "--bus", lab.bus, *arguments, "--json")
+    assert result.returncode == 0, result.stderr
+    (bus,) = last_json(result.stdout)["buses"]
+    return {node["node_id"]: node for node in bus["nodes"]} | {0: bus}
+
+
+# -- scan
+
+
+def test_scan_tells_who_is_there(lab: Lab) -> None:
+    found = scan(lab)
+    assert found.keys() == {0, 1, 2}
+    assert found[0]["seconds"] < 6.0  # 127 ids, 125 of them silent
+    for node_id in (1, 2):
+        node = found[node_id]
+        assert node["device_name"] == "Generic CiA 402 torque servo"
+        assert (node["vendor_id"], node["product_code"]) == (0xCD9A01, 0x402)
+        assert node["serial"] == node_id
+        assert node["supported_modes"] == [1, 3, 4, 6, 8, 9, 10]
+        assert node["state"] == "switch on disabled"
+        assert node["profiles"] == ["generic-cia402"]
+        assert node["problems"] == []
+    assert found[0]["warning"] == ""
+
+
+def test_scan_disturbs_nobody(lab: Lab) -> None:
+    """All that goes out are requests to read."""
+    with lab.join() as ear:
+        scan(lab, "--nodes", "1-5")
+        passed = lab.passed(ear)
+        sent = [m for m in passed if m.arbitration_id & 0x780 == 0x600]
+        others = [
+            m for m in passed if m not in sent and m.arbitration_id & 0x780 not in (0x580, 0x700)
+        ]
+    assert {m.arbitration_id for m in sent} == {0x601, 0x602, 0x603, 0x604, 0x605}
+    assert {m.data[0] for m in sent} <= {0x40, 0x60, 0x70}
+    assert not others
+
+
+def test_scan_for_people(lab: Lab) -> None:
+    result = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "2,9")
+    assert result.returncode == 0
+    title, heads, row, identity, doing = result.stdout.splitlines()
+    assert title == f"{lab.bus}: 1 node"
+    assert re.split(r"\s{2,}", row.strip()) == [
+        "2",
+        "not told",
+        "Generic CiA 402 torque servo",
+        "generic-cia402",
+        "switch on disabled",
+        "PP PV PT HM CSP CSV CST",
+    ]
+    assert heads.index("CiA 402 state") == row.index("switch on disabled")
+    assert "serial 00000002h" in identity
+    assert "no heartbeat" in doing
+    nobody = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "9")
+    assert nobody.returncode == 0
+    assert "no nodes" in nobody.stdout
+    assert "termination" in nobody.stdout
+
+
+def test_two_nodes_with_one_id_are_told(lab: Lab) -> None:
+    with stranger(lab, 1, x1018_4=77, x1000=0x20192):
+        found = scan(lab, "--nodes", "1-2")
+    assert found[2]["problems"] == []
+    (problem,) = found[1]["problems"]
+    assert "several nodes have this id" in problem
+    assert "differing answers to one request for 1018h:4" in problem
+
+
+def test_devices_that_are_no_drives(lab: Lab, tmp_path: Path) -> None:
+    with (
+        stranger(lab, 20, x1000=0x00000000, x1018_1=5, x1018_2=6),
+        stranger(lab, 21, x1000=0x000F0191),
+        stranger(lab, 22) as silent,
+        stranger(lab, 23, x1000=0x00020192, x1018_1=5, x1018_2=6, x1018_3=8, x6502=0x200),
+    ):
+        silent.network.unsubscribe(0x616)  # answers nothing
+        silent.nmt.start_heartbeat(100)
+        found = scan(lab, "--nodes", "20-23")
+    assert "as a bootloader has" in found[20]["problems"][0]
+    assert found[20]["cia402"] is False
+    assert "CiA 401" in found[21]["problems"][0]
+    assert found[22]["answers_sdo"] is False
+    assert found[22]["heartbeats"] >= 5
+    assert "answers no SDO" in found[22]["problems"][0]
+    assert found[23]["cia402"] is True
+    assert found[23]["supported_modes"] == [10]
+    assert found[23]["profiles"] == []
+
+
+def test_profiles_of_ones_own(lab: Lab, tmp_path: Path) -> None:
+    source = Path(EDS)
+    text = source.with_suffix(".toml").read_text(encoding="utf-8")
+    (tmp_path / source.name).write_bytes(source.read_bytes())
+    (tmp_path / "mine.toml").write_text(text.replace("0x00010000", "0x00010009"))
+    (tmp_path / "motor.toml").write_text('model = "X"\n')
+    node = scan(lab, "--nodes", "1", "--profiles", str(tmp_path))[1]
+    own = f"{tmp_path / 'mine.toml'} (but its revision is 00010009h)"
+    assert node["profiles"] == ["generic-cia402", own]
+
+
+def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
+    with lab.join() as bus:
+        reading = can.Message(arbitration_id=0x601, data=bytes.fromhex("4018100100000000"))
+        reading.is_extended_id = False
+        task = bus.send_periodic(reading, 0.05)
+        refused = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "1")
+        assert refused.returncode == 1
+        assert "SDO requests to node 1" in refused.stderr
+        assert "--force" in refused.stderr
+        forced = scan(lab, "--nodes", "1", "--force")
+        task.stop()
+    assert forced[1]["serial"] == 1
+    assert forced[1]["problems"] == []  # answers to the other are no second node
+    assert "SDO requests" in forced[0]["warning"]
+
+
+def test_scan_of_two_buses(labs: tuple[Lab, Lab]) -> None:
+    lab, other = labs
+    result = cdpr("bus", "scan", "--bus", lab.bus, "--bus", other.bus, "--nodes", "1-9", "--json")
+    buses = last_json(result.stdout)["buses"]
+    assert [(bus["bus"], len(bus["nodes"])) for bus in buses] == [(lab.bus, 2), (other.bus, 1)]
+
+
+# -- monitor and replay
+
+
+class Session:
+    """A jog that was watched and logged."""
+
+    def __init__(self, lab: Lab, folder: Path) -> None:
+        self.log = folder / "jog.log"
+        shown = folder / "shown.txt"
+        arguments = ("bus", "monitor", "--bus", lab.bus, "--winch", WINCH, "--log", self.log)
+        with lab.join() as ear, shown.open("w") as screen:
+            monitor = subprocess.Popen(
+                command(*arguments), stdout=screen, stderr=subprocess.PIPE, text=True
+            )
+            wait_for_log(self.log, ear)
+            ear.send(PROBE)
+            jog = ("drive", "jog", WINCH, "--bus", lab.bus, "--speed-deg-s", "90")
+            assert cdpr(*jog, "--seconds", "0.5").returncode == 0
+            self.heard = lab.passed(ear)
+            time.sleep(0.3)
+            monitor.send_signal(signal.SIGINT)
+            _, self.errors = monitor.communicate(timeout=30)
+        assert monitor.returncode == 0, self.errors
+        self.lines = shown.read_text().splitlines()
+
+
+def wait_for_log(log: Path, bus: can.BusABC) -> None:
+    """Return when a monitor logs what is sent."""
+    until = time.monotonic() + 30
+    while not log.exists() or not log.stat().st_size:
+        assert time.monotonic() < until
+        bus.send(PROBE)
+        time.sleep(0.05)
+
+
+@pytest.fixture(scope="module")
+def session(lab: Lab, tmp_path_factory: pytest.TempPathFactory) -> Session:
+    return Session(lab, tmp_path_factory.mktemp("session"))
+
+
+def of_kind(lines: list[str], kind: str) -> list[str]:
+    return [line for line in lines if f"  {kind} " in line]
+
+
+def test_monitor_shows_a_session_in_words(session: Session) -> None:
+    feedback = of_kind(session.lines, "TPDO1")
+    commands = of_kind(session.lines, "RPDO1")
+    assert len(feedback) > 1000
+    assert any("Statusword operation enabled" in line for line in feedback)
+    assert any("Controlword enable operation (000Fh)" in line for line in commands)
+    assert re.search(r"Position actual value -?\d+\.\d{3} deg", feedback[0])
+    assert re.search(r"Target torque -?\d+\.\d{4} Nm", commands[0])
+    sdo = of_kind(session.lines, "SDO")
+    assert any("-> write 1017h Producer heartbeat time = 100 ms" in line for line in sdo)
+    assert any("<- 1018h:1 Identity object: Vendor-ID = 00CD9A01h" in line for line in sdo)
+    assert any("start: node 1" in line for line in of_kind(session.lines, "NMT"))
+    assert any("boot-up" in line for line in of_kind(session.lines, "heartbeat"))
+    # what SYNC has to tell is counted
+    assert not of_kind(session.lines, "SYNC")
+
+
+def test_monitor_sums_up(session: Session) -> None:
+    head, _, *rows = session.errors.splitlines()
+    assert re.fullmatch(
+        r"\d+ frames in \d+\.\d{3} s of bus time; bus load \d+\.\d % of 1000 kbit/s, stuffed as "
+        r"badly as can be; 0 told of trouble \(marked !\)",
+        head,
+    )
+    assert "went by unseen" not in session.errors
+    counts = {row.split()[0]: row.split()[1:-1] for row in rows}
+    assert counts["181"] == ["1", "TPDO1", str(len(of_kind(session.lines, "TPDO1")))]
+    assert counts["080"] == ["SYNC", counts["181"][-1]]
+    assert int(head.split()[0]) == sum(int(row[-1]) for row in counts.values())
+
+
+def test_the_log_is_what_others_have_heard(session: Session) -> None:
+    logged = [(m.arbitration_id, bytes(m.data)) for m in can.CanutilsLogReader(session.log)]
+    logged = [frame for frame in logged if frame != (0x7FF, b"\1")]
+    heard = [(m.arbitration_id, bytes(m.data)) for m in session.heard]
+    assert len(heard) > 4000
+    assert logged[: len(heard)] == heard
+
+
+def test_replay_shows_the_same_lines(session: Session) -> None:
+    result = cdpr("bus", "replay", session.log, "--winch", WINCH)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines() == session.lines
+    logged = len(session.log.read_text().splitlines())
+    assert result.stderr.startswith(f"{logged} frames in")
+
+
+def test_replay_of_a_log_of_python_can(session: Session, tmp_path: Path) -> None:
+    """Other formats, and the same one written by somebody else."""
+    for name in ("other.log", "other.asc", "other.blf"):
+        with can.Logger(tmp_path / name) as logger:
+            for message in can.CanutilsLogReader(session.log):
+                logger(message)
+        result = cdpr("bus", "replay", tmp_path / name, "--winch", WINCH)
+        assert result.returncode == 0, result.stderr
+        told = [line[15:] for line in result.stdout.splitlines()]
+        assert told == [line[15:] for line in session.lines], name
+
+
+def test_raw_lines_are_a_log_again(session: Session) -> None:
+    raw = cdpr("bus", "replay", session.log, "--raw", "--ids", "181,700-7FD").stdout
+    frames = [
+        line for line in session.log.read_text().splitlines() if re.search(" (181|7..)#", line)
+    ]
+    frames = [line for line in frames if not re.search(" 7F[EF]#", line)]
+    assert raw.splitlines() == frames
+    again = cdpr("bus", "replay", "-", "--raw", stdin=raw)
+    assert again.stdout == raw
+
+
+def test_replay_sends_to_a_bus(lab: Lab, tmp_path: Path) -> None:
+    log = tmp_path / "short.log"
+    lines = [f"({i / 50:.6f}) can0 {0x7F0 + i:03X}#0{i}" for i in range(10)]
+    log.write_text("\n".join([*lines, "(0.3) can0 20000004#0001000000000000"]) + "\n")
+    with lab.join() as ear:
+        begun = time.monotonic()
+        result = cdpr("bus", "replay", log, "--to", lab.bus, "--speed", "0.2", "--json")
+        assert result.returncode == 0, result.stderr
+        assert time.monotonic() - begun > 0.9  # 0.18 s recorded, five times as slow
+        sent = [(m.arbitration_id, bytes(m.data)) for m in lab.passed(ear)]
+    sent = [frame for frame in sent if frame[0] & 0x7F0 == 0x7F0]
+    assert sent == [(0x7F0 + i, bytes([i])) for i in range(10)]
+    told = last_json(result.stdout)
+    assert (told["sent"], told["not_sent"]) == (10, 1)
+
+
+def test_a_sending_that_is_broken_off_takes_the_power_off(lab: Lab, tmp_path: Path) -> None:
+    log = tmp_path / "motion.log"
+    log.write_text("(0.0) can0 301#0F00\n(0.1) can0 7FF#01\n(600.0) can0 301#0F00\n")
+    with lab.join() as ear:
+        replay = begin("bus", "replay", log, "--to", lab.bus)
+        while (message := ear.recv(30.0)) is not None and message.arbitration_id != 0x7FF:
+            pass
+        replay.send_signal(signal.SIGINT)
+        _, errors = replay.communicate(timeout=30)
+        after = [m for m in lab.passed(ear) if m.arbitration_id & 0x780 == 0x600]
+    (last,) = after
+    assert replay.returncode == 1
+    assert "stopped on request" in errors
+    assert (last.arbitration_id, last.data.hex()) == (0x601, "2b40600000000000")
+
+
+# -- how a monitor ends, and what it writes
+
+
+def test_monitor_lines_come_at_once_and_plain(lab: Lab) -> None:
+    monitor = begin("bus", "monitor", "--bus", lab.bus, "--ids", "705")
+    assert monitor.stdout is not None
+    with lab.join() as bus:
+        os.set_blocking(monitor.stdout.fileno(), False)
+        line = ""
+        until = time.monotonic() + 30
+        while not line:
+            assert time.monotonic() < until
+            bus.send(can.Message(arbitration_id=0x705, data=[5], is_extended_id=False))
+            time.sleep(0.05)
+            line = monitor.stdout.readline()
+    assert re.fullmatch(r"    0\.000000       705    5  heartbeat operational\n", line)
+    os.set_blocking(monitor.stdout.fileno(), True)
+    monitor.send_signal(signal.SIGINT)
+    out, errors = monitor.communicate(timeout=30)
+    assert monitor.returncode == 0
+    assert (out + errors).isascii()
+    assert "\x1b" not in out + errors
+    assert "" not in errors.splitlines()
+    assert "frames in" in errors.splitlines()[0]
+
+
+def test_monitor_ends_by_itself_and_counts_what_is_odd(lab: Lab) -> None:
+    monitor = begin("bus", "monitor", "--bus", lab.bus, "--seconds", "3", "--ids", "711", "--json")
+    with lab.join() as bus:
+        while monitor.poll() is None:
+            for identifier in (0x711, 0x712):
+                bus.send(can.Message(arbitration_id=identifier, data=[9], is_extended_id=False))
+            time.sleep(0.02)
+    out, errors = monitor.communicate(timeout=60)
+    assert monitor.returncode == 0, errors
+    told = last_json(out)
+    assert [row["id"] for row in told["ids"]] == ["711"]
+    assert told["problems"] == told["frames"] > 0
+    assert told["missed"] is None  # nobody counts what the filters keep away
+
+
+def test_a_bus_that_goes_away(labs: tuple[Lab, Lab], tmp_path: Path) -> None:
+    lab = labs[1]  # nobody needs it any more
+    log = tmp_path / "cut.log"
+    monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", log)
+    with lab.join() as bus:
+        wait_for_log(log, bus)
+    lab.close()
+    _, errors = monitor.communicate(timeout=30)
+    assert monitor.returncode == 1
+    assert errors.splitlines()[-1].startswith(f"cdpr: {lab.bus}: the bus has gone away")
+    assert "7FF" in errors  # the summary is told all the same
+    assert cdpr("bus", "replay", log).returncode == 0
+
+
+def test_a_reader_that_sleeps_costs_the_log_nothing(lab: Lab, tmp_path: Path) -> None:
+    log = tmp_path / "all.log"
+    monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", log)  # its lines are not read
+    with lab.join() as bus:
+        wait_for_log(log, bus)
+        for _ in range(60):
+            for i in range(100):
+                bus.send(can.Message(arbitration_id=0x7FD, data=[i] * 8, is_extended_id=False))
+            time.sleep(0.01)
+        lab.passed(bus)
+    time.sleep(0.5)
+    monitor.send_signal(signal.SIGINT)
+    out, errors = monitor.communicate(timeout=30)
+    assert "went by unseen" not in errors
+    assert log.read_text().count(" 7FD#") == 6000
+    assert out.count(" 7FD ") == 6000
+
+
+def test_a_reader_that_has_seen_enough(lab: Lab, session: Session) -> None:
+    shell = f"{sys.executable} -m tools.cli bus replay {session.log} | head -n 2"
+    result = subprocess.run(
+        ["bash", "-c", shell], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert len(result.stdout.splitlines()) == 2
+    assert "Traceback" not in result.stderr
+    assert "Exception" not in result.stderr
+
+
+# -- bad input
+
+
+def complaint(*arguments: str | Path, status: int = 2, stdin: str = "") -> str:
+    result = cdpr("bus", *arguments, stdin=stdin)
+    assert result.returncode == status, result.stderr
+    assert "Traceback" not in result.stderr
+    (line,) = [one for one in result.stderr.splitlines() if "cdpr: " in one]
+    return line.partition("cdpr: ")[2]
+
+
+def test_bad_arguments(lab: Lab, tmp_path: Path) -> None:
+    here = ("--bus", lab.bus)
+    assert lab.bus in complaint("monitor", "--bus", "simbus:")  # tells what runs
+    assert "'18x'" in complaint("monitor", *here, "--ids", "181,18x")
+    assert "--nodes 0-3" in complaint("scan", *here, "--nodes", "0-3")
+    assert "did you mean 'generic-cia402'" in complaint("monitor", *here, "--profile", "generic402")
+    both = ("--profile", "generic-cia402", "--winch", WINCH)
+    assert "one of them" in complaint("monitor", *here, *both)
+    nowhere = tmp_path / "none" / "x.log"
+    assert str(nowhere) in complaint("monitor", *here, "--log", nowhere)
+    assert "is no folder" in complaint("scan", *here, "--profiles", nowhere)
+
+
+def test_bad_logs(tmp_path: Path) -> None:
+    log = tmp_path / "trip.log"
+    assert "trip.log: cannot be read" in complaint("replay", log)
+    log.write_text("(1.0) can0 123#00\n(1.0) can1 123#00\n")
+    assert "can0, can1" in complaint("replay", log)
+    assert "--channel can7" in complaint("replay", log, "--channel", "can7")
+    log.write_text("(1.0) can0 123#00\n(1.0) can0 123#0\n(1.0) can0 123#00\n")
+    assert "trip.log: line 2" in complaint("replay", log, status=1)
+    (tmp_path / "trip.blf").write_bytes(b"nothing of the kind" * 20)
+    assert "trip.blf" in complaint("replay", tmp_path / "trip.blf")
+
+
+def test_nothing_is_sent_to_a_real_bus_unasked(tmp_path: Path) -> None:
+    log = tmp_path / "trip.log"
+    log.write_text("(1.0) can0 201#0F00\n")
+    for answer in ("", "n\n"):
+        told = complaint("replay", log, "--to", "socketcan:no-such-can", stdin=answer)
+        assert "nothing was energised" in told
+    assert "no-such-can" in complaint("replay", log, "--to", "socketcan:no-such-can", "--yes")
