@@ -100,7 +100,7 @@ def lab() -> Iterator[str]:
 def test_help_names_every_command() -> None:
     result = cdpr("--help")
     assert result.returncode == 0
-    for name in ("bench", "cogging", "commission", "doctor", "drive", "profiles", "sim"):
+    for name in ("bench", "bus", "cogging", "commission", "doctor", "drive", "profiles", "sim"):
         assert re.search(rf"^│ {name} ", result.stdout, re.MULTILINE), name
 
 
