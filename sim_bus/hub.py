@@ -291,11 +291,14 @@ class Hub:
             if peer is not source:
                 self._deliver(frame, peer)
         if route.nodes:
+            answered = False
             for node in route.nodes:
                 node.receive(frame, now_s)
+                answered = answered or bool(node.outbox)
             if route.configures:
                 self._check_accepts()
-            self._flush()
+            if answered:
+                self._flush()
         return False
 
     def _sync(self, frame: bytes, source: Client, route: Route, length: int) -> None:
