@@ -59,9 +59,13 @@ class Output:
 
     @contextmanager
     def progress(self, what: str, total_s: float) -> Iterator[Advance]:
-        """Show a bar over `total_s` seconds of bus time while the block runs."""
+        """Show a bar over `total_s` seconds of bus time while the block runs.
+
+        On a terminal only: elsewhere nothing could be drawn over again.
+        """
         columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-        bar = Progress(*columns, console=self.notes, transient=True, disable=total_s < _SLOW_S)
+        shown = total_s >= _SLOW_S and self.notes.is_interactive
+        bar = Progress(*columns, console=self.notes, transient=True, disable=not shown)
         with bar:
             yield Advance(bar, bar.add_task(what, total=total_s))
 
