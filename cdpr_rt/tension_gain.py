@@ -68,7 +68,8 @@ def identify_tension_gain(
     3.6.2, after eq. (3.80)); half their difference is the part of friction that grows with
     tension, half the difference of the intercepts the part that does not. Friction that differs
     with direction goes into the bias and leaves the gain alone. With `cogging_order`, cogging of
-    that many periods per motor turn is fitted too. Raises CalibrationRefusedError.
+    that many periods per motor turn is fitted too, and the points are taken as a course of time
+    whose errors are alike from one point to the next. Raises CalibrationRefusedError.
     """
     _refuse_few(points)
     tension = np.array([p.tension_N for p in points])
@@ -78,7 +79,8 @@ def identify_tension_gain(
     if cogging_order is not None:
         angle = cogging_order * np.array([p.angle_rad for p in points])
         columns += [np.cos(angle), np.sin(angle)]
-    found, half, rms = _least_squares(np.column_stack(columns), torque)
+    course = cogging_order is not None
+    found, half, rms = _least_squares(np.column_stack(columns), torque, course)
     gain, bias, friction, per_N = (Estimate(float(found[i]), float(half[i])) for i in range(4))
     result = TensionGain(
         gain,
@@ -94,11 +96,16 @@ def identify_tension_gain(
     return result
 
 
-def _least_squares(matrix: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return the solution, the half-widths of its confidence intervals and the residual's rms."""
+def _least_squares(
+    matrix: FloatArray, wanted: FloatArray, course: bool
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return the solution, the half-widths of its confidence intervals and the residual's rms.
+
+    Of a `course` of time only as many samples count as its residual's correlation leaves.
+    """
     samples, unknowns = matrix.shape
-    freedom = samples - unknowns
-    if freedom < 1:
+    freedom = float(samples - unknowns)
+    if freedom < 1.0:
         raise CalibrationRefusedError(
             f"{samples} measurements for {unknowns} unknowns; measure at more tensions"
         )
@@ -111,6 +118,11 @@ def _least_squares(matrix: FloatArray, wanted: FloatArray) -> tuple[FloatArray, 
         )
     solution, *_ = np.linalg.lstsq(scaled, wanted, rcond=None)
     residual = wanted - scaled @ solution
+    if course:
+        alike = max(
+            0.0, float(residual[1:] @ residual[:-1]) / max(1e-30, float(residual @ residual))
+        )
+        freedom = max(1.0, samples * (1.0 - alike) / (1.0 + alike) - unknowns)
     spread = float(residual @ residual) / freedom
     variance = spread * np.diag(np.linalg.inv(scaled.T @ scaled))
     width = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * np.sqrt(variance)

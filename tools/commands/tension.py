@@ -34,7 +34,7 @@ from tools.signals import stop_on_signals
 from tools.simulator import OwnSimulator
 from tools.tension import calibration
 from tools.tension import watch as watching
-from tools.tension.anchor import AnchorPlan, check_plan, measure_anchored
+from tools.tension.anchor import measure_anchored, plan_anchor
 from tools.tension.masses import (
     Hang,
     by_prompt,
@@ -55,6 +55,7 @@ _PortOption = Annotated[
 _OutOption = Annotated[Path | None, typer.Option("--out", help="Folder for raw data and result.")]
 _FIRST_READING_S = 2.0
 _STANDARD_GRAVITY = 9.80665
+_MASS_SPEED_mm_s, _ANCHOR_SPEED_mm_s = 40.0, 5.0
 _MASS_PLANT = '[load]\nkind = "hung_mass"\n'
 
 
@@ -168,8 +169,11 @@ def calibrate(
     out_dir: _OutOption = None,
     overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
     speed_mm_s: Annotated[
-        float, typer.Option("--speed-mm-s", min=5.0, max=200.0, help="Speed of a mass.")
-    ] = 40.0,
+        float | None,
+        typer.Option(
+            "--speed-mm-s", min=0.5, max=200.0, help="Of the cable: 40 with masses, 5 without."
+        ),
+    ] = None,
     lead_mm: Annotated[
         float, typer.Option("--lead-mm", min=20.0, max=2000.0, help="Wound in before measuring.")
     ] = 160.0,
@@ -177,9 +181,11 @@ def calibrate(
     gravity: Annotated[
         float, typer.Option(min=9.7, max=9.9, help="Local gravity, m/s2.")
     ] = _STANDARD_GRAVITY,
-    lowest_N: Annotated[float, typer.Option("--lowest-n", help="Lowest torque step.")] = 10.0,
-    highest_N: Annotated[float, typer.Option("--highest-n", help="Highest torque step.")] = 80.0,
-    steps: Annotated[int, typer.Option(min=4, max=100, help="Torque steps each way.")] = 16,
+    lowest_N: Annotated[float, typer.Option("--lowest-n", help="Paid out to, in N.")] = 10.0,
+    highest_N: Annotated[float, typer.Option("--highest-n", help="Wound in to, in N.")] = 80.0,
+    travel_mm: Annotated[
+        float, typer.Option("--travel-mm", min=1.0, help="Wound in at most, the cable made fast.")
+    ] = 500.0,
     plant: PlantOption = None,
     board: Annotated[
         Path | None,
@@ -199,7 +205,8 @@ def calibrate(
         if masses is not None:
             kilograms = _masses(masses)
             check_masses(profile, kilograms, gravity)
-            hoist = plan_hoist(profile, speed_mm_s * 1e-3, lead_mm * 1e-3, turns)
+            speed = speed_mm_s or _MASS_SPEED_mm_s
+            hoist = plan_hoist(profile, speed * 1e-3, lead_mm * 1e-3, turns)
             _fresh(folder, overwrite)
             confirm_motion(url, yes, "masses are raised and lowered by the winch")
             url, hang = _hands(stack, profile, url, out, plant, board)
@@ -210,8 +217,8 @@ def calibrate(
         else:
             cells = load_tension_sensors(sensors or "")
             number = _number_of(cells, cable)
-            steps_plan = AnchorPlan(lowest_N, highest_N, steps)
-            check_plan(profile, steps_plan)
+            speed = speed_mm_s or _ANCHOR_SPEED_mm_s
+            pull = plan_anchor(profile, lowest_N, highest_N, speed * 1e-3, travel_mm * 1e-3)
             if port is None:
                 raise BadInputError("--sensors needs --port, the serial port of the load cells")
             _fresh(folder, overwrite)
@@ -223,8 +230,8 @@ def calibrate(
                 open_winch(profile, url, out, plant, safety_io=safety_io) as session,
             ):
                 session.set_mode(profile.drive.mode_torque)
-                path = calibration.steps_file(folder)
-                measure_anchored(session, out, path, steps_plan, sampler, number)
+                path = calibration.pull_file(folder)
+                measure_anchored(session, out, path, pull, sampler, number)
     _finish(out, folder, profile)
 
 

@@ -1,11 +1,9 @@
-"""Calibrate a winch by load cells: its cable made fast, the torque raised and lowered in steps."""
+"""Calibrate a winch by a load cell: its cable made fast, wound in and paid out again."""
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,80 +19,142 @@ from tools.errors import BadInputError
 from tools.output import Output
 from tools.session import WinchSession
 
-COLUMNS = ["time_s", "step", "winding_in", "torque_sent_Nm", "position_rad", "tension_N", "read_s"]
+COLUMNS = ["time_s", "winding_in", "torque_sent_Nm", "position_rad", "tension_N", "read_s"]
 _TORQUE_SHARE = 0.9
-_SLOPE_Nm_s = 1.0
-# phase the latency may take where the damping crosses over on the rotor alone
+# beyond what the geometry says the highest tension needs
+_LIMIT_RATIO, _LIMIT_MORE_Nm = 1.3, 0.4
+_TOO_MUCH = 1.25
+# phase that the latency may take where the damping crosses over on the rotor alone
 _DAMPING_PHASE = 0.5
-_SPEED_FILTER_S = 0.005
+_NATURAL_HZ = 12.0
+_SPEED_FILTER_S = 0.002
 _FASTEST_RAD_S = 60.0
-_LOOK_EVERY = 10
-_PATIENCE_S = 10.0
 _LONGEST_S = 3600.0
+_TURNED_RAD, _TURNED_SHARE = 0.15, 0.1
 
 
 @dataclass(frozen=True)
 class AnchorPlan:
-    """The tensions to step through, up and down again, and how long to look at each."""
+    """Between which tensions to wind in and pay out, and how fast; on the motor side."""
 
     lowest_N: float
     highest_N: float
-    steps: int = 16
-    settle_s: float = 0.3
-    """Wall time from the end of a torque's change until readings count: the amplifier's filter."""
-    readings: int = 3
-
-    def levels(self) -> Iterator[tuple[float, bool]]:
-        """Yield (tension, winding in), the highest once each way."""
-        up = np.linspace(self.lowest_N, self.highest_N, self.steps)
-        yield from ((float(level), True) for level in up)
-        yield from ((float(level), False) for level in up[-2::-1])
+    speed_rad_s: float
+    most_travel_rad: float
+    """Wound in so far without the highest tension, the cable is not made fast."""
 
 
-def check_plan(winch: Winch, plan: AnchorPlan) -> None:
-    """Raise BadInputError for tensions the motor cannot give."""
-    most = _TORQUE_SHARE * winch.motor.rated_torque_Nm / abs(winch.cable_m_per_motor_rad)
-    if not 0.0 < plan.lowest_N < plan.highest_N <= most:
+def plan_anchor(
+    winch: Winch, lowest_N: float, highest_N: float, speed_m_s: float, most_travel_m: float
+) -> AnchorPlan:
+    """Return the plan; raises BadInputError for tensions the motor cannot give."""
+    gain = abs(winch.cable_m_per_motor_rad)
+    most = _TORQUE_SHARE * winch.motor.rated_torque_Nm / gain
+    if not 0.0 < lowest_N < highest_N <= most:
         raise BadInputError(
-            f"--lowest-n {plan.lowest_N:g}, --highest-n {plan.highest_N:g}; allowed: rising and up "
-            f"to {most:.0f} N, which takes {100 * _TORQUE_SHARE:g} % of the motor's rated torque"
+            f"--lowest-n {lowest_N:g}, --highest-n {highest_N:g}; allowed: rising and up to "
+            f"{most:.0f} N, which takes {100 * _TORQUE_SHARE:g} % of the motor's rated torque"
         )
+    return AnchorPlan(lowest_N, highest_N, speed_m_s / gain, most_travel_m / gain)
 
 
-class _Torque:
-    """Leads the torque to a level and holds it there, damping the rotor, for `Executive.step`."""
+class _Puller:
+    """Moves the rotor at constant speed against the cable, one cycle at a time."""
 
-    def __init__(self, session: WinchSession) -> None:
+    def __init__(self, session: WinchSession, plan: AnchorPlan) -> None:
         device, winch = session.device, session.winch
         self._device = device
         self._supervisor = session.executive.supervisor
-        self._period_s = device.period_s
         self._setpoint = session.executive.setpoint
+        self._period_s = device.period_s
         inertia = winch.motor.rotor_inertia_kg_m2
         self._damping_Nms_rad = inertia * _DAMPING_PHASE / session.latency_s
-        self._wind_in = -winch.cable_sign
+        self._stiffness_Nm_rad = inertia * (math.tau * _NATURAL_HZ) ** 2
+        needed = plan.highest_N * abs(winch.cable_m_per_motor_rad)
+        self._limit_Nm = min(_LIMIT_RATIO * needed + _LIMIT_MORE_Nm, winch.motor.rated_torque_Nm)
         self._speed_rad_s = 0.0
-        self._last_rad = float(device.feedback.position_rad[0])
-        self.wanted_Nm = self.now_Nm = 0.0
+        self._last_rad = self._wanted_rad = float(device.feedback.position_rad[0])
+        self._start_rad = self._last_rad
+        self.wanted_rad_s = 0.0
 
-    def cycle(self) -> bool:
-        """Write the torque of this cycle; return whether the wanted level is reached."""
+    @property
+    def travel_rad(self) -> float:
+        """How far the set-point has gone."""
+        return abs(self._wanted_rad - self._start_rad)
+
+    def cycle(self) -> float:
+        """Write this cycle's torque and return it."""
         feedback, command = self._device.feedback, self._device.command
-        position = float(feedback.position_rad[0])
-        share = self._period_s / (self._period_s + _SPEED_FILTER_S)
-        self._speed_rad_s += share * (
-            (position - self._last_rad) / self._period_s - self._speed_rad_s
-        )
+        position, period = float(feedback.position_rad[0]), self._period_s
+        share = period / (period + _SPEED_FILTER_S)
+        self._speed_rad_s += share * ((position - self._last_rad) / period - self._speed_rad_s)
         self._last_rad = position
-        step = _SLOPE_Nm_s * self._period_s
-        self.now_Nm += min(step, max(-step, self.wanted_Nm - self.now_Nm))
-        command.torque_Nm[0] = (
-            self._wind_in * self.now_Nm - self._damping_Nms_rad * self._speed_rad_s
-        )
+        self._wanted_rad += self.wanted_rad_s * period
+        torque = self._stiffness_Nm_rad * (self._wanted_rad - position)
+        torque += self._damping_Nms_rad * (self.wanted_rad_s - self._speed_rad_s)
+        command.torque_Nm[0] = min(self._limit_Nm, max(-self._limit_Nm, torque))
         reason = self._supervisor.check(feedback, self._setpoint, command.torque_Nm)
         if reason:
             raise TripError(f"{reason}; is the cable made fast?")
-        return self.now_Nm == self.wanted_Nm
+        return float(command.torque_Nm[0])
+
+
+class _Recording:
+    """Pulls until a tension is reached, writing a row for each reading of the load cell."""
+
+    def __init__(
+        self, session: WinchSession, plan: AnchorPlan, sampler: TensionSampler, cable: int
+    ) -> None:
+        self._session = session
+        self._plan = plan
+        self._exchange = sampler.exchange
+        self._cable = cable
+        self._wind_in = -session.winch.cable_sign
+        self._puller = _Puller(session, plan)
+        self._sums = np.zeros(3)
+        self._row = np.zeros((1, len(COLUMNS)))
+        self._read_s = -math.inf
+        # a bus in lockstep must not run ahead of the load cell, which lives in the host's time
+        self._ahead_s = time.monotonic() - session.device.feedback.time_s
+
+    def pull(self, winding_in: bool, log: RawLogWriter) -> None:
+        """Wind in to the highest tension, or pay out to the lowest."""
+        side = self._wind_in if winding_in else -self._wind_in
+        self._puller.wanted_rad_s = side * self._plan.speed_rad_s
+        what = "the highest tension" if winding_in else "the lowest tension"
+        self._session.executive.step(lambda: self._cycle(winding_in, log), _LONGEST_S, what)
+
+    def _cycle(self, winding_in: bool, log: RawLogWriter) -> bool:
+        torque = self._puller.cycle()
+        feedback, told, i = self._session.device.feedback, self._exchange.feedback, self._cable
+        self._sums += (1.0, torque, feedback.position_rad[0])
+        early_s = feedback.time_s + self._ahead_s - time.monotonic()
+        if self._session.device.lockstep and early_s > 0.0:
+            time.sleep(early_s)
+        self._exchange.update()
+        if not told.valid[i]:
+            raise TripError(self._exchange.reason())
+        if told.time_s[i] == self._read_s:
+            return False
+        self._read_s = float(told.time_s[i])
+        tension = float(told.tension_N[i])
+        if tension > _TOO_MUCH * self._plan.highest_N:
+            raise TripError(f"{self._exchange.cables[i]}: {tension:.1f} N")
+        _, mean_Nm, mean_rad = self._sums / self._sums[0]
+        self._sums[:] = 0.0
+        if tension >= self._plan.lowest_N:
+            self._row[0] = (feedback.time_s, winding_in, mean_Nm, mean_rad, tension, self._read_s)
+            log.write(self._row)
+        if winding_in and self._puller.travel_rad > self._plan.most_travel_rad:
+            raise TripError(
+                f"wound in by {1e3 * self._travel_m():.0f} mm and the tension is {tension:.1f} N; "
+                "is the cable made fast? (--travel-mm)"
+            )
+        plan = self._plan
+        return tension >= plan.highest_N if winding_in else tension <= plan.lowest_N
+
+    def _travel_m(self) -> float:
+        return self._puller.travel_rad * abs(self._session.winch.cable_m_per_motor_rad)
 
 
 def measure_anchored(
@@ -105,10 +165,10 @@ def measure_anchored(
     sampler: TensionSampler,
     cable: int,
 ) -> Path:
-    """Step through the plan's tensions with the cable made fast, recording readings into `path`.
+    """Wind in to the highest tension and pay out again, recording readings into `path`.
 
-    `cable` is the load cell's place among the sampler's. Raises TripError when it does not answer
-    or the rotor runs away; the torque is zero afterwards.
+    `cable` is the load cell's place among the sampler's. Raises TripError when it does not answer,
+    the cable gives way or the rotor runs away; the torque is zero afterwards.
     """
     winch, device = session.winch, session.device
     meta: dict[str, Any] = {
@@ -117,22 +177,16 @@ def measure_anchored(
         "wind_in": -winch.cable_sign,
         "pole_pairs": winch.motor.poles // 2,
         "cable": sampler.exchange.cables[cable],
+        "speed_rad_s": plan.speed_rad_s,
     }
-    session.restrict(_FASTEST_RAD_S, 1e3 * math.tau)
+    session.restrict(_FASTEST_RAD_S, math.inf)
     session.enable()
     log = RawLogWriter(path, COLUMNS, meta)
-    levels = list(plan.levels())
-    gain = abs(winch.cable_m_per_motor_rad)
     try:
-        torque = _Torque(session)
-        with out.progress("torque steps", float(len(levels))) as advance:
-            for number, (level, winding_in) in enumerate(levels):
-                torque.wanted_Nm = gain * level
-                session.executive.step(torque.cycle, _LONGEST_S, "the torque's level")
-                _Dwell(session, torque, plan, sampler, cable, log).run(number, winding_in)
-                advance(float(number + 1))
-            torque.wanted_Nm = 0.0
-            session.executive.step(torque.cycle, _LONGEST_S, "the torque's end")
+        recording = _Recording(session, plan, sampler, cable)
+        out.note(f"winding in to {plan.highest_N:g} N and paying out to {plan.lowest_N:g} N")
+        recording.pull(True, log)
+        recording.pull(False, log)
     finally:
         device.command.torque_Nm[:] = 0.0
         device.transmit()
@@ -141,64 +195,8 @@ def measure_anchored(
     return path
 
 
-class _Dwell:
-    """One level held until enough readings have come that were taken while it was."""
-
-    def __init__(
-        self,
-        session: WinchSession,
-        torque: _Torque,
-        plan: AnchorPlan,
-        sampler: TensionSampler,
-        cable: int,
-        log: RawLogWriter,
-    ) -> None:
-        self._executive = session.executive
-        self._device = session.device
-        self._torque = torque
-        self._plan = plan
-        self._exchange = sampler.exchange
-        self._cable = cable
-        self._log = log
-
-    def run(self, number: int, winding_in: bool) -> None:
-        """Write the readings; the torque of a row is the mean since the row before."""
-        begun = time.monotonic()
-        last_read = begun + self._plan.settle_s
-        kept, cycles = 0, itertools.count(1)
-        sums = np.zeros(3)
-        row = np.zeros((1, len(COLUMNS)))
-        i = self._cable
-        feedback, told = self._device.feedback, self._exchange.feedback
-
-        def cycle() -> bool:
-            nonlocal last_read, kept
-            self._torque.cycle()
-            if time.monotonic() > last_read:
-                sums[:] += (1.0, self._device.command.torque_Nm[0], feedback.position_rad[0])
-            if next(cycles) % _LOOK_EVERY:
-                return False
-            self._exchange.update()
-            if not told.valid[i]:
-                raise TripError(self._exchange.reason())
-            if sums[0] and told.time_s[i] > last_read:
-                _, torque, position = sums / sums[0]
-                tension = told.tension_N[i]
-                row[0] = (feedback.time_s, number, winding_in, torque, position, tension,
-                          told.time_s[i])  # fmt: skip
-                self._log.write(row)
-                last_read = float(told.time_s[i])
-                kept += 1
-                sums[:] = 0.0
-            elif time.monotonic() > last_read + _PATIENCE_S:
-                raise TripError(f"no reading of the load cell for {_PATIENCE_S:g} s")
-            return kept == self._plan.readings
-
-        self._executive.step(cycle, _LONGEST_S, "the readings")
-
-
 def anchored_points(path: Path) -> tuple[list[TorquePoint], int]:
-    """Return the points of a recording, one for each step, and the motor's pole pairs.
+    """Return the points of a recording in the order of time, and the motor's pole pairs.
 
     Raises RawLogError for a recording of something else, CalibrationRefusedError where the cable
     was never taut.
@@ -207,16 +205,17 @@ def anchored_points(path: Path) -> tuple[list[TorquePoint], int]:
     try:
         wind_in, order = int(log.header["wind_in"]), int(log.header["pole_pairs"])
     except (KeyError, TypeError, ValueError) as error:
-        raise RawLogError(f"{path}: not a recording of torque steps ({error})") from None
-    step = log.column("step")
-    points = []
-    for number in np.unique(step):
-        rows = step == number
-        tension, torque, angle, side = (
-            float(log.column(name)[rows].mean())
-            for name in ("tension_N", "torque_sent_Nm", "position_rad", "winding_in")
-        )
-        points.append(TorquePoint(tension, wind_in * torque, side > 0.0, angle))
+        raise RawLogError(f"{path}: not a recording of a pulled cable ({error})") from None
+    columns = [log.column(c) for c in ("tension_N", "torque_sent_Nm", "winding_in", "position_rad")]
+    angle = columns[-1]
+    reversal = angle[np.argmax(wind_in * angle)]
+    apart = min(_TURNED_RAD, _TURNED_SHARE * float(np.ptp(angle)))
+    points = [
+        TorquePoint(float(tension), wind_in * float(torque), bool(side), float(at))
+        for tension, torque, side, at in zip(*columns, strict=True)
+        # until the rotor slides the other way, friction is anywhere between both sides
+        if side or abs(at - reversal) > apart
+    ]
     if max(point.tension_N for point in points) <= 0.0:
         raise CalibrationRefusedError(f"{path}: the load cell saw no tension; is the cable slack?")
     return points, order

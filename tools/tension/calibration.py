@@ -1,4 +1,4 @@
-"""From recorded masses or torque steps to the calibration file of a winch."""
+"""From recorded masses or a pulled cable to the calibration file of a winch."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tools.tension.anchor import anchored_points
 from tools.tension.masses import mass_points
 
 FILE_NAME = "winch-calibration.toml"
-_STEPS = "steps.raw"
+_PULL = "pull.raw"
 
 
 def raw_folder(folder: Path) -> Path:
@@ -26,9 +26,9 @@ def raw_folder(folder: Path) -> Path:
     return folder / "raw"
 
 
-def steps_file(folder: Path) -> Path:
-    """Return the recording of torque steps."""
-    return raw_folder(folder) / _STEPS
+def pull_file(folder: Path) -> Path:
+    """Return the recording of a made-fast cable."""
+    return raw_folder(folder) / _PULL
 
 
 def recorded_winch(folder: Path) -> str:
@@ -37,7 +37,7 @@ def recorded_winch(folder: Path) -> str:
 
 
 def _recordings(folder: Path) -> list[Path]:
-    found = sorted(raw_folder(folder).glob("mass-*.raw")) + sorted(raw_folder(folder).glob(_STEPS))
+    found = sorted(raw_folder(folder).glob("mass-*.raw")) + sorted(raw_folder(folder).glob(_PULL))
     if not found:
         raise BadInputError(f"{folder}: holds no recordings of a calibration (raw/...)")
     return found
@@ -59,7 +59,7 @@ def calibrate(folder: Path, winch: Winch) -> tuple[WinchCalibration, TensionGain
     whose = _identity(recorded[0])
     nominal = abs(winch.cable_m_per_motor_rad)
     method: Literal["masses", "sensors"]
-    if recorded[0].name == _STEPS:
+    if recorded[0].name == _PULL:
         method = "sensors"
         points, order = anchored_points(recorded[0])
         found = identify_tension_gain(points, nominal, order)
