@@ -12,6 +12,7 @@ import uuid
 from collections.abc import Iterator
 from typing import Any
 
+import can
 import canopen
 import pytest
 
@@ -27,7 +28,7 @@ class Lab:
     """A simulated drive reachable three ways, and a stranger's master on the simulated bus."""
 
     def __init__(self) -> None:
-        name = f"adapters-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+        self.name = name = f"adapters-{os.getpid()}-{uuid.uuid4().hex[:6]}"
         options = ("--bus", f"simbus:{name}", "--slcan", "--socketcand", "0", "--exit-with-stdin")
         self.process = subprocess.Popen(
             [*CDPR, "sim", "up", WINCH, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -91,12 +92,15 @@ def test_pulled_out_in_motion(gateway: str) -> None:
     command = subprocess.Popen(
         [*CDPR, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    deadline = time.monotonic() + 30.0
-    while lab.state() != ENABLED:
-        assert time.monotonic() < deadline
-        assert command.poll() is None
-        time.sleep(0.05)
-    time.sleep(0.3)
+    # from the PDOs: a second SDO client would disturb the command while it boots the drive
+    filters = [{"can_id": 0x181, "can_mask": 0x7FF}]
+    with can.Bus(lab.name, interface="simbus", can_filters=filters) as bus:
+        enabled, deadline = 0, time.monotonic() + 30.0
+        while enabled < 100:
+            assert time.monotonic() < deadline
+            assert command.poll() is None
+            message = bus.recv(0.1)
+            enabled += message is not None and message.data[0] & 0x6F == ENABLED
     os.kill(lab.ready[f"{gateway}_pid"], signal.SIGKILL)
     pulled_at = time.monotonic()
     _, errors = command.communicate(timeout=20)
