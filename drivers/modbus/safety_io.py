@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from profiles.safety_io import Brake, SafetyIoProfile
 _STOP_GRACE_S: Final = 2.0
 """Longest time that a controlled stop may take before power is taken all the same."""
 _LOOK_S = 0.002
+_PRIORITY: Final = 50
 _SHOWN: Final = ("red", "yellow", "green")
 
 
@@ -180,6 +182,9 @@ class SafetyIo:
     # -- the polling thread
 
     def _run(self) -> None:
+        # who holds the interpreter must not be kept waiting: the control cycle waits for it then
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
         due = time.monotonic()
         while not self._ended.is_set():
             try:

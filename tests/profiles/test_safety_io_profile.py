@@ -26,12 +26,12 @@ def test_the_shipped_one_loads_and_can_be_moved_to_another_place() -> None:
         ("{ input = 2 }", "{ input = 3 }", "input 3 is that of axes[0].brake.feedback already"),
         ("coil = 1 }", "coil = 0 }", "coil 0 is that of contactor.output already"),
         ("{ coil = 1 }", "{ coil = 1, inverted = true }", "a brake to hold"),
-        ("trip_timeout_s = 0.1", "trip_timeout_s = 0.03", "at least two poll periods (0.04)"),
+        ("trip_timeout_s = 0.2", "trip_timeout_s = 0.03", "at least two poll periods (0.04)"),
         ("input = 7,", "input = 4000,", "input 4000; allowed: less than 1968 from the first (0)"),
         ("port = 502", "port = 70000", "port: value 70000; allowed: less than or equal to 65535"),
         ('axis = "rail 1"', 'axis = "winch 1"', "allowed: each once"),
         ("[chain]", "[chian]", "did you mean 'chain'?"),
-        ("timeout_s = 0.25", "timeout_s = 0.01", "watchdog.timeout_s: value 0.01"),
+        ("timeout_s = 0.5", "timeout_s = 0.01", "watchdog.timeout_s: value 0.01"),
     ],
 )
 def test_what_cannot_be_is_refused_with_file_and_key(

@@ -14,6 +14,7 @@ from drivers.modbus.io_link import IoLink
 from drivers.modbus.io_rules import IoState
 from profiles.safety_io import Brake, load_safety_io
 from tools.commands.options import JsonOption, YesOption
+from tools.consent import require_consent
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.safety import connect, trip_file
@@ -108,7 +109,7 @@ def brake(
         if one is None:
             known = ", ".join(repr(name) for name in brakes) or "none"
             raise BadInputError(f"axis {axis!r} has no brake in {io}; with one: {known}")
-        _confirm_release(axis, yes)
+        require_consent(f"{axis} is held by nothing but its drive then.", yes)
         link.set_watchdog()
         try:
             _hold(link, axis, one, True, one.timeout_s)
@@ -140,17 +141,6 @@ def _link(io: str) -> Iterator[IoLink]:
         yield link
     finally:
         link.close()
-
-
-def _confirm_release(axis: str, yes: bool) -> None:
-    if yes:
-        return
-    try:
-        agreed = typer.confirm(f"{axis} is held by nothing but its drive then. Go on?", err=True)
-    except typer.Abort:  # nobody there to answer
-        agreed = False
-    if not agreed:
-        raise BadInputError("not confirmed (--yes does it beforehand); the brake stays applied")
 
 
 def _hold(link: IoLink, axis: str, brake: Brake, released: bool, seconds: float) -> None:

@@ -93,8 +93,7 @@ def patient_profile(folder: Path) -> Path:
     for key, value in (("answer_timeout_s", 0.2), ("trip_timeout_s", 0.4)):
         line = next(line for line in text.splitlines() if line.startswith(key))
         text = text.replace(line, f"{key} = {value}")
-    text = text.replace("[watchdog]                   # of", "[watchdog] # of")
-    text = text.replace("timeout_s = 0.25", "timeout_s = 1.0")
+    text = text.replace("timeout_s = 0.5", "timeout_s = 1.0")
     path = folder / "io.toml"
     path.write_text(text)
     return path
