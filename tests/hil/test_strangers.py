@@ -266,7 +266,7 @@ def test_the_stock_master_moves_data_in_blocks_through_two_drives_at_once(drives
 def tool(*words: str) -> Iterator[subprocess.Popen[bytes]]:
     """Run a command of python-can; end it as its user does, by Ctrl-C."""
     process = subprocess.Popen(
-        [sys.executable, "-m", *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        [sys.executable, "-u", "-m", *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     )
     try:
         yield process
