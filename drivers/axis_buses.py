@@ -228,7 +228,8 @@ class AxisBuses:
         try:
             self._stop_together()
         finally:
-            doubts = [group.close() for group in self.groups]
+            # the last ones may take seconds, during which the others' masters are to be heard
+            doubts = [group.close() for group in sorted(self.groups, key=_has_power)]
         return "; ".join(doubt for doubt in doubts if doubt)
 
     def _stop_together(self) -> None:
@@ -241,7 +242,7 @@ class AxisBuses:
             self.command.torque_Nm[:] = 0.0
             for step in (AxisGroup.sync, AxisGroup.receive, _transmit_zero):
                 live = [group for group in live if _lives(group, step)]
-            if all(state in POWER_OFF for group in live for state in group.states()):
+            if not any(_has_power(group) for group in live):
                 return
             if not self.lockstep:
                 time.sleep(self.period_s)
@@ -261,6 +262,10 @@ class AxisBuses:
         if error is None:
             raise DriveFaultError(doubt)
         error.add_note(doubt)
+
+
+def _has_power(group: AxisGroup) -> bool:
+    return not all(state in POWER_OFF for state in group.states())
 
 
 def _transmit_zero(group: AxisGroup) -> None:

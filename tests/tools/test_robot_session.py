@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -13,6 +14,7 @@ import pytest
 from robot_rig import OUT, Simulator, hold, robot_file, simulated, unique
 
 import profiles
+from cdpr_rt.errors import TripError
 from drivers.cia402 import POWER_OFF, State, state_of
 from drivers.errors import BusError, DriveFaultError
 from profiles import Robot, load_robot
@@ -165,6 +167,31 @@ def test_a_lost_bus_leaves_the_drives_of_the_other_without_power(tmp_path: Path)
             assert drive_states(opened) == [State.SWITCH_ON_DISABLED]
             assert opened.networks["right"].read_int(1, 0x1003) == 0
     finally:
+        left.close()
+        right.close()
+
+
+def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path):
+    robot = load_robot(robot_file(tmp_path, [("left", 1), ("right", 1)], period_s=0.01))
+    left, right = (
+        Simulator("winch-mpp0923d", "--bus", f"simbus:{unique()}", "--paced") for _ in range(2)
+    )
+    buses = [f"left={left.ready['bus']}", f"right={right.ready['bus']}"]
+    try:
+        with pytest.raises(TripError), open_robot(robot, buses, OUT) as opened:
+            opened.set_torque_mode()
+            opened.enable()
+            hold(opened, 0.5, gain_Nm_rad=0.05)
+            left.process.send_signal(signal.SIGSTOP)
+            hold(opened, 1e4, gain_Nm_rad=0.05)
+        left.process.send_signal(signal.SIGCONT)
+        one = load_robot(robot_file(tmp_path, [("right", 1)], period_s=0.01))
+        with open_robot(one, buses[1:], OUT) as opened:
+            assert drive_states(opened) == [State.SWITCH_ON_DISABLED]
+            # by the master: a drive that misses its heartbeat reports it and is in fault
+            assert opened.networks["right"].read_int(1, 0x1003) == 0
+    finally:
+        left.process.send_signal(signal.SIGCONT)
         left.close()
         right.close()
 

@@ -20,6 +20,7 @@ from sim_bus.drive import SimDrive
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
+from tools.bus_fit import require_fit
 from tools.commands import sim_rail, sim_robot, sim_safety_io, sim_tension
 from tools.errors import BadInputError
 
@@ -104,6 +105,7 @@ def up(
         stores = partial(_store_file, store)
         sim_robot.up(profile, bus, truth, mode, stores, board, exit_with_stdin)
         return
+    require_fit(profile)
     url = _bus(bus)
     if truth_log is not None and nodes > 1:
         raise BadInputError("--truth-log: one drive only; leave out --nodes")
