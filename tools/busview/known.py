@@ -51,17 +51,24 @@ def _bitrate(url: BusUrl | None, otherwise: int) -> int:
 
 
 def _of_robot(robot: Robot, name: str, url: BusUrl | None) -> KnownBus:
-    """Return one bus of a robot: the one of this name, of this URL, or its only one."""
-    names = [bus.name for bus in robot.buses]
-    if not name and url is not None:
-        name = next((bus.name for bus in robot.buses if bus.url == str(url)), "")
-    if not name and len(names) == 1:
-        name = names[0]
-    if name not in names:
+    """Return one bus of a robot, or all where no node id says which one is meant."""
+    buses = {bus.name: bus for bus in robot.buses}
+    if name and name not in buses:
+        allowed = " or ".join(f"--robot {robot.reference}:{one}" for one in buses)
+        raise BadInputError(f"--robot {robot.reference}:{name}: no such bus; allowed: {allowed}")
+    axes = [axis for axis in robot.axes if axis.bus == (name or _bus_at(robot, url) or axis.bus)]
+    nodes = {axis.node_id: KnownNode.of_winch(axis.winch) for axis in axes}
+    if len(nodes) < len(axes):
+        choice = " or ".join(f"--robot {robot.reference}:{one}" for one in buses)
         raise BadInputError(
-            f"--robot {robot.reference}: which of its buses is meant: "
-            + " or ".join(f"--robot {robot.reference}:{one}" for one in names)
+            f"--robot {robot.reference}: its buses have node ids in common: choose {choice}"
         )
-    bus = next(bus for bus in robot.buses if bus.name == name)
-    nodes = {a.node_id: KnownNode.of_winch(a.winch) for a in robot.axes if a.bus == name}
-    return KnownBus(nodes, bitrate_bit_s=_bitrate(url, bus.bitrate_bit_s))
+    return KnownBus(nodes, bitrate_bit_s=_bitrate(url, buses[axes[0].bus].bitrate_bit_s))
+
+
+def _bus_at(robot: Robot, url: BusUrl | None) -> str:
+    """Return the name of the robot's bus with this URL, real or simulated; "" if none has it."""
+    for bus in robot.buses:
+        if url is not None and (bus.url == str(url) or f"-{url.channel}".endswith(f"-{bus.name}")):
+            return bus.name
+    return ""
