@@ -194,9 +194,9 @@ def open_robot(
         real = not all(url.is_simulated for url in urls.values())
         nodes = [axis.node_id for axis in robot.axes]
         reference = safety_io or (robot.safety_io if real else None)
+        rehearse(len(robot.axes), robot.sync_period_s)  # compiling may keep a poll waiting
         safety = stack.enter_context(open_safety(reference, out, nodes))
         networks = _open_networks(stack, robot, urls)
-        rehearse(len(robot.axes), robot.sync_period_s)
         begin = time.monotonic()
         booted, absent = _boot(stack, robot, networks, torque_share)
         boot_s = time.monotonic() - begin

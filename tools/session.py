@@ -248,6 +248,7 @@ def open_winch(
     """
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
+        rehearse(1, winch.sync_period_s)  # compiling may keep a polling thread waiting
         safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id]))
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
         limit = winch.motor.rated_torque_Nm
@@ -258,7 +259,6 @@ def open_winch(
             rated_torque_Nm=winch.motor.rated_torque_Nm,
             counts_per_turn=winch.encoder_counts_per_turn,
         )
-        rehearse(1, winch.sync_period_s)
         report = boot(network, winch.node_id, winch.drive, settings)
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
