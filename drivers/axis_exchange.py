@@ -20,8 +20,9 @@ from drivers.network import CanNetwork
 
 _SYNC_ID, _HEARTBEAT_ID = 0x080, 0x700
 _OPERATIONAL_STATE = 5
-# for an axis that answered before, and for one that has not answered last time
-_PATIENCE_S, _SHORT_PATIENCE_S = 2.0, 0.02
+# lockstep: for all axes, as their simulator may be held up; for one that is alone in not answering,
+# less than bus time stands still; and for one that has not answered last time
+_PATIENCE_S, _PATIENCE_WITH_ONE_S, _SHORT_PATIENCE_S = 2.0, 0.4, 0.02
 _PACED_SHARE = 0.6
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
 _LATE_PASSES = 8
@@ -63,10 +64,10 @@ class AxisExchange:
         waiting = select.poll()
         waiting.register(self._port, select.POLLIN)
         self._waiting = waiting.poll
-        self._patience_s = _PATIENCE_S
-        self._port.settimeout(self._patience_s if self.lockstep else 0.0)
+        self._port.settimeout(0.0)
+        self._be_patient(True)
         self._cycling = self._closed = False
-        self._late = self._impatient = False
+        self._late = False
         self._alarms = 0
         state = GroupState(self.axes, period_s, self.lockstep, room)
         self._ints, self._floats = state.ints, state.floats
@@ -112,34 +113,34 @@ class AxisExchange:
     def receive(self, deadline_s: float = 0.0) -> int:
         """Wait for the answers to this SYNC and decode them; return how many axes answered.
 
-        In lockstep an axis that falls silent is waited for up to 2 s of wall time; otherwise the
-        wait ends at `deadline_s` (monotonic), by default so that a share of the period is left
-        for computing and sending.
+        In lockstep an axis that falls silent is waited for up to 0.4 s of wall time, during which
+        bus time stands, and where none answers up to 2 s. Otherwise the wait ends at `deadline_s`
+        (monotonic), by default so that a share of the period is left for computing and sending.
         """
         if not self.lockstep:
             return self._receive_paced(deadline_s or time.monotonic() + self.paced_wait_s)
         recv_into, rows = self._port.recv_into, self._rx.rows
-        missing, last, deadline = self.n, 0, 0.0
-        try:
-            while missing:
-                last = 0
+        missing, since_s = self.n, 0.0
+        while missing:
+            last, timed_out = 0, False
+            try:
                 for row in rows[:missing]:
                     if not recv_into(row):
                         raise self._port.lost()
                     last += 1
-                missing -= self._decode(0, last)
-                if missing:
-                    # heartbeats go on when answers do not: each of them ends a wait of the port
-                    now = time.monotonic()
-                    deadline = deadline or now + self._patience_s
-                    if now > deadline:
-                        self._late = True
-                        break
-        except BlockingIOError:
+            except BlockingIOError:
+                timed_out = True
+            except OSError as error:
+                raise self._port.lost(error) from error
             missing -= self._decode(0, last)
-            self._late = True
-        except OSError as error:
-            raise self._port.lost(error) from error
+            if missing:
+                # heartbeats go on when answers do not: each of them ends a wait of the port
+                now = time.monotonic()
+                since_s = since_s or now - timed_out * self._wait_s
+                some = missing < self.n
+                if now - since_s >= (self._wait_s if some else self._patience_s):
+                    self._late = True
+                    break
         return self.n - missing
 
     def _receive_paced(self, deadline: float) -> int:
@@ -194,10 +195,11 @@ class AxisExchange:
         self._port.drain()
 
     def _be_patient(self, patient: bool) -> None:
+        self._impatient = not patient
+        self._patience_s = _PATIENCE_S if patient else _SHORT_PATIENCE_S
+        self._wait_s = _PATIENCE_WITH_ONE_S if patient else _SHORT_PATIENCE_S
         if self.lockstep:
-            self._impatient = not patient
-            self._patience_s = _PATIENCE_S if patient else _SHORT_PATIENCE_S
-            self._port.settimeout(self._patience_s)
+            self._port.settimeout(self._wait_s)
 
     def _decode(self, first: int, last: int) -> int:
         layout = self._layout

@@ -99,7 +99,8 @@ class ObjectAccess:
         self, node_id: int, index: int, sub: int, data: bytes, *, timeout_s: float = _TIMEOUT_S
     ) -> None:
         """Write an object's data as they are; raises SdoError, BusError."""
-        what = f"set to {data.hex()}h" if len(data) <= 8 else f"set to {len(data)} bytes"
+        number = f"{data[::-1].hex().upper()}h"  # as CiA 301 writes it, the highest byte first
+        what = f"set to {number if len(data) <= 8 else f'{len(data)} bytes'}"
         self._transfer(
             node_id,
             index,

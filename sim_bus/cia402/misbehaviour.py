@@ -37,6 +37,7 @@ class Misbehaviour:
         self._babbled_ms = 0
         self._now = 0.0
         self._silent_until = 0.0
+        self._silence_ms = _FOR_GOOD_MS
         self.active = False
         """Whether the outbox must be looked through."""
         writers: dict[int, Callable[[Any], None]] = {
@@ -44,7 +45,7 @@ class Misbehaviour:
             _REFUSE_MODES: self._refuse_modes,
             _SHOW_MODE: self._show_mode,
             _MUTE_HEARTBEAT: self._mute,
-            _FALL_SILENT: self._fall_silent,
+            _FALL_SILENT: self._silence_after_the_answer,
             _BABBLE: self._set_babble,
         }
         writers |= {sub: self._counter(sub) for sub in _COUNTED}
@@ -92,7 +93,7 @@ class Misbehaviour:
             return
         if identifier & _FUNCTION == _SDO_ANSWER and self._use(_VANISH_IN_SDO):
             if not self._left[_VANISH_IN_SDO]:
-                self._fall_silent(_FOR_GOOD_MS)
+                self._fall_silent()
         elif _is_tpdo(frame):
             if self._use(_DROP_TPDOS):
                 return
@@ -127,8 +128,10 @@ class Misbehaviour:
 
     def _counter(self, sub: int) -> Callable[[Value], None]:
         def set_count(count: Value) -> None:
-            # the answer to the SDO that asks for it is not meant
-            self._left[sub] = int(count) + (sub == _VANISH_IN_SDO and bool(count))
+            self._left[sub] = int(count)
+            if count and sub == _VANISH_IN_SDO:
+                self._left[sub] += 1  # the answer to the SDO that asks for it is not meant
+                self._silence_ms = _FOR_GOOD_MS
             self._look()
 
         return set_count
@@ -145,11 +148,14 @@ class Misbehaviour:
         self._babble = int(frames_per_ms)
         self._look()
 
-    def _fall_silent(self, ms: Value) -> None:
-        duration_s = math.inf if ms == _FOR_GOOD_MS else int(ms) * 1e-3
-        self._now = self._machine.axis.time
-        self._silent_until = self._now + duration_s
+    def _silence_after_the_answer(self, ms: Value) -> None:
+        self._silence_ms = int(ms)
+        self._left[_VANISH_IN_SDO] = 1
         self._look()
+
+    def _fall_silent(self) -> None:
+        ms = self._silence_ms
+        self._silent_until = self._now + (math.inf if ms == _FOR_GOOD_MS else ms * 1e-3)
 
     def _refuse_modes(self, how: Value) -> None:
         self._machine.ignore_modes = int(how)

@@ -12,6 +12,7 @@ from scripted_node import ScriptedNode, expedited, scripted
 
 from drivers.boot import boot, boot_all
 from drivers.errors import BootError
+from profiles import Pdo
 
 OPTIONAL = replace(SETTINGS, mandatory=False)
 WRONG = DRIVE.model_copy(update={"product_code": 0x1234})
@@ -109,3 +110,18 @@ def test_two_boot_ups_after_one_reset_are_two_devices(bus: str) -> None:
     assert caught.value.letter == "B"
     assert "2 boot-up messages followed one reset" in str(caught.value)
     assert "a node id of its own" in str(caught.value)
+
+
+def test_a_map_that_does_not_fit_a_frame_is_refused_by_the_drive_in_words(bus: str) -> None:
+    """The profile refuses it first; this one was made behind its back."""
+    tpdo = DRIVE.tpdos[0]
+    wide = tpdo.entries[1].model_copy(update={"index": 0x606C})
+    entries = (*tpdo.entries, wide)  # 16 + 32 + 16 + 32 bits
+    with pytest.raises(ValueError, match="96 bits; allowed: at most 64 in one frame"):
+        Pdo.model_validate(tpdo.model_dump() | {"entries": entries})
+    profile = DRIVE.model_copy(update={"tpdos": (tpdo.model_copy(update={"entries": entries}),)})
+    with open_network(bus, [1]) as network, pytest.raises(BootError) as caught:
+        boot(network, 1, profile, SETTINGS)
+    assert caught.value.letter == "J"
+    assert "object 1A00h:0 cannot be set to 04h" in str(caught.value)
+    assert "would exceed the PDO length (06040042h)" in str(caught.value)
