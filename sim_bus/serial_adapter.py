@@ -17,7 +17,7 @@ from collections import deque
 from sim_bus.errors import BusSetupError
 from sim_bus.frame import FRAME_BYTES
 from sim_bus.lawicel import OVERRUN, RX_FULL, LawicelAdapter
-from sim_bus.membership import join, listen_to_all, tell
+from sim_bus.membership import go_first, join, listen_to_all, tell
 
 LINE_BAUD = 1_000_000
 """Of the serial line, whatever the terminal is set to: about what USB adapters reach."""
@@ -127,6 +127,7 @@ def main() -> None:
         tell({"error": f"serial adapter: {error}"})
         return
     tell({"path": adapter.path})
+    go_first()
     adapter.run()
 
 

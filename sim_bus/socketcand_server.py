@@ -16,7 +16,7 @@ from contextlib import suppress
 
 from sim_bus.errors import BusSetupError
 from sim_bus.frame import EFF_FLAG, EFF_MASK, FRAME, FRAME_BYTES, RTR_FLAG, SFF_MASK, pack_frame
-from sim_bus.membership import join, listen_to_all, tell
+from sim_bus.membership import go_first, join, listen_to_all, tell
 
 ALIAS = "can0"
 """A second name of the bus, for clients that only know interface names."""
@@ -243,6 +243,7 @@ def main() -> None:
     listener.setblocking(False)
     with listener:
         tell({"port": listener.getsockname()[1]})
+        go_first()
         with suppress(BusSetupError):  # the bus has ended meanwhile
             serve(name, listener)
 

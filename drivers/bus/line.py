@@ -28,6 +28,7 @@ from drivers.errors import BusError
 _MOST_ROUTES = 4096
 _BATCH = 256
 """Frames handed on at once: 4096 bytes go through a local socket whole or not at all."""
+_PRIORITY = 40
 _CAN_ID = struct.Struct("=I")
 
 
@@ -119,6 +120,9 @@ class SharedLine:
             self._hand_out([bytes(frame)], source)
 
     def _run(self) -> None:
+        with contextlib.suppress(PermissionError):
+            # it waits and copies; a cycle that waits for it must not wait for ordinary processes
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
         try:
             while not self._stopping:
                 frames = self._line.read(self._wake)
