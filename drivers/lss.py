@@ -15,7 +15,7 @@ from typing import Self
 
 import can
 
-from drivers.bus import BusUrl, open_python_can
+from drivers.bus import BusUrl, bus_gone, open_python_can
 from drivers.bus.packed import EFF_FLAG, RTR_FLAG
 from drivers.errors import BusError, DriverError
 
@@ -388,7 +388,7 @@ class LssMaster:
         try:
             message = self._bus.recv(max(0.0, deadline - time.monotonic()))
         except (can.CanError, OSError) as error:
-            raise BusError(f"{self.url}: the bus has gone away ({error})") from error
+            raise bus_gone(self.url, error) from error
         if message is None:
             return None
         if message.is_extended_id or message.is_remote_frame or message.is_error_frame:

@@ -10,7 +10,7 @@ from canopen.objectdictionary import ObjectDictionary
 
 from drivers import emergency as emcy
 from drivers import error_control as nmt
-from drivers.bus import BusUrl, open_python_can
+from drivers.bus import BusUrl, bus_gone, open_python_can
 from drivers.bus.health import BusHealth, BusState
 from drivers.bus.packed import EFF_FLAG, RTR_FLAG
 from drivers.cia402 import POWER_OFF, state_of
@@ -84,8 +84,9 @@ class CanNetwork(ObjectAccess):
                 message = self._bus.recv(_LOOK_S)
             except (can.CanError, OSError) as error:
                 if not self._stop.is_set():
-                    self._fail_transfers(self._gone(error))
-                    self.raise_alarm(f"{self.url}: the bus has gone away")
+                    gone = self._gone(error)
+                    self._fail_transfers(gone)
+                    self.raise_alarm(str(gone))
                 return
             if message is not None:
                 self._dispatch(message)
@@ -157,7 +158,7 @@ class CanNetwork(ObjectAccess):
             raise self._gone(error) from error
 
     def _gone(self, error: Exception) -> BusError:
-        return BusError(f"{self.url}: the bus has gone away ({error})")
+        return bus_gone(self.url, error)
 
     def reset_communication(self, node_id: int, timeout_s: float) -> bool:
         """Reset the node's communication; return whether its boot-up message came in time.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from drivers.bus.health import BusHealth, BusState
 from drivers.bus.packed import FrameBuffer, FramePort, open_simbus
-from drivers.bus.pythoncan import open_line_port, open_python_can
+from drivers.bus.pythoncan import bus_gone, open_line_port, open_python_can
 from drivers.bus.simbus_socket import Filters, query_status
 from drivers.bus.socketcan import open_socketcan
 from drivers.bus.socketcand import SocketcandPort
@@ -17,6 +17,7 @@ __all__ = [
     "Filters",
     "FrameBuffer",
     "FramePort",
+    "bus_gone",
     "open_line_port",
     "open_port",
     "open_python_can",

@@ -76,6 +76,15 @@ def open_python_can(url: BusUrl, filters: Filters | None = None) -> can.BusABC:
     return bus
 
 
+def bus_gone(url: BusUrl, error: Exception) -> BusError:
+    """Return the BusError for what a python-can bus on `url` raised when it was lost, said once."""
+    if str(error).startswith(f"{url}: "):
+        return BusError(str(error))
+    if url.interface == "socketcan" and (problem := interface_problem(url)):
+        return BusError(f"{url}: the bus has gone away: {problem}")
+    return BusError(f"{url}: the bus has gone away ({error})")
+
+
 def _open(url: BusUrl) -> can.BusABC:
     if url.interface == "socketcan":
         problem = interface_problem(url)

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import can
 
-from drivers.bus import BusUrl, Filters, open_port, open_python_can, query_status
+from drivers.bus import BusUrl, Filters, bus_gone, open_port, open_python_can, query_status
 from drivers.decode import Frame
 from drivers.errors import BusError
 from tools.errors import BadInputError
@@ -126,7 +126,7 @@ class PythonCanSource:
                     return
                 self._waiting.append(message)
         except (can.CanError, OSError) as error:
-            self.lost = BusError(f"{self._url}: the bus has gone away ({error})")
+            self.lost = bus_gone(self._url, error)
 
     def next_frames(self, most: int) -> list[Frame]:
         """Return frames that were taken in, the oldest first."""

@@ -19,7 +19,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus import BusHealth, BusState, BusUrl, open_port, open_python_can
+from drivers.bus import BusHealth, BusState, BusUrl, bus_gone, open_port, open_python_can
 from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG, FramePort
 from drivers.bus.slcan import SlcanLine
 from drivers.bus.socketcand import SocketcandLine
@@ -318,6 +318,15 @@ def test_a_bus_that_cannot_be_opened_is_told_once(url: str, message: str) -> Non
         assert str(caught.value).count(url.split("?", maxsplit=1)[0]) == 1 + url.startswith(
             "simbus"
         )
+
+
+def test_a_lost_bus_is_told_once_whoever_tells_it() -> None:
+    url = BusUrl.parse("simbus:one")
+    for error in (
+        can.CanOperationError("simbus:one: the bus has gone away (connection closed)"),
+        can.CanOperationError("connection closed"),
+    ):
+        assert str(bus_gone(url, error)) == "simbus:one: the bus has gone away (connection closed)"
 
 
 def test_two_ports_on_any_other_interface_share_one_bus() -> None:
