@@ -16,7 +16,7 @@ from sim_bus.client import PACKET_BYTES, Client, listening_socket
 from sim_bus.clock import HOLD_S, BusClock, ClockMode
 from sim_bus.control import handle
 from sim_bus.errors import SimulatorError
-from sim_bus.frame import FRAME_BYTES, HEADER, arbitration_key
+from sim_bus.frame import FRAME_BYTES, HEADER, RTR_FLAG, arbitration_key
 from sim_bus.node_protocol import LocalNode
 from sim_bus.route import Route
 
@@ -343,7 +343,9 @@ class Hub:
         if len(self._routes) >= _MOST_ROUTES:
             self._routes.clear()
         clients = [client for client in self._clients.values() if client.wants(can_id)]
-        nodes = [node for node in self.nodes if node.accepts is None or can_id in node.accepts]
+        # a remote frame has the identifier of what it asks for
+        plain = can_id & ~RTR_FLAG
+        nodes = [node for node in self.nodes if node.accepts is None or plain in node.accepts]
         self._routes[can_id] = route = Route(can_id, clients, nodes)
         return route
 

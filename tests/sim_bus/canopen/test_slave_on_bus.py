@@ -121,3 +121,21 @@ def test_stranger_hears_of_a_lost_heartbeat(site: Site) -> None:
     assert (emergency.code, emergency.register) == (0x8130, 0x11)
     assert site.remote.sdo[0x1003][1].raw & 0xFFFF == 0x8130
     assert ("heartbeat_lost", MASTER) in site.app.events
+
+
+def test_stranger_asks_by_remote_frames(site: Site) -> None:
+    """Node guarding, and a TPDO that is sent on request only."""
+    seen: list[tuple[int, bytes]] = []
+    for identifier in (0x700 + NODE, 0x180 + NODE):
+        site.network.subscribe(identifier, lambda id_, data, _time: seen.append((id_, bytes(data))))
+    site.network.send_message(0x700 + NODE, b"", remote=True)
+    assert wait_for(lambda: seen == [(0x700 + NODE, b"\x7f")])
+    site.network.send_message(0x700 + NODE, b"", remote=True)
+    assert wait_for(lambda: seen[1:] == [(0x700 + NODE, b"\xff")])
+    tpdo = site.remote.tpdo[1]
+    tpdo.read()
+    tpdo.trans_type = 253
+    tpdo.save()
+    site.remote.nmt.state = "OPERATIONAL"
+    site.network.send_message(0x180 + NODE, b"", remote=True)
+    assert wait_for(lambda: len(seen) > 2 and seen[2][0] == 0x180 + NODE)
