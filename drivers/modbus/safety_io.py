@@ -55,7 +55,9 @@ class SafetyIo:
         self._armed = self._kept_trip = False
         self._alarm = self._stop = self._error = ""
         self._stop_at_s = 0.0
-        self._good_at_s = 0.0
+        self._timeout_s = profile.trip_timeout_s
+        self._good_at_s = self._asked_at_s = 0.0
+        self._granted_for_s = self._granted_at_s = 0.0
         self._state: IoState | None = None
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="safety-io", daemon=True)
@@ -68,17 +70,23 @@ class SafetyIo:
 
     def stop_reason(self) -> str:
         """Return why the motion must be braked to its end, or an empty text."""
-        if self._armed and time.monotonic() - self._good_at_s > self.profile.trip_timeout_s:
-            self._trip(stop=self._unheard())
+        now = time.monotonic()
+        good, timeout = self._good_at_s, self._timeout_s
+        if now - good > timeout and self._armed and not self._stop:
+            # cycles that begin after a pause, in which polls may have had to wait for the
+            # interpreter, are no silence yet: that is granted once for each good poll
+            if now - self._asked_at_s > timeout and good != self._granted_for_s:
+                self._granted_for_s, self._granted_at_s = good, now
+            elif good != self._granted_for_s or now - self._granted_at_s > timeout:
+                self._trip(stop=self._unheard())
+        self._asked_at_s = now
         return self._stop
 
     # -- for whoever uses it
 
     @property
     def state(self) -> IoState:
-        """What the last good poll saw; raises SafetyIoError when that is too long ago."""
-        if time.monotonic() - self._good_at_s > self.profile.trip_timeout_s:
-            raise SafetyIoError(self._unheard())
+        """What the last good poll saw; for how old it is see `IoState.at_s`."""
         assert self._state is not None  # `open` has polled
         return self._state
 
@@ -98,7 +106,7 @@ class SafetyIo:
         tripped = self._tripped or self._kept()
         if tripped:
             raise SafetyIoError(f"{tripped}; see to it, then acknowledge it: cdpr io ack")
-        self._refuse(self._obstacle(self.state))
+        self._refuse(self._obstacle(self._next()))
         with self._lock:
             self._rules.restart(time.monotonic())
             self._armed = self._wanted[self._contactor] = True
@@ -139,7 +147,7 @@ class SafetyIo:
 
     def acknowledge(self) -> None:
         """Forget a trip whose cause is gone; raises SafetyIoError while it is not."""
-        self._refuse(self._obstacle(self.state, limits=False))
+        self._refuse(self._obstacle(self._next(), limits=False))
         with self._lock:
             self._alarm = self._stop = ""
             self._kept_trip = False
@@ -271,7 +279,7 @@ class SafetyIo:
     def _unheard(self) -> str:
         age = time.monotonic() - self._good_at_s
         return (
-            f"{self.name}: no good poll for {age:.2f} s, {self.profile.trip_timeout_s:g} s allowed "
+            f"{self.name}: no good poll for {age:.2f} s, {self._timeout_s:g} s allowed "
             f"({self._error or 'no answer has come'})"
         )
 
@@ -317,23 +325,30 @@ class SafetyIo:
             raise SafetyIoError(f"{self.name}: {axis!r} has no brake there; with one: {known}")
         return brake
 
-    def _await(self, done: Callable[[IoState], bool], timeout_s: float) -> None:
+    def _next(self) -> IoState:
+        """Return what a poll begun from now on sees; raises SafetyIoError where none is good."""
+        return self._await(lambda _: True, 0.0)
+
+    def _await(self, done: Callable[[IoState], bool], timeout_s: float) -> IoState:
         """Wait until a poll begun from now on sees `done`; raises SafetyIoError."""
         asked = time.monotonic()
         # the rules know better what is wrong, a poll after the same time
-        patience = timeout_s + self.profile.trip_timeout_s
+        patience = timeout_s + self._timeout_s
         while True:
             if self._armed and self._tripped:
                 raise SafetyIoError(self._tripped)
             state = self.state
             if state.at_s > asked and done(state):
-                return
-            if time.monotonic() - asked > patience:
+                return state
+            now = time.monotonic()
+            if now - asked > patience:
+                if now - state.at_s > self._timeout_s:
+                    raise SafetyIoError(self._unheard())
                 raise SafetyIoError(f"{self.name}: {self._obstacle(state) or 'does not follow'}")
             time.sleep(_LOOK_S)
 
     @staticmethod
-    def _doubt(wait: Callable[[], None]) -> str:
+    def _doubt(wait: Callable[[], object]) -> str:
         try:
             wait()
         except SafetyIoError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import socket
 import sys
@@ -131,6 +132,35 @@ def test_a_polling_thread_that_hangs_trips_as_well(twin: Twin) -> None:
     finally:
         twin.break_(Fault(0))
         assert "no good poll" in io.close()
+
+
+def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(twin: Twin) -> None:
+    hold_interpreter = ctypes.PyDLL(None).usleep  # unlike time.sleep it lets no thread run
+    with SafetyIo(twin.profile()) as io:
+        io.energise()
+        assert io.stop_reason() == ""
+        hold_interpreter(int(1.5e6 * TRIP_S))
+        assert io.stop_reason() == ""
+        asking = time.monotonic() + 2 * TRIP_S
+        while time.monotonic() < asking:
+            assert io.stop_reason() == ""
+            time.sleep(0.01)
+        twin.break_(Fault.SILENT)
+        hold_interpreter(int(1.5e6 * TRIP_S))
+        assert wait_until(io.stop_reason) < TRIP_S + SLACK_S
+        twin.break_(Fault(0))
+
+
+def test_rare_questions_are_answered_as_well(twin: Twin) -> None:
+    """Cycles that are longer than the trip time-out get the benefit of the doubt only once."""
+    with SafetyIo(twin.profile()) as io:
+        io.energise()
+        twin.break_(Fault.SILENT)
+        for _ in range(2):
+            time.sleep(1.5 * TRIP_S)
+            io.stop_reason()
+        assert "no good poll" in io.stop_reason()
+        twin.break_(Fault(0))
 
 
 def test_a_welded_contactor_is_noticed(twin: Twin) -> None:
