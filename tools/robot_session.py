@@ -203,6 +203,8 @@ def open_robot(
         _note(robot, booted, absent, out)
         axes = [robot.axes[i] for i in booted]
         device = stack.enter_context(_device(robot, networks, booted, torque_share))
+        if safety is not None:
+            stack.callback(safety.drop_brakes)
         for network in networks.values():
             network.start_heartbeat()
         if not device.lockstep:

@@ -42,6 +42,11 @@ class SessionSafety:
             self.io.apply_brakes(*self.braked)
             executive.step(lambda: self._are(False), _FOR_EVER_S, "the brakes to be applied")
 
+    def drop_brakes(self) -> None:
+        """Have the brakes applied as soon as the session ends, without waiting for them."""
+        if self.braked:
+            self.io.apply_brakes(*self.braked)
+
     @property
     def tripped(self) -> str:
         """Why the safety I/O ends the motion, or an empty text."""

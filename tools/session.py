@@ -262,6 +262,8 @@ def open_winch(
         report = boot(network, winch.node_id, winch.drive, settings)
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
+        if safety is not None:
+            stack.callback(safety.drop_brakes)
         note_lacking_guards(f"node {winch.node_id}", report, out)
         network.start_heartbeat()
         if not device.lockstep:
