@@ -9,6 +9,7 @@ from typing import Any
 
 import typer
 
+from cdpr_rt.errors import TripError
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
 from cdpr_rt.recorder import column_names
 from cdpr_rt.tension_gain import TorquePoint
@@ -80,7 +81,10 @@ def measure_masses(
     hang: Hang,
     gravity: float,
 ) -> list[Path]:
-    """Raise and lower each mass, recording into `folder`; the drive has no power in between."""
+    """Raise and lower each mass, recording into `folder`; the drive has no power in between.
+
+    Raises CalibrationRefusedError for a recording that is of no use.
+    """
     recorded = []
     for mass_kg in masses_kg:
         hang(mass_kg)
@@ -88,6 +92,7 @@ def measure_masses(
         with out.progress(f"raising and lowering {mass_kg:g} kg", plan.duration_s) as advance:
             session.executive.on_progress = advance
             _hoist(session, path, plan, mass_kg, gravity)
+        hoist_points(read_raw_log(path))  # refused before the next mass is hung
         recorded.append(path)
     session.executive.on_progress = None
     return recorded
@@ -127,6 +132,13 @@ def _hoist(
     log = RawLogWriter(path, column_names(device.n), meta)
     try:
         session.executive.run(controller, motion, log)
+    except TripError as error:
+        if session.device.alarm() or abs(controller.effort_Nm[0]) < limit:
+            raise
+        raise TripError(
+            f"{error}: {limit:.2f} Nm, the most that was allowed, do not lift {mass_kg:g} kg; take "
+            "lighter masses, and see that the cable runs free"
+        ) from None
     finally:
         log.close()
     session.disable()

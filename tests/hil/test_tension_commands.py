@@ -1,0 +1,216 @@
+"""Winch calibration and load cells as commands, against the simulator's truth."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from profiles.winch_calibration import load_winch_calibration
+from sim_bus.physics_board import PhysicsBoard
+
+WINCH = "winch-mpp0923d"
+FAILED, BAD_INPUT = 1, 2
+
+
+def cdpr(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+
+
+def run(*arguments: str | Path, status: int = 0) -> dict[str, Any]:
+    done = subprocess.run(
+        cdpr(*arguments, "--json"),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == status, done.stderr
+    assert "Traceback" not in done.stderr
+    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return result
+
+
+@contextmanager
+def simulator(*arguments: str | Path) -> Iterator[dict[str, Any]]:
+    """A `cdpr sim ...` in the background; yields what it told when it was ready."""
+    process = subprocess.Popen(
+        cdpr("sim", *arguments, "--exit-with-stdin"),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        yield json.loads(process.stdout.readline())["ready"]
+    finally:
+        process.communicate(timeout=20)
+
+
+@contextmanager
+def winch(folder: Path, plant: str) -> Iterator[tuple[str, Path]]:
+    """A simulated winch; yields its bus and its board."""
+    (folder / "plant.toml").write_text(plant)
+    bus, board = f"simbus:ten-{os.getpid()}-{uuid.uuid4().hex[:6]}", folder / "board"
+    with simulator("up", WINCH, "--bus", bus, "--plant", folder / "plant.toml", "--board", board):
+        yield bus, board
+
+
+def without_power(board: PhysicsBoard) -> None:
+    """Wait for it: bus time stands still for half a second after the last SYNC."""
+    end = time.monotonic() + 10.0
+    while board.axis(0).state().power_on:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def gain(result: dict[str, Any], true: float) -> None:
+    """The gain is right within 1 %, and its interval is honest (three times as wide at most)."""
+    assert result["gain_m"] == pytest.approx(true, rel=0.01)
+    assert abs(result["gain_m"] - true) < 3.0 * result["gain_half_width_m"] + 1e-3 * true
+
+
+@pytest.mark.parametrize(
+    ("masses", "plant", "radius_error", "constant_error", "share"),
+    [
+        ("2,5,9", "[load]\nkind = 'hung_mass'\n", 0.0, 0.04, 0.05),
+        (
+            "2,4,7",
+            "seed = 3\n[motor]\ntorque_constant_error = -0.06\n[[cogging]]\norder = 24\n"
+            "amplitude_Nm = 0.04\n[[cogging]]\norder = 4\namplitude_Nm = 0.1\n"
+            "kind = 'current_offset'\n[friction]\ndirection_asymmetry = 0.5\n"
+            "[load]\nkind = 'hung_mass'\ndrum_radius_error = 0.08\nfriction_share = 0.12\n"
+            "winch_friction_Nm = 0.05\ncable_m = 2.0\nslack_m = 0.02\n",
+            0.08,
+            -0.06,
+            0.12,
+        ),
+    ],
+    ids=["default", "other"],
+)
+def test_masses_give_gain_and_friction(
+    tmp_path: Path,
+    masses: str,
+    plant: str,
+    radius_error: float,
+    constant_error: float,
+    share: float,
+) -> None:
+    (tmp_path / "plant.toml").write_text(plant)
+    out = tmp_path / "out"
+    result = run(
+        *("tension", "calibrate", WINCH, "--bus", "simbus:", "--masses", masses),
+        *("--plant", tmp_path / "plant.toml", "--out", out),
+    )
+    true = 0.026 * (1.0 + radius_error) / (1.0 + constant_error)
+    gain(result, true)
+    assert result["friction_per_N_m"] == pytest.approx(share * true, rel=0.1)
+    stored = load_winch_calibration(Path(result["calibration"]))
+    assert stored.gain_m == result["gain_m"]
+    assert all((out / name).is_file() for name in stored.raw_data)
+    again = run("tension", "fit", out)
+    assert again["gain_m"] == result["gain_m"]
+
+
+def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
+    plant = "[load]\nkind = 'fixed_anchor'\npretension_N = 2.0\nanchor_stiffness_N_m = 500.0\n"
+    plant += "drum_radius_error = 0.03\n"
+    out = tmp_path / "out"
+    sensors = "rtu-load-cell-1"
+    with (
+        winch(tmp_path, plant) as (bus, board),
+        simulator("tension", sensors, "--board", board) as cells,
+    ):
+        seen = run("tension", "watch", "--sensors", sensors, "--port", cells["port"],
+                   "--seconds", "0.5")  # fmt: skip
+        (cable,) = seen["cables"]
+        assert cable["valid"] and cable["mean_N"] == pytest.approx(2.0, abs=1.5)
+        assert cable["rate_Hz"] > 8.0
+        result = run(
+            *("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors),
+            *("--port", cells["port"], "--out", out),
+            *("--speed-mm-s", "40", "--highest-n", "70"),
+        )
+        with PhysicsBoard.attach(board) as shared:
+            without_power(shared)
+    gain(result, 0.026 * 1.03 / 1.04 / 1.001)
+    assert result["friction_per_N_m"] == pytest.approx(0.05 * 0.02575, rel=0.25)
+
+
+def test_what_cannot_be_calibrated_is_refused(tmp_path: Path) -> None:
+    calibrate = ("tension", "calibrate", WINCH, "--bus", "simbus:nobody", "--out", tmp_path / "o")
+    for more, message in (
+        (("--masses", "2,5"), "at least three different masses"),
+        (("--masses", "2,5,50"), "up to 10.6 kg"),
+        (("--sensors", "rtu-load-cel-1", "--port", "/dev/null"), "did you mean 'rtu-load-cell-1'"),
+        (
+            ("--sensors", "rtu-load-cell-1", "--port", "x", "--highest-n", "200"),
+            "up to 104 N",
+        ),
+    ):
+        result = run(*calibrate, *more, status=BAD_INPUT)
+        assert message in result["error"]
+
+
+def test_slack_that_eats_the_lead_in_refuses_the_result_and_keeps_the_data(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (tmp_path / "plant.toml").write_text("[load]\nkind = 'hung_mass'\nslack_m = 0.3\n")
+    result = run(
+        *("tension", "calibrate", WINCH, "--bus", "simbus:", "--masses", "2,5,9"),
+        *("--plant", tmp_path / "plant.toml", "--out", out),
+        status=FAILED,
+    )
+    assert "the mass did not hang freely all the time" in result["error"]
+    assert "--lead-mm" in result["error"] and str(out / "raw") in result["error"]
+    assert [path.name for path in (out / "raw").iterdir()] == ["mass-2kg.raw"]
+    assert not (out / "winch-calibration.toml").exists()
+    result = run(
+        *("tension", "calibrate", WINCH, "--bus", "simbus:", "--masses", "2,5,9", "--out", out),
+        status=BAD_INPUT,
+    )
+    assert "--overwrite" in result["error"]
+
+
+def test_stopping_lowers_the_mass_and_a_dead_load_cell_stops_the_pull(tmp_path: Path) -> None:
+    plant = "[load]\nkind = 'hung_mass'\n[encoder]\nnoise_counts = 0.0\n"
+    with winch(tmp_path, plant) as (bus, board), PhysicsBoard.attach(board) as shared:
+        axis = shared.axis(0)
+        process = subprocess.Popen(
+            cdpr("tension", "calibrate", WINCH, "--bus", bus, "--masses", "4,6,8", "--board",
+                 board, "--out", tmp_path / "stopped", "--turns", "20", "--json"),
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        while axis.state().tension_N < 35.0 or axis.state().motor_rad > -9.0:
+            assert process.poll() is None
+            time.sleep(0.001)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+        assert process.returncode == FAILED
+        assert "stopped on request" in json.loads(out.splitlines()[-1])["error"]
+        without_power(shared)
+        state = axis.state()
+        assert abs(state.motor_rad) < 3.0  # back where it began, the mass on the floor
+        subprocess.run(cdpr("sim", "hang", "7.5", "--board", board), check=True)
+        assert axis.hung_mass_kg == 7.5
+
+        options = ("--board", board, "--fault", "silent 1")
+        with simulator("tension", "rtu-load-cell-1", *options) as cells:
+            port = ("--port", cells["port"])
+            result = run("tension", "watch", "--sensors", "rtu-load-cell-1", *port,
+                         "--seconds", "0.5", status=FAILED)  # fmt: skip
+            assert "no answer within" in result["cables"][0]["error"]
+            result = run("tension", "calibrate", WINCH, "--bus", bus, "--sensors",
+                         "rtu-load-cell-1", *port, "--out", tmp_path / "dead",
+                         status=FAILED)  # fmt: skip
+            assert "winch 1: " in result["error"] and "unit 1" in result["error"]
