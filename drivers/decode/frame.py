@@ -29,8 +29,10 @@ class Frame(NamedTuple):
         """Return the frame in a 16-byte `struct can_frame`; a length above 8 counts as 8."""
         word, length, data = FRAME.unpack(packet)
         length = min(length, _MOST_BYTES)
-        error, remote = bool(word & ERR_FLAG), bool(word & RTR_FLAG)
-        extended = bool(word & EFF_FLAG)
+        error = bool(word & ERR_FLAG)
+        # the other flags mean nothing in an error frame
+        remote = bool(word & RTR_FLAG) and not error
+        extended = bool(word & EFF_FLAG) and not error
         return cls(
             round(time_s, 6),
             word & (EFF_MASK if extended or error else SFF_MASK),

@@ -15,7 +15,7 @@ _TIMEOUT_S = 0.4
 _ATTEMPTS = 2
 _MOST_BYTES = 1024
 SETTLE_S = 0.15
-"""For how long a second node may answer what a first one has answered."""
+"""For how long a second node may still answer what a first one has answered."""
 
 Object = tuple[int, int]
 FIRST: Object = (0x1000, 0)
@@ -63,9 +63,9 @@ class Found:
 
 
 class _Turn(NamedTuple):
-    """What to send, if anything, and for how long to wait for its answer."""
+    """What to send, and for how long to wait for its answer."""
 
-    data: bytes | None
+    data: bytes
     wait_s: float
 
 
@@ -117,7 +117,6 @@ class Asking:
         yield from self._read(FIRST)
         if not self.found.answers:
             return
-        yield _Turn(None, SETTLE_S)
         for what in ALWAYS + (DRIVE if self.found.is_drive else ()):
             yield from self._read(what)
 

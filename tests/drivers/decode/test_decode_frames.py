@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.decode import Decoder, Frame, KnownNode, Record
+from drivers.decode import Decoder, Frame, KnownNode, Record, format_line, parse_line
 from profiles import DriveProfile, Pdo, PdoEntry, load_winch
 
 WINCH = load_winch("winch-mpp0923d")
@@ -322,7 +322,9 @@ def test_no_frame_makes_it_fail(frames: list[tuple[int, bytes, int, int]], known
         packet = struct.pack(
             "=IB3x8s", identifier | flags, length if length > 8 else len(data), data
         )
-        record = decoder.decode(Frame.unpack(1.0, packet))
+        frame = Frame.unpack(1.0, packet)
+        assert parse_line(format_line("can0", frame)).frame == frame
+        record = decoder.decode(frame)
         line = record.line(0.0)
         assert line.isprintable()
         assert all(
