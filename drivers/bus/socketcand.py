@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import re
 import select
 import socket
@@ -208,10 +209,18 @@ class SocketcandPort(PackedPort):
         self._wanted: dict[int, bool] = {}
         self._flags = 0
         self._pending: deque[bytes] = deque()
+        # readable while the connection is or frames taken from it wait here
+        self._ready = select.epoll()
+        self._ready.register(self._line.sock, select.EPOLLIN)
+        self._waits = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._ready.register(self._waits, select.EPOLLIN)
+        self._told = False
         self._keep(self._line.early())
+        self._tell()
         self.send = self._send
         self.recv_into = self._recv_into
-        self.close = self._line.close
+        self.fileno = self._ready.fileno
+        self.close = self._close
 
     def settimeout(self, seconds: float | None) -> None:
         """Limit the wait of `recv_into`; None waits for ever, 0 does not wait."""
@@ -226,17 +235,41 @@ class SocketcandPort(PackedPort):
                 count += len(self._pending)
                 self._pending.clear()
                 self._keep(self._line.receive(socket.MSG_DONTWAIT))
+        self._tell()
         return count
+
+    def recv_waiting(self, buffer: bytearray | memoryview, /) -> int:
+        """Write a frame that has come already into `buffer`, return its length; never wait."""
+        return self._take(buffer, socket.MSG_DONTWAIT)
+
+    def _recv_into(self, buffer: bytearray | memoryview) -> int:
+        return self._take(buffer, self._flags)
+
+    def _take(self, buffer: bytearray | memoryview, flags: int) -> int:
+        while not self._pending:
+            self._keep(self._line.receive(flags))
+        buffer[:FRAME_BYTES] = self._pending.popleft()
+        self._tell()
+        return FRAME_BYTES
+
+    def _tell(self) -> None:
+        """Make the descriptor readable while frames wait here."""
+        if self._told is not bool(self._pending):
+            self._told = not self._told
+            if self._told:
+                os.eventfd_write(self._waits, 1)
+            else:
+                os.eventfd_read(self._waits)
 
     def _send(self, frame: Bytes) -> int:
         self._line.write(frame)
         return FRAME_BYTES
 
-    def _recv_into(self, buffer: bytearray | memoryview) -> int:
-        while not self._pending:
-            self._keep(self._line.receive(self._flags))
-        buffer[:FRAME_BYTES] = self._pending.popleft()
-        return FRAME_BYTES
+    def _close(self) -> None:
+        if not self._ready.closed:
+            self._ready.close()
+            os.close(self._waits)
+            self._line.close()
 
     def _keep(self, frames: list[bytes]) -> None:
         """Put aside those that pass the filters; error frames are for the acyclic side."""

@@ -439,6 +439,27 @@ def test_rubbish_from_a_server_loses_no_frame() -> None:
     server.close()
 
 
+def test_frames_taken_in_one_piece_can_still_be_polled_for() -> None:
+    server = Server(*GREETING)
+    port = open_port(server.url, [(0x180, 0x780)])
+    port.settimeout(2.0)
+    server.client.sendall(b"< frame 181 1.0 01 >< frame 182 1.0 02 >< frame 183 1.0 03 >")
+    for can_id in (0x181, 0x182):
+        assert receive(port) == frame(can_id, bytes([can_id & 3]))
+        assert select.select([port], [], [], 0.0)[0]
+    buffer = bytearray(16)
+    assert port.recv_waiting(buffer) == 16
+    assert buffer == frame(0x183, b"\x03")
+    assert not select.select([port], [], [], 0.0)[0]
+    with pytest.raises(BlockingIOError):
+        port.recv_waiting(buffer)
+    server.client.sendall(b"< frame 184 1.0 >")
+    assert select.select([port], [], [], 2.0)[0]
+    assert receive(port) == frame(0x184)
+    port.close()
+    server.close()
+
+
 def test_error_frames_of_a_server() -> None:
     server = Server(*GREETING)
     bus = open_python_can(server.url, [(0x701, 0x7FF)])
