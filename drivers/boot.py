@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
+from drivers.bus_census import flood_text
 from drivers.cia402 import State, mode_bits, state_of
 from drivers.configuration import BootSettings, wanted_configuration
 from drivers.download import configure, store
@@ -19,6 +20,7 @@ _DEVICE_TYPE, _IDENTITY = 0x1000, 0x1018
 _PROFILE_402 = 402
 _BOOT_UP_TIMEOUT_S = 2.0
 _QUIET_DRIVE_S = 1.0
+_MAY_BE_A_FLOOD = "BK"
 
 
 @dataclass
@@ -81,8 +83,8 @@ def boot_all(
     `store_configuration` a drive whose stored configuration is another one is told to keep it
     (1010h).
 
-    Raises the BootError of the lowest node id that failed, with the others' as notes, once all
-    have come to an end, and BusError.
+    Raises the BootError of the lowest node id that failed, with the others' as notes (and who
+    floods the bus, should that be why), once all have come to an end, and BusError.
     """
     _listen(network, drives)
     network.clear_alarm()
@@ -97,8 +99,10 @@ def boot_all(
         _collect(node_id, job, reports, errors)
     fatal = [error for node, error in errors.items() if drives[node][1].mandatory]
     if fatal:
-        for other in fatal[1:]:
-            fatal[0].add_note(str(other))
+        flood = flood_text(network.url) if any(e.letter in _MAY_BE_A_FLOOD for e in fatal) else ""
+        for other in (*fatal[1:], flood):
+            if other:
+                fatal[0].add_note(str(other))
         raise fatal[0]
     for node_id in reports:
         network.start(node_id, drives[node_id][0].heartbeat_producer_s)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import threading
 import time
 from dataclasses import replace
 
+import can
 import pytest
 from axis_rig import DRIVE, MASTER, SETTINGS, open_network
 from scripted_node import ScriptedNode, expedited, scripted
 
 from drivers.boot import boot, boot_all
+from drivers.bus import BusUrl
+from drivers.bus_census import census, flood_text
 from drivers.errors import BootError
 from profiles import Pdo
 
@@ -125,3 +129,36 @@ def test_a_map_that_does_not_fit_a_frame_is_refused_by_the_drive_in_words(bus: s
     assert caught.value.letter == "J"
     assert "object 1A00h:0 cannot be set to 04h" in str(caught.value)
     assert "would exceed the PDO length (06040042h)" in str(caught.value)
+
+
+def test_who_floods_the_bus_is_named_where_a_node_does_not_answer(bus: str) -> None:
+    stop = threading.Event()
+
+    def babble() -> None:
+        with can.Bus(interface="simbus", channel=bus[7:], can_filters=[]) as babbler:
+            message = can.Message(arbitration_id=0x12A, data=bytes(8), is_extended_id=False)
+            while not stop.is_set():
+                for _ in range(100):
+                    babbler.send(message)
+                time.sleep(0.005)
+
+    thread = threading.Thread(target=babble)
+    thread.start()
+    try:
+        with open_network(bus, [1, 9]) as network, pytest.raises(BootError) as caught:
+            boot_all(network, dict.fromkeys([1, 9], (DRIVE, SETTINGS)))
+        busiest = census(BusUrl.parse(bus), 0.1)[0]
+    finally:
+        stop.set()
+        thread.join()
+    assert caught.value.node_id == 9  # the drive that is there boots all the same
+    (note,) = caught.value.__notes__
+    assert "the bus is flooded" in note
+    assert "identifier 12Ah (node 42 by the usual numbering)" in note
+    assert (busiest.identifier, busiest.node_id) == (0x12A, 42)
+    assert busiest.load > 0.5
+
+
+def test_a_quiet_bus_is_no_flood(bus: str) -> None:
+    assert flood_text(BusUrl.parse(bus)) == ""
+    assert flood_text(BusUrl.parse("simbus:nobody-here")) == ""
