@@ -5,20 +5,23 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal, TypeVar, get_args
 
 from profiles.cable import Cable, CableSeries
 from profiles.drive import DriveProfile
 from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings, MotorSeries
+from profiles.rail import load_rail
 from profiles.reader import closest, read_toml, read_toml_model
 from profiles.robot import Robot, RobotAxis, RobotFile
 from profiles.safety_io import load_safety_io
 from profiles.tension_sensor import load_tension_sensors
 from profiles.winch import Winch, WinchFile
 
-Kind = Literal["motors", "drives", "cables", "winches", "robots", "tension_sensors"]
-KINDS: tuple[Kind, ...] = ("motors", "drives", "cables", "winches", "robots", "tension_sensors")
+Kind = Literal[
+    "motors", "drives", "cables", "winches", "robots", "tension_sensors", "safety_io", "rails"
+]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 SHIPPED = Path(__file__).parent
 
 _SERIES = ".series.toml"
@@ -197,6 +200,8 @@ def load_all() -> dict[str, dict[str, object]]:
         ("winches", load_winch),
         ("robots", load_robot),
         ("tension_sensors", load_tension_sensors),
+        ("safety_io", load_safety_io),
+        ("rails", load_rail),
     )
     for kind, load in loaders:
         for path in _files(kind):

@@ -7,8 +7,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from profiles.catalogue import load_drive
-from profiles.drive import DriveProfile
 from profiles.reader import Profile, one_of, read_toml_model
 from profiles.safety_io import Address, DeviceWatchdog, find_shipped
 
@@ -132,8 +130,3 @@ class RailProfile(Profile):
 def load_rail(name: str | Path) -> RailProfile:
     """Return a rail by name of a shipped one or by path; raises ProfileError."""
     return read_toml_model(find_shipped(SHIPPED, name), RailProfile)
-
-
-def load_rail_drive(name: str | Path, rail: Cia402Rail) -> DriveProfile:
-    """Return the drive that a rail's file names, looked for beside it first; ProfileError."""
-    return load_drive(rail.drive, find_shipped(SHIPPED, name).parent)

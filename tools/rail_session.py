@@ -16,7 +16,8 @@ from drivers.network import CanNetwork
 from drivers.rail import RailAxis
 from drivers.rail_cia402 import Cia402RailAxis
 from profiles import DriveProfile
-from profiles.rail import Cia402Rail, RailProfile, load_rail_drive
+from profiles.rail import Cia402Rail, RailProfile
+from profiles.rail_drive import load_rail_drive
 from profiles.tension_sensor import load_tension_sensors
 from tools.errors import BadInputError
 from tools.output import Output

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from profiles import ProfileError
-from profiles.rail import SHIPPED, load_rail, load_rail_drive
+from profiles.rail import SHIPPED, load_rail
+from profiles.rail_drive import load_rail_drive
 
 CIA402 = (SHIPPED / "rail-cia402.toml").read_text()
 MODBUS = (SHIPPED / "rail-modbus.toml").read_text()

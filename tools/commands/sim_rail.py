@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from profiles.rail import RailProfile, load_rail, load_rail_drive
+from profiles.rail import RailProfile, load_rail
+from profiles.rail_drive import load_rail_drive
 from sim_bus.clock import ClockMode
 from sim_bus.drive import SimDrive
 from sim_bus.modbus_tcp_server import serve_units
