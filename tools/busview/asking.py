@@ -43,8 +43,10 @@ class Found:
     objects: dict[Object, bytes] = field(default_factory=dict)
     refused: dict[Object, int] = field(default_factory=dict)
     """Abort codes of objects it does not give."""
-    twice: set[str] = field(default_factory=set)
-    """What came more often than asked for, in words: several nodes have this id."""
+    repeated: set[str] = field(default_factory=set)
+    """Objects whose value came more often than asked for: several nodes have this id."""
+    differing: set[str] = field(default_factory=set)
+    """Those of them that came with differing values."""
 
     def number(self, index: int, sub: int = 0) -> int | None:
         """Return an unsigned object, None where it was not given."""
@@ -162,7 +164,7 @@ class Asking:
         if data[0] >> 5 == 0:
             if self._toggle is not None and data[0] >> 4 & 1 == self._toggle:
                 return True
-            self.found.twice.add("segments of values that were not asked for")
+            self.found.repeated.add("segments")
             return False
         what: Object = (data[1] | data[2] << 8, data[3])
         if data[0] == _REFUSED and self._toggle is not None:
@@ -173,6 +175,7 @@ class Asking:
         answers.append(data)
         if len(answers) > self._requests[what]:
             name = f"{what[0]:04X}h:{what[1]}" if what[1] else f"{what[0]:04X}h"
-            kind = "differing" if len(set(answers)) > 1 else "equal"
-            self.found.twice.add(f"{kind} answers to one request for {name}")
+            self.found.repeated.add(name)
+            if len(set(answers)) > 1:
+                self.found.differing.add(name)
         return what == self._asked and self._toggle is None

@@ -47,8 +47,11 @@ def entry(found: Found, drives: dict[str, DriveProfile]) -> dict[str, Any]:
 def problems(found: Found) -> list[str]:
     """Return what is wrong with a node, in words."""
     told = []
-    if found.twice:
-        told.append(f"several nodes have this id: {'; '.join(sorted(found.twice))}")
+    if found.repeated:
+        told.append(
+            "several nodes have this id: two answers to one request"
+            + (f", differing for {', '.join(sorted(found.differing))}" if found.differing else "")
+        )
     if not found.answers:
         closed = "; a stopped node never does" if found.nmt_state == _STOPPED else ""
         told.append(f"heartbeats only, it answers no SDO (a master?{closed})")

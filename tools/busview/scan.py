@@ -77,7 +77,9 @@ class Scan:
                     break
         self.listen(SETTLE_S)
         for node_id in self.traffic.sdo_requests & self.found.keys():
-            self.found[node_id].twice.clear()  # somebody else may have asked
+            # somebody else may have asked for what came
+            self.found[node_id].repeated.clear()
+            self.found[node_id].differing.clear()
 
     def _send(self, node_id: int, data: bytes | None) -> None:
         if data is None:
