@@ -265,7 +265,7 @@ class AxisExchange:
         self.network.claim_cycle()
         for axis in self.axes:
             if has_deadline(axis):
-                self.network.start(axis.node_id)
+                self.network.start(axis.node_id, axis.drive.heartbeat_producer_s)
         self._port.drain()
         for i, axis in enumerate(self.axes):
             if axis.node_id in self.network.restarted:
