@@ -250,11 +250,12 @@ def fit(
 
 def _finish(out: Output, folder: Path, winch: Winch) -> None:
     with _keeping(folder):
-        found, _ = calibration.calibrate(folder, winch)
+        found = calibration.calibrate(folder, winch)
     path = folder / calibration.FILE_NAME
     calibration.show(out, found, path)
     result = found.model_dump(mode="json")
-    out.result({"ok": True, "calibration": str(path), **result})
+    picture = str(folder / calibration.PICTURE)
+    out.result({"ok": True, "calibration": str(path), "picture": picture, **result})
 
 
 def _masses(text: str) -> list[float]:

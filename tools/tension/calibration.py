@@ -9,15 +9,16 @@ from typing import Any, Literal
 
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import read_raw_log
-from cdpr_rt.tension_gain import TensionGain, identify_tension_gain
+from cdpr_rt.tension_gain import identify_tension_gain
 from profiles import Winch
 from profiles.winch_calibration import WinchCalibration
-from tools.errors import BadInputError
+from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.tension.anchor import anchored_points
 from tools.tension.masses import mass_points
+from tools.tension.picture import draw_calibration
 
-FILE_NAME = "winch-calibration.toml"
+FILE_NAME, PICTURE = "winch-calibration.toml", "winch-calibration.png"
 _PULL = "pull.raw"
 
 
@@ -50,8 +51,8 @@ def _identity(path: Path) -> Mapping[str, Any]:
     return whose
 
 
-def calibrate(folder: Path, winch: Winch) -> tuple[WinchCalibration, TensionGain]:
-    """Identify from the recordings in `folder` and write the file beside them.
+def calibrate(folder: Path, winch: Winch) -> WinchCalibration:
+    """Identify from the recordings in `folder` and write the file and its picture beside them.
 
     Raises CalibrationRefusedError where they do not support it, and then writes nothing.
     """
@@ -65,7 +66,8 @@ def calibrate(folder: Path, winch: Winch) -> tuple[WinchCalibration, TensionGain
         found = identify_tension_gain(points, nominal, order)
     else:
         method = "masses"
-        found = identify_tension_gain(mass_points(recorded), nominal)
+        points = mass_points(recorded)
+        found = identify_tension_gain(points, nominal)
     calibration = WinchCalibration(
         winch=str(whose["winch"]),
         motor=str(whose["motor"]),
@@ -87,7 +89,11 @@ def calibrate(folder: Path, winch: Winch) -> tuple[WinchCalibration, TensionGain
         raw_data=tuple(str(path.relative_to(folder)) for path in recorded),
     )
     calibration.save(folder / FILE_NAME)
-    return calibration, found
+    try:
+        draw_calibration(folder / PICTURE, points, calibration)
+    except OSError as error:
+        raise WorkFailedError(f"{folder / PICTURE}: cannot be written: {error.strerror}") from error
+    return calibration
 
 
 def show(out: Output, found: WinchCalibration, path: Path) -> None:
