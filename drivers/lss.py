@@ -21,6 +21,8 @@ from drivers.errors import BusError, DriverError
 
 UNCONFIGURED = 255
 """Node id of a device that has none."""
+NOT_TOLD = 0
+"""Node id of a device that does not tell it, as early ones."""
 
 BITRATE_INDEX = {
     1_000_000: 0,
@@ -56,7 +58,6 @@ _REASONS = {
 _VENDORS_OWN = 255
 
 _SEARCHES = 4
-_MOST_DEVICES = 127
 _SETTLE_S = 0.005
 _SDO_PATIENCE = 3.0
 _ALL = (0, 0xFFFFFFFF)
@@ -173,7 +174,7 @@ class LssMaster:
         return found
 
     def select(self, address: LssAddress) -> int:
-        """Put one device into the configuration state and return its node id (255: none).
+        """Put one device into the configuration state and return its node id, or one of the above.
 
         Raises LssError when it does not answer.
         """
@@ -236,15 +237,19 @@ class LssMaster:
                 if number is None:
                     return None
                 numbers.append(number)
+            address = LssAddress(*numbers)
+            if address in found:
+                raise LssError(
+                    f"{address} takes part in the fastscan after it has been found, which hides "
+                    "others: connect it alone and use --alone"
+                )
             # it is in configuration state now, so that the next scan passes it by
-            found.add(LssAddress(*numbers))
-            if len(found) > _MOST_DEVICES:
-                return None
+            found.add(address)
         return found
 
     def _is_there(self, address: LssAddress) -> bool:
         try:
-            return self.select(address) == UNCONFIGURED
+            return self.select(address) in (UNCONFIGURED, NOT_TOLD)
         except LssError:
             return False
 
@@ -275,7 +280,8 @@ class LssMaster:
         return vendor, product, revision, serial
 
     def _node_id(self) -> int:
-        return self._one(bytes([_INQUIRE_NODE_ID]), _INQUIRE_NODE_ID)[1]
+        answer = self._ask(bytes([_INQUIRE_NODE_ID]), _INQUIRE_NODE_ID)
+        return NOT_TOLD if answer is None else answer[1]
 
     def set_node_id(self, node_id: int) -> None:
         """Give the selected device a node id, 1 to 127 or 255; raises LssError if refused.

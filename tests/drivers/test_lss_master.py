@@ -158,6 +158,9 @@ def test_the_only_device_needs_no_name_and_two_are_refused() -> None:
 class Sluggish:
     """Answers the fastscan like a device, each answer late: it meets the next question."""
 
+    stubborn = False
+    """Whether it goes on answering the fastscan after it has been found."""
+
     def __init__(self, name: str, numbers: tuple[int, ...], delay_s: float) -> None:
         self.bus = can.Bus(interface="simbus", channel=name)
         self.numbers, self.delay_s = numbers, delay_s
@@ -184,7 +187,7 @@ class Sluggish:
                 self.answer(b"\x44")
         elif data[0] == 0x5E and self.found:
             self.answer(b"\x5e\xff")
-        elif data[0] == 0x51 and not self.found:
+        elif data[0] == 0x51 and (self.stubborn or not self.found):
             number, bit, part, following = int.from_bytes(data[1:5], "little"), *data[5:]
             if bit == 128:
                 self.position = 0
@@ -223,6 +226,19 @@ def test_answers_that_run_into_the_next_question_are_no_bits(
         stack.enter_context(sluggish_device(name, 0x55555555, 0.002))
         master = stack.enter_context(LssMaster(BusUrl.parse(f"simbus:{name}"), 0.02))
         assert master.unconfigured() == [address(0x55555555), address(0x7FFFFFFF)]
+
+
+def test_a_device_that_is_found_again_and_again_ends_the_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("drivers.lss._SETTLE_S", 0.001)
+    monkeypatch.setattr(Sluggish, "stubborn", True)
+    with ExitStack() as stack:
+        name = stack.enter_context(bus_with())
+        stack.enter_context(sluggish_device(name, 3, 0.0))
+        master = stack.enter_context(LssMaster(BusUrl.parse(f"simbus:{name}"), 0.02))
+        with pytest.raises(LssError, match="serial 3 takes part in the fastscan after"):
+            master.unconfigured()
 
 
 def test_a_device_too_slow_for_the_timeout_is_an_error_not_a_wrong_identity() -> None:

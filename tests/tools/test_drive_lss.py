@@ -205,15 +205,16 @@ def test_nothing_is_written_on_a_real_bus_without_consent() -> None:
             message = refused(2, bus, "--alone", "--node-id", "9")
             assert "not confirmed (--yes does it beforehand); nothing was changed" in message
             assert answering.written == []
-            status, _, errors = lss(bus, "--alone", "--node-id", "9", "--yes")
+            status, text, errors = lss(bus, "--alone", "--node-id", "9", "--yes")
             assert (status, "it cannot store" in errors) == (1, True), errors
+            assert "serial 0: node id not told; no profile fits" in text
             assert answering.written == [0x11, 0x17]
         finally:
             notifier.stop()
 
 
 class Answering(can.Listener):
-    """A device that tells who it is, takes a node id, and cannot store."""
+    """An early device: it tells its identity but no node id, takes one, and cannot store."""
 
     def __init__(self, bus: can.BusABC) -> None:
         self.bus = bus
@@ -225,7 +226,7 @@ class Answering(can.Listener):
             return
         if command in (0x11, 0x17):
             self.written.append(command)
-        answer = {0x5E: b"\x04", 0x17: b"\x01"}.get(command, b"\x00")
-        if command in (0x5A, 0x5B, 0x5C, 0x5D, 0x5E, 0x11, 0x17):
+        answer = b"\x01" if command == 0x17 else b"\x00"
+        if command in (0x5A, 0x5B, 0x5C, 0x5D, 0x11, 0x17):
             data = (bytes([command]) + answer).ljust(8, b"\0")
             self.bus.send(can.Message(arbitration_id=0x7E4, data=data, is_extended_id=False))

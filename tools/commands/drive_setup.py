@@ -11,7 +11,7 @@ import typer
 
 from drivers.bus import BusUrl
 from drivers.errors import BusError
-from drivers.lss import BITRATE_INDEX, UNCONFIGURED, LssAddress, LssError, LssMaster
+from drivers.lss import BITRATE_INDEX, NOT_TOLD, UNCONFIGURED, LssAddress, LssError, LssMaster
 from profiles import DriveProfile, list_profiles, load_drive
 from tools.commands.drive_import import import_drive
 from tools.commands.options import JsonOption
@@ -40,12 +40,18 @@ class _Device:
     """Whether it was not searched for, as the only one on the bus."""
 
     @property
+    def has_node_id(self) -> bool:
+        """Whether it is known to have one."""
+        return self.node_id not in (UNCONFIGURED, NOT_TOLD)
+
+    @property
     def told(self) -> dict[str, Any]:
-        own = None if self.node_id == UNCONFIGURED else self.node_id
+        own = self.node_id if self.has_node_id else None
         return dataclasses.asdict(self.address) | {"node_id": own, "profile": self.profile}
 
     def __str__(self) -> str:
-        own = "no node id" if self.node_id == UNCONFIGURED else f"node id {self.node_id}"
+        without = {UNCONFIGURED: "no node id", NOT_TOLD: "node id not told"}
+        own = without.get(self.node_id, f"node id {self.node_id}")
         return f"{self.address}: {own}; " + (
             f"profile {self.profile}" if self.profile else "no profile fits"
         )
@@ -207,7 +213,7 @@ def _check(master: LssMaster, device: _Device, found: list[_Device], wish: _Wish
         sign = f"it is {other.address}" if other else master.who_has(wanted)
         if sign:
             raise BadInputError(f"--node-id {wanted}: taken by another node ({sign})")
-    if device.node_id != UNCONFIGURED:
+    if device.has_node_id:
         status = master.read_object(device.node_id, 0x6041)
         if status is not None and status & _ENABLED_MASK == _ENABLED:
             raise WorkFailedError(
@@ -241,15 +247,16 @@ def _set(master: LssMaster, device: _Device, wish: _Wish, out: Output) -> None:
             ) from error
     out.say(f"{device.address}: {wish} set" + (" and stored" if wish.store else ", not stored"))
     if wish.node_id is not None:
-        _restart(master, device.node_id, wish.node_id, out)
+        _restart(master, device, wish.node_id, out)
     if wish.bitrate_bit_s is not None:
         _change_over(master, device, wish, out)
 
 
-def _restart(master: LssMaster, old: int, new: int, out: Output) -> None:
+def _restart(master: LssMaster, device: _Device, new: int, out: Output) -> None:
     """Have the device use its new node id."""
+    old = device.node_id
     master.release()
-    if old not in (new, UNCONFIGURED):
+    if device.has_node_id and old != new:
         master.reset_communication(old)
     if old != new and not master.wait_for_boot_up(new):
         raise WorkFailedError(
