@@ -113,11 +113,12 @@ def compare(name: str, session: RobotSession, before: Counts, after: Counts) -> 
 
 
 def growth(samples: Sequence[Process]) -> Process:
-    """Return what a process has gained: the least of its later half over its first sample."""
-    later = samples[len(samples) // 2 :]
+    """Return what a process has gained: the least of its later half over that of its first."""
+    middle = len(samples) // 2
+    first, later = samples[:middle], samples[middle:]
     return Process(
-        min(sample.resident_KiB for sample in later) - samples[0].resident_KiB,
-        min(sample.open_files for sample in later) - samples[0].open_files,
+        min(s.resident_KiB for s in later) - min(s.resident_KiB for s in first),
+        min(s.open_files for s in later) - min(s.open_files for s in first),
     )
 
 
