@@ -15,6 +15,7 @@ from drivers.errors import DriverError
 
 _CONNECT_TIMEOUT_S = 1.0
 _HEADER_BYTES, _UNIT_AT = 8, 6
+_READ_COILS, _READ_INPUTS, _READ_REGISTERS, _WRITE_COIL, _WRITE_REGISTERS = 1, 2, 3, 5, 16
 _EXCEPTIONS: Final = {
     1: "illegal function: the device does not know this kind of request",
     2: "illegal data address: the device has no such input, coil or register",
@@ -65,38 +66,47 @@ class ModbusTcp:
     def inputs(self, start: int, count: int) -> list[bool]:
         """Return `count` discrete inputs from address `start` on."""
         read: Callable[..., Any] = self._client.read_discrete_inputs
-        return self._bits("discrete input", read, start, count)
+        return self._bits("discrete input", _READ_INPUTS, read, start, count)
 
     def coils(self, start: int, count: int) -> list[bool]:
         """Return what `count` coils from address `start` on hold."""
-        return self._bits("coil", self._client.read_coils, start, count)
+        return self._bits("coil", _READ_COILS, self._client.read_coils, start, count)
 
     def registers(self, start: int, count: int) -> list[int]:
         """Return `count` holding registers from address `start` on."""
         what = _named("holding register", start, count)
         read = self._client.read_holding_registers
-        answer = self._ask(what, read, start, count=count)
+        answer = self._ask(what, _READ_REGISTERS, read, start, count=count)
         if len(answer.registers) != count:
             raise self._wrong(what, f"{len(answer.registers)} registers came, not {count}")
         return [int(value) for value in answer.registers]
 
     def write_coil(self, address: int, on: bool) -> None:
         """Set one coil."""
-        self._ask(f"set coil {address} to {int(on)}", self._client.write_coil, address, on)
+        what = f"set coil {address} to {int(on)}"
+        answer = self._ask(what, _WRITE_COIL, self._client.write_coil, address, on)
+        if answer.address != address or bool(answer.bits[0]) != on:
+            raise self._wrong(what, "the answer is that to another request")
 
     def write_registers(self, start: int, values: list[int]) -> None:
         """Set holding registers from address `start` on, in one request."""
         what = f"set {_named('holding register', start, len(values))} to {values}"
-        self._ask(what, self._client.write_registers, start, values)
+        answer = self._ask(what, _WRITE_REGISTERS, self._client.write_registers, start, values)
+        if answer.address != start or answer.count != len(values):
+            raise self._wrong(what, "the answer is that to another request")
 
-    def _bits(self, kind: str, read: Callable[..., Any], start: int, count: int) -> list[bool]:
+    def _bits(
+        self, kind: str, code: int, read: Callable[..., Any], start: int, count: int
+    ) -> list[bool]:
         what = _named(kind, start, count)
-        answer = self._ask(what, read, start, count=count)
+        answer = self._ask(what, code, read, start, count=count)
         if not count <= len(answer.bits) < count + 8:
             raise self._wrong(what, f"{len(answer.bits)} bits came, not {count}")
         return [bool(bit) for bit in answer.bits[:count]]
 
-    def _ask(self, what: str, request: Callable[..., Any], *args: Any, **named: Any) -> Any:
+    def _ask(
+        self, what: str, code: int, request: Callable[..., Any], *args: Any, **named: Any
+    ) -> Any:
         self._connect()
         self._received = b""
         try:
@@ -106,9 +116,12 @@ class ModbusTcp:
         except (OSError, ValueError, IndexError, struct.error) as error:
             raise self._wrong(what, f"the answer makes no sense ({error})") from None
         if answer.isError():
-            code = getattr(answer, "exception_code", 0)
-            reason = exception_text(code)
-            raise ModbusError(f"{self.name}: {what}: refused with exception {code} ({reason})")
+            number = getattr(answer, "exception_code", 0)
+            reason = exception_text(number)
+            raise ModbusError(f"{self.name}: {what}: refused with exception {number} ({reason})")
+        if answer.function_code != code:
+            problem = f"function {answer.function_code} was answered, {code} was asked"
+            raise self._wrong(what, problem)
         return answer
 
     def _connect(self) -> None:
