@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterable
 
 import can
@@ -25,7 +26,7 @@ _EXACT = 0x7FF | EFF_FLAG | RTR_FLAG
 _RPDO_TIMEOUT = 0x8250
 _START, _ENTER_PRE_OPERATIONAL, _RESET_NODE, _RESET_COMMUNICATION = 1, 128, 129, 130
 _LOOK_S = 0.1
-"""How often the receiving thread looks whether it is to end."""
+"""How often the receiving thread looks for nodes that are lost, and whether it is to end."""
 _HELD_CLOCK_S = 1.0
 """Slack for heartbeats of a simulated bus, whose time may stand for half a second."""
 _SOME_STRAYS = 3
@@ -79,9 +80,11 @@ class CanNetwork(ObjectAccess):
     # -- what comes in; one thread of its own, since python-can's prints the end of a bus
 
     def _receive(self) -> None:
+        look_at_s = 0.0
         while not self._stop.is_set():
+            due = time.monotonic() >= look_at_s
             try:
-                message = self._bus.recv(_LOOK_S)
+                message = self._bus.recv(0.0 if due else _LOOK_S)
             except (can.CanError, OSError) as error:
                 if not self._stop.is_set():
                     gone = self._gone(error)
@@ -90,8 +93,11 @@ class CanNetwork(ObjectAccess):
                 return
             if message is not None:
                 self._dispatch(message)
-            elif not self.cycling:
-                self._errors.look_for_losses()
+            elif due:
+                # nothing waits: who has not been heard by now has not said anything
+                look_at_s = time.monotonic() + _LOOK_S
+                if not self.cycling:
+                    self._errors.look_for_losses()
 
     def _dispatch(self, message: can.Message) -> None:
         """Hand a frame on; one that no CANopen device sends is noise."""

@@ -252,14 +252,7 @@ def open_winch(
         safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id]))
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
         limit = winch.motor.rated_torque_Nm
-        settings = BootSettings(
-            winch.master_node_id,
-            winch.sync_period_s,
-            limit,
-            rated_torque_Nm=winch.motor.rated_torque_Nm,
-            counts_per_turn=winch.encoder_counts_per_turn,
-        )
-        report = boot(network, winch.node_id, winch.drive, settings)
+        report = boot(network, winch.node_id, winch.drive, boot_settings(winch))
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
         if safety is not None:
@@ -290,6 +283,17 @@ def note_lacking_guards(node: str, report: BootReport, out: Output) -> None:
         out.note(
             f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
         )
+
+
+def boot_settings(winch: Winch) -> BootSettings:
+    """Return what the master wants of a winch's drive besides its profile."""
+    return BootSettings(
+        winch.master_node_id,
+        winch.sync_period_s,
+        winch.motor.rated_torque_Nm,
+        rated_torque_Nm=winch.motor.rated_torque_Nm,
+        counts_per_turn=winch.encoder_counts_per_turn,
+    )
 
 
 def _heartbeat_s(winch: Winch) -> float:

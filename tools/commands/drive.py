@@ -14,7 +14,7 @@ from cdpr_rt.tuning import design_pid
 from drivers.cia402 import fault_text, mode_bits, mode_name, state_of, supported_modes
 from drivers.errors import SdoError
 from profiles import load_winch
-from tools.commands import drive_setup
+from tools.commands import drive_configure, drive_setup
 from tools.commands.options import (
     BusOption,
     JsonOption,
@@ -40,6 +40,7 @@ _JOG_SPEEDS, _JOG_LEAST_RAD_S = 4.0, 40.0
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
     drive_setup.add(app)
+    drive_configure.add(app)
     parent.add_typer(app, name="drive")
 
 
