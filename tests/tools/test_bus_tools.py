@@ -369,6 +369,20 @@ def test_raw_lines_are_a_log_again(session: Session) -> None:
     assert again.stdout == raw
 
 
+def test_a_pipe_is_shown_line_by_line() -> None:
+    replay = subprocess.Popen(
+        command("bus", "replay", "-"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert replay.stdin is not None
+    assert replay.stdout is not None
+    for state, text in (("05", "operational"), ("04", "stopped")):
+        replay.stdin.write(f"(1.0) can0 709#{state}\n")
+        replay.stdin.flush()
+        assert replay.stdout.readline().split()[-2:] == ["heartbeat", text]
+    replay.communicate(timeout=30)
+    assert replay.returncode == 0
+
+
 def test_replay_sends_to_a_bus(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "short.log"
     lines = [f"({i / 50:.6f}) can0 {0x7F0 + i:03X}#0{i}" for i in range(10)]

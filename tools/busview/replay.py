@@ -19,7 +19,8 @@ from tools.busview.source import frame_of
 from tools.errors import BadInputError, WorkFailedError
 
 _LOOK_S = 0.1
-_BLOCK = 200
+BLOCK = 200
+"""Frames to show at once where a long file is to be read fast."""
 _DISABLE_VOLTAGE = bytes.fromhex("2B40600000000000")
 """SDO request that writes 0 to the controlword (6040h)."""
 _SDO_REQUEST, _NODE, _FUNCTION = 0x600, 0x07F, 0x780
@@ -81,11 +82,6 @@ class Pacer:
         self._speed = speed
         self._stop_wanted = stop_wanted
         self._first: tuple[float, float] | None = None
-
-    @property
-    def waits(self) -> bool:
-        """Whether it waits at all."""
-        return self._speed is not None
 
     def wait_for(self, frame: Frame) -> None:
         """Return when the frame is due, or the user wants an end."""
@@ -173,13 +169,12 @@ def play(
     pacer: Pacer,
     stop_wanted: Callable[[], bool],
     sender: Sender | None = None,
+    block: int = 1,
 ) -> None:
-    """Show, and send, a recording until its end or the user's.
+    """Show, and send, a recording until its end or the user's; so many frames at once.
 
     Raises WorkFailedError when sending ended early.
     """
-    # one by one where time matters, in blocks where a long file is to be read fast
-    block = _BLOCK if sender is None and not pacer.waits else 1
     pending: list[Logged] = []
     try:
         for logged in log:

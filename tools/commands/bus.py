@@ -14,7 +14,7 @@ from drivers.errors import BusError
 from tools.busview.identifiers import filters, parse_identifiers
 from tools.busview.known import known_bus
 from tools.busview.monitor import LineWriter, LogFile, Viewer, watch
-from tools.busview.replay import Pacer, Sender, chosen, play, recorded
+from tools.busview.replay import BLOCK, Pacer, Sender, chosen, play, recorded
 from tools.busview.source import SimbusSource, named_bus, open_source
 from tools.busview.summary import Summary
 from tools.commands import bus_budget, bus_scan
@@ -145,7 +145,9 @@ def replay(
         stop_wanted = stack.enter_context(stop_on_signals())
         frames = chosen(recorded(file, channel), wanted)
         if url is None:
-            play(frames, viewer, Pacer(speed, stop_wanted), stop_wanted)
+            whole = speed is None and str(file) != "-"
+            pacer = Pacer(speed, stop_wanted)
+            play(frames, viewer, pacer, stop_wanted, block=BLOCK if whole else 1)
             told: dict[str, int] = {}
         else:
             sender = stack.enter_context(Sender(url, out.note))
