@@ -23,7 +23,11 @@ def _of_axis(axis: AxisConfig, column: Ints) -> str:
     bits = int(column[codec.ALARM])
     shown, wanted = int(column[codec.MODE_SHOWN]), int(column[codec.MODE_WANTED])
     texts = (
-        (codec.RESTARTED, "the drive has restarted (unexpected boot-up message)"),
+        (
+            codec.RESTARTED,
+            "the drive has restarted (unexpected boot-up message), or another device with its "
+            "node id was switched on: boot it anew",
+        ),
         (codec.EMERGENCY_MESSAGE, f"EMCY {fault_text(int(column[codec.EMERGENCY]))}"),
         (codec.FAULT, "the drive is in fault"),
         (codec.WRONG_MODE, f"the drive reports mode {mode_name(shown)}, not {mode_name(wanted)}"),

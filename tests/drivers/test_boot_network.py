@@ -52,9 +52,9 @@ def test_nobody_is_started_when_a_mandatory_node_fails(bus: str) -> None:
 
 
 def test_a_node_booted_alone_is_mandatory(bus: str) -> None:
-    with open_network(bus, [9]) as network, pytest.raises(BootError) as caught:
-        boot(network, 9, DRIVE, OPTIONAL)
-    assert caught.value.letter == "B"
+    with open_network(bus, [2]) as network, pytest.raises(BootError) as caught:
+        boot(network, 2, WRONG, OPTIONAL)
+    assert caught.value.letter == "M"
 
 
 def test_another_master_is_told_for_all_at_once(bus: str) -> None:

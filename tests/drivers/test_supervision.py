@@ -156,7 +156,7 @@ def test_a_node_lost_between_cycles_is_an_alarm(trio: Rig) -> None:
 def test_all_are_heard_between_cycles(trio: Rig) -> None:
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
-    time.sleep(2.5)  # longer than the patience
+    time.sleep(1.6)  # longer than the patience
     assert trio.network.alarm_text == ""
 
 
