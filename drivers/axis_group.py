@@ -114,7 +114,8 @@ class AxisGroup(AxisExchange):
         """Ask for a mode of operation, one for all axes or one each.
 
         `mode_confirmed` tells when they have it. Raises ModeRefusedError when an axis is enabled
-        or refuses, with the drive's reason.
+        or lacks its mode, which leaves all as they were, or when a drive refuses, with its
+        reason; then no axis is enabled before it was asked for a mode again.
         """
         wanted = [modes] * self.n if isinstance(modes, int) else list(modes)
         for i, (axis, mode) in enumerate(zip(self.axes, wanted, strict=True)):
@@ -127,8 +128,10 @@ class AxisGroup(AxisExchange):
                     f"node {axis.node_id}: mode {mode_name(mode)} is not among the modes "
                     f"the drive supports (6502h = {axis.supported_modes:08X}h)"
                 )
+        self._ints[codec.MODE_WANTED] = NO_MODE
+        for i, mode in enumerate(wanted):
             self._write_mode(i, mode)
-            self._ints[codec.MODE_WANTED, i] = mode
+        self._ints[codec.MODE_WANTED] = wanted
 
     def _write_mode(self, i: int, mode: int) -> None:
         node = self.axes[i].node_id
@@ -159,7 +162,9 @@ class AxisGroup(AxisExchange):
         i = int(np.flatnonzero(shown != wanted)[0])
         node = self.axes[i].node_id
         if wanted[i] == NO_MODE:
-            return ModeRefusedError(f"node {node}: no mode of operation was asked for yet")
+            return ModeRefusedError(
+                f"node {node}: no mode of operation was asked for yet, or the last was refused"
+            )
         return ModeRefusedError(
             f"node {node}: asked for mode {mode_name(int(wanted[i]))}, "
             f"but the drive reports {mode_name(int(shown[i]))} (6061h); it was not enabled"

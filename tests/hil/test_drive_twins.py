@@ -368,13 +368,29 @@ def test_different_drives_work_in_one_group(mixed: AxisGroup) -> None:
 
 def test_a_mode_that_one_of_them_lacks_is_refused_by_name(mixed: AxisGroup) -> None:
     lacking = next(a for a in mixed.axes if Mode.CYCLIC_TORQUE not in a.drive.supported_modes)
+    mixed.ask_mode(Mode.HOMING)
     with pytest.raises(ModeRefusedError, match=f"node {lacking.node_id}: mode 10"):
         mixed.ask_mode(Mode.CYCLIC_TORQUE)
+    _cycles(mixed, 50, [0.0] * mixed.n)
+    assert mixed.mode_confirmed(), "those that have the mode were not left in it"
+    for axis in mixed.axes:
+        assert mixed.network.read_int(axis.node_id, 0x6061) == Mode.HOMING
+
+
+def test_after_a_refusal_none_is_enabled_in_the_mode_it_had(mixed: AxisGroup) -> None:
+    """The drive's refusal comes late: axes before it have taken the new mode, others have not."""
+    mixed.ask_mode(mixed.torque_modes)
+    _cycles(mixed, 50, [0.0] * mixed.n)
+    assert mixed.mode_confirmed()
+    with pytest.raises(ModeRefusedError, match="was refused"):
+        mixed.ask_mode([*mixed.torque_modes[:-1], -7])
+    _cycles(mixed, 50, [0.0] * mixed.n)
+    with pytest.raises(ModeRefusedError):
+        mixed.request(State.OPERATION_ENABLED)
 
 
 def test_none_is_enabled_before_the_last_confirms_its_mode(mixed: AxisGroup) -> None:
-    asked = [Mode.HOMING] * mixed.n
-    mixed.ask_mode(asked)
+    mixed.ask_mode(Mode.PROFILE_POSITION)
     _cycles(mixed, 1, [0.0] * mixed.n)
     assert not mixed.mode_confirmed()
     with pytest.raises(ModeRefusedError, match="but the drive reports"):

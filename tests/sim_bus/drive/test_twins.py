@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 from drive_rig import EDS, NODE, Rig, SdoRefusedError
@@ -92,7 +93,7 @@ def test_velocities_are_in_rpm(mnm: Rig) -> None:
 
 
 @pytest.mark.parametrize("eds", [MNM, COMPAX3])
-def test_only_its_own_modes_are_taken(eds: object) -> None:
+def test_only_its_own_modes_are_taken(eds: Path) -> None:
     rig = Rig(Plant(), eds=eds)
     for mode in (2, 5, 7, 8, 9, CST, -1):
         assert refusal(rig, 0x6060, mode) == INVALID
@@ -111,7 +112,7 @@ def test_a_mode_is_passed_over_without_halt(mnm: Rig) -> None:
 
 
 @pytest.mark.parametrize("eds", [MNM, COMPAX3])
-def test_no_mode_change_while_enabled(eds: object) -> None:
+def test_no_mode_change_while_enabled(eds: Path) -> None:
     rig = Rig(Plant(), eds=eds)
     enable(rig, PT)
     assert refusal(rig, 0x6060, HM) == DEVICE_STATE
@@ -150,7 +151,7 @@ def test_homing_methods_it_does_not_have(mnm: Rig, method: int) -> None:
         (COMPAX3, (0x6502, 0x60B2, 0x60B8, 0x60B9, 0x60C1, 0x2F00, 0x60E0)),
     ],
 )
-def test_objects_it_lacks_cannot_be_reached(eds: object, lacking: tuple[int, ...]) -> None:
+def test_objects_it_lacks_cannot_be_reached(eds: Path, lacking: tuple[int, ...]) -> None:
     rig = Rig(Plant(), eds=eds)
     for index in lacking:
         with pytest.raises(SdoRefusedError) as caught:
@@ -176,6 +177,21 @@ def test_its_statusword_has_bits_of_its_own(mnm: Rig) -> None:
     assert word & 0x4100 == 0x4100
     enable(mnm, PT)
     assert mnm.read(0x6041) & 0x4110 == 0x4100, "voltage enabled is not told"
+
+
+def test_a_drive_that_nobody_described_is_a_standard_one(tmp_path: Path) -> None:
+    """With the objects of its EDS: torque in per mille, all modes, no peculiarity."""
+    eds = tmp_path / "my-own.eds"
+    eds.write_text(COMPAX3.read_text().replace("0x0000C321", "0x00000001"))
+    rig = Rig(Plant(), eds=eds)
+    enable(rig, CST)
+    assert turn(rig, 200)[0] == pytest.approx(0.6 * 1.04, rel=0.005)
+    rig.write(0x6060, PT)
+    rig.run(0.02)
+    assert rig.read(0x6061) == PT
+    assert rig.read(0x6041) & 0x10
+    with pytest.raises(SdoRefusedError):
+        rig.read(0x6502)
 
 
 def test_objects_a_master_cannot_see_keep_it_safe(mnm: Rig) -> None:
