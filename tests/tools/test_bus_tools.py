@@ -1,9 +1,7 @@
-"""`cdpr bus` as a user types it, beside simulated drives, a working master and strangers."""
+"""`cdpr bus monitor` and `replay` beside simulated drives and a working master."""
 
 from __future__ import annotations
 
-import io
-import json
 import os
 import re
 import signal
@@ -11,91 +9,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any
-from unittest import mock
 
 import can
-import canopen
 import pytest
-
-from profiles import load_winch
-from tools.cli import main
-
-WINCH = "winch-mpp0923d"
-EDS = str(load_winch(WINCH).drive.eds)
-Result = subprocess.CompletedProcess[str]
-Process = subprocess.Popen[str]
-MARK = can.Message(arbitration_id=0x7FE, is_extended_id=False)
-PROBE = can.Message(arbitration_id=0x7FF, data=[1], is_extended_id=False)
-
-
-def command(*arguments: str | Path) -> list[str]:
-    return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
-
-
-def cdpr(*arguments: str | Path, stdin: str = "") -> Result:
-    """Run a command in this process, which spares it the second that its libraries take to load."""
-    argv = ["cdpr", *map(str, arguments)]
-    out, errors = io.StringIO(), io.StringIO()
-    with (
-        mock.patch.multiple(sys, argv=argv, stdin=io.StringIO(stdin)),
-        redirect_stdout(out),
-        redirect_stderr(errors),
-        pytest.raises(SystemExit) as ended,
-    ):
-        main()
-    assert isinstance(ended.value.code, int)
-    return Result(argv, ended.value.code, out.getvalue(), errors.getvalue())
-
-
-def begin(*arguments: str | Path) -> Process:
-    return subprocess.Popen(
-        command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-
-
-def last_json(text: str) -> dict[str, Any]:
-    return dict(json.loads(text.splitlines()[-1]))
-
-
-class Lab:
-    """Simulated drives on a bus of their own."""
-
-    def __init__(self, name: str, *options: str) -> None:
-        self.name = f"{name}-{os.getpid()}"
-        self.bus = f"simbus:{self.name}"
-        arguments = ["sim", "up", WINCH, "--bus", self.bus, "--exit-with-stdin", *options]
-        self.process = subprocess.Popen(
-            command(*arguments), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-
-    def ready(self) -> None:
-        assert self.process.stdout is not None
-        assert self.bus in self.process.stdout.readline()
-
-    def join(self) -> can.BusABC:
-        return can.Bus(self.name, "simbus")
-
-    def passed(self, ear: can.BusABC) -> list[can.Message]:
-        """Return what has come to a member since it was last asked."""
-        with self.join() as other:
-            other.send(MARK)
-        messages = []
-        while (message := ear.recv(10.0)) is not None and message.arbitration_id != 0x7FE:
-            messages.append(message)
-        assert message is not None
-        return messages
-
-    def close(self) -> None:
-        if self.process.poll() is None:
-            self.process.communicate("", timeout=20)
+from bus_lab import PROBE, WINCH, Lab, begin, cdpr, command, last_json
 
 
 @pytest.fixture(scope="module")
 def labs() -> Iterator[tuple[Lab, Lab]]:
-    two = Lab("bustools", "--nodes", "2"), Lab("bustools2")
+    two = Lab("bustools", "--nodes", "2"), Lab("bustools-cut")
     for lab in two:
         lab.ready()
     yield two
@@ -106,153 +29,6 @@ def labs() -> Iterator[tuple[Lab, Lab]]:
 @pytest.fixture(scope="module")
 def lab(labs: tuple[Lab, Lab]) -> Lab:
     return labs[0]
-
-
-@contextmanager
-def stranger(lab: Lab, node_id: int, **objects: int) -> Iterator[canopen.LocalNode]:
-    """A slave of the canopen library on the bus; `x1018_1=7` sets an object."""
-    dictionary = canopen.import_od(EDS, node_id)
-    network = canopen.Network()
-    network.NOTIFIER_CYCLE = 0.02
-    network.connect(interface="simbus", channel=lab.name)
-    node = canopen.LocalNode(node_id, dictionary)
-    network.add_node(node)
-    for name, value in objects.items():
-        index, _, sub = name[1:].partition("_")
-        entry = dictionary[int(index, 16)]
-        variable = entry[int(sub)] if sub else entry
-        node.set_data(int(index, 16), int(sub or 0), variable.encode_raw(value))
-    try:
-        yield node
-    finally:
-        network.disconnect()
-
-
-def scan(lab: Lab, *arguments: str) -> dict[int, dict[str, Any]]:
-    result = cdpr("bus", "scan", "--bus", lab.bus, *arguments, "--json")
-    assert result.returncode == 0, result.stderr
-    (bus,) = last_json(result.stdout)["buses"]
-    return {node["node_id"]: node for node in bus["nodes"]} | {0: bus}
-
-
-# -- scan
-
-
-def test_scan_tells_who_is_there(lab: Lab) -> None:
-    found = scan(lab)
-    assert found.keys() == {0, 1, 2}
-    assert found[0]["seconds"] < 6.0  # 127 ids, 125 of them silent
-    for node_id in (1, 2):
-        node = found[node_id]
-        assert node["device_name"] == "Generic CiA 402 torque servo"
-        assert (node["vendor_id"], node["product_code"]) == (0xCD9A01, 0x402)
-        assert node["serial"] == node_id
-        assert node["supported_modes"] == [1, 3, 4, 6, 8, 9, 10]
-        assert node["state"] == "switch on disabled"
-        assert node["profiles"] == ["generic-cia402"]
-        assert node["problems"] == []
-    assert found[0]["warning"] == ""
-
-
-def test_scan_disturbs_nobody(lab: Lab) -> None:
-    """All that goes out are requests to read."""
-    with lab.join() as ear:
-        scan(lab, "--nodes", "1-5")
-        passed = lab.passed(ear)
-        sent = [m for m in passed if m.arbitration_id & 0x780 == 0x600]
-        others = [
-            m for m in passed if m not in sent and m.arbitration_id & 0x780 not in (0x580, 0x700)
-        ]
-    assert {m.arbitration_id for m in sent} == {0x601, 0x602, 0x603, 0x604, 0x605}
-    assert {m.data[0] for m in sent} <= {0x40, 0x60, 0x70}
-    assert not others
-
-
-def test_scan_for_people(lab: Lab) -> None:
-    result = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "2,9")
-    assert result.returncode == 0
-    title, heads, row, identity, doing = result.stdout.splitlines()
-    assert title == f"{lab.bus}: 1 node"
-    assert re.split(r"\s{2,}", row.strip()) == [
-        "2",
-        "not told",
-        "Generic CiA 402 torque servo",
-        "generic-cia402",
-        "switch on disabled",
-        "PP PV PT HM CSP CSV CST",
-    ]
-    assert heads.index("CiA 402 state") == row.index("switch on disabled")
-    assert "serial 00000002h" in identity
-    assert "no heartbeat" in doing
-
-
-def test_two_nodes_with_one_id_are_told(lab: Lab) -> None:
-    with stranger(lab, 1, x1018_4=77, x1000=0x20192):
-        found = scan(lab, "--nodes", "1-2")
-    assert found[2]["problems"] == []
-    (problem,) = found[1]["problems"]
-    assert re.fullmatch(
-        "several nodes have this id: two answers to one request, differing for .*1018h:4.*", problem
-    )
-
-
-def test_devices_that_are_no_drives(lab: Lab, tmp_path: Path) -> None:
-    with (
-        stranger(lab, 20, x1000=0x00000000, x1018_1=5, x1018_2=6),
-        stranger(lab, 21, x1000=0x000F0191),
-        stranger(lab, 22) as silent,
-        stranger(lab, 23, x1000=0x00020192, x1018_1=5, x1018_2=6, x1018_3=8, x6502=0x200),
-    ):
-        silent.network.unsubscribe(0x616)  # answers nothing
-        silent.nmt.start_heartbeat(100)
-        found = scan(lab, "--nodes", "20-23")
-    assert "as a bootloader has" in found[20]["problems"][0]
-    assert found[20]["cia402"] is False
-    assert "CiA 401" in found[21]["problems"][0]
-    assert found[22]["answers_sdo"] is False
-    assert found[22]["heartbeats"] >= 5
-    assert "answers no SDO" in found[22]["problems"][0]
-    assert found[23]["cia402"] is True
-    assert found[23]["supported_modes"] == [10]
-    assert found[23]["profiles"] == []
-
-
-def test_profiles_of_ones_own(lab: Lab, tmp_path: Path) -> None:
-    source = Path(EDS)
-    text = source.with_suffix(".toml").read_text(encoding="utf-8")
-    (tmp_path / source.name).write_bytes(source.read_bytes())
-    (tmp_path / "mine.toml").write_text(text.replace("0x00010000", "0x00010009"))
-    (tmp_path / "motor.toml").write_text('model = "X"\n')
-    node = scan(lab, "--nodes", "1", "--profiles", str(tmp_path))[1]
-    own = f"{tmp_path / 'mine.toml'} (but its revision is 00010009h)"
-    assert node["profiles"] == ["generic-cia402", own]
-
-
-def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
-    with lab.join() as bus:
-        reading = can.Message(arbitration_id=0x601, data=bytes.fromhex("4018100100000000"))
-        reading.is_extended_id = False
-        task = bus.send_periodic(reading, 0.05)
-        refused = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "1")
-        assert refused.returncode == 1
-        assert "SDO requests to node 1" in refused.stderr
-        assert "--force" in refused.stderr
-        forced = scan(lab, "--nodes", "1", "--force")
-        task.stop()
-    assert forced[1]["serial"] == 1
-    assert forced[1]["problems"] == []  # answers to the other are no second node
-    assert "SDO requests" in forced[0]["warning"]
-
-
-def test_scan_of_two_buses(labs: tuple[Lab, Lab]) -> None:
-    lab, other = labs
-    result = cdpr("bus", "scan", "--bus", lab.bus, "--bus", other.bus, "--nodes", "2-9", "--json")
-    assert result.returncode == 0
-    buses = last_json(result.stdout)["buses"]
-    assert [(bus["bus"], len(bus["nodes"])) for bus in buses] == [(lab.bus, 1), (other.bus, 0)]
-    empty = result.stderr.splitlines()[-2:]  # for people
-    assert empty[0] == f"{other.bus}: no nodes"
-    assert "termination" in empty[1]
 
 
 # -- monitor and replay
@@ -457,7 +233,7 @@ def test_monitor_ends_by_itself_and_counts_what_is_odd(lab: Lab) -> None:
 
 
 def test_a_bus_that_goes_away(labs: tuple[Lab, Lab], tmp_path: Path) -> None:
-    lab = labs[1]  # nobody needs it any more
+    lab = labs[1]
     log = tmp_path / "cut.log"
     monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", log)
     with lab.join() as bus:
