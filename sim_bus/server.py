@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import os
 import signal
 import sys
@@ -19,6 +18,7 @@ from sim_bus.errors import BusSetupError
 from sim_bus.hub import Hub
 from sim_bus.membership import Gateway
 from sim_bus.node_protocol import LocalNode
+from sim_bus.ready import tell_ready
 
 _PRIORITY = 40
 
@@ -50,7 +50,8 @@ def serve(
     """Run `nodes` on `bus` until SIGTERM or SIGINT, then close them.
 
     `bus` is simbus:NAME, which is opened here, or socketcan:IFACE, which must exist. When all is
-    up, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}}.
+    up, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}}; a
+    terminal gets a few readable lines instead.
     With `until_stdin_ends` the end of standard input (a pipe whose other end the parent holds)
     stops it too, so that a simulator never outlives the command that started it.
 
@@ -105,7 +106,7 @@ def run_until_stopped(
     with _stopped_by_signals(loop):
         if until_stdin_ends:
             _stop_with_stdin(loop)
-        print(json.dumps({"ready": ready}), flush=True)
+        tell_ready(ready)
         # what lives from here on is never garbage, so it need not be searched
         gc.collect()
         gc.freeze()
