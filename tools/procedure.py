@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from cdpr_rt.cogging_profile import (
     CoggingProfile,
@@ -38,6 +38,7 @@ from tools.commissioning import (
     Measurement,
     Paths,
 )
+from tools.finding_index import Index
 from tools.output import Output
 from tools.session import WinchSession
 
@@ -50,7 +51,6 @@ _STIFF_HZ = (30.0, 25.0, 20.0, 15.0)
 # the set-point starts ahead of a rotor that has to break away first
 _PROBE_TURNS = 1.2
 
-Index = Literal["homing", "probe"]
 _SHORT_LEAD_IN_RAD = math.pi
 
 

@@ -22,7 +22,6 @@ from profiles.tension_sensor import load_tension_sensors
 from tools.errors import BadInputError
 from tools.output import Output
 from tools.safety import open_safety
-from tools.session import open_bus
 
 # nothing is exchanged with SYNC; the drive only has to be told some period
 _SYNC_PERIOD_S = 0.01
@@ -118,7 +117,10 @@ def slack_watch(
 def _bus_of(rail: RailProfile, bus: str | None) -> BusUrl:
     if bus is None:
         raise BadInputError(f"--bus: {rail.name} is on a CAN bus; name it")
-    url = open_bus(bus)
+    try:
+        url = BusUrl.parse(bus)
+    except BusError as error:
+        raise BadInputError(str(error)) from error
     if url.starts_own_simulator:
         raise BadInputError(
             "--bus simbus: has no rails; cdpr sim rail starts one, then simbus:NAME"

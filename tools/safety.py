@@ -6,13 +6,15 @@ import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from cdpr_rt.executive import Executive
 from cdpr_rt.state_file import state_path
 from drivers.modbus.safety_io import SafetyIo
 from profiles.safety_io import load_safety_io
 from tools.output import Output
+
+if TYPE_CHECKING:  # it brings a compiler along, which a look at the I/O does without
+    from cdpr_rt.executive import Executive
 
 # a brake that does not follow trips by itself, on the clock; bus time may be much faster
 _FOR_EVER_S = 1e5

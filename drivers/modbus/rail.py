@@ -81,9 +81,8 @@ class ModbusRailAxis:
         """Begin to move to a position."""
         unit, command = self._map.metre_per_unit, self._map.command
         counts = round(target_m / unit) & 0xFFFFFFFF
-        self._client.write_registers(self._map.target_register, [counts >> 16, counts & 0xFFFF])
-        speed = min(round(self._rail.speed_m_s / unit), 0xFFFF)
-        self._client.write_registers(self._map.speed_register, [speed])
+        self._set(self._map.target_register, [counts >> 16, counts & 0xFFFF])
+        self._set(self._map.speed_register, [min(round(self._rail.speed_m_s / unit), 0xFFFF)])
         self._write(self._command & ~(1 << command.start | 1 << command.halt))
         self._write(self._command | 1 << command.start)
 
@@ -105,6 +104,16 @@ class ModbusRailAxis:
         timeout_s = self._map.brake_timeout_s
         text = f"the brake is not {wanted} {timeout_s:g} s after it was told to"
         self._await(self._map.status.brake_released, released, timeout_s, text)
+
+    def _set(self, register: int, values: list[int]) -> None:
+        """Write what a move goes by, and read it back."""
+        self._client.write_registers(register, values)
+        held = self._client.registers(register, len(values))
+        if held != values:
+            raise RailError(
+                f"{self._rail.name}: holding register {register} was set to {values} and reads "
+                f"{held}; the drive was not started"
+            )
 
     def _write(self, command: int) -> None:
         self._feed()

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.procedure import Index
+from tools.finding_index import Index
 
 WinchArgument = Annotated[
     str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")
