@@ -41,8 +41,8 @@ class Output:
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
-        self.notes = Console(stderr=True, highlight=False)
-        self.text = self.notes if as_json else Console(highlight=False)
+        self.notes = Console(stderr=True, highlight=False, emoji=False)
+        self.text = self.notes if as_json else Console(highlight=False, emoji=False)
 
     def say(self, text: str) -> None:
         """Write a line for people."""

@@ -97,7 +97,8 @@ def _tell(
 ) -> None:
     texts = eds.remarks.texts
     if texts:
-        out.say(f"{eds.path}: {len(texts) + eds.remarks.untold} remarks")
+        count = len(texts) + eds.remarks.untold
+        out.say(f"{eds.path}: {count} remark{'s' * (count != 1)}")
         for text in texts:
             out.say(f"  {text}")
         out.say("")

@@ -142,14 +142,26 @@ def _modes(made: Proposal, eds: EdsFile) -> None:
     made.know("supported_modes", modes, *source)
     made.know("mode_torque", int(torque[0]), *source)
     if torque[0] == Mode.PROFILE_TORQUE:
-        made.know("torque_slope_Nm_s", _DEFAULT_SLOPE_Nm_s, _ASSUMED, "steep enough not to be felt")
-        made.unknown.append(
-            Unknown(
-                "torque_slope_Nm_s (6087h)",
-                "in PT the torque follows a ramp, which is a lag in the loop",
-                "the steepest that 6087h takes: manual, or upper limit in the EDS",
-            )
+        _torque_slope(made, eds)
+
+
+def _torque_slope(made: Proposal, eds: EdsFile) -> None:
+    """PT follows a ramp: as steep as the drive takes it, where the EDS tells."""
+    slope, rated_mNm = eds.get(0x6087), eds.number(0x6076)
+    if slope is not None and slope.high and rated_mNm and slope.high < 0xFFFFFFFF:
+        steepest = slope.high * 1e-3 * rated_mNm * 1e-3
+        how = "upper limit of 6087h by the default of 6076h in the EDS"
+        made.know("torque_slope_Nm_s", round(steepest, 3), _MANUAL, how)
+    else:
+        how = "steep enough not to be felt"
+        made.know("torque_slope_Nm_s", _DEFAULT_SLOPE_Nm_s, _ASSUMED, how)
+    made.unknown.append(
+        Unknown(
+            "torque_slope_Nm_s (6087h)",
+            "in PT the torque follows a ramp, which is a lag in the loop",
+            "the steepest that 6087h takes: manual, or upper limit in the EDS",
         )
+    )
 
 
 def _modes_by_objects(eds: EdsFile) -> list[int]:
