@@ -108,7 +108,7 @@ class EmergencyLog:
 
     def of(self, node_id: int) -> list[Emergency]:
         """Return the messages kept of one node, oldest first."""
-        return [emergency for emergency in self.kept if emergency.node_id == node_id]
+        return [emergency for emergency in list(self.kept) if emergency.node_id == node_id]
 
     def _flood(self, emergency: Emergency) -> str:
         node_id = emergency.node_id
