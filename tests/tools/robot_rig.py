@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+import profiles
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.trajectory import Leg
 from tools.output import Output
@@ -25,14 +26,28 @@ _names = itertools.count()
 
 
 def robot_file(
-    folder: Path, axes: Sequence[tuple[str, int]], *, period_s: float = 1e-3, optional: int = -1
+    folder: Path,
+    axes: Sequence[tuple[str, int]],
+    *,
+    period_s: float = 1e-3,
+    optional: int = -1,
+    drives: Sequence[str] = (),
 ) -> Path:
-    """Write a robot with `axes` (bus, node id); the one numbered `optional` is not mandatory."""
+    """Write a robot with `axes` (bus, node id); the one numbered `optional` is not mandatory.
+
+    `drives` are the drive profiles of the axes, where these are not that of the shipped winch.
+    """
     lines = ['name = "test robot"', f"sync_period_s = {period_s}"]
     for bus in dict.fromkeys(bus for bus, _ in axes):
         lines += ["[[buses]]", f'name = "{bus}"']
+    shipped = (Path(profiles.__file__).parent / "winches/winch-mpp0923d.toml").read_text()
+    for drive in drives:
+        (folder / f"with-{drive}.toml").write_text(
+            shipped.replace('"generic-cia402"', f'"{drive}"')
+        )
     for i, (bus, node) in enumerate(axes):
-        lines += ["[[axes]]", 'winch = "winch-mpp0923d"', f'bus = "{bus}"', f"node_id = {node}"]
+        winch = f"with-{drives[i]}" if drives else "winch-mpp0923d"
+        lines += ["[[axes]]", f'winch = "{winch}"', f'bus = "{bus}"', f"node_id = {node}"]
         lines += ["mandatory = false"] * (i == optional)
     path = folder / f"robot-{next(_names)}.toml"
     path.write_text("\n".join(lines))

@@ -18,6 +18,7 @@ from cdpr_rt.errors import TripError
 from drivers.cia402 import POWER_OFF, State, state_of
 from drivers.errors import BusError, DriveFaultError
 from profiles import Robot, load_robot
+from tools.bench.soak import Counts, compare
 from tools.errors import BadInputError, WorkFailedError
 from tools.robot_session import RobotSession, open_robot
 
@@ -226,6 +227,32 @@ def test_a_mandatory_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Pa
             open_robot(load_robot(path), [url], OUT),
         ):
             pytest.fail("opened without a mandatory drive")
+
+
+def test_drives_of_different_makes_run_side_by_side(tmp_path: Path):
+    """Other torque units, signs, modes and PDO maps; the budget knows the frames of each."""
+    drives = ("generic-cia402", "mnm-profile-torque", "parker-compax3-canopen")
+    path = robot_file(tmp_path, [("a", 1), ("a", 2), ("b", 1)], drives=drives)
+    robot = load_robot(path)
+    with simulated(path) as url, open_robot(robot, [url], OUT) as opened:
+        opened.set_torque_mode()
+        opened.enable()
+        hold(opened, 0.3)
+        before = Counts.all(opened)
+        start = opened.device.feedback.position_rad.copy()
+        speeds = np.array([2.0, -3.0, 4.0])
+        hold(opened, 1.0, speeds)
+        moved = opened.device.feedback.position_rad - start
+        np.testing.assert_allclose(moved, 0.9 * speeds, atol=0.2)
+        after = Counts.all(opened)
+        for bus, commands, answers in (("a", 3, 3), ("b", 1, 1)):
+            verdict = compare(bus, opened, before[bus], after[bus])
+            assert verdict.lost == 0
+            cycles = after[bus].cycles - before[bus].cycles
+            expected = cycles * (1 + commands + answers)
+            assert verdict.frames_counted == pytest.approx(expected, abs=60)
+            assert verdict.frames_expected == pytest.approx(verdict.frames_counted, abs=10)
+        opened.disable()
 
 
 def test_paced_buses_run_as_one_device(tmp_path: Path):

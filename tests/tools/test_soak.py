@@ -35,6 +35,7 @@ def test_minutes_of_bus_time_leak_nothing_and_lose_nothing():
     assert (done.returncode, told["ok"], told["leaks"]) == (0, True, []), told
     assert told["bus_hours"] == pytest.approx(0.04, rel=1e-3)
     assert told["cycles"] >= 36_000
+    assert (told["drives"], told["boot_s"] < 2.0) == (8, True)
     assert (told["lost_frames"], told["missed_answers"]) == (0, 0)
     for bus in told["buses"].values():
         # SYNC, 4 RPDOs and 4 TPDOs in each cycle, 10 heartbeats a second from each of 4 drives

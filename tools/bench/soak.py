@@ -66,6 +66,12 @@ class Counts:
             group.feedback.cycle, device.transmits, group.missed, status["bus_time_s"], status
         )
 
+    @classmethod
+    def all(cls, session: RobotSession) -> dict[str, Counts]:
+        """Take the counts of every bus, by the robot's name of it."""
+        status = session.bus_status()
+        return {name: cls.of(session, name, told) for name, told in status.items()}
+
 
 @dataclass(frozen=True)
 class BusVerdict:
@@ -140,15 +146,11 @@ class Soak:
         self._controller = Proportional(gain, limit)
         self._speed = _SPEED_RAD_S * np.where(np.arange(device.n) % 2, -1.0, 1.0)
         self.bus_s = self.wall_s = 0.0
-        self._before = self._counts()
-
-    def _counts(self) -> dict[str, Counts]:
-        status = self.session.bus_status()
-        return {name: Counts.of(self.session, name, told) for name, told in status.items()}
+        self._before = Counts.all(session)
 
     def run(self, seconds: float, advance: Callable[[float], None]) -> None:
         """Move for `seconds` of bus time; raises WorkFailedError when the motion ends early."""
-        self._before = self._counts()
+        self._before = Counts.all(self.session)
         self._sample()
         begin, cycle = time.monotonic(), self.session.device.feedback.cycle
         period_s = self.session.device.period_s
@@ -175,7 +177,7 @@ class Soak:
 
     def figures(self) -> dict[str, Any]:
         """Return what was measured, and whether all is well."""
-        after = self._counts()
+        after = Counts.all(self.session)
         buses = [
             compare(name, self.session, before, after[name])
             for name, before in self._before.items()
@@ -224,4 +226,10 @@ def measure(robot: Robot, hours: float, rate_Hz: float | None, out: Output) -> d
             soak.run(seconds, advance)
         figures = soak.figures()
         session.disable()
-    return {"robot": robot.reference, "rate_Hz": 1.0 / robot.sync_period_s, **figures}
+    head = {
+        "robot": robot.reference,
+        "rate_Hz": 1.0 / robot.sync_period_s,
+        "drives": session.device.n,
+        "boot_s": round(session.boot_s, 3),
+    }
+    return head | figures

@@ -54,6 +54,7 @@ def _failure(figures: dict[str, Any]) -> str:
 
 def _table(figures: dict[str, Any]) -> list[str]:
     lines = [
+        f"{figures['drives']} drives were up in {figures['boot_s']:.2f} s of bus time",
         f"{figures['robot']} at {figures['rate_Hz']:g} Hz: {figures['bus_hours']:.3f} h of bus "
         f"time, {figures['cycles']} cycles, in {figures['wall_s']:.0f} s "
         f"({figures['us_per_cycle']:.0f} us each)",
