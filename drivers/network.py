@@ -58,7 +58,7 @@ class CanNetwork(ObjectAccess):
         ids = list(node_ids)
         filters = [(base + node, _EXACT) for node in ids for base in (_EMCY, SDO_ANSWER)]
         filters += [(_HEARTBEAT + node, _EXACT) for node in (*ids, master_node_id)]
-        self._bus = open_python_can(url, filters)
+        self._bus = open_python_can(url, filters, self.health)
         self._send_lock = threading.Lock()
         held = url.is_simulated or url.asks_for_lockstep
         slack_s = _HELD_CLOCK_S if held else 0.0

@@ -258,10 +258,11 @@ class LineBus(PacketBus):
         self,
         url: BusUrl,
         open_line: Callable[[BusUrl], Line],
+        health: BusHealth,
         can_filters: can.typechecking.CanFilters | None = None,
     ) -> None:
         """Join the line; raises BusError when it cannot be opened."""
-        self._member = _Member([], BusHealth(), hears_errors=True)
+        self._member = _Member([], health, hears_errors=True)
         try:
             self._shared = _join(url, open_line, self._member)
         except BaseException:

@@ -14,7 +14,7 @@ from drivers.bus.packed import EFF_FLAG, Bytes
 from drivers.bus.packet_bus import message_of, packet_of
 from drivers.bus.simbus_socket import Filters
 from drivers.bus.slcan import open_slcan
-from drivers.bus.socketcan import interface_problem
+from drivers.bus.socketcan import SocketCanBus, interface_problem
 from drivers.bus.socketcand import open_socketcand
 from drivers.bus.url import BusUrl
 from drivers.errors import BusError
@@ -29,7 +29,7 @@ class PythonCanLine:
 
     def __init__(self, url: BusUrl) -> None:
         """Open it; raises BusError."""
-        self._bus = _open(url)
+        self._bus = _open(url, BusHealth())
         self._sending = threading.Lock()
 
     def read(self, wake: int, /) -> list[bytes]:  # noqa: ARG002  # not all interfaces can be polled
@@ -59,33 +59,39 @@ def open_line_port(
     return LinePort(url, _LINES.get(url.interface, PythonCanLine), filters, health)
 
 
-def open_python_can(url: BusUrl, filters: Filters | None = None) -> can.BusABC:
+def open_python_can(
+    url: BusUrl, filters: Filters | None = None, health: BusHealth | None = None
+) -> can.BusABC:
     """Return a python-can bus for `url`, for acyclic work; `filters` None lets all through.
 
     Error frames come through whatever the filters, where the interface tells of errors. What
-    opens only once (a serial port) is shared with every other port of this process on it.
+    opens only once (a serial port) is shared with every other port of this process on it. What
+    the bus notices by itself, a full transmit queue or frames it had no room for, goes into
+    `health`; error frames are for the caller to put there.
 
     Raises:
         BusError: the interface cannot be opened; the message holds the reason.
     """
+    health = health if health is not None else BusHealth()
+    bus: can.BusABC
     if url.interface in ("simbus", "socketcan"):
-        bus = _open(url)
+        bus = _open(url, health)
     else:
-        bus = LineBus(url, _LINES.get(url.interface, PythonCanLine))
+        bus = LineBus(url, _LINES.get(url.interface, PythonCanLine), health)
     bus.set_filters(_python_can_filters(filters))
     return bus
 
 
 def bus_gone(url: BusUrl, error: Exception) -> BusError:
     """Return the BusError for what a python-can bus on `url` raised when it was lost, said once."""
-    if str(error).startswith(f"{url}: "):
-        return BusError(str(error))
+    if str(error).startswith((f"{url}: ", f"{url.interface}:{url.channel}: ")):
+        return BusError(error.args[0])
     if url.interface == "socketcan" and (problem := interface_problem(url)):
         return BusError(f"{url}: the bus has gone away: {problem}")
     return BusError(f"{url}: the bus has gone away ({error})")
 
 
-def _open(url: BusUrl) -> can.BusABC:
+def _open(url: BusUrl, health: BusHealth) -> can.BusABC:
     if url.interface == "socketcan":
         problem = interface_problem(url)
         if problem:
@@ -93,6 +99,8 @@ def _open(url: BusUrl) -> can.BusABC:
     try:
         options: dict[str, Any] = dict(url.options)
         options.pop("lockstep", None)  # ours, not the interface's
+        if url.interface == "socketcan":
+            return SocketCanBus(url, health, **options)
         return can.Bus(url.channel, url.interface, ignore_config=True, **options)
     except Exception as error:
         # vendors' modules raise whatever comes, a NameError where their library is missing

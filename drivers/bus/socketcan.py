@@ -9,6 +9,10 @@ import select
 import socket
 import struct
 import time
+from typing import Any
+
+import can
+from can.interfaces.socketcan import SocketcanBus
 
 from drivers.bus.health import BusHealth
 from drivers.bus.packed import BUFFER_BYTES, SEND_TIMEOUT_S, Bytes, PackedPort
@@ -46,14 +50,9 @@ class SocketCanPort(PackedPort):
 
     def lost(self, error: OSError | None = None) -> BusError:
         """Return the BusError that tells why the bus cannot be used any more, and what helps."""
-        channel = self.url.channel
         number = error.errno if error is not None else None
         if number == errno.ENOBUFS:
-            return BusError(
-                f"{self.url}: the transmit queue of {channel} has been full for "
-                f"{SEND_TIMEOUT_S:g} s: no other node acknowledges (power, cable, bit rate), the "
-                f"controller is bus-off, or the queue is too short ({channel}'s txqueuelen)"
-            )
+            return BusError(f"{self.url}: {_queue_full(self.url.channel)}")
         if number in (errno.ENETDOWN, errno.ENXIO, errno.ENODEV):
             problem = interface_problem(self.url) or "it went down for a moment"
             return BusError(f"{self.url}: the bus has gone away: {problem}")
@@ -73,6 +72,41 @@ class SocketCanPort(PackedPort):
                 if not attempts:
                     raise
             select.select([], [], [], SEND_TIMEOUT_S / _TRIES)
+
+
+class SocketCanBus(SocketcanBus):
+    """python-can's bus, which waits for room in the transmit queue and counts where it had to."""
+
+    def __init__(self, url: BusUrl, health: BusHealth, **options: Any) -> None:
+        self._health = health
+        super().__init__(url.channel, **options)
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Send; waits up to `timeout` seconds (None: one second) for room.
+
+        Raises:
+            can.CanOperationError: the queue stays full, or the interface is gone.
+        """
+        deadline = time.monotonic() + (SEND_TIMEOUT_S if timeout is None else timeout)
+        while True:
+            try:
+                return super().send(msg, timeout)
+            except can.CanOperationError as error:
+                if error.error_code != errno.ENOBUFS:
+                    raise
+                self._health.note_tx_full()
+                if time.monotonic() > deadline:
+                    words = f"socketcan:{self.channel}: {_queue_full(str(self.channel))}"
+                    raise can.CanOperationError(words, errno.ENOBUFS) from None
+            select.select([], [], [], SEND_TIMEOUT_S / _TRIES)
+
+
+def _queue_full(channel: str) -> str:
+    return (
+        f"the transmit queue of {channel} has been full for {SEND_TIMEOUT_S:g} s: no other node "
+        "acknowledges (power, cable, bit rate), the controller is bus-off, or the queue is too "
+        f"short ({channel}'s txqueuelen)"
+    )
 
 
 def open_socketcan(

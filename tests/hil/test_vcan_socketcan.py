@@ -23,7 +23,7 @@ import pytest
 import serial
 import vcan_replay
 
-from drivers.bus import BusHealth, BusState, BusUrl, open_port, open_python_can
+from drivers.bus import BusHealth, BusState, BusUrl, bus_gone, open_port, open_python_can
 from drivers.bus.packed import ERR_FLAG, FRAME
 from drivers.bus.socketcan import SocketCanPort
 from drivers.errors import BusError
@@ -183,6 +183,13 @@ def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, s
     assert time.monotonic() - started < 20.0
     assert health.tx_full > 100
     assert f"transmit queue of {name} has been full" in str(port.lost(caught.value))
+    counted = health.tx_full
+    url = BusUrl.parse(f"socketcan:{name}")
+    with open_python_can(url, [], health) as acyclic, pytest.raises(can.CanError) as failed:
+        acyclic.send(can.Message(arbitration_id=0x601, data=bytes(8), is_extended_id=False))
+    assert health.tx_full > counted
+    told = str(bus_gone(url, failed.value))
+    assert told.startswith(f"socketcan:{name}: the transmit queue of {name} has been full for 1 s")
     # as soon as the adapter takes frames again the bus is usable
     os.set_blocking(host, False)
     deadline = time.monotonic() + 5.0
