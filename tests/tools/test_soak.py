@@ -40,6 +40,7 @@ def test_minutes_of_bus_time_leak_nothing_and_lose_nothing():
     for bus in told["buses"].values():
         # SYNC, 4 RPDOs and 4 TPDOs in each cycle, 10 heartbeats a second from each of 4 drives
         assert bus["frames_counted"] == pytest.approx(9 * told["cycles"] + 40 * 144, rel=0.01)
+        assert bus["overruns"] == 0
         assert abs(bus["frames_counted"] - bus["frames_expected"]) <= bus["tolerance"]
 
 

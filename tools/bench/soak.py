@@ -84,6 +84,8 @@ class BusVerdict:
     malformed: int
     frames_expected: int
     frames_counted: int
+    overruns: int
+    """Cycles whose frames did not fit into the bus time between two SYNCs."""
     tolerance: int
     """Heartbeats whose moment lies just inside or outside."""
 
@@ -114,6 +116,7 @@ def compare(name: str, session: RobotSession, before: Counts, after: Counts) -> 
         malformed=after.bus["malformed"] - before.bus["malformed"],
         frames_expected=round(frames),
         frames_counted=after.bus["frames"] - before.bus["frames"],
+        overruns=after.bus["overruns"] - before.bus["overruns"],
         tolerance=2 * (len(here.axes) + 1),
     )
 

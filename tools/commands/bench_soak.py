@@ -66,7 +66,8 @@ def _table(figures: dict[str, Any]) -> list[str]:
             f"bus {name}: {verdict['frames_counted']} frames on the bus, "
             f"{verdict['frames_expected']} expected by the master (heartbeats to within "
             f"{verdict['tolerance']}); SYNCs lost {verdict['syncs_lost']}, answers missed "
-            f"{verdict['answers_missed']}, dropped {verdict['dropped']}"
+            f"{verdict['answers_missed']}, dropped {verdict['dropped']}, cycles that did not fit "
+            f"{verdict['overruns']}"
         )
     for name, gained in figures["memory_growth_KiB"].items():
         lines.append(
