@@ -6,9 +6,9 @@ import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from cdpr_rt.state_file import state_path
+from cdpr_rt.state_file import StateFileError, read_state, state_path
 from drivers.modbus.safety_io import SafetyIo
 from profiles.safety_io import load_safety_io
 from tools.output import Output
@@ -73,6 +73,14 @@ class SessionSafety:
 def trip_file(reference: str) -> Path:
     """Return the file in which a safety I/O's trip is kept until it is acknowledged."""
     return state_path("safety-io", Path(reference.partition("@")[0]).stem)
+
+
+def kept_trip(reference: str) -> dict[str, Any] | None:
+    """Return the trip that is kept (reason, date), None where there is none; tolerates damage."""
+    try:
+        return read_state(trip_file(reference))
+    except StateFileError as error:
+        return {"reason": str(error), "date": None}
 
 
 def connect(reference: str) -> SafetyIo:

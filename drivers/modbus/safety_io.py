@@ -22,6 +22,7 @@ from profiles.safety_io import Brake, SafetyIoProfile
 _STOP_GRACE_S: Final = 2.0
 """Longest time that a controlled stop may take before power is taken all the same."""
 _LOOK_S = 0.002
+_CONNECT_S: Final = 2.0
 _PRIORITY: Final = 50
 _SHOWN: Final = ("red", "yellow", "green")
 
@@ -91,8 +92,12 @@ class SafetyIo:
         return self._state
 
     def open(self) -> Self:
-        """Connect, set all outputs safe, and begin to poll; raises ModbusError."""
+        """Connect, set all outputs safe, and begin to poll.
+
+        Raises ModbusError, and SafetyIoError for an I/O whose outputs somebody else has set.
+        """
         try:
+            self._refuse_in_use(self._link.state())
             self._link.set_watchdog()
             self._poll()
         except BaseException:
@@ -162,8 +167,10 @@ class SafetyIo:
             return ""
         doubt = self.de_energise()
         self._ended.set()
-        self._thread.join()
+        self._thread.join(_CONNECT_S + 5 * self.profile.answer_timeout_s)
         self._keep_trip()
+        if self._thread.is_alive():
+            return f"{doubt}; the polling thread hangs"
         with contextlib.suppress(ModbusError):
             for colour, output in self.profile.lights.items():
                 if colour in _SHOWN:  # red stays on until the trip is acknowledged
@@ -273,7 +280,12 @@ class SafetyIo:
 
     def _kept(self) -> str:
         """Return the trip that an earlier command has left, or an empty text."""
-        held = None if self._latch_file is None else read_state(self._latch_file)
+        if self._latch_file is None:
+            return ""
+        try:
+            held = read_state(self._latch_file)
+        except StateFileError as error:
+            return str(error)
         return "" if held is None else f"tripped on {held.get('date')}: {held.get('reason')}"
 
     def _unheard(self) -> str:
@@ -305,6 +317,14 @@ class SafetyIo:
         return state.limits[0] if limits and state.limits else ""
 
     # -- waiting
+
+    def _refuse_in_use(self, state: IoState) -> None:
+        if state.contactor_asked or any(state.brakes_asked.values()):
+            raise SafetyIoError(
+                f"{self.name}: its outputs for contactor or brakes are on already: another command "
+                "uses it, or has died (the device's own watchdog switches them off then; "
+                "otherwise: cdpr io off)"
+            )
 
     def _refuse(self, obstacle: str) -> None:
         if obstacle:

@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
 from safety_rig import Twin, board_file, patient_profile, ready, start, wait_until
 
+from drivers.modbus.safety_io import SafetyIo
 from profiles import load_winch
 from sim_bus.physics_board import BoardAxis, PhysicsBoard
 from sim_bus.safety_twin import Fault
@@ -180,6 +181,11 @@ def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
     wait_until(lambda: lab.winch.brake_released, 20)
     assert result(command)["ok"]
     assert not lab.winch.brake_released
+    with SafetyIo(lab.twin.profile()) as other:
+        other.energise()
+        assert lab.io("off")["contactor_closed"] is False
+        assert not lab.winch.power_allowed
+        wait_until(other.alarm)  # it may not switch on again
     refused("light", lab.twin.reference, "pink", said="red, yellow, green")
     refused("brake", lab.twin.reference, "winch 9", said="'winch 1', 'rail 1'")
 

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_rt.state_file import read_state
 from drivers.modbus.io_link import IoLink
 from drivers.modbus.io_rules import IoState
 from profiles.safety_io import Brake, load_safety_io
@@ -17,7 +16,7 @@ from tools.commands.options import JsonOption, YesOption
 from tools.consent import require_consent
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
-from tools.safety import connect, trip_file
+from tools.safety import connect, kept_trip
 
 app = typer.Typer(help="The safety I/O beside the drives.", no_args_is_help=True)
 
@@ -38,7 +37,7 @@ def show(io: _IoArgument, as_json: JsonOption = False) -> None:
     out = Output(as_json)
     with _link(io) as link:
         state = link.state()
-    kept = read_state(trip_file(io))
+    kept = kept_trip(io)
     for line in _lines(state):
         out.say(line)
     if kept is not None:
@@ -124,10 +123,28 @@ def brake(
 
 
 @app.command()
+def off(io: _IoArgument, as_json: JsonOption = False) -> None:
+    """Open the contactor and apply all brakes, also those that another command has set."""
+    out = Output(as_json)
+    with _link(io) as link:
+        brakes = [axis.brake for axis in link.profile.axes if axis.brake is not None]
+        devices = (*brakes, link.profile.contactor)
+        for device in devices:
+            link.write(device.output.coil, False)
+        time.sleep(max(device.timeout_s for device in devices))
+        state = link.state()
+    for line in _lines(state):
+        out.say(line)
+    if state.contactor_closed or any(state.brakes_released.values()):
+        raise WorkFailedError(f"{link.name}: contactor or brakes do not follow their outputs")
+    out.result({"ok": True, **_told(state)})
+
+
+@app.command()
 def ack(io: _IoArgument, as_json: JsonOption = False) -> None:
     """Acknowledge a trip whose cause is gone; nothing is energised by it."""
     out = Output(as_json)
-    kept = read_state(trip_file(io))
+    kept = kept_trip(io)
     with connect(io) as safety:
         safety.acknowledge()
     out.say("no trip was kept" if kept is None else f"acknowledged: {kept.get('reason')}")

@@ -202,6 +202,28 @@ def test_an_output_that_somebody_else_changes_is_noticed(twin: Twin) -> None:
         assert "output 0 was set to 1 and reads 0" in io.alarm() or "contactor" in io.alarm()
 
 
+def test_a_second_command_does_not_take_the_power_from_the_first(
+    twin: Twin, winch: BoardAxis
+) -> None:
+    with SafetyIo(twin.profile()) as io:
+        io.energise()
+        with pytest.raises(SafetyIoError, match="another command uses it"):
+            SafetyIo(twin.profile()).open()
+        time.sleep(0.1)
+        assert winch.power_allowed
+        assert not io.alarm()
+
+
+def test_a_damaged_trip_file_refuses_until_it_is_acknowledged(twin: Twin, tmp_path: Path) -> None:
+    latch = tmp_path / "trip.json"
+    latch.write_text("{")
+    with SafetyIo(twin.profile(), latch) as io:
+        with pytest.raises(SafetyIoError, match="is damaged"):
+            io.energise()
+        io.acknowledge()
+        io.energise()
+
+
 def test_a_limit_switch_stops_the_motion(twin: Twin, winch: BoardAxis) -> None:
     with SafetyIo(twin.profile()) as io:
         io.energise()
