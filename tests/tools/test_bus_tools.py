@@ -246,6 +246,21 @@ def test_a_bus_that_goes_away(labs: tuple[Lab, Lab], tmp_path: Path) -> None:
     assert cdpr("bus", "replay", log).returncode == 0
 
 
+def test_a_log_that_cannot_be_written_on(lab: Lab) -> None:
+    monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", "/dev/full")
+    with lab.join() as bus:
+        while monitor.poll() is None:
+            bus.send(PROBE)
+            time.sleep(0.05)
+    _, errors = monitor.communicate()
+    assert monitor.returncode == 1
+    assert (
+        errors.splitlines()[-1]
+        == "cdpr: --log /dev/full: cannot be written: No space left on device"
+    )
+    assert "Traceback" not in errors
+
+
 def test_a_reader_that_sleeps_costs_the_log_nothing(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "all.log"
     monitor = begin("bus", "monitor", "--bus", lab.bus, "--log", log)  # its lines are not read

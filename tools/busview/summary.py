@@ -93,7 +93,9 @@ class Summary:
     def lines(self) -> list[str]:
         """Return the summary for people."""
         whose = " of bus time" if self.time_s is not None else ""
-        told = [f"{self.frames} frames in {self.duration_s:.3f} s{whose}"]
+        told = [
+            f"{self.frames} frame{'s' if self.frames != 1 else ''} in {self.duration_s:.3f} s{whose}"
+        ]
         if self.load is not None:
             rate = f"{self.bitrate_bit_s / 1e3:g} kbit/s"
             told.append(f"bus load {100 * self.load:.1f} % of {rate}, stuffed as badly as can be")
@@ -108,7 +110,8 @@ class Summary:
         for row in self.rows():
             node = "" if row["node_id"] is None else row["node_id"]
             rate = "" if row["per_s"] is None else f"{row['per_s']:.1f}"
-            lines.append(f"{row['id']:>8} {node:>5}  {row['kind']:<10}{row['frames']:>9}{rate:>10}")
+            line = f"{row['id']:>8} {node:>5}  {row['kind']:<10}{row['frames']:>9}{rate:>10}"
+            lines.append(line.rstrip())
         return lines
 
 
