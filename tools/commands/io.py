@@ -11,7 +11,7 @@ import typer
 
 from drivers.modbus.io_link import IoLink
 from drivers.modbus.io_rules import IoState
-from profiles.safety_io import Brake, load_safety_io
+from profiles.safety_io import Brake, Contactor, load_safety_io
 from tools.commands.options import JsonOption, YesOption
 from tools.consent import require_consent
 from tools.errors import BadInputError, WorkFailedError
@@ -128,7 +128,7 @@ def off(io: _IoArgument, as_json: JsonOption = False) -> None:
     out = Output(as_json)
     with _link(io) as link:
         brakes = [axis.brake for axis in link.profile.axes if axis.brake is not None]
-        devices = (*brakes, link.profile.contactor)
+        devices: list[Brake | Contactor] = [*brakes, link.profile.contactor]
         for device in devices:
             link.write(device.output.coil, False)
         time.sleep(max(device.timeout_s for device in devices))
