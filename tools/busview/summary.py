@@ -93,9 +93,8 @@ class Summary:
     def lines(self) -> list[str]:
         """Return the summary for people."""
         whose = " of bus time" if self.time_s is not None else ""
-        told = [
-            f"{self.frames} frame{'s' if self.frames != 1 else ''} in {self.duration_s:.3f} s{whose}"
-        ]
+        what = "1 frame" if self.frames == 1 else f"{self.frames} frames"
+        told = [f"{what} in {self.duration_s:.3f} s{whose}"]
         if self.load is not None:
             rate = f"{self.bitrate_bit_s / 1e3:g} kbit/s"
             told.append(f"bus load {100 * self.load:.1f} % of {rate}, stuffed as badly as can be")
