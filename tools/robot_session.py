@@ -184,15 +184,9 @@ def open_robot(
     require_fit(robot)
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
-        pid = None
-        if asks_for_own_simulator(buses):
-            pid, name = _own_simulator(stack, robot, out, plant)
-            buses = [name]
-        elif plant is not None:
-            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-        urls = robot_urls(robot, buses)
-        real = not all(url.is_simulated for url in urls.values())
+        urls, pid = _find_buses(stack, robot, buses, out, plant)
         nodes = [axis.node_id for axis in robot.axes]
+        real = not all(url.is_simulated for url in urls.values())
         reference = safety_io or (robot.safety_io if real else None)
         rehearse(len(robot.axes), robot.sync_period_s)  # compiling may keep a poll waiting
         safety = stack.enter_context(open_safety(reference, out, nodes))
@@ -219,10 +213,27 @@ def open_robot(
         try:
             yield session
         except TripError as error:
-            reason = str(error) if safety is None else safety.cause(str(error))
-            if device.faulted().any():
-                raise DriveFaultError(f"{reason}: {_faults(session)}") from error
-            raise TripError(reason) from error
+            raise _explained(session, error) from error
+
+
+def _find_buses(
+    stack: ExitStack, robot: Robot, buses: Sequence[str], out: Output, plant: Path | None
+) -> tuple[dict[str, BusUrl], int | None]:
+    """Return the robot's buses, and the process of their simulator where one was to be started."""
+    if asks_for_own_simulator(buses):
+        pid, name = _own_simulator(stack, robot, out, plant)
+        return robot_urls(robot, [name]), pid
+    if plant is not None:
+        raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+    return robot_urls(robot, buses), None
+
+
+def _explained(session: RobotSession, error: TripError) -> TripError | DriveFaultError:
+    """Return `error` with what the safety I/O and the drives in fault say of it."""
+    reason = str(error) if session.safety is None else session.safety.cause(str(error))
+    if session.device.faulted().any():
+        return DriveFaultError(f"{reason}: {_faults(session)}")
+    return TripError(reason)
 
 
 def _note(

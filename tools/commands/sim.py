@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ import typer
 
 from drivers.bus import BusUrl
 from drivers.errors import BusError
-from profiles import Robot, load_machine
+from profiles import Robot, Winch, load_machine
 from sim_bus.canopen.lss import UNCONFIGURED
 from sim_bus.canopen.store import StoreError
 from sim_bus.clock import ClockMode
@@ -109,30 +110,13 @@ def up(
     url = _bus(bus)
     if truth_log is not None and nodes > 1:
         raise BadInputError("--truth-log: one drive only; leave out --nodes")
-    first = profile.node_id
-    if first + nodes - 1 > 127:
-        raise BadInputError(f"--nodes {nodes}: node ids end at 127, the first is {first}")
+    last = profile.node_id + nodes - 1
+    if last > 127:
+        raise BadInputError(f"--nodes {nodes}: node ids end at 127, the first is {profile.node_id}")
+    ids = [UNCONFIGURED] * nodes if unconfigured else range(profile.node_id, last + 1)
     with ExitStack() as stack:
-        drives = []
-        for serial, node_id in enumerate(range(first, first + nodes), 1):
-            one = dataclasses.replace(profile, node_id=UNCONFIGURED if unconfigured else node_id)
-            kept = _store_file(store, serial)
-            try:
-                drive = SimDrive.for_winch(
-                    one, truth, truth_log=truth_log, store=kept, serial=serial
-                )
-            except StoreError as error:
-                raise BadInputError(str(error)) from error
-            except OSError as error:
-                raise BadInputError(f"--truth-log {truth_log}: {error.strerror}") from error
-            stack.callback(drive.close)
-            drives.append(drive)
-        if board is not None:
-            shared = stack.enter_context(PhysicsBoard.create(board, len(drives)))
-            for number, drive in enumerate(drives):
-                drive.connect(shared.axis(number))
         serve(
-            drives,
+            _drives(stack, profile, ids, truth, truth_log, store, board),
             str(url),
             mode=mode,
             bitrate=profile.bitrate_bit_s,
@@ -141,6 +125,35 @@ def up(
             slcan=slcan,
             socketcand_port=socketcand,
         )
+
+
+def _drives(
+    stack: ExitStack,
+    winch: Winch,
+    node_ids: Sequence[int],
+    plant: Plant,
+    truth_log: Path | None,
+    store: Path | None,
+    board: Path | None,
+) -> list[SimDrive]:
+    """Return a drive of the winch for each node id, closed with `stack`."""
+    drives = []
+    for serial, node_id in enumerate(node_ids, 1):
+        one = dataclasses.replace(winch, node_id=node_id)
+        kept = _store_file(store, serial)
+        try:
+            drive = SimDrive.for_winch(one, plant, truth_log=truth_log, store=kept, serial=serial)
+        except StoreError as error:
+            raise BadInputError(str(error)) from error
+        except OSError as error:
+            raise BadInputError(f"--truth-log {truth_log}: {error.strerror}") from error
+        stack.callback(drive.close)
+        drives.append(drive)
+    if board is not None:
+        shared = stack.enter_context(PhysicsBoard.create(board, len(drives)))
+        for number, drive in enumerate(drives):
+            drive.connect(shared.axis(number))
+    return drives
 
 
 def _store_file(folder: Path | None, serial: int) -> Path | None:
