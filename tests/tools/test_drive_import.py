@@ -269,7 +269,7 @@ VALUES = st.sampled_from(
 ) | st.text(max_size=6)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None, derandomize=True)
 @given(data=st.data())
 def test_a_mutated_data_sheet_makes_a_profile_or_a_clear_error(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
