@@ -30,6 +30,8 @@ _LOOK_S = 0.1
 _HELD_CLOCK_S = 1.0
 """Slack for heartbeats of a simulated bus, whose time may stand for half a second."""
 _SOME_STRAYS = 3
+_LATE_ANSWERS_S = 0.05
+"""A second device may be slower than the first."""
 
 
 class CanNetwork(ObjectAccess):
@@ -181,7 +183,7 @@ class CanNetwork(ObjectAccess):
         boot_ups = self._errors.boot_ups_since_reset(node_id)
         if boot_ups > 1:
             return f"two devices have this node id: {boot_ups} boot-up messages followed one reset"
-        strays = self.clients[node_id].strays
+        strays = self.clients[node_id].await_strays(_LATE_ANSWERS_S)
         if strays >= _SOME_STRAYS:
             return (
                 f"two devices have this node id, or another program reads it by SDO at the same "

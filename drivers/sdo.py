@@ -51,6 +51,17 @@ class SdoClient:
         """Take an answer of 8 bytes from the bus."""
         self._answers.put(data)
 
+    def await_strays(self, seconds: float) -> int:
+        """Return how many answers nobody had asked for, after waiting for more of them."""
+        with self._lock:
+            deadline = time.monotonic() + seconds
+            while True:
+                try:
+                    frame = self._answers.get(timeout=max(deadline - time.monotonic(), 0.0))
+                except queue.Empty:
+                    return self.strays
+                self.strays += frame is not None
+
     def cancel(self) -> bool:
         """Have the transfer that runs end with SdoCancelledError; return whether one runs.
 

@@ -72,8 +72,10 @@ def test_another_master_is_told_for_all_at_once(bus: str) -> None:
 # -- two devices with one node id
 
 
-def test_two_answers_to_each_request_are_two_devices(bus: str) -> None:
-    """The second device has another serial number, and answers a little later."""
+@pytest.mark.parametrize("serial", [None, 0x1234], ids=["any serial number", "another one"])
+def test_two_answers_to_each_request_are_two_devices(bus: str, serial: int | None) -> None:
+    """Even where the identity is wrong as well: what explains it comes first."""
+    profile = DRIVE.model_copy(update={"serial": serial})
 
     def answer(request: bytes) -> list[bytes]:
         time.sleep(0.0005)
@@ -84,7 +86,7 @@ def test_two_answers_to_each_request_are_two_devices(bus: str) -> None:
         open_network(bus, [1]) as network,
         pytest.raises(BootError) as caught,
     ):
-        boot(network, 1, DRIVE, SETTINGS)
+        boot(network, 1, profile, SETTINGS)
     assert caught.value.letter == "B"
     assert "two devices have this node id" in str(caught.value)
 
