@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -34,7 +35,8 @@ from tools.signals import stop_on_signals
 from tools.simulator import OwnSimulator
 from tools.tension import calibration
 from tools.tension import watch as watching
-from tools.tension.anchor import measure_anchored, plan_anchor
+from tools.tension.anchor import AnchorPlan, measure_anchored, plan_anchor
+from tools.tension.hoist import HoistPlan
 from tools.tension.masses import (
     Hang,
     by_prompt,
@@ -196,43 +198,72 @@ def calibrate(
     as_json: JsonOption = False,
 ) -> None:
     """Identify a winch's tension-to-torque gain and friction, from masses or from a load cell."""
-    out = Output(as_json)
-    profile, url = load_winch(winch), open_bus(bus)
+    profile = load_winch(winch)
     folder = out_dir or Path("out") / f"tension-{profile.profile}"
+    run = _Run(profile, open_bus(bus), Output(as_json), folder, plant, safety_io)
     if (masses is None) == (sensors is None):
         raise BadInputError("give either --masses or --sensors")
-    with ExitStack() as stack:
-        if masses is not None:
-            kilograms = _masses(masses)
-            check_masses(profile, kilograms, gravity)
-            speed = speed_mm_s or _MASS_SPEED_mm_s
-            hoist = plan_hoist(profile, speed * 1e-3, lead_mm * 1e-3, turns)
-            _fresh(folder, overwrite)
-            confirm_motion(url, yes, "masses are raised and lowered by the winch")
-            url, hang = _hands(stack, profile, url, out, plant, board)
-            with _keeping(folder), open_winch(profile, url, out, safety_io=safety_io) as session:
-                session.set_mode(profile.drive.mode_torque)
-                raw = calibration.raw_folder(folder)
-                measure_masses(session, out, raw, hoist, kilograms, hang, gravity)
-        else:
-            cells = load_tension_sensors(sensors or "")
-            number = _number_of(cells, cable)
-            speed = speed_mm_s or _ANCHOR_SPEED_mm_s
-            pull = plan_anchor(profile, lowest_N, highest_N, speed * 1e-3, travel_mm * 1e-3)
-            if port is None:
-                raise BadInputError("--sensors needs --port, the serial port of the load cells")
-            _fresh(folder, overwrite)
-            confirm_motion(url, yes, "the made-fast cable is pulled by the winch")
-            sampler = stack.enter_context(TensionSampler(cells, port))
+    if masses is not None:
+        kilograms = _masses(masses)
+        check_masses(profile, kilograms, gravity)
+        speed = speed_mm_s or _MASS_SPEED_mm_s
+        hoist = plan_hoist(profile, speed * 1e-3, lead_mm * 1e-3, turns)
+        run.prepare(overwrite, yes, "masses are raised and lowered by the winch")
+        run.by_masses(hoist, kilograms, gravity, board)
+    else:
+        cells = load_tension_sensors(sensors or "")
+        number = _number_of(cells, cable)
+        speed = speed_mm_s or _ANCHOR_SPEED_mm_s
+        pull = plan_anchor(profile, lowest_N, highest_N, speed * 1e-3, travel_mm * 1e-3)
+        if port is None:
+            raise BadInputError("--sensors needs --port, the serial port of the load cells")
+        run.prepare(overwrite, yes, "the made-fast cable is pulled by the winch")
+        run.by_load_cell(pull, TensionSampler(cells, port), number)
+    run.finish()
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One calibration: where it measures and where it leaves its files."""
+
+    winch: Winch
+    url: BusUrl
+    out: Output
+    folder: Path
+    plant: Path | None
+    safety_io: str | None
+
+    def prepare(self, overwrite: bool, yes: bool, what: str) -> None:
+        """Make room for recordings and ask before a real motor is energised."""
+        _fresh(self.folder, overwrite)
+        confirm_motion(self.url, yes, what)
+
+    def by_masses(
+        self, plan: HoistPlan, masses_kg: list[float], gravity: float, board: Path | None
+    ) -> None:
+        """Record the raising and lowering of masses."""
+        winch, out = self.winch, self.out
+        with ExitStack() as stack:
+            url, hang = _hands(stack, winch, self.url, out, self.plant, board)
+            stack.enter_context(_keeping(self.folder))
+            session = stack.enter_context(open_winch(winch, url, out, safety_io=self.safety_io))
+            session.set_mode(winch.drive.mode_torque)
+            raw = calibration.raw_folder(self.folder)
+            measure_masses(session, out, raw, plan, masses_kg, hang, gravity)
+
+    def by_load_cell(self, plan: AnchorPlan, sampler: TensionSampler, cable: int) -> None:
+        """Record the pull at a made-fast cable."""
+        winch, out = self.winch, self.out
+        with sampler, _keeping(self.folder):
             sampler.await_readings(_FIRST_READING_S)
-            with (
-                _keeping(folder),
-                open_winch(profile, url, out, plant, safety_io=safety_io) as session,
-            ):
-                session.set_mode(profile.drive.mode_torque)
-                path = calibration.pull_file(folder)
-                measure_anchored(session, out, path, pull, sampler, number)
-    _finish(out, folder, profile)
+            with open_winch(winch, self.url, out, self.plant, safety_io=self.safety_io) as session:
+                session.set_mode(winch.drive.mode_torque)
+                path = calibration.pull_file(self.folder)
+                measure_anchored(session, out, path, plan, sampler, cable)
+
+    def finish(self) -> None:
+        """Identify, and say and store what was found."""
+        _finish(self.out, self.folder, self.winch)
 
 
 @app.command()
