@@ -29,7 +29,7 @@ TIMEOUT_S = 0.02
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Devices of one process answer together, so that little time has to pass for the last."""
-    monkeypatch.setattr("drivers.lss._SETTLE_S", 0.001)
+    monkeypatch.setattr("drivers.lss_link._SETTLE_S", 0.001)
 
 
 def device(
@@ -264,6 +264,29 @@ def test_a_device_too_slow_for_the_timeout_is_an_error_not_a_wrong_identity() ->
             assert "longer --timeout" in str(error)
         else:
             assert found in ([], [address(0x0F0F0F0F)])
+
+
+def test_a_babbling_node_does_not_hold_the_search() -> None:
+    """Somebody sends LSS answers without end, faster than they can be read."""
+    with bus_with() as name, can.Bus(interface="simbus", channel=name) as babbler:
+        stop = threading.Event()
+
+        def babble() -> None:
+            noise = can.Message(arbitration_id=0x7E4, data=bytes(8), is_extended_id=False)
+            while not stop.is_set():
+                babbler.send(noise)
+
+        thread = threading.Thread(target=babble)
+        thread.start()
+        try:
+            start = time.monotonic()
+            with LssMaster(BusUrl.parse(f"simbus:{name}"), TIMEOUT_S) as master:
+                assert master.who_has(5, 0.05) == ""
+                assert not master.has_unconfigured()
+            assert time.monotonic() - start < 10.0
+        finally:
+            stop.set()
+            thread.join()
 
 
 def test_a_bus_that_is_not_there_is_a_bus_error() -> None:

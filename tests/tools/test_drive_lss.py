@@ -34,7 +34,7 @@ TYPE = ("--profile", "generic-cia402")
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Devices of one process answer together, so that little time has to pass for the last."""
-    monkeypatch.setattr("drivers.lss._SETTLE_S", 0.001)
+    monkeypatch.setattr("drivers.lss_link._SETTLE_S", 0.001)
 
 
 @contextmanager

@@ -1,0 +1,137 @@
+"""Frames between the LSS master and the devices on one bus: questions, answers, time-outs."""
+
+from __future__ import annotations
+
+import time
+
+import can
+
+from drivers.bus import BusUrl, bus_gone, open_python_can
+from drivers.bus.packed import EFF_FLAG, RTR_FLAG
+from drivers.errors import BusError, DriverError
+
+_MASTER, _SLAVE = 0x7E5, 0x7E4
+_NMT, _SDO_REQUEST, _SDO_ANSWER, _HEARTBEAT = 0x000, 0x600, 0x580, 0x700
+_EXACT = 0x7FF | EFF_FLAG | RTR_FLAG
+_ANY_NODE = 0x780 | EFF_FLAG | RTR_FLAG
+_RESET_COMMUNICATION = 130
+_SETTLE_S = 0.005
+_SDO_PATIENCE = 3.0
+_LONGEST_DRAIN_S = 0.3
+
+
+class LssError(DriverError):
+    """A device refused a setting, or did not answer, over LSS; says which and why."""
+
+
+class LssLink:
+    """One bus as an LSS master sees it, and what it needs of the other nodes on it.
+
+    Raises BusError when the bus cannot be opened, or is lost later.
+    """
+
+    def __init__(self, url: BusUrl, timeout_s: float) -> None:
+        self.url = url
+        self.timeout_s = timeout_s
+        heard = [(_SLAVE, _EXACT), (_SDO_ANSWER, _ANY_NODE), (_HEARTBEAT, _ANY_NODE)]
+        self._bus = open_python_can(url, heard)
+        self._settle_s = _SETTLE_S
+
+    # -- other nodes of the bus
+
+    def who_has(self, node_id: int, listen_s: float = 0.5) -> str:
+        """Return how a node shows that it has `node_id`, "" when nothing does."""
+        if self._upload(node_id, 0x1000) is not None:
+            return "it answers to SDO"
+        deadline = time.monotonic() + listen_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _HEARTBEAT + node_id:
+                return "its heartbeat is on the bus"
+        return ""
+
+    def read_object(self, node_id: int, index: int) -> int | None:
+        """Return an integer object of at most 4 bytes by SDO, None where there is no answer."""
+        answer = self._upload(node_id, index)
+        if answer is None or answer[0] & 0xE2 != 0x42:
+            return None
+        return int.from_bytes(answer[4:8], "little")
+
+    def _upload(self, node_id: int, index: int) -> bytes | None:
+        question = bytes([0x40]) + index.to_bytes(2, "little") + bytes(5)
+        for _ in range(2):
+            self._collect(0, 0.0)
+            self._send(question, _SDO_REQUEST + node_id)
+            deadline = time.monotonic() + _SDO_PATIENCE * self.timeout_s
+            while (frame := self._receive(deadline)) is not None:
+                if frame[0] == _SDO_ANSWER + node_id and len(frame[1]) == 8:
+                    return frame[1]
+        return None
+
+    def reset_communication(self, node_id: int) -> None:
+        """Restart a node's communication by NMT, so that its new node id counts."""
+        self._transmit(_NMT, bytes([_RESET_COMMUNICATION, node_id]))
+
+    def wait_for_boot_up(self, node_id: int, timeout_s: float = 2.0) -> bool:
+        """Tell whether a node's boot-up message or heartbeat comes in time."""
+        deadline = time.monotonic() + timeout_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _HEARTBEAT + node_id:
+                return True
+        return False
+
+    # -- frames
+
+    def _one(self, question: bytes, specifier: int) -> bytes:
+        """Return the answer of the one device in the configuration state; raises LssError."""
+        answer = self._ask(question, specifier)
+        if answer is None:
+            raise LssError(f"no device answers (LSS command {question[0]:02X}h)")
+        answers = [answer, *self._collect(specifier, self._settle_s)]
+        if len(answers) > 1:
+            raise LssError(
+                f"{len(answers)} devices answer at once: connect one at a time, or name one by its "
+                "profile and serial number"
+            )
+        return answers[0]
+
+    def _ask(self, question: bytes, specifier: int) -> bytes | None:
+        self._collect(specifier, 0.0)
+        self._send(question)
+        deadline = time.monotonic() + self.timeout_s
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
+                return frame[1].ljust(8, b"\0")
+        return None
+
+    def _collect(self, specifier: int, wait_s: float) -> list[bytes]:
+        """Return the answers that come within `wait_s`; with 0.0 throw away what waits."""
+        deadline = time.monotonic() + wait_s
+        answers = []
+        while (frame := self._receive(deadline)) is not None:
+            if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
+                answers.append(frame[1].ljust(8, b"\0"))
+        return answers
+
+    def _receive(self, deadline: float) -> tuple[int, bytes] | None:
+        """Return the next frame, also one that waits when the time is over; None without one."""
+        left_s = deadline - time.monotonic()
+        if left_s < -_LONGEST_DRAIN_S:
+            return None  # a babbling node would keep us for ever
+        try:
+            message = self._bus.recv(max(0.0, left_s))
+        except (can.CanError, OSError) as error:
+            raise bus_gone(self.url, error) from error
+        if message is None:
+            return None
+        if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
+            return -1, b""
+        return message.arbitration_id, bytes(message.data)
+
+    def _send(self, data: bytes, identifier: int = _MASTER) -> None:
+        self._transmit(identifier, data.ljust(8, b"\0"))
+
+    def _transmit(self, identifier: int, data: bytes) -> None:
+        try:
+            self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+        except (can.CanError, OSError) as error:
+            raise BusError(f"{self.url}: cannot send: {error}") from error
