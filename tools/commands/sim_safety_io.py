@@ -18,7 +18,6 @@ from sim_bus.safety_twin import Fault, SafetyTwin
 from tools.errors import BadInputError, WorkFailedError
 
 _FAULTS = {fault.name.lower().replace("_", "-"): fault for fault in Fault if fault.name}
-_PANEL_UNIT = 247
 _PRESSED, _FAULT = 0, 1
 
 

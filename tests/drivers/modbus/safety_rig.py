@@ -87,13 +87,13 @@ def wait_until(done: Callable[[], object], timeout_s: float = DEADLINE_S) -> flo
     return time.monotonic() - began
 
 
-def patient_profile(folder: Path) -> Path:
+def patient_profile(folder: Path, watchdog_s: float = 1.0) -> Path:
     """Return the shipped profile with times that suit a busy machine."""
     text = (SHIPPED / "modbus-remote-io.toml").read_text()
     for key, value in (("answer_timeout_s", 0.2), ("trip_timeout_s", 0.4)):
         line = next(line for line in text.splitlines() if line.startswith(key))
         text = text.replace(line, f"{key} = {value}")
-    text = text.replace("timeout_s = 0.5", "timeout_s = 1.0")
+    text = text.replace("timeout_s = 0.5", f"timeout_s = {watchdog_s}")
     path = folder / "io.toml"
     path.write_text(text)
     return path
