@@ -18,7 +18,13 @@ from drivers.sdo_abort import abort_text
 SCRIPTED = 9
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
+def bus(simulated_bus: str) -> str:
+    """A bus that is not switched off and on between the tests."""
+    return simulated_bus
+
+
+@pytest.fixture(scope="module")
 def network(bus: str) -> Iterator[CanNetwork]:
     with open_network(bus, [1, 2, SCRIPTED]) as opened:
         yield opened
