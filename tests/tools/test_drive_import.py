@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import subprocess
+import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ import typer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import profiles
 from profiles import ProfileError, load_drive
 from profiles.eds_check import read_eds
 from tools.commands import drive_setup
@@ -170,6 +173,37 @@ def test_a_file_beside_its_profile_is_not_overwritten(tmp_path: Path) -> None:
     assert load_drive(tmp_path / "odd.toml").eds.name == "odd-mended.eds"
 
 
+@pytest.mark.parametrize("suffix", [".eds", ".dcf"])
+def test_a_data_sheet_that_a_strangers_library_wrote(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"theirs{suffix}"
+    od = canopen.import_od(str(GENERIC.eds), 5)
+    od.node_id, od.bitrate = 5, 250_000
+    canopen.export_od(od, str(path))
+    told = imported(path, tmp_path / "out")
+    assert told["remarks"] == []
+    drive = load_drive(tmp_path / "out" / "theirs.toml")
+    assert (drive.rpdos, drive.tpdos) == (GENERIC.rpdos, GENERIC.tpdos)
+    wanted = (5, 250_000) if suffix == ".dcf" else (None, None)
+    assert (told["node_id"], told["bitrate_bit_s"]) == wanted
+
+
+def test_an_imported_profile_runs_its_drive(tmp_path: Path) -> None:
+    """A mended data sheet, all the way to the power stage: master and simulated drive take it."""
+    path = tmp_path / "odd.eds"
+    path.write_bytes((TEXT + "\n[6041]\nParameterName=Zustand für alle\n").encode("cp1252"))
+    assert imported(path, tmp_path / "mine")["eds_rewritten"]
+    winch = tmp_path / "mine" / "winch.toml"
+    shipped = (Path(profiles.__file__).parent / "winches" / "winch-mpp0923d.toml").read_text()
+    assert 'drive = "generic-cia402"' in shipped
+    winch.write_text(shipped.replace('drive = "generic-cia402"', 'drive = "odd"'))
+    words = ("drive", "enable", str(winch), "--bus", "simbus:", "--seconds", "0.2", "--json")
+    ended = subprocess.run(
+        [sys.executable, "-m", "tools.cli", *words], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads(ended.stdout.splitlines()[-1])["ok"] is True
+
+
 def test_maps_are_proposed_where_the_defaults_do_not_serve(tmp_path: Path) -> None:
     text = TEXT
     for number in range(4):
@@ -269,6 +303,7 @@ VALUES = st.sampled_from(
 ) | st.text(max_size=6)
 
 
+@pytest.mark.filterwarnings("ignore:The .warn. method:DeprecationWarning")  # of the library
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(data=st.data())
 def test_a_mutated_data_sheet_makes_a_profile_or_a_clear_error(
