@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,6 +119,19 @@ def analyse(
         gain_reduction_dB=20.0 * reduction / math.log(10.0),
         sensitivity_peak=float(np.max(1.0 / np.abs(1.0 + loop))),
     )
+
+
+def stiffest_pid(
+    inertia_kg_m2: float, latency_s: float, bandwidths_Hz: Sequence[float], period_s: float
+) -> PidDesign:
+    """Return the PID of the first of some bandwidths, highest first, that keeps its margins.
+
+    Raises TuningError, with what can be had, where none does.
+    """
+    for bandwidth in bandwidths_Hz[:-1]:
+        with contextlib.suppress(TuningError):
+            return design_pid(inertia_kg_m2, latency_s, bandwidth, period_s)
+    return design_pid(inertia_kg_m2, latency_s, bandwidths_Hz[-1], period_s)
 
 
 def design_pid(

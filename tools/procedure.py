@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 import time
@@ -31,7 +30,7 @@ from cdpr_rt.identification import (
 )
 from cdpr_rt.measurement import Pass, both_ways, recording
 from cdpr_rt.rawlog import read_raw_log
-from cdpr_rt.tuning import PidDesign, TuningError, design_pid, sweep_gain
+from cdpr_rt.tuning import PidDesign, TuningError, design_pid, stiffest_pid, sweep_gain
 from profiles import Winch
 from tools.commissioning import (
     VALIDATION_SPEED_RAD_S,
@@ -47,7 +46,7 @@ DEFAULT_BANDWIDTH_HZ = 12.0
 _LEAD_IN_RAD = math.tau
 _SWEEP_ATTEMPTS = 4
 _SETTLE_S = 2.0
-_STIFF_HZ = (30.0, 25.0, 20.0, 15.0)
+_STIFF_HZ = (30.0, 25.0, 20.0, 15.0, DEFAULT_BANDWIDTH_HZ)
 # the set-point starts ahead of a rotor that has to break away first
 _PROBE_TURNS = 1.2
 
@@ -218,10 +217,7 @@ class Commissioning:
         """Return the stiffest of some loops that its latency allows, for legs at speed."""
         session = self._session
         inertia = session.winch.motor.rotor_inertia_kg_m2
-        for bandwidth in _STIFF_HZ:
-            with contextlib.suppress(TuningError):
-                return design_pid(inertia, session.latency_s, bandwidth, session.device.period_s)
-        return self._first_design()
+        return stiffest_pid(inertia, session.latency_s, _STIFF_HZ, session.device.period_s)
 
     def _first_design(self) -> PidDesign:
         """Return a loop for the motor as its data sheet has it."""

@@ -10,7 +10,7 @@ import typer
 
 from cdpr_rt.controllers.pid import Pid
 from cdpr_rt.trajectory import Leg
-from cdpr_rt.tuning import design_pid
+from cdpr_rt.tuning import stiffest_pid
 from drivers.cia402 import fault_text, mode_bits, mode_name, state_of, supported_modes
 from drivers.errors import SdoError
 from profiles import load_winch
@@ -25,12 +25,12 @@ from tools.commands.options import (
 )
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
-from tools.procedure import DEFAULT_BANDWIDTH_HZ
 from tools.session import WinchSession, confirm_motion, open_bus, open_network, open_winch
 
 app = typer.Typer(help="One drive on the bus.", no_args_is_help=True)
 
 _JOG_RAMP_S = 0.5
+_JOG_HZ = (20.0, 15.0, 12.0, 8.0, 5.0)
 _TORQUE_SHARE = 0.25
 # a motor that turns the wrong way is to be stopped before half a turn
 _JOG_ERROR_RAD = 2.5
@@ -202,7 +202,8 @@ def jog(
 
 def _jog_controller(session: WinchSession) -> Pid:
     motor, period = session.winch.motor, session.device.period_s
-    design = design_pid(motor.rotor_inertia_kg_m2, session.latency_s, DEFAULT_BANDWIDTH_HZ, period)
+    # a soft loop lets a rotor with friction stick and slip: by turns at these speeds
+    design = stiffest_pid(motor.rotor_inertia_kg_m2, session.latency_s, _JOG_HZ, period)
     return Pid([design.gains], np.array([_TORQUE_SHARE * motor.rated_torque_Nm]), period)
 
 
