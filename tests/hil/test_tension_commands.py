@@ -42,9 +42,22 @@ def run(*arguments: str | Path, status: int = 0) -> dict[str, Any]:
     return result
 
 
+class Simulator:
+    """A running simulator and what it told when it was ready."""
+
+    def __init__(self, process: subprocess.Popen[str], ready: dict[str, Any]) -> None:
+        self.process = process
+        self.port = str(ready.get("port"))
+
+    def tell(self, text: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(text + "\n")
+        self.process.stdin.flush()
+
+
 @contextmanager
-def simulator(*arguments: str | Path) -> Iterator[dict[str, Any]]:
-    """A `cdpr sim ...` in the background; yields what it told when it was ready."""
+def simulator(*arguments: str | Path) -> Iterator[Simulator]:
+    """A `cdpr sim ...` in the background."""
     process = subprocess.Popen(
         cdpr("sim", *arguments, "--exit-with-stdin"),
         stdin=subprocess.PIPE,
@@ -53,7 +66,7 @@ def simulator(*arguments: str | Path) -> Iterator[dict[str, Any]]:
     )
     try:
         assert process.stdout is not None
-        yield json.loads(process.stdout.readline())["ready"]
+        yield Simulator(process, json.loads(process.stdout.readline())["ready"])
     finally:
         process.communicate(timeout=20)
 
@@ -132,17 +145,32 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
         winch(tmp_path, plant) as (bus, board),
         simulator("tension", sensors, "--board", board) as cells,
     ):
-        seen = run("tension", "watch", "--sensors", sensors, "--port", cells["port"],
+        seen = run("tension", "watch", "--sensors", sensors, "--port", cells.port,
                    "--seconds", "0.5")  # fmt: skip
         (cable,) = seen["cables"]
         assert cable["valid"] and cable["mean_N"] == pytest.approx(2.0, abs=1.5)
         assert cable["rate_Hz"] > 8.0
         result = run(
             *("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors),
-            *("--port", cells["port"], "--out", out),
+            *("--port", cells.port, "--out", out),
             *("--speed-mm-s", "60", "--highest-n", "60"),
         )
         with PhysicsBoard.attach(board) as shared:
+            without_power(shared)
+            broken = subprocess.Popen(
+                cdpr("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors, "--port",
+                     cells.port, "--out", tmp_path / "broken", "--speed-mm-s", "60", "--json"),
+                stdout=subprocess.PIPE, text=True,
+            )  # fmt: skip
+            while shared.axis(0).state().tension_N < 20.0:
+                assert broken.poll() is None
+                time.sleep(0.005)
+            cells.tell("silent 1")
+            told, _ = broken.communicate(timeout=60)
+            assert broken.returncode == FAILED
+            error = json.loads(told.splitlines()[-1])["error"]
+            assert "winch 1: tension sensor: stale" in error
+            assert str(tmp_path / "broken" / "raw") in error
             without_power(shared)
     gain(result, 0.026 * 1.03 / 1.04 / 1.001)
     assert result["friction_per_N_m"] == pytest.approx(0.05 * 0.02575, rel=0.25)
@@ -208,11 +236,8 @@ def test_stopping_lowers_the_mass_and_a_dead_load_cell_stops_the_pull(tmp_path: 
 
         options = ("--board", board, "--fault", "silent 1")
         with simulator("tension", "rtu-load-cell-1", *options) as cells:
-            port = ("--port", cells["port"])
-            result = run("tension", "watch", "--sensors", "rtu-load-cell-1", *port,
-                         "--seconds", "0.5", status=FAILED)  # fmt: skip
-            assert "no answer within" in result["cables"][0]["error"]
+            port = ("--port", cells.port)
             result = run("tension", "calibrate", WINCH, "--bus", bus, "--sensors",
                          "rtu-load-cell-1", *port, "--out", tmp_path / "dead",
                          status=FAILED)  # fmt: skip
-            assert "winch 1: " in result["error"] and "unit 1" in result["error"]
+            assert "winch 1: " in result["error"] and "no answer within" in result["error"]

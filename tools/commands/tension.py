@@ -248,6 +248,7 @@ class _Run:
             stack.enter_context(_keeping(self.folder))
             session = stack.enter_context(open_winch(winch, url, out, safety_io=self.safety_io))
             session.set_mode(winch.drive.mode_torque)
+            session.disable()  # nothing cycles while somebody hangs a mass
             raw = calibration.raw_folder(self.folder)
             measure_masses(session, out, raw, plan, masses_kg, hang, gravity)
 
@@ -274,7 +275,7 @@ def fit(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Identify again from recorded masses or torque steps."""
+    """Identify again from the recordings of a calibration."""
     out = Output(as_json)
     _finish(out, folder, load_winch(winch or calibration.recorded_winch(folder)))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,8 @@ def check_masses(winch: Winch, masses_kg: Sequence[float], gravity: float) -> No
 
 
 def by_prompt(mass_kg: float) -> None:
-    """Ask the person at the winch."""
+    """Ask the person at the winch; the drive has no power, so Ctrl-C may end it here at once."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         typer.prompt(
             f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
@@ -59,7 +61,9 @@ def by_prompt(mass_kg: float) -> None:
             err=True,
         )
     except typer.Abort:
-        raise BadInputError("nobody there to hang the masses; nothing was energised") from None
+        raise BadInputError(f"nobody has hung {mass_kg:g} kg; the drive is without power") from None
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def on_board(board: Path) -> Hang:
