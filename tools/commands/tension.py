@@ -81,11 +81,9 @@ def watch(
     with stop_on_signals() as stop_requested, TensionSampler(profile, port) as sampler:
         figures = watching.watch(sampler, out, seconds or float("inf"), stop_requested)
     for one in figures:
+        shown = f"{one['mean_N']:8.2f} N ± {one['std_N']:.2f}, {one['rate_Hz']:.0f} readings/s"
         state = "" if one["valid"] else f"  {one['error'] or one['fault']}"
-        out.say(
-            f"{one['cable']:12} {one['mean_N']:8.2f} N ± {one['std_N']:.2f}, "
-            f"{one['rate_Hz']:.0f} readings/s{state}"
-        )
+        out.say(f"{one['cable']:12} {shown if one['readings'] else ''}{state}")
     out.result({"ok": all(one["valid"] for one in figures), "cables": figures})
     if not all(one["valid"] for one in figures):
         raise typer.Exit(WorkFailedError.exit_status)

@@ -50,7 +50,8 @@ def watch(
             time.sleep(_LOOK_S)
             exchange.update()
             sums.take(sampler)
-            highest = max(highest, float(np.max(exchange.feedback.tension_N)))
+            told = exchange.feedback
+            highest = float(np.max(told.tension_N, where=told.valid, initial=highest))
             if time.monotonic() > shown + 1.0 / _SHOW_HZ:
                 shown = time.monotonic()
                 live.update(_table(sampler, highest))
