@@ -27,6 +27,8 @@ class RailFault(IntFlag):
     BRAKE_WORN = 4
     BRAKE_STUCK = 8
     DRIVE_FAULT = 16
+    TARGET_LOST = 32
+    """The target register takes 0 whatever is written."""
 
 
 class RailTwin:
@@ -123,6 +125,8 @@ class RailTwin:
         registers: list[int],
         values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
+        if RailFault.TARGET_LOST in self.fault and values and address == self._map.target_register:
+            values[:] = [0] * len(values)
         for register, value in enumerate(values or (), address):
             self._take(register, int(value))
         self.step()

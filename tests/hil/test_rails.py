@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
 from safety_rig import PANEL, Twin, board_file, patient_profile, ready, start, wait_until
 
+from drivers.errors import DriverError
 from profiles.rail import SHIPPED
 from sim_bus.physics_board import BoardAxis, PhysicsBoard
 from sim_bus.rail_twin import RailFault
@@ -86,12 +87,14 @@ class Rails:
         status = self._modbus().read_holding_registers(111, count=1, device_id=1).registers[0]
         return not status & 0b10011
 
-    def wear_brake(self, kind: str, worn: bool) -> None:
+    def wear_brake(self, kind: str) -> None:
         if kind == "cia402":
-            self.twin.break_(Fault.BRAKES_WORN if worn else Fault(0))
+            self.twin.break_(Fault.BRAKES_WORN)
         else:
-            fault = RailFault.BRAKE_WORN if worn else 0
-            self._modbus().write_register(1, int(fault), device_id=PANEL)
+            self.break_modbus(RailFault.BRAKE_WORN)
+
+    def break_modbus(self, fault: RailFault) -> None:
+        self._modbus().write_register(1, int(fault), device_id=PANEL)
 
     def calibration(self) -> dict[str, Any]:
         held: dict[str, Any] = json.loads(self._state_file().read_text())
@@ -141,7 +144,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rails]:
 def rails(parts: Rails) -> Rails:
     parts.winch.publish(0.0, 0.0, 0.0, 0.0, False)
     parts.twin.mend()
-    parts.wear_brake("modbus", False)
+    parts.break_modbus(RailFault(0))
     parts.forget()
     return parts
 
@@ -168,11 +171,36 @@ def test_a_move_arrives_and_voids_the_calibration(rails: Rails, kind: str) -> No
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
 def test_a_brake_that_does_not_hold_is_found_before_the_move(rails: Rails, kind: str) -> None:
     before = rails.position_m(kind)
-    rails.wear_brake(kind, True)
+    rails.wear_brake(kind)
     error = result(rails.move(kind, before + 0.3), FAILED)["error"]
     assert "the applied brake does not hold: pushed with 10 % of the rated torque" in error
     assert abs(rails.position_m(kind) - before) < 0.05
     assert "slipped by" in rails.calibration()["why"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (RailFault.TARGET_LOST, "holding register 100 was set to"),
+        (RailFault.DRIVE_FAULT, "the drive is in fault"),
+        (RailFault.BRAKE_STUCK, "the brake is not released 0.5 s after it was told to"),
+        (RailFault.TRUNCATED, "the answer was cut off after"),
+        (RailFault.SILENT, "no answer within 0.2 s from unit 1"),
+    ],
+)
+def test_a_drive_that_does_not_do_as_it_is_told_is_not_moved(
+    rails: Rails, fault: RailFault, said: str
+) -> None:
+    before = rails.position_m("modbus")
+    rails.break_modbus(fault)
+    arguments = ["move", str(rails.modbus), "--to", "0.9", "--yes", "--cables-slack-checked"]
+    outcome = CliRunner(env={"XDG_STATE_HOME": str(rails.home)}).invoke(
+        rail_commands.app, arguments
+    )
+    rails.break_modbus(RailFault(0))
+    assert isinstance(outcome.exception, DriverError)
+    assert said in str(outcome.exception)
+    assert rails.position_m("modbus") == before
 
 
 def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
