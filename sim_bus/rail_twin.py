@@ -126,7 +126,7 @@ class RailTwin:
         values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
         if RailFault.TARGET_LOST in self.fault and values and address == self._map.target_register:
-            values[:] = [0] * len(values)
+            values[:] = [False] * len(values)
         for register, value in enumerate(values or (), address):
             self._take(register, int(value))
         self.step()
