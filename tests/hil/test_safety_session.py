@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import uuid
 from collections.abc import Iterator
@@ -188,6 +189,18 @@ def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
         wait_until(other.alarm)  # it may not switch on again
     refused("light", lab.twin.reference, "pink", said="red, yellow, green")
     refused("brake", lab.twin.reference, "winch 9", said="'winch 1', 'rail 1'")
+
+
+def test_watching_tells_what_changes_and_changes_nothing(lab: Lab) -> None:
+    pressing = threading.Timer(0.3, lab.twin.press)
+    pressing.start()
+    outcome = CliRunner().invoke(io_commands.app, ["watch", lab.twin.reference, "--seconds", "0.8"])
+    pressing.join()
+    lines = outcome.stdout.splitlines()
+    told = [line for line in lines if "emergency-stop chain" in line]
+    assert [line.split("chain")[1].strip() for line in told] == ["closed (ok)", "OPEN"]
+    assert len(lines) == 6 + 1  # once each, and the change
+    assert not lab.twin.coil(8)  # not even the red lamp
 
 
 def refused(*arguments: str, said: str) -> None:

@@ -52,14 +52,16 @@ def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = Fal
     deadline = time.monotonic() + seconds
     before: list[str] = []
     with _link(io) as link:
+        state = link.state()
         try:
             while time.monotonic() < deadline:
-                lines = _lines(state := link.state())
+                lines = _lines(state)
                 for line in lines:
                     if line not in before:
                         out.say(f"{time.strftime('%H:%M:%S')}  {line}")
                 before = lines
                 time.sleep(link.profile.poll_period_s)
+                state = link.state()
         except KeyboardInterrupt:
             out.note("stopped on request")
     out.result({"ok": True, **_told(state)})
