@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 
+from profiles.tension_sensor import SHIPPED
 from profiles.winch_calibration import load_winch_calibration
 from sim_bus.physics_board import PhysicsBoard
 
@@ -136,6 +137,23 @@ def test_masses_give_gain_and_friction(
     assert all((out / name).is_file() for name in stored.raw_data)
 
 
+def tare(folder: Path, port: str) -> None:
+    """By the file where the amplifier cannot, then by the amplifier."""
+    shipped = (SHIPPED / "rtu-load-cell-1.toml").read_text()
+    start, end = shipped.index("[amplifier.tare]"), shipped.index("[[sensors]]")
+    plain = folder / "plain.toml"
+    plain.write_text(shipped[:start] + shipped[end:])
+    seconds = ("--seconds", "0.3")
+    (cable,) = run("tension", "tare", "--sensors", plain, "--port", port, *seconds)["cables"]
+    assert cable["zero_N"] == cable["before_N"] == pytest.approx(2.0, abs=1.5)
+    plain.write_text(plain.read_text() + f"zero_N = {cable['zero_N']}\n")
+    (cable,) = run("tension", "tare", "--sensors", plain, "--port", port, *seconds)["cables"]
+    assert cable["before_N"] == pytest.approx(0.0, abs=0.1)
+    sensors = ("--sensors", "rtu-load-cell-1")
+    (cable,) = run("tension", "tare", *sensors, "--port", port, *seconds)["cables"]
+    assert cable["after_N"] == pytest.approx(0.0, abs=0.1)
+
+
 def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
     plant = "[load]\nkind = 'fixed_anchor'\npretension_N = 2.0\nanchor_stiffness_N_m = 500.0\n"
     plant += "drum_radius_error = 0.03\n"
@@ -150,6 +168,7 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
         (cable,) = seen["cables"]
         assert cable["valid"] and cable["mean_N"] == pytest.approx(2.0, abs=1.5)
         assert cable["rate_Hz"] > 8.0
+        tare(tmp_path, cells.port)
         result = run(
             *("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors),
             *("--port", cells.port, "--out", out),

@@ -16,7 +16,6 @@ from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.tension.anchor import anchored_points
 from tools.tension.masses import mass_points
-from tools.tension.picture import draw_calibration
 
 FILE_NAME, PICTURE = "winch-calibration.toml", "winch-calibration.png"
 _PULL = "pull.raw"
@@ -89,6 +88,8 @@ def calibrate(folder: Path, winch: Winch) -> WinchCalibration:
         raw_data=tuple(str(path.relative_to(folder)) for path in recorded),
     )
     calibration.save(folder / FILE_NAME)
+    from tools.tension.picture import draw_calibration  # noqa: PLC0415  # slow to load
+
     try:
         draw_calibration(folder / PICTURE, points, calibration)
     except OSError as error:
