@@ -30,6 +30,7 @@ _LOOK_S = 0.1
 _HELD_CLOCK_S = 1.0
 """Slack for heartbeats of a simulated bus, whose time may stand for half a second."""
 _SOME_STRAYS = 3
+_MOST_TWINS = 4
 _LATE_ANSWERS_S = 0.05
 """A second device may be slower than the first."""
 
@@ -181,7 +182,8 @@ class CanNetwork(ObjectAccess):
     def twins(self, node_id: int) -> str:
         """Return what speaks for two devices with this node id since its reset, else nothing."""
         boot_ups = self._errors.boot_ups_since_reset(node_id)
-        if boot_ups > 1:
+        # without end they are the heartbeats of a device that stays in the state of a restart
+        if 1 < boot_ups <= _MOST_TWINS:
             return f"two devices have this node id: {boot_ups} boot-up messages followed one reset"
         strays = self.clients[node_id].await_strays(_LATE_ANSWERS_S)
         if strays >= _SOME_STRAYS:
