@@ -25,6 +25,7 @@ _TPDO_FIELDS = {
     0x60B9: codec.PROBE_STATUS,
     0x60BA: codec.PROBE_POSITION,
 }
+_BITS = {0x6041: 16, 0x6064: 32, 0x6077: 16, 0x6061: 8, 0x60B9: 16, 0x60BA: 32}
 _EVERY_CYCLE = (0x6041, 0x6064, 0x6077)
 _UNSIGNED = (0x6041, 0x60B9)
 _RPDO_FIELDS = {
@@ -32,6 +33,8 @@ _RPDO_FIELDS = {
     0x6071: (codec.TORQUE_FRAME, codec.TARGET_TORQUE),
 }
 _EVERY_SYNC = 1
+_OBJECTS = 0x1000
+"""First index that is no data type; those map as dummies (CiA 301)."""
 
 
 @dataclass(frozen=True)
@@ -85,11 +88,7 @@ class AxisConfig:
     @property
     def awaited_tpdos(self) -> int:
         """The TPDOs that make the answer to a SYNC, as bits by their place in the profile."""
-        awaited = 0
-        for number, pdo in enumerate(self.drive.tpdos):
-            if any(entry.index in _EVERY_CYCLE for entry in pdo.entries):
-                awaited |= 1 << number
-        return awaited
+        return sum({1 << pdo for pdo in _feedback_tpdos(self.drive).values()})
 
 
 class GroupLayout:
@@ -124,24 +123,25 @@ class GroupLayout:
     def _place_feedback(self, i: int, axis: AxisConfig) -> None:
         self._claim(_EMCY + axis.node_id, i, codec.EMCY)
         self._claim(_HEARTBEAT + axis.node_id, i, codec.HEARTBEAT)
-        pdo_of: dict[int, int] = {}
+        pdo_of = _feedback_tpdos(axis.drive)
         row = 0
         for number, pdo in enumerate(axis.drive.tpdos):
             self._claim(pdo.cob_id(axis.node_id), i, number)
             for index, start, size in _places(pdo):
-                if index not in _TPDO_FIELDS or index in pdo_of:
+                wanted = _TPDO_FIELDS.get(index)
+                if wanted is None or number != pdo_of.get(index, number):
+                    continue
+                if 8 * size != _BITS[index]:
+                    raise DriverError(
+                        f"drive profile {axis.drive.name!r}: tpdos: {index:04X}h has {8 * size} "
+                        f"bits; allowed: {_BITS[index]}"
+                    )
+                if wanted in self.fields[i, :row, 1]:
                     continue
                 pdo_of[index] = number
                 signed = int(index not in _UNSIGNED)
-                self.fields[i, row] = number, _TPDO_FIELDS[index], start, size, signed
+                self.fields[i, row] = number, wanted, start, size, signed
                 row += 1
-        for index in _EVERY_CYCLE:
-            kind = pdo_of.get(index)
-            if kind is None or axis.drive.tpdos[kind].transmission_type != _EVERY_SYNC:
-                raise DriverError(
-                    f"drive profile {axis.drive.name!r}: tpdos: no TPDO of transmission_type 1 "
-                    f"holds {index:04X}h, which torque control needs of every cycle"
-                )
         self.mode_mapped[i] = 0x6061 in pdo_of
         self.probe_mapped[i] = 0x60B9 in pdo_of and pdo_of[0x60B9] == pdo_of.get(0x60BA)
 
@@ -164,8 +164,27 @@ class GroupLayout:
                     self.answer[i, frame_column], self.answer[i, byte_column] = row, start
 
 
+def _feedback_tpdos(drive: DriveProfile) -> dict[int, int]:
+    """Return which TPDO, by its place in the profile, answers every SYNC with what object."""
+    found: dict[int, int] = {}
+    for index in _EVERY_CYCLE:
+        for number, pdo in enumerate(drive.tpdos):
+            every = pdo.transmission_type == _EVERY_SYNC
+            if every and any(entry.index == index for entry in pdo.entries):
+                found.setdefault(index, number)
+        if index not in found:
+            raise DriverError(
+                f"drive profile {drive.name!r}: tpdos: no TPDO of transmission_type 1 "
+                f"holds {index:04X}h, which torque control needs of every cycle"
+            )
+    return found
+
+
 def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
-    """Return the RPDOs that carry controlword and target torque."""
+    """Return the RPDOs that carry controlword and target torque, and nothing else but gaps.
+
+    Another object in them, as mode of operation or torque limit, would be set to 0 every cycle.
+    """
     found: dict[int, Pdo] = {}
     for index in _RPDO_FIELDS:
         for pdo in drive.rpdos:
@@ -176,7 +195,14 @@ def _command_rpdos(drive: DriveProfile) -> list[Pdo]:
                 f"drive profile {drive.name!r}: rpdos: no RPDO holds {index:04X}h with 16 bits, "
                 "which torque control needs"
             )
-    return [pdo for pdo in drive.rpdos if pdo in found.values()]
+    pdos = [pdo for pdo in drive.rpdos if pdo in found.values()]
+    for index in (entry.index for pdo in pdos for entry in pdo.entries):
+        if index not in _RPDO_FIELDS and index >= _OBJECTS:
+            raise DriverError(
+                f"drive profile {drive.name!r}: rpdos: {index:04X}h is in one RPDO with what is "
+                "sent every cycle, and would be set to 0; allowed: 6040h, 6071h and dummies"
+            )
+    return pdos
 
 
 def _places(pdo: Pdo) -> Iterator[tuple[int, int, int]]:

@@ -11,6 +11,7 @@ from drivers import axis_codec as codec
 from drivers.axis_codec import Ints
 from drivers.axis_layout import AxisConfig
 from drivers.cia402 import State
+from drivers.drive_units import whole_units
 
 NO_MODE = -1000
 """Wanted mode of an axis that was not asked for any."""
@@ -95,7 +96,8 @@ class GroupState:
             floats[codec.RAD_PER_COUNT, i] = axis.rad_per_count
             floats[codec.NM_PER_UNIT, i] = axis.Nm_per_unit
             ints[codec.AWAITED, i] = axis.awaited_tpdos
-            most = int(axis.torque_limit_Nm / abs(axis.Nm_per_unit) + 1e-9)
+            most = whole_units(axis.torque_limit_Nm, abs(axis.Nm_per_unit))
+            # 6071h has 16 bits: in mNm no more than 32.767 Nm can be asked for
             floats[codec.LIMIT_UNITS, i] = min(most, 0x7FFF)
             ints[codec.FRAMES_ALLOWED, i] = max(_FRAMES_A_CYCLE, round(_FRAMES_A_SECOND * period_s))
             patience_s = _HEARTBEAT_PATIENCE * axis.drive.heartbeat_producer_s

@@ -312,7 +312,8 @@ def _read_ratings(
     report: BootReport,
 ) -> None:
     try:
-        report.device_name = str(network.read(node_id, 0x1008))
+        if 0x1008 in network.dictionary(node_id):
+            report.device_name = str(network.read(node_id, 0x1008))
         report.rated_torque_Nm = _rated_torque_Nm(network, node_id, want)
         increments, turns = _counts_per_turn(network, node_id, want)
         if 0x6502 in network.dictionary(node_id):

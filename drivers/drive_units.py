@@ -18,6 +18,11 @@ def torque_unit_Nm(drive: DriveProfile, rated_torque_Nm: float) -> float:
     return _ABSOLUTE_Nm[drive.torque_unit] if share is None else share * rated_torque_Nm
 
 
+def whole_units(limit: float, unit: float) -> int:
+    """Return how many units are within a limit; the share of a unit that is noise counts as one."""
+    return int(limit / unit + 1e-9)
+
+
 def velocity_unit_rad_s(drive: DriveProfile, counts_per_turn: int) -> float:
     """Return the speed of one unit of 6099h."""
     return _RAD_S_PER_RPM if drive.velocity_unit == "rpm" else math.tau / counts_per_turn
@@ -32,8 +37,11 @@ def acceleration_unit_rad_s2(drive: DriveProfile, counts_per_turn: int) -> float
 def torque_settings(
     drive: DriveProfile, rated_torque_Nm: float, limit_Nm: float
 ) -> Iterator[tuple[int, int]]:
-    """Yield object index and value of what bounds the torque: limit and, where given, slope."""
+    """Yield object index and value of what bounds the torque: limit and, where given, slope.
+
+    A limit that is no whole number of units is rounded down.
+    """
     unit = torque_unit_Nm(drive, rated_torque_Nm)
-    yield 0x6072, round(min(limit_Nm / unit, 0xFFFF)) if unit > 0.0 else 0
+    yield 0x6072, min(whole_units(limit_Nm, unit), 0xFFFF) if unit > 0.0 else 0
     if drive.torque_slope_Nm_s is not None and unit > 0.0:
         yield 0x6087, round(min(drive.torque_slope_Nm_s / unit, 0xFFFFFFFF))

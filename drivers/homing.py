@@ -14,8 +14,12 @@ _SPEED_RAD_S = math.radians(30.0)
 _ACCELERATION_RAD_S2 = math.radians(360.0)
 # by then a drive has seen the start bit, so that what it says is about this homing
 _ANSWER_S = 0.02
-_MIRRORED = {33: 34, 34: 33, 1: 2, 2: 1} | {k: k + 4 for k in range(3, 7)}
-_MIRRORED |= {k: k + 4 for k in range(7, 11)} | {k: k - 4 for k in range(11, 15)}
+# CiA 402-2: limit switches, home switch from either side, home switch between limits, index alone;
+# 17 to 30 are 1 to 14 without the index
+_WITH_INDEX = ((1, 2), (3, 5), (4, 6), (7, 11), (8, 12), (9, 13), (10, 14))
+_PAIRS = (*_WITH_INDEX, *((a + 16, b + 16) for a, b in _WITH_INDEX), (33, 34))
+MIRRORED = dict(_PAIRS) | {b: a for a, b in _PAIRS}
+"""The homing method that does the same in the other direction."""
 _FINDING_INDEX = (*range(1, 15), 33, 34)
 
 
@@ -56,22 +60,26 @@ class Homing:
         self._done = self._telling & ~_ERROR
 
     def configure(self) -> None:
-        """Write method, speeds and offset by SDO; raises SdoError."""
+        """Write method, speeds and, where the drive has them, acceleration and offset by SDO.
+
+        Raises SdoError.
+        """
         config = self._group.axes[self._axis]
         speed = config.speed_units(_SPEED_RAD_S)
-        write = self._group.network.write
-        write(self._node_id, 0x6098, 0, self._drives_method())
+        network = self._group.network
+        network.write(self._node_id, 0x6098, 0, self._drives_method())
         for sub in (1, 2):
-            write(self._node_id, 0x6099, sub, speed)
+            network.write(self._node_id, 0x6099, sub, speed)
         acceleration = config.acceleration_units(_ACCELERATION_RAD_S2)
-        write(self._node_id, 0x609A, 0, acceleration)
-        write(self._node_id, 0x607C, 0, 0)
+        for index, value in ((0x609A, acceleration), (0x607C, 0)):
+            if index in network.dictionary(self._node_id):
+                network.write(self._node_id, index, 0, value)
 
     def _drives_method(self) -> int:
         """Return the method as this drive counts directions."""
         if self._group.axes[self._axis].drive.homing_sign > 0:
             return self._method
-        return _MIRRORED.get(self._method, self._method)
+        return MIRRORED.get(self._method, self._method)
 
     def update(self) -> bool:
         """Advance by one cycle, after its `receive`; return whether homing is done.

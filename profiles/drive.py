@@ -40,7 +40,7 @@ class Pdo(Profile):
     """One PDO as the master configures it; times of 0 leave the function off."""
 
     number: int = Field(ge=1, le=512)
-    cob_id_offset: int = Field(ge=0x180, le=0x57F)
+    cob_id_offset: int = Field(ge=0x180, le=0x500)
     transmission_type: Unsigned8
     inhibit_time_s: float = Field(default=0.0, ge=0, le=6.5535)
     event_timer_s: float = Field(default=0.0, ge=0, le=65.535)
@@ -140,6 +140,12 @@ class DriveProfile(Profile):
                 values = [getattr(pdo, key) for pdo in pdos]
                 if len(set(values)) < len(values):
                     raise ValueError(f"{kind}: {key} {values}; allowed: each value once")
+        both = {p.cob_id_offset for p in self.rpdos} & {p.cob_id_offset for p in self.tpdos}
+        if both:
+            raise ValueError(
+                f"rpdos: cob_id_offset {min(both):03X}h is that of a TPDO too; allowed: each "
+                "value once, as two senders of one identifier destroy each other's frames"
+            )
         unknown = [fact for fact in self.verified if fact not in type(self).model_fields]
         if unknown:
             raise ValueError(f"verified.{unknown[0]}: unknown key; allowed: a key of this file")

@@ -15,7 +15,7 @@ from drivers.decode.frame import EFF_MASK, Frame
 from drivers.errors import DriverError
 
 _LINE = re.compile(
-    r"\((?P<time>\d+(?:\.\d+)?)\)\s+(?P<channel>\S+)\s+"
+    r"\((?P<time>[0-9]{1,12}(?:\.[0-9]{1,12})?)\)\s+(?P<channel>\S+)\s+"
     r"(?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})#"
     r"(?:(?P<remote>[Rr])(?P<length>[0-8]?)|(?P<data>(?:[0-9A-Fa-f]{2}){0,8}))"
     r"(?:_[0-9A-Fa-f])?(?:\s+[RTrt])?"

@@ -16,7 +16,9 @@ from profiles import DriveProfile
 _POSITIONS = frozenset(
     (0x6062, 0x6064, 0x6067, 0x607A, 0x607C, 0x60E4, 0x60F4, *range(0x60BA, 0x60BE))
 )
-_VELOCITIES = frozenset((0x606B, 0x606C, 0x60FF, 0x6081, 0x6099))
+_VELOCITIES = frozenset((0x606B, 0x606C, 0x60FF))
+_SPEEDS = frozenset((0x607F, 0x6081, 0x6082, 0x6099))
+"""Velocities without direction; 6099h is a record of two."""
 _TORQUES = frozenset((0x6071, 0x6074, 0x6077, 0x60B2))
 _TORQUE_LIMITS = frozenset((0x6072, 0x60E0, 0x60E1))
 _HOMING, _CYCLIC = 6, (8, 9, 10)
@@ -118,8 +120,10 @@ def _quantity(node: NodeView, index: int, sub: int) -> tuple[float, str, int] | 
     if index in _POSITIONS:
         scale = node.position_rad()
         return (1.0, "counts", 0) if scale is None else (math.degrees(scale), "deg", 3)
-    if index in _VELOCITIES:
+    if index in _VELOCITIES or (index in _SPEEDS and (sub or index != 0x6099)):
         scale = node.velocity_rad_s()
+        if scale is not None and index in _SPEEDS:
+            scale = abs(scale)
         return None if scale is None else (math.degrees(scale), "deg/s", 3)
     if index in _TORQUES:
         return _torque(node)

@@ -12,7 +12,8 @@ from axis_rig import DRIVE, Rig, open_rig, start_simulator
 from drivers import touch_probe
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveFaultError
-from drivers.homing import Homing, HomingStep
+from drivers.homing import MIRRORED, Homing, HomingStep
+from sim_bus.cia402.homing import METHODS
 
 COUNT_RAD = math.tau / 8192
 
@@ -72,6 +73,13 @@ def test_a_drive_that_counts_homing_directions_the_other_way_round(bus: str) -> 
         assert rig.network.read_int(1, 0x6098) == 33
         Homing(rig.group, 0, 37 if 37 in DRIVE.homing_methods else 35).configure()
         assert rig.network.read_int(1, 0x6098) in (35, 37)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_mirror_of_a_method_is_its_own_the_other_way_round(method: int) -> None:
+    assert METHODS[MIRRORED[method]] == METHODS[method].mirrored()
+    if method < 15:  # the same without index
+        assert MIRRORED[method + 16] == MIRRORED[method] + 16
 
 
 def test_homing_in_place_tells_no_index(rig: Rig) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import struct
 
 import numpy as np
@@ -15,7 +17,8 @@ from drivers.axis_layout import AxisConfig, GroupLayout
 from drivers.axis_state import GroupState
 from drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE, State
 from drivers.errors import DriverError
-from profiles import load_drive
+from profiles import DriveProfile, Pdo, load_drive
+from profiles.drive import PdoEntry
 
 CAN_FRAME = struct.Struct("=IB3x8s")
 SPLIT = load_drive("mnm-profile-torque")
@@ -132,3 +135,57 @@ def test_feedback_that_does_not_come_at_every_sync_is_refused() -> None:
     drive = SPLIT.model_copy(update={"tpdos": late})
     with pytest.raises(DriverError, match="no TPDO of transmission_type 1 holds 6077h"):
         GroupLayout([AxisConfig(1, drive, 3.0, 8192, 0x2D, 2.0)])
+
+
+def _one(drive: DriveProfile, limit_Nm: float = 2.0) -> GroupLayout:
+    return GroupLayout([AxisConfig(1, drive, 3.0, 8192, 0x2D, limit_Nm)])
+
+
+def test_feedback_that_is_told_again_when_it_changes_is_not_waited_for() -> None:
+    """Drives have the statusword in a PDO of its own, sent on change, as delivered."""
+    (statusword, *_), *_ = (pdo.entries for pdo in SPLIT.tpdos)
+    event = Pdo(number=2, cob_id_offset=0x280, transmission_type=255, entries=(statusword,))
+    plain = AxisConfig(1, SPLIT, 3.0, 8192, 0x2D, 2.0)
+    for tpdos, bits in (((event, *SPLIT.tpdos), 0b110), ((*SPLIT.tpdos, event), 0b011)):
+        axis = dataclasses.replace(plain, drive=SPLIT.model_copy(update={"tpdos": tpdos}))
+        assert axis.awaited_tpdos == bits
+        fields = GroupLayout([axis]).fields[0]
+        assert np.count_nonzero(fields[:, 3]) == 3
+        assert tpdos.index(event) not in fields[fields[:, 3] > 0, 0]
+
+
+def test_what_would_be_set_to_zero_every_cycle_is_refused() -> None:
+    command, torque = SPLIT.rpdos
+    for index, refused in ((0x6060, True), (0x6072, True), (0x0005, False)):
+        more = (*command.entries, PdoEntry(index=index, bits=8))
+        rpdos = command.model_copy(update={"entries": more}), torque
+        drive = SPLIT.model_copy(update={"rpdos": rpdos})
+        if refused:
+            with pytest.raises(DriverError, match=f"{index:04X}h .* would be set to 0"):
+                _one(drive)
+        else:
+            assert _one(drive).rpdos.array["length"].tolist() == [3, 2]
+
+
+def test_an_object_of_another_length_is_refused() -> None:
+    status, torque = SPLIT.tpdos
+    entries = (status.entries[0], PdoEntry(index=0x6064, bits=16))
+    tpdos = status.model_copy(update={"entries": entries}), torque
+    with pytest.raises(DriverError, match="6064h has 16 bits; allowed: 32"):
+        _one(SPLIT.model_copy(update={"tpdos": tpdos}))
+
+
+@pytest.mark.parametrize("torque_Nm", [40.0, -40.0, 1e300])
+def test_more_millinewtonmetres_than_16_bits_hold_are_cut_and_not_wrapped(torque_Nm: float) -> None:
+    axes = [AxisConfig(1, SPLIT, 3.0, 8192, 0x2D, 50.0)]
+    layout, state = GroupLayout(axes), GroupState(axes, PERIOD_S, lockstep=True)
+    state.ints[codec.TARGET] = state.ints[codec.STATE] = State.OPERATION_ENABLED
+    state.command.torque_Nm[0] = torque_Nm
+    for _ in range(3):
+        codec.encode(
+            layout.rpdos.array.view(np.uint8).reshape(-1, 16), layout.answer, CONTROLWORD_TABLE,
+            state.ints, state.floats, state.flags,
+        )  # fmt: skip
+        (units,) = struct.unpack("<h", CAN_FRAME.unpack(layout.rpdos.rows[1])[2][:2])
+        assert units == math.copysign(32767, torque_Nm)
+        assert state.command.sent_torque_Nm[0] == pytest.approx(math.copysign(32.767, torque_Nm))

@@ -21,7 +21,7 @@ def drive(**keys: object) -> DriveProfile:
     ("unit", "step_Nm", "half_a_Nm"),
     [
         ("per_mille_of_rated", 0.0024, 208),
-        ("percent_of_rated", 0.024, 21),
+        ("percent_of_rated", 0.024, 20),  # rounded down: a limit is never exceeded
         ("mNm", 0.001, 500),
         ("cNm", 0.01, 50),
     ],

@@ -228,6 +228,14 @@ def test_contradictions_within_a_drive(change: dict[str, Any], part: str, tmp_pa
         read_toml_model(_write(tmp_path, source, _read(source) | change), DriveProfile)
 
 
+def test_one_identifier_has_one_sender(tmp_path: Path):
+    source = SHIPPED / "drives" / "generic-cia402.toml"
+    table = _read(source)
+    table["rpdos"][0]["cob_id_offset"] = table["tpdos"][1]["cob_id_offset"]
+    with pytest.raises(ProfileError, match="rpdos: cob_id_offset 280h is that of a TPDO too"):
+        read_toml_model(_write(tmp_path, source, table), DriveProfile)
+
+
 def test_more_than_a_frame_in_a_pdo(tmp_path: Path):
     source = SHIPPED / "drives" / "generic-cia402.toml"
     table = _read(source)

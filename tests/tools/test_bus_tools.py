@@ -130,8 +130,10 @@ def test_replay_of_a_log_of_python_can(session: Session, tmp_path: Path) -> None
                 logger(message)
         result = cdpr("bus", "replay", tmp_path / name, "--winch", WINCH)
         assert result.returncode == 0, result.stderr
-        told = [line[15:] for line in result.stdout.splitlines()]
-        assert told == [line[15:] for line in session.lines], name
+        told = result.stdout.splitlines()
+        assert [line[15:] for line in told] == [line[15:] for line in session.lines], name
+        times = [[float(line[:12]) for line in lines] for lines in (told, session.lines)]
+        assert times[0] == pytest.approx(times[1], abs=1.1e-3), name  # .blf has whole milliseconds
 
 
 def test_raw_lines_are_a_log_again(session: Session) -> None:
@@ -313,7 +315,7 @@ def test_bad_arguments(lab: Lab, tmp_path: Path) -> None:
     assert "is no folder" in complaint("scan", *here, "--profiles", nowhere)
 
 
-def test_bad_logs(tmp_path: Path) -> None:
+def test_bad_logs(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "trip.log"
     assert "trip.log: cannot be read" in complaint("replay", log)
     log.write_text("(1.0) can0 123#00\n(1.0) can1 123#00\n")
@@ -321,8 +323,22 @@ def test_bad_logs(tmp_path: Path) -> None:
     assert "--channel can7" in complaint("replay", log, "--channel", "can7")
     log.write_text("(1.0) can0 123#00\n(1.0) can0 123#0\n(1.0) can0 123#00\n")
     assert "trip.log: line 2" in complaint("replay", log, status=1)
+    with lab.join() as ear:  # not even the first line is sent
+        assert "trip.log: line 2" in complaint("replay", log, "--to", lab.bus, status=1)
+        assert 0x123 not in {message.arbitration_id for message in lab.passed(ear)}
     (tmp_path / "trip.blf").write_bytes(b"nothing of the kind" * 20)
     assert "trip.blf" in complaint("replay", tmp_path / "trip.blf")
+
+
+def test_a_pipe_of_bytes_that_are_no_text() -> None:
+    strict = os.environ | {"PYTHONIOENCODING": "utf-8:strict"}
+    arguments = command("bus", "replay", "-")
+    result = subprocess.run(
+        arguments, input=b"\xd2\x00\n", capture_output=True, env=strict, timeout=60, check=False
+    )
+    assert result.returncode == 2
+    assert result.stderr.decode().splitlines()[-1].endswith("is no text, so no log of candump")
+    assert b"Traceback" not in result.stderr
 
 
 def test_nothing_is_sent_to_a_real_bus_unasked(tmp_path: Path) -> None:

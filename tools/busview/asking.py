@@ -56,7 +56,10 @@ class Found:
     def text(self, index: int) -> str | None:
         """Return a text object, None where it was not given."""
         raw = self.objects.get((index, 0))
-        return None if raw is None else raw.decode("ascii", "replace").rstrip("\0 ")
+        if raw is None:
+            return None
+        told = raw.decode("ascii", "replace").rstrip("\0 ")
+        return "".join(c if c.isprintable() else "?" for c in told)  # no escapes to a terminal
 
     @property
     def is_drive(self) -> bool:

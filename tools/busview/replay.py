@@ -49,6 +49,16 @@ def recorded(path: Path, channel: str | None) -> Iterator[Logged]:
         raise BadInputError(f"--channel {channel}: {path} holds {names}")
 
 
+def check(path: Path, channel: str | None) -> None:
+    """Read a file to its end, so that nothing of one that is broken is sent; see `recorded`.
+
+    Standard input can be read only once: there is nothing to check before it is sent.
+    """
+    if str(path) != "-":
+        for _ in recorded(path, channel):
+            pass
+
+
 def _frames(path: Path) -> Iterator[Logged]:
     try:
         if str(path) == "-":
@@ -60,6 +70,8 @@ def _frames(path: Path) -> Iterator[Logged]:
             yield from _foreign(path)
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise BadInputError("standard input: is no text, so no log of candump") from error
 
 
 def _foreign(path: Path) -> Iterator[Logged]:

@@ -124,6 +124,8 @@ class PythonCanSource:
                 message = self._bus.recv(0.0 if i else timeout_s)
                 if message is None:
                     return
+                if message.timestamp < _LATEST_RELATIVE_s:
+                    message.timestamp = time.time()
                 self._waiting.append(message)
         except (can.CanError, OSError) as error:
             self.lost = bus_gone(self._url, error)
@@ -141,9 +143,8 @@ class PythonCanSource:
 
 def frame_of(message: can.Message) -> Frame:
     """Return a message of python-can as a frame."""
-    stamp = message.timestamp if message.timestamp > _LATEST_RELATIVE_s else time.time()
     return Frame(
-        round(stamp, 6),
+        round(message.timestamp, 6),
         message.arbitration_id,
         bytes(message.data or b""),
         message.is_extended_id and not message.is_error_frame,

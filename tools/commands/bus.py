@@ -14,7 +14,7 @@ from drivers.errors import BusError
 from tools.busview.identifiers import filters, parse_identifiers
 from tools.busview.known import known_bus
 from tools.busview.monitor import LineWriter, LogFile, Viewer, watch
-from tools.busview.replay import BLOCK, Pacer, Sender, chosen, play, recorded
+from tools.busview.replay import BLOCK, Pacer, Sender, check, chosen, play, recorded
 from tools.busview.source import SimbusSource, named_bus, open_source
 from tools.busview.summary import Summary
 from tools.commands import bus_budget, bus_scan
@@ -135,6 +135,7 @@ def replay(
     wanted = None if ids is None else parse_identifiers(ids)
     url = None if to is None else named_bus(to)
     if url is not None:
+        check(file, channel)
         what = f"the recorded frames are sent to {url}, commands to motors among them."
         require_consent(what, yes or url.is_simulated)
     summary = Summary(known.bitrate_bit_s)

@@ -95,6 +95,22 @@ def test_units_are_those_of_the_profile(
     assert told[0x6077] == (pytest.approx(torque[0]), torque[1])
 
 
+@pytest.mark.parametrize(
+    ("index", "sub", "text"),
+    [
+        (0x6099, 0, "2"),
+        (0x6099, 1, "90.000 deg/s"),
+        (0x6081, 0, "90.000 deg/s"),
+        (0x60FF, 0, "-90.000 deg/s"),
+    ],
+)
+def test_a_speed_has_no_direction_and_a_count_no_unit(index: int, sub: int, text: str) -> None:
+    number = 2048 if sub or index != 0x6099 else 2
+    answer = struct.pack("<BHBI", 0x43, index, sub, number)
+    known = replace(KNOWN, drive=drive(position_sign=-1))
+    assert decoded(0x581, answer, known).text.endswith(f" = {text}")
+
+
 STATES = {
     0x0000: "not ready to switch on",
     0x0250: "switch on disabled",
