@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import can
 import canopen
@@ -202,6 +203,8 @@ def test_the_stock_lss_master_configures_new_drives_one_by_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(canopen.lss.LssMaster, "RESPONSE_TIMEOUT", 0.02)
+    shorter = SimpleNamespace(sleep=lambda seconds: time.sleep(0.3 * seconds))
+    monkeypatch.setattr("canopen.lss.time", shorter)
     with simulator("--nodes", "2", "--unconfigured") as name, stranger_on(name) as network:
         lss = network.lss
         serials = set()
