@@ -364,6 +364,8 @@ class Hub:
                 for frame in node.outbox:
                     can_id, length = HEADER.unpack_from(frame)
                     route = self._routes.get(can_id) or self._route(can_id)
+                    if route.merges and any(other[4] == frame for other in batch):
+                        continue
                     batch.append((route.key, len(batch), length, route, frame, node))
                 node.outbox.clear()
         if not batch:

@@ -58,6 +58,15 @@ def test_long_filter_lists_come_in_parts(start_bus: StartBus) -> None:
     assert picky.quiet()
 
 
+def test_lss_answers_that_are_the_same_are_one_frame(start_bus: StartBus, stub_node: type) -> None:
+    both = (pack_frame(0x7E4, b"\x4f" + bytes(7)), pack_frame(0x584, bytes(8)))
+    bus = start_bus(stub_node(1, answers=both), stub_node(2, answers=both))
+    master = bus.join()
+    master.send(0x080)
+    assert [master.recv_id() for _ in range(3)] == [0x584, 0x584, 0x7E4]
+    assert master.quiet()
+
+
 def test_answers_to_one_sync_come_in_the_order_of_arbitration(
     start_bus: StartBus, stub_node: type
 ) -> None:
