@@ -14,6 +14,7 @@ import pytest
 from bus_lab import WINCH, Lab, cdpr, last_json
 
 from profiles import load_winch
+from tools.commands import bus_scan
 
 EDS = str(load_winch(WINCH).drive.eds)
 
@@ -60,6 +61,15 @@ def scan(lab: Lab, *arguments: str) -> dict[int, dict[str, Any]]:
     return {node["node_id"]: node for node in bus["nodes"]} | {0: bus}
 
 
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scan that listens only briefly, where no heartbeat is waited for."""
+    monkeypatch.setattr(bus_scan, "LISTEN_S", 0.25)
+
+
+hastily = pytest.mark.usefixtures("hasty")
+
+
 # -- scan
 
 
@@ -79,6 +89,17 @@ def test_scan_tells_who_is_there(lab: Lab) -> None:
     assert found[0]["warning"] == ""
 
 
+@hastily
+def test_a_name_that_is_an_escape_to_the_terminal(lab: Lab) -> None:
+    with stranger(lab, 20, x1000=0x20192, x6502=0xFFFFFFFF, x6041=0xFFFF, x1001=0xFF) as node:
+        node.set_data(0x1008, 0, b"\x1b[2JEvil\nnode\xff")
+        result = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "20")
+    assert result.returncode == 0, result.stderr
+    assert "\x1b" not in result.stdout
+    assert "?[2JEvil?node" in result.stdout.splitlines()[2]
+
+
+@hastily
 def test_scan_disturbs_nobody(lab: Lab) -> None:
     """All that goes out are requests to read."""
     with lab.join() as ear:
@@ -93,6 +114,7 @@ def test_scan_disturbs_nobody(lab: Lab) -> None:
     assert not others
 
 
+@hastily
 def test_scan_for_people(lab: Lab) -> None:
     result = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "2,9")
     assert result.returncode == 0
@@ -111,6 +133,7 @@ def test_scan_for_people(lab: Lab) -> None:
     assert "no heartbeat" in doing
 
 
+@hastily
 def test_two_nodes_with_one_id_are_told(lab: Lab) -> None:
     with stranger(lab, 1, x1018_4=77, x1000=0x20192):
         found = scan(lab, "--nodes", "1-2")
@@ -142,6 +165,7 @@ def test_devices_that_are_no_drives(lab: Lab, tmp_path: Path) -> None:
     assert found[23]["profiles"] == []
 
 
+@hastily
 def test_profiles_of_ones_own(lab: Lab, tmp_path: Path) -> None:
     source = Path(EDS)
     text = source.with_suffix(".toml").read_text(encoding="utf-8")
@@ -153,6 +177,7 @@ def test_profiles_of_ones_own(lab: Lab, tmp_path: Path) -> None:
     assert node["profiles"] == ["generic-cia402", own]
 
 
+@hastily
 def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
     with lab.join() as bus:
         reading = can.Message(arbitration_id=0x601, data=bytes.fromhex("4018100100000000"))
@@ -169,6 +194,7 @@ def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
     assert "SDO requests" in forced[0]["warning"]
 
 
+@hastily
 def test_scan_of_two_buses(labs: tuple[Lab, Lab]) -> None:
     lab, other = labs
     result = cdpr("bus", "scan", "--bus", lab.bus, "--bus", other.bus, "--nodes", "2-9", "--json")

@@ -220,7 +220,7 @@ def test_monitor_lines_come_at_once_and_plain(lab: Lab) -> None:
 
 
 def test_monitor_ends_by_itself_and_counts_what_is_odd(lab: Lab) -> None:
-    monitor = begin("bus", "monitor", "--bus", lab.bus, "--seconds", "3", "--ids", "711", "--json")
+    monitor = begin("bus", "monitor", "--bus", lab.bus, "--seconds", "1", "--ids", "711", "--json")
     with lab.join() as bus:
         while monitor.poll() is None:
             for identifier in (0x711, 0x712):

@@ -53,7 +53,7 @@ class Scan:
             raise BadInputError(str(error)) from error
         self._port.settimeout(_POLL_S)
 
-    def listen(self, seconds: float = LISTEN_S) -> None:
+    def listen(self, seconds: float) -> None:
         """Take in what is said without being asked."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:

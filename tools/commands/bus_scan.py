@@ -14,7 +14,7 @@ from profiles import DriveProfile
 from tools.busview.fit import drive_profiles
 from tools.busview.identifiers import parse_node_ids
 from tools.busview.roster import entry, lines, master_signs, there
-from tools.busview.scan import Scan
+from tools.busview.scan import LISTEN_S, Scan
 from tools.busview.source import named_bus
 from tools.commands.options import JsonOption
 from tools.errors import WorkFailedError
@@ -68,7 +68,7 @@ def _visit(
     """Scan one bus; raises WorkFailedError where another master is in the way."""
     begun = time.monotonic()
     with Scan(url, node_ids) as scan_:
-        scan_.listen()
+        scan_.listen(LISTEN_S)
         if scan_.traffic.sdo_requests and not force:
             raise WorkFailedError(
                 f"{url}: another master is busy with {master_signs(scan_.traffic)}: answers to our "

@@ -330,7 +330,7 @@ FRAMES = st.tuples(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=400)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(st.lists(FRAMES, max_size=60), st.booleans())
 def test_no_frame_makes_it_fail(frames: list[tuple[int, bytes, int, int]], known: bool) -> None:
     decoder = Decoder({1: KNOWN}) if known else Decoder(others=KnownNode(WINCH.drive))
