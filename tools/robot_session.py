@@ -11,7 +11,6 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-import canopen
 import numpy as np
 
 from cdpr_rt.errors import TripError
@@ -25,6 +24,7 @@ from drivers.boot import BootReport, BootReports, BootSettings, boot_all
 from drivers.bus import BusUrl, query_status
 from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
 from drivers.cia402 import State, fault_text
+from drivers.data_sheet import load_dictionary
 from drivers.errors import BootError, BusError, DriveFaultError, DriverError, SdoError
 from drivers.network import CanNetwork
 from profiles import Robot, RobotAxis
@@ -275,8 +275,8 @@ def _open_networks(
             raise BadInputError(f"bus {name}: {error}") from error
         stack.callback(network.close)
         for axis in axes:
-            eds = str(axis.winch.drive.eds)
-            network.add_node(axis.node_id, canopen.import_od(eds, axis.node_id))
+            eds = axis.winch.drive.eds
+            network.add_node(axis.node_id, load_dictionary(eds, axis.node_id))
         networks[name] = network
     return networks
 

@@ -9,8 +9,6 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-import canopen
-
 from cdpr_rt.cogging_profile import DriveIdentity
 from cdpr_rt.errors import TripError
 from cdpr_rt.executive import Executive
@@ -24,6 +22,7 @@ from drivers.boot import BootReport, BootSettings, boot
 from drivers.bus import BusUrl, query_status
 from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
 from drivers.cia402 import Mode, State, fault_text
+from drivers.data_sheet import load_dictionary
 from drivers.errors import BusError, DriveFaultError, SdoError
 from drivers.homing import Homing
 from drivers.network import CanNetwork
@@ -227,7 +226,7 @@ def open_network(
         except BusError as error:
             raise BadInputError(str(error)) from error
         stack.callback(network.close)
-        network.add_node(winch.node_id, canopen.import_od(str(drive.eds), winch.node_id))
+        network.add_node(winch.node_id, load_dictionary(drive.eds, winch.node_id))
         yield network
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
 
+from drivers.data_sheet import load_dictionary
 from profiles import load_drive
 
 _STANDARD_DRIVE = "generic-cia402"
@@ -76,7 +77,7 @@ def _part(entry: Any, sub: int) -> ODVariable | None:
 
 @lru_cache(maxsize=32)
 def _dictionary(eds: Path) -> Any:
-    return canopen.import_od(str(eds), None)
+    return load_dictionary(eds)
 
 
 @cache

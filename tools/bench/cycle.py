@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-import canopen
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +16,7 @@ from cdpr_rt.realtime import one_core
 from drivers.axis_group import AxisConfig, AxisGroup
 from drivers.boot import BootReport, BootSettings, boot
 from drivers.bus import BusUrl, query_status
+from drivers.data_sheet import load_dictionary
 from drivers.network import CanNetwork
 from profiles import Winch, load_winch
 from tools.bench.contenders import Exchange, FloorExchange, LibraryExchange, OwnExchange
@@ -135,7 +135,7 @@ def _contenders(out: Output) -> Iterator[tuple[str, Sequence[Exchange]]]:
         heartbeat_s = winch.drive.heartbeat_consumer_s / 4
         network = CanNetwork(url, nodes, winch.master_node_id, heartbeat_s)
         stack.callback(network.close)
-        dictionaries = {node: canopen.import_od(str(winch.drive.eds), node) for node in nodes}
+        dictionaries = {node: load_dictionary(winch.drive.eds, node) for node in nodes}
         reports = []
         for node, dictionary in dictionaries.items():
             network.add_node(node, dictionary)

@@ -65,9 +65,10 @@ def info(
             there = index in network.dictionary(node)
             return network.read_int(node, index, sub) if there else otherwise
 
+        has_name = 0x1008 in network.dictionary(node)
         told: dict[str, Any] = {
             "node_id": node,
-            "device_name": str(network.read(node, 0x1008)),
+            "device_name": str(network.read(node, 0x1008)) if has_name else "",
             "vendor_id": vendor,
             "product_code": product,
             "revision": revision,
