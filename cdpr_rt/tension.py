@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from enum import IntEnum
@@ -113,10 +114,14 @@ class TensionExchange:
 
 
 class TensionWatch:
-    """Brakes a motion whose tensions are not known any more (a watch of the executive)."""
+    """Brakes a motion whose tensions are too high or not known any more (a watch of the executive).
 
-    def __init__(self, exchange: TensionExchange) -> None:
+    `stop_above_N` is what no cable may exceed.
+    """
+
+    def __init__(self, exchange: TensionExchange, stop_above_N: float = math.inf) -> None:
         self._exchange = exchange
+        self._stop_above_N = stop_above_N
 
     def alarm(self) -> str:
         """Nothing here takes the torque at once: slack cables drop the platform."""
@@ -124,5 +129,13 @@ class TensionWatch:
 
     def stop_reason(self) -> str:
         """Return why the motion must be braked, or an empty text."""
-        self._exchange.update()
-        return self._exchange.reason()
+        exchange = self._exchange
+        exchange.update()
+        reason = exchange.reason()
+        if reason:
+            return reason
+        most = int(exchange.feedback.tension_N.argmax())
+        tension = float(exchange.feedback.tension_N[most])
+        if tension <= self._stop_above_N:
+            return ""
+        return f"{exchange.cables[most]}: {tension:.1f} N, {self._stop_above_N:g} N allowed"

@@ -15,9 +15,12 @@ from cdpr_rt.exchange import FloatArray
 CONFIDENCE = 0.95
 MOST_UNCERTAINTY = 0.05
 """Relative half-width of the gain beyond which a calibration is refused."""
-_LEAST_LEVELS = 3
-_LEAST_SPAN = 2.0
-_FARTHEST_FROM_NOMINAL = 0.5
+LEAST_LEVELS = 3
+"""Different tensions that are needed each way."""
+LEAST_SPAN = 2.0
+"""Highest tension over the lowest."""
+FARTHEST_FROM_NOMINAL = 0.5
+"""Relative."""
 
 
 class CalibrationRefusedError(ControlError):
@@ -132,16 +135,16 @@ def _least_squares(
 def _refuse_few(points: Sequence[TorquePoint]) -> None:
     for winding_in, name in ((True, "winding in"), (False, "paying out")):
         levels = {round(p.tension_N, 1) for p in points if p.winding_in is winding_in}
-        if len(levels) < _LEAST_LEVELS:
+        if len(levels) < LEAST_LEVELS:
             raise CalibrationRefusedError(
-                f"{len(levels)} tensions were measured {name}; at least {_LEAST_LEVELS} different "
+                f"{len(levels)} tensions were measured {name}; at least {LEAST_LEVELS} different "
                 "ones are needed to tell the gain from friction"
             )
-        if max(levels) < _LEAST_SPAN * min(levels):
+        if max(levels) < LEAST_SPAN * min(levels):
             raise CalibrationRefusedError(
                 f"the tensions measured {name} reach from {min(levels):.1f} to "
                 f"{max(levels):.1f} N; "
-                f"the highest must be at least {_LEAST_SPAN:g} times the lowest"
+                f"the highest must be at least {LEAST_SPAN:g} times the lowest"
             )
 
 
@@ -158,7 +161,7 @@ def _refuse_unsound(found: TensionGain, nominal_m: float) -> None:
             f"{half * 1e3:.2f} mNm/N), {100 * MOST_UNCERTAINTY:g} % are allowed; use a wider range "
             "of tensions, and let the motor turn further (whole turns, or a spring at the anchor)"
         )
-    if abs(gain - nominal_m) > _FARTHEST_FROM_NOMINAL * nominal_m:
+    if abs(gain - nominal_m) > FARTHEST_FROM_NOMINAL * nominal_m:
         raise CalibrationRefusedError(
             f"the gain, {gain * 1e3:.2f} mNm/N, is far from the geometry's {nominal_m * 1e3:.2f} "
             "(drum_radius_m / gear_ratio); are gear, drum, masses or sensor scale what they are "

@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 from profiles.reader import Profile, one_of, read_toml_model
 from profiles.safety_io import find_shipped
 
-Address = Annotated[int, Field(ge=0, le=0xFFFF)]
+_LAST_ADDRESS = 0xFFFF
+Address = Annotated[int, Field(ge=0, le=_LAST_ADDRESS)]
 RegisterKind = Literal["input", "holding"]
 DataType = Literal["int16", "uint16", "int32", "uint32", "float32"]
 REGISTERS: dict[DataType, int] = {"int16": 1, "uint16": 1, "int32": 2, "uint32": 2, "float32": 2}
@@ -65,6 +66,11 @@ class Amplifier(Profile):
         if self.lowest_N >= self.highest_N:
             raise ValueError(f"lowest_N = {self.lowest_N} must be below {self.highest_N}")
         status = self.status
+        if self.value.address + REGISTERS[self.value.type] - 1 > _LAST_ADDRESS:
+            raise ValueError(
+                f"value.address: {self.value.address} for {self.value.type}; "
+                f"allowed: up to {_LAST_ADDRESS + 1 - REGISTERS[self.value.type]}"
+            )
         if status is not None and status.over_range_bit is status.broken_wire_bit is None:
             raise ValueError("status: allowed: at least one of over_range_bit, broken_wire_bit")
         return self
@@ -96,6 +102,8 @@ class TensionSensors(Profile):
     """How often each sensor is read, where the line is fast enough."""
     stale_after_s: float = Field(default=0.25, ge=0.01, le=60)
     """A reading older than this is not valid any more."""
+    stop_above_N: float = Field(default=1e6, gt=0, le=1e6)
+    """What no cable may exceed while these sensors watch a motion."""
     amplifier: Amplifier
     sensors: tuple[Sensor, ...] = Field(min_length=1, max_length=64)
 

@@ -55,7 +55,8 @@ class WinchCalibration(Profile):
         lines = ["# Tension-to-torque gain and friction of one winch, as measured."]
         for key, value in self.model_dump().items():
             # JSON writes strings, numbers and lists of them as TOML does
-            text = value.isoformat() if isinstance(value, datetime) else json.dumps(value)
+            is_date = isinstance(value, datetime)
+            text = value.isoformat() if is_date else json.dumps(value, ensure_ascii=False)
             lines.append(f"{key} = {text}")
         return "\n".join(lines) + "\n"
 

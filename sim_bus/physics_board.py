@@ -125,6 +125,8 @@ class PhysicsBoard:
         if not 1 <= axes <= _MAX_AXES:
             raise ValueError(f"axes = {axes}; allowed: 1 to {_MAX_AXES}")
         path = Path(path)
+        if path.exists():
+            cls.attach(path).close()  # one that a killed simulator left is replaced, no other file
         fresh = path.with_name(f".{path.name}.{os.getpid()}")
         words = bytearray(8 * _WORDS * (1 + axes))
         _HEADER.pack_into(words, 0, _MAGIC, axes, _WORDS)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from cdpr_rt.cogging_profile import DriveIdentity
 from cdpr_rt.errors import TripError
-from cdpr_rt.executive import Executive
+from cdpr_rt.executive import Executive, Watch
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.rehearsal import rehearse
 from cdpr_rt.supervisor import Limits, Supervisor
@@ -238,12 +238,14 @@ def open_winch(
     plant: Path | None = None,
     truth_log: Path | None = None,
     safety_io: str | None = None,
+    watches: Sequence[Watch] = (),
 ) -> Iterator[WinchSession]:
     """Boot the winch's drive on `url` and get ready to run its axis.
 
-    With `safety_io`, the profile of a safety I/O, there is power only while that allows it.
-    Whatever ends the block, the drive's power stage is off afterwards. Raises what `open_network`
-    and `open_safety` raise and the drivers' errors for a drive that does not boot.
+    With `safety_io`, the profile of a safety I/O, there is power only while that allows it;
+    `watches` are asked every cycle besides. Whatever ends the block, the drive's power stage is off
+    afterwards. Raises what `open_network` and `open_safety` raise and the drivers' errors for a
+    drive that does not boot.
     """
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
@@ -263,7 +265,8 @@ def open_winch(
                 out.note(notice)
         limits = Limits(limit, _SPEED_SHARE * winch.motor.rated_speed_rad_s, _FOLLOWING_ERROR_RAD)
         supervisor = Supervisor(limits, device.n, device.period_s)
-        watches = () if safety is None else (safety.io,)
+        if safety is not None:
+            watches = (safety.io, *watches)
         executive = Executive(device, supervisor, stop_requested, watches)
         try:
             yield WinchSession(winch, network.url, network, device, executive, report, safety)

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 
 import serial  # type: ignore[import-untyped]
 from pymodbus.client import ModbusSerialClient
-from pymodbus.exceptions import ModbusException
+from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.framer.rtu import FramerRTU
 
 from drivers.modbus.tcp import ModbusError, exception_text
@@ -21,6 +21,23 @@ _READ_CODES: Final = {"holding": 3, "input": 4}
 
 class LineError(ModbusError):
     """The serial port itself cannot be opened or is gone."""
+
+
+class _Client(ModbusSerialClient):
+    """Receives by the monotonic clock: the library's own time-out follows a clock that is set."""
+
+    def recv(self, size: int | None) -> bytes:
+        """Return what has come; nothing where the time-out passes first."""
+        del size  # the library asks for whatever there is
+        port = self.socket
+        if port is None:
+            raise ConnectionException(f"{self.comm_params.host}: not open")
+        try:
+            first: bytes = port.read(1)
+            return first + bytes(port.read(port.in_waiting))
+        except OSError:
+            self.close()  # type: ignore[no-untyped-call]
+            raise ConnectionException(f"{self.comm_params.host}: gone") from None
 
 
 class ModbusLine:
@@ -57,7 +74,7 @@ class ModbusLine:
         """Requests that had to be repeated so far."""
         self.patient = True
         """Whether a request that failed is repeated."""
-        self._client = ModbusSerialClient(
+        self._client = _Client(
             port,
             baudrate=baudrate,
             parity=parity,

@@ -20,12 +20,15 @@ from tools.commands.options import (
     JsonOption,
     PlantOption,
     SafetyIoOption,
+    SensorsOption,
+    SensorsPortOption,
     WinchArgument,
     YesOption,
 )
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.session import WinchSession, confirm_motion, open_bus, open_network, open_winch
+from tools.tension.session_watch import tension_watch
 
 app = typer.Typer(help="One drive on the bus.", no_args_is_help=True)
 
@@ -101,6 +104,8 @@ def enable(
     plant: PlantOption = None,
     seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 2.0,
     safety_io: SafetyIoOption = None,
+    sensors: SensorsOption = None,
+    port: SensorsPortOption = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -108,7 +113,10 @@ def enable(
     out = Output(as_json)
     profile, url = load_winch(winch), open_bus(bus)
     confirm_motion(url, yes, "the drive's power stage is switched on")
-    with open_winch(profile, url, out, plant, safety_io=safety_io) as session:
+    with (
+        tension_watch(sensors, port) as watches,
+        open_winch(profile, url, out, plant, safety_io=safety_io, watches=watches) as session,
+    ):
         session.set_mode(profile.drive.mode_torque)
         session.enable()
         out.say(f"{session.device.states()[0].label}, no torque")
@@ -146,6 +154,8 @@ def home(
         int, typer.Option(help="Homing method of CiA 402: 33, 34, 37, 35, 1 to 14.")
     ] = 34,
     safety_io: SafetyIoOption = None,
+    sensors: SensorsOption = None,
+    port: SensorsPortOption = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -158,7 +168,10 @@ def home(
             f"--method {method}: {profile.drive.name} has {', '.join(map(str, known))}"
         )
     confirm_motion(url, yes, "homing turns the motor by up to a turn")
-    with open_winch(profile, url, out, plant, safety_io=safety_io) as session:
+    with (
+        tension_watch(sensors, port) as watches,
+        open_winch(profile, url, out, plant, safety_io=safety_io, watches=watches) as session,
+    ):
         session.find_index(method)
         position = math.degrees(session.device.feedback.position_rad[0])
         out.say(f"homed by method {method}; the motor stands {position:.2f} deg from there")
@@ -175,6 +188,8 @@ def jog(
     ] = 22.0,
     seconds: Annotated[float, typer.Option(min=0.1, max=600.0)] = 3.0,
     safety_io: SafetyIoOption = None,
+    sensors: SensorsOption = None,
+    port: SensorsPortOption = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -187,7 +202,10 @@ def jog(
             f"--speed-deg-s {speed_deg_s:g}: allowed are up to {fastest:.0f} deg/s, not 0"
         )
     confirm_motion(url, yes, f"the motor turns at {speed_deg_s:g} deg/s for {seconds:g} s")
-    with open_winch(profile, url, out, plant, safety_io=safety_io) as session:
+    with (
+        tension_watch(sensors, port) as watches,
+        open_winch(profile, url, out, plant, safety_io=safety_io, watches=watches) as session,
+    ):
         session.set_mode(profile.drive.mode_torque)
         speed = math.radians(speed_deg_s)
         session.restrict(max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S), _JOG_ERROR_RAD)

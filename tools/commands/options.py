@@ -47,3 +47,15 @@ SafetyIoOption = Annotated[
         metavar="IO",
     ),
 ]
+
+SensorsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--sensors",
+        help="Tension sensors, a name or a file: too much tension or none known stops the motion.",
+        metavar="SENSORS",
+    ),
+]
+SensorsPortOption = Annotated[
+    str | None, typer.Option("--port", help="Serial port of the tension sensors' line.")
+]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import tempfile
 import time
 from collections.abc import Iterator
@@ -135,7 +134,7 @@ def _means(cells: LoadCells, chosen: list[int], seconds: float) -> list[float]:
         for i, number in enumerate(chosen):
             reading = cells.read(number)
             if reading.fault:
-                raise WorkFailedError(f"{reading.cable}: {reading.fault.label}; nothing was tared")
+                raise WorkFailedError(f"{reading.cable}: {reading.fault.label}; not tared")
             sums[i] += reading.tension_N
         rounds += 1
     return [total / rounds for total in sums]
@@ -201,6 +200,10 @@ def calibrate(
     run = _Run(profile, open_bus(bus), Output(as_json), folder, plant, safety_io)
     if (masses is None) == (sensors is None):
         raise BadInputError("give either --masses or --sensors")
+    if sensors is None and (port is not None or cable is not None):
+        raise BadInputError("--port and --cable go with --sensors, not with --masses")
+    if board is not None and (sensors is not None or run.url.starts_own_simulator):
+        raise BadInputError("--board goes with --masses on a running simulator (simbus:NAME)")
     if masses is not None:
         kilograms = _masses(masses)
         check_masses(profile, kilograms, gravity)
@@ -215,8 +218,10 @@ def calibrate(
         pull = plan_anchor(profile, lowest_N, highest_N, speed * 1e-3, travel_mm * 1e-3)
         if port is None:
             raise BadInputError("--sensors needs --port, the serial port of the load cells")
+        # the others' cells are of no interest: they may be silent, and are not waited for
+        cell = cells.model_copy(update={"sensors": (cells.sensors[number],)})
         run.prepare(overwrite, yes, "the made-fast cable is pulled by the winch")
-        run.by_load_cell(pull, TensionSampler(cells, port), number)
+        run.by_load_cell(pull, TensionSampler(cell, port))
     run.finish()
 
 
@@ -233,8 +238,9 @@ class _Run:
 
     def prepare(self, overwrite: bool, yes: bool, what: str) -> None:
         """Make room for recordings and ask before a real motor is energised."""
-        _fresh(self.folder, overwrite)
+        _refuse_loss(self.folder, overwrite)
         confirm_motion(self.url, yes, what)
+        _make_room(self.folder)
 
     def by_masses(
         self, plan: HoistPlan, masses_kg: list[float], gravity: float, board: Path | None
@@ -250,7 +256,7 @@ class _Run:
             raw = calibration.raw_folder(self.folder)
             measure_masses(session, out, raw, plan, masses_kg, hang, gravity)
 
-    def by_load_cell(self, plan: AnchorPlan, sampler: TensionSampler, cable: int) -> None:
+    def by_load_cell(self, plan: AnchorPlan, sampler: TensionSampler) -> None:
         """Record the pull at a made-fast cable."""
         winch, out = self.winch, self.out
         with sampler, _keeping(self.folder):
@@ -258,7 +264,7 @@ class _Run:
             with open_winch(winch, self.url, out, self.plant, safety_io=self.safety_io) as session:
                 session.set_mode(winch.drive.mode_torque)
                 path = calibration.pull_file(self.folder)
-                measure_anchored(session, out, path, plan, sampler, cable)
+                measure_anchored(session, out, path, plan, sampler)
 
     def finish(self) -> None:
         """Identify, and say and store what was found."""
@@ -295,21 +301,23 @@ def _masses(text: str) -> list[float]:
         raise BadInputError(f"--masses {text}: numbers in kg are wanted, as 2,5,10") from None
 
 
-def _fresh(folder: Path, overwrite: bool) -> None:
-    """Make room for recordings; raises BadInputError where earlier ones would be lost."""
+def _refuse_loss(folder: Path, overwrite: bool) -> None:
+    """Raise BadInputError where earlier recordings would be lost."""
     raw = calibration.raw_folder(folder)
-    if raw.exists() and any(raw.iterdir()):
-        if not overwrite:
-            raise BadInputError(
-                f"--out {folder}: holds the data of an earlier run; choose another folder, or "
-                "replace it with --overwrite"
-            )
-        shutil.rmtree(raw)
-        (folder / calibration.FILE_NAME).unlink(missing_ok=True)
+    if raw.is_dir() and any(raw.iterdir()) and not overwrite:
+        raise BadInputError(
+            f"--out {folder}: holds the data of an earlier run; choose another folder, or "
+            "replace it with --overwrite"
+        )
+
+
+def _make_room(folder: Path) -> None:
+    """Have an empty folder for recordings; raises BadInputError where there can be none."""
     try:
-        raw.mkdir(parents=True, exist_ok=True)
+        calibration.discard(folder)
+        calibration.raw_folder(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInputError(f"--out {folder}: cannot be created: {error.strerror}") from error
+        raise BadInputError(f"--out {folder}: cannot be written: {error.strerror}") from error
 
 
 @contextmanager

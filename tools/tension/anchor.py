@@ -102,13 +102,10 @@ class _Puller:
 class _Recording:
     """Pulls until a tension is reached, writing a row for each reading of the load cell."""
 
-    def __init__(
-        self, session: WinchSession, plan: AnchorPlan, sampler: TensionSampler, cable: int
-    ) -> None:
+    def __init__(self, session: WinchSession, plan: AnchorPlan, sampler: TensionSampler) -> None:
         self._session = session
         self._plan = plan
         self._exchange = sampler.exchange
-        self._cable = cable
         self._wind_in = -session.winch.cable_sign
         self._puller = _Puller(session, plan)
         self._sums = np.zeros(3)
@@ -126,20 +123,20 @@ class _Recording:
 
     def _cycle(self, winding_in: bool, log: RawLogWriter) -> bool:
         torque = self._puller.cycle()
-        feedback, told, i = self._session.device.feedback, self._exchange.feedback, self._cable
+        feedback, told = self._session.device.feedback, self._exchange.feedback
         self._sums += (1.0, torque, feedback.position_rad[0])
         early_s = feedback.time_s + self._ahead_s - time.monotonic()
         if self._session.device.lockstep and early_s > 0.0:
             time.sleep(early_s)
         self._exchange.update()
-        if not told.valid[i]:
+        if not told.valid[0]:
             raise TripError(self._exchange.reason())
-        if told.time_s[i] == self._read_s:
+        if told.time_s[0] == self._read_s:
             return False
-        self._read_s = float(told.time_s[i])
-        tension = float(told.tension_N[i])
+        self._read_s = float(told.time_s[0])
+        tension = float(told.tension_N[0])
         if tension > _TOO_MUCH * self._plan.highest_N:
-            raise TripError(f"{self._exchange.cables[i]}: {tension:.1f} N")
+            raise TripError(f"{self._exchange.cables[0]}: {tension:.1f} N")
         _, mean_Nm, mean_rad = self._sums / self._sums[0]
         self._sums[:] = 0.0
         if tension >= self._plan.lowest_N:
@@ -163,11 +160,10 @@ def measure_anchored(
     path: Path,
     plan: AnchorPlan,
     sampler: TensionSampler,
-    cable: int,
 ) -> Path:
     """Wind in to the highest tension and pay out again, recording readings into `path`.
 
-    `cable` is the load cell's place among the sampler's. Raises TripError when it does not answer,
+    The sampler reads the one load cell of this cable. Raises TripError when it does not answer,
     the cable gives way or the rotor runs away; the torque is zero afterwards.
     """
     winch, device = session.winch, session.device
@@ -176,21 +172,23 @@ def measure_anchored(
         "identity": session.identity,
         "wind_in": -winch.cable_sign,
         "pole_pairs": winch.motor.poles // 2,
-        "cable": sampler.exchange.cables[cable],
+        "cable": sampler.exchange.cables[0],
         "speed_rad_s": plan.speed_rad_s,
     }
     session.restrict(_FASTEST_RAD_S, math.inf)
     session.enable()
     log = RawLogWriter(path, COLUMNS, meta)
     try:
-        recording = _Recording(session, plan, sampler, cable)
+        recording = _Recording(session, plan, sampler)
         out.note(f"winding in to {plan.highest_N:g} N and paying out to {plan.lowest_N:g} N")
         recording.pull(True, log)
         recording.pull(False, log)
     finally:
-        device.command.torque_Nm[:] = 0.0
-        device.transmit()
-        log.close()
+        try:
+            device.command.torque_Nm[:] = 0.0
+            device.transmit()
+        finally:  # a bus that is gone takes no zero torque, yet the rows are to be kept
+            log.close()
     session.disable()
     return path
 

@@ -36,8 +36,18 @@ def recorded_winch(folder: Path) -> str:
     return str(_identity(_recordings(folder)[0])["winch"])
 
 
+def discard(folder: Path) -> None:
+    """Remove the recordings and the result of an earlier calibration, nothing else."""
+    for path in (*_found(folder), folder / FILE_NAME, folder / PICTURE):
+        path.unlink(missing_ok=True)
+
+
+def _found(folder: Path) -> list[Path]:
+    return sorted(raw_folder(folder).glob("mass-*.raw")) + sorted(raw_folder(folder).glob(_PULL))
+
+
 def _recordings(folder: Path) -> list[Path]:
-    found = sorted(raw_folder(folder).glob("mass-*.raw")) + sorted(raw_folder(folder).glob(_PULL))
+    found = _found(folder)
     if not found:
         raise BadInputError(f"{folder}: holds no recordings of a calibration (raw/...)")
     return found
@@ -45,7 +55,11 @@ def _recordings(folder: Path) -> list[Path]:
 
 def _identity(path: Path) -> Mapping[str, Any]:
     whose = read_raw_log(path).header.get("identity")
-    if not isinstance(whose, dict) or not {"winch", "motor", "serial"} <= whose.keys():
+    if (
+        not isinstance(whose, dict)
+        or not {"winch", "motor"} <= whose.keys()
+        or not isinstance(whose.get("serial"), int)
+    ):
         raise RawLogError(f"{path}: does not say which winch it is of")
     return whose
 
@@ -70,7 +84,7 @@ def calibrate(folder: Path, winch: Winch) -> WinchCalibration:
     calibration = WinchCalibration(
         winch=str(whose["winch"]),
         motor=str(whose["motor"]),
-        drive_serial=int(whose["serial"]),
+        drive_serial=whose["serial"],
         date=datetime.now(UTC).replace(microsecond=0),
         method=method,
         gain_m=found.gain_m.value,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.controllers.pid import Pid, PidGains
+from cdpr_rt.errors import RawLogError
 from cdpr_rt.exchange import FloatArray, Setpoint
 from cdpr_rt.executive import Motion
 from cdpr_rt.rawlog import RawLog
@@ -126,8 +127,11 @@ def hoist_points(log: RawLog) -> list[TorquePoint]:
     recording of something else.
     """
     header = log.header
-    wind_in, turns = int(header["wind_in"]), int(header["turns"])
-    speed, tension = float(header["speed_rad_s"]), float(header["tension_N"])
+    try:
+        wind_in, turns = int(header["wind_in"]), int(header["turns"])
+        speed, tension = float(header["speed_rad_s"]), float(header["tension_N"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise RawLogError(f"{log.path}: not a recording of a hoist ({error})") from None
     angle = wind_in * log.column("position_rad")
     torque = wind_in * log.column("torque_sent_Nm")
     wanted = wind_in * log.column("setpoint_velocity_rad_s")

@@ -13,7 +13,13 @@ import typer
 from cdpr_rt.errors import TripError
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
 from cdpr_rt.recorder import column_names
-from cdpr_rt.tension_gain import TorquePoint
+from cdpr_rt.tension_gain import (
+    FARTHEST_FROM_NOMINAL,
+    LEAST_LEVELS,
+    LEAST_SPAN,
+    CalibrationRefusedError,
+    TorquePoint,
+)
 from profiles import Winch
 from sim_bus.physics_board import PhysicsBoard
 from tools.errors import BadInputError
@@ -23,7 +29,7 @@ from tools.tension.hoist import Hoist, HoistPlan, hoist_controller, hoist_points
 
 _TORQUE_SHARE = 0.9
 # beyond what the geometry says the heaviest mass needs
-_LIMIT_RATIO, _LIMIT_MORE_Nm = 1.3, 0.4
+_LIMIT_RATIO, _LIMIT_MORE_Nm = 1.3, 0.6
 _SPEED_RATIO, _LEAST_SPEED_RAD_S = 5.0, 30.0
 
 Hang = Callable[[float], None]
@@ -38,8 +44,14 @@ def plan_hoist(winch: Winch, speed_m_s: float, lead_m: float, turns: int) -> Hoi
 
 def check_masses(winch: Winch, masses_kg: Sequence[float], gravity: float) -> None:
     """Raise BadInputError for masses that are too heavy for the motor or of no use."""
-    if len(set(masses_kg)) < 3 or min(masses_kg) <= 0.0:
+    sound = all(math.isfinite(mass) and mass > 0.0 for mass in masses_kg)
+    if not sound or len(masses_kg) < LEAST_LEVELS or len(_files(masses_kg)) < len(masses_kg):
         raise BadInputError("--masses: at least three different masses in kg, as 2,5,10")
+    if max(masses_kg) < LEAST_SPAN * min(masses_kg):
+        raise BadInputError(
+            f"--masses: {min(masses_kg):g} to {max(masses_kg):g} kg; the heaviest must be at least "
+            f"{LEAST_SPAN:g} times the lightest"
+        )
     gain = abs(winch.cable_m_per_motor_rad)
     most = _TORQUE_SHARE * winch.motor.rated_torque_Nm / (gain * gravity)
     if max(masses_kg) > most:
@@ -49,21 +61,33 @@ def check_masses(winch: Winch, masses_kg: Sequence[float], gravity: float) -> No
         )
 
 
+def _files(masses_kg: Sequence[float]) -> set[str]:
+    return {_file_name(mass_kg) for mass_kg in masses_kg}
+
+
+def _file_name(mass_kg: float) -> str:
+    return f"mass-{mass_kg:g}kg.raw"
+
+
 def by_prompt(mass_kg: float) -> None:
-    """Ask the person at the winch; the drive has no power, so Ctrl-C may end it here at once."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Ask the person at the winch; the drive has no power, so Ctrl-C may end it here at once.
+
+    Only Enter alone raises the mass: who types a word wants something else.
+    """
+    ending = (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.signal(number, signal.default_int_handler) for number in ending}
+    question = (
+        f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
+        "press Enter (Ctrl-C ends)"
+    )
     try:
-        typer.prompt(
-            f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
-            "press Enter",
-            default="",
-            show_default=False,
-            err=True,
-        )
+        while typer.prompt(question, default="", show_default=False, err=True):
+            typer.echo("Enter alone, please.", err=True)
     except typer.Abort:
         raise BadInputError(f"nobody has hung {mass_kg:g} kg; the drive is without power") from None
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def on_board(board: Path) -> Hang:
@@ -92,14 +116,27 @@ def measure_masses(
     recorded = []
     for mass_kg in masses_kg:
         hang(mass_kg)
-        path = folder / f"mass-{mass_kg:g}kg.raw"
+        path = folder / _file_name(mass_kg)
         with out.progress(f"raising and lowering {mass_kg:g} kg", plan.duration_s) as advance:
             session.executive.on_progress = advance
             _hoist(session, path, plan, mass_kg, gravity)
-        hoist_points(read_raw_log(path))  # refused before the next mass is hung
+        # refused before the next mass is hung
+        points = hoist_points(read_raw_log(path))
+        _refuse_another_mass(points, mass_kg, gravity * abs(session.winch.cable_m_per_motor_rad))
         recorded.append(path)
     session.executive.on_progress = None
     return recorded
+
+
+def _refuse_another_mass(points: Sequence[TorquePoint], mass_kg: float, gain_m2_s2: float) -> None:
+    """Raise CalibrationRefusedError where the torque is nowhere near that of the mass."""
+    lifted_kg = sum(point.torque_Nm for point in points) / len(points) / gain_m2_s2
+    if abs(lifted_kg - mass_kg) > FARTHEST_FROM_NOMINAL * mass_kg:
+        raise CalibrationRefusedError(
+            f"{mass_kg:g} kg were asked for, and the torque is that of {lifted_kg:.1f} kg by the "
+            "geometry; does that mass hang there, and are cable_sign, drum_radius_m and "
+            "gear_ratio of the winch's profile right?"
+        )
 
 
 def _hoist(
@@ -140,8 +177,8 @@ def _hoist(
         if session.device.alarm() or abs(controller.effort_Nm[0]) < limit:
             raise
         raise TripError(
-            f"{error}: {limit:.2f} Nm, the most that was allowed, do not lift {mass_kg:g} kg; take "
-            "lighter masses, and see that the cable runs free"
+            f"{error}: {limit:.2f} Nm, the most that was allowed, do not lift {mass_kg:g} kg; see "
+            "that the cable runs free and that no heavier mass hangs there, or take lighter ones"
         ) from None
     finally:
         log.close()
