@@ -31,6 +31,8 @@ class Summary:
     last_s: float = 0.0
     time_s: float | None = None
     """What the traffic took, where something else than its time stamps tells."""
+    untimed: bool = False
+    """Whether the time stamps are not those of the traffic and nothing else tells its time."""
     missed: int | None = None
     """Frames that went past the monitor, where that is known."""
     _by_id: dict[tuple[str, str], _Traffic] = field(default_factory=dict)
@@ -60,13 +62,17 @@ class Summary:
     @property
     def load(self) -> float | None:
         """Return the share of time that the wire was in use at most; None for a moment only."""
-        return self.bits / self.bitrate_bit_s / self.duration_s if self.duration_s > 0 else None
+        return self.bits / self.bitrate_bit_s / self.duration_s if self._has_rates else None
+
+    @property
+    def _has_rates(self) -> bool:
+        return self.duration_s > 0 and not self.untimed
 
     def rows(self) -> list[dict[str, Any]]:
         """Return frames and frames a second by identifier, in the order of their priority."""
         rows = []
         for (identifier, kind), traffic in sorted(self._by_id.items()):
-            rate = traffic.frames / self.duration_s if self.duration_s > 0 else None
+            rate = traffic.frames / self.duration_s if self._has_rates else None
             rows.append(
                 {
                     "id": identifier,

@@ -93,7 +93,7 @@ def monitor(
         file = None if log is None else stack.enter_context(LogFile(log))
         stop_wanted = stack.enter_context(stop_on_signals())
         watch(source, viewer, file, seconds, stop_wanted)
-        if isinstance(source, SimbusSource) and source.lost is None:
+        if isinstance(source, SimbusSource):
             _ask_bus(source, summary)
     if source.lost is not None:
         raise source.lost
@@ -164,9 +164,12 @@ def _filters(ids: str | None) -> Filters | None:
 def _ask_bus(source: SimbusSource, summary: Summary) -> None:
     """Complete the summary by what a simulated bus tells: its time, and what we missed."""
     try:
+        if source.lost is not None:
+            raise source.lost
         passed = source.ask()
     except BusError:
-        return  # it has ended just now
+        summary.untimed = True  # it has ended, and its time with it
+        return
     summary.time_s = passed["bus_time_s"]
     if source.seen is None:
         return
