@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
+from drivers import sdo_abort
 from drivers.bus_census import flood_text
 from drivers.cia402 import State, mode_bits, state_of
 from drivers.configuration import BootSettings, wanted_configuration
 from drivers.download import configure, store
-from drivers.errors import BootError, DriverError, SdoError
+from drivers.errors import BootError, DriverError, SdoAbortError, SdoCancelledError, SdoError
 from drivers.network import CanNetwork
 from profiles import DriveProfile
 
@@ -20,6 +21,8 @@ _DEVICE_TYPE, _IDENTITY = 0x1000, 0x1018
 _PROFILE_402 = 402
 _BOOT_UP_TIMEOUT_S = 2.0
 _QUIET_DRIVE_S = 1.0
+_LISTEN_SHARE = 0.5
+"""Of what drives tolerate of a silent master: one of our kind is heard several times in it."""
 _MAY_BE_A_FLOOD = "BK"
 
 
@@ -122,8 +125,7 @@ def _collect(
 
 
 def _listen(network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]) -> None:
-    # a master of our kind is heard four times within what its drives tolerate
-    listen_s = max(0.5 * profile.heartbeat_consumer_s for profile, _ in drives.values())
+    listen_s = max(_LISTEN_SHARE * profile.heartbeat_consumer_s for profile, _ in drives.values())
     if network.foreign_master.wait(listen_s):
         raise BootError(
             "L", min(drives), "another master's heartbeat is on the bus", "stop that master first"
@@ -167,9 +169,19 @@ def _lead(
     return report
 
 
-def _read(network: CanNetwork, node_id: int, index: int, sub: int) -> int:
+def _read(network: CanNetwork, node_id: int, index: int, sub: int) -> int | None:
+    """Return what an object of the identity holds, None where the drive has none."""
     try:
         return network.read_int(node_id, index, sub)
+    except SdoAbortError as error:
+        if error.code in sdo_abort.ABSENT:
+            return None
+        raise BootError(
+            "B",
+            node_id,
+            f"it refuses to say what it is ({error})",
+            "switch it off and on; if that does not help, check that it is the drive meant",
+        ) from error
     except SdoError as error:
         raise BootError(
             "B",
@@ -209,11 +221,11 @@ def _check_identity(
     network: CanNetwork, node_id: int, profile: DriveProfile, report: BootReport
 ) -> None:
     device = _read(network, node_id, _DEVICE_TYPE, 0)
-    if device & 0xFFFF != _PROFILE_402:
+    if device is None or device & 0xFFFF != _PROFILE_402:
         raise BootError(
             "C",
             node_id,
-            f"its device type is {device:08X}h, not a CiA 402 drive",
+            f"its device type is {_hex(device)}, not a CiA 402 drive",
             "check the node id: this may be another device",
         )
     steps = (
@@ -223,15 +235,27 @@ def _check_identity(
         ("O", 4, "serial number", "serial", profile.serial),
     )
     for letter, sub, what, name, wanted in steps:
-        found = _read(network, node_id, _IDENTITY, sub)
-        setattr(report, name, found)
+        # of these only the vendor id is mandatory (CiA 301)
+        found = (
+            _read(network, node_id, _IDENTITY, sub) if _may_have(network, node_id, sub) else None
+        )
+        setattr(report, name, found or 0)
         if wanted is not None and found != wanted:
             raise BootError(
                 letter,
                 node_id,
-                f"its {what} is {found:08X}h, the profile {profile.name!r} has {wanted:08X}h",
+                f"its {what} is {_hex(found)}, the profile {profile.name!r} has {wanted:08X}h",
                 "choose the profile of this drive, or connect the drive that was meant",
             )
+
+
+def _may_have(network: CanNetwork, node_id: int, sub: int) -> bool:
+    """Return whether the EDS gives the identity such a sub-index."""
+    return sub in network.dictionary(node_id).get(_IDENTITY, ())
+
+
+def _hex(found: int | None) -> str:
+    return "not there" if found is None else f"{found:08X}h"
 
 
 def _configure(
@@ -304,6 +328,16 @@ def _heartbeat_entry(network: CanNetwork, node_id: int, master_node_id: int) -> 
     return 1
 
 
+def _device_name(network: CanNetwork, node_id: int) -> str:
+    """Return 1008h, empty where the drive does not tell it: a name is nothing to fail for."""
+    try:
+        return str(network.read(node_id, 0x1008))
+    except SdoCancelledError:
+        raise
+    except SdoError:
+        return ""
+
+
 def _read_ratings(
     network: CanNetwork,
     node_id: int,
@@ -312,8 +346,7 @@ def _read_ratings(
     report: BootReport,
 ) -> None:
     try:
-        if 0x1008 in network.dictionary(node_id):
-            report.device_name = str(network.read(node_id, 0x1008))
+        report.device_name = _device_name(network, node_id)
         report.rated_torque_Nm = _rated_torque_Nm(network, node_id, want)
         increments, turns = _counts_per_turn(network, node_id, want)
         if 0x6502 in network.dictionary(node_id):

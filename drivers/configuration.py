@@ -100,12 +100,14 @@ def is_application(block: tuple[DcfEntry, ...]) -> bool:
     return block[0].index >= _APPLICATION
 
 
-def matches(entry: DcfEntry, found: int) -> bool:
-    """Return whether an object that holds `found` needs no writing.
+def matches(entry: DcfEntry, found: int | None) -> bool:
+    """Return whether an object that holds `found` (None: nothing) needs no writing.
 
     Of a PDO's COB-ID remote requests (bit 30) are the drive's affair, and nothing but bit 31
     matters of one that is to be off.
     """
+    if found is None:
+        return False
     if not _is_cob_id(entry):
         return found % (1 << 8 * len(entry.data)) == entry.value  # of signed types too
     mask = _PDO_OFF if entry.value & _PDO_OFF else _PDO_OFF | _IDENTIFIER

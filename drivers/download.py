@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drivers import sdo_abort
 from drivers.concise_dcf import DcfEntry
 from drivers.configuration import (
     Configuration,
@@ -11,6 +12,7 @@ from drivers.configuration import (
     matches,
     to_write,
 )
+from drivers.errors import SdoAbortError
 from drivers.network import CanNetwork
 
 _VERIFY, _STORE = 0x1020, 0x1010
@@ -63,7 +65,7 @@ def store(network: CanNetwork, node_id: int) -> bool:
 
 def _bring_in_line(network: CanNetwork, node_id: int, block: Block, changed: list[str]) -> None:
     final = {(entry.index, entry.sub): entry for entry in block}
-    found = {key: network.read_int(node_id, *key) for key in final}
+    found = {key: _found(network, node_id, *key) for key in final}
     if all(matches(entry, found[key]) for key, entry in final.items()):
         return
     for entry in block:
@@ -71,6 +73,17 @@ def _bring_in_line(network: CanNetwork, node_id: int, block: Block, changed: lis
         data = value.to_bytes(len(entry.data), "little")
         network.write_bytes(node_id, entry.index, entry.sub, data)
     changed.append(_name(block))
+
+
+def _found(network: CanNetwork, node_id: int, index: int, sub: int) -> int | None:
+    """Return what an object holds, None where it holds nothing: some drives have the entries of
+    a mapping only up to the number in sub-index 0."""
+    try:
+        return network.read_int(node_id, index, sub)
+    except SdoAbortError as error:
+        if error.code in sdo_abort.ABSENT:
+            return None
+        raise
 
 
 def _name(block: Block) -> str:

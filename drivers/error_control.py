@@ -140,7 +140,7 @@ class ErrorControl:
         To be called when no message waits, so that a busy master does not blame the nodes.
         """
         now = time.monotonic()
-        for node in self._nodes.values():
+        for node in list(self._nodes.values()):  # another thread may add one
             if not node.heartbeat_s:
                 continue
             silent_s = now - node.heard_s

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, ODVariable
 
+from drivers import sdo_abort
 from drivers.emergency import ErrorRecord
 from drivers.errors import BusError, SdoAbortError, SdoCancelledError, SdoError, SdoTimeoutError
 from drivers.sdo import SdoClient
@@ -16,7 +17,6 @@ SDO_REQUEST, SDO_ANSWER = 0x600, 0x580
 _TIMEOUT_S = 0.5
 _ATTEMPTS = 2
 _HISTORY = 0x1003
-_NO_DATA, _NO_SUBINDEX = 0x08000024, 0x06090011
 
 T = TypeVar("T")
 Send = Callable[[int, bytes], None]
@@ -127,7 +127,7 @@ class ObjectAccess:
             try:
                 value = self.read_int(node_id, _HISTORY, sub)
             except SdoAbortError as error:
-                if error.code in (_NO_DATA, _NO_SUBINDEX):
+                if error.code in (sdo_abort.NO_DATA, sdo_abort.NO_SUBINDEX):
                     break  # cleared meanwhile
                 raise
             records.append(ErrorRecord(value & 0xFFFF, value >> 16))

@@ -23,6 +23,10 @@ _END = struct.Struct("<BH")
 _ABORT = 0x80
 _TOGGLE = 0x10
 _BLOCK_SEGMENTS = 127
+_MOST_WAITING = 1024
+"""Frames kept for a transfer; a node that floods its SDO identifier fills no memory."""
+_MOST_BYTES = 1 << 18
+"""An upload that goes on and on is given up after so many."""
 _UPLOAD, _DOWNLOAD, _BLOCK_UPLOAD = 2, 3, 6
 """What the top three bits of an answer to the first request say."""
 
@@ -49,18 +53,19 @@ class SdoClient:
 
     def on_answer(self, data: bytes) -> None:
         """Take an answer of 8 bytes from the bus."""
-        self._answers.put(data)
+        if self._answers.qsize() < _MOST_WAITING:
+            self._answers.put(data)
 
     def await_strays(self, seconds: float) -> int:
         """Return how many answers nobody had asked for, after waiting for more of them."""
         with self._lock:
             deadline = time.monotonic() + seconds
-            while True:
+            while (left_s := deadline - time.monotonic()) > 0.0:
                 try:
-                    frame = self._answers.get(timeout=max(deadline - time.monotonic(), 0.0))
+                    self.strays += self._answers.get(timeout=left_s) is not None
                 except queue.Empty:
-                    return self.strays
-                self.strays += frame is not None
+                    break
+            return self.strays
 
     def cancel(self) -> bool:
         """Have the transfer that runs end with SdoCancelledError; return whether one runs.
@@ -120,15 +125,16 @@ class SdoClient:
         size = int.from_bytes(answer[4:8], "little") if command & 0x01 else None
         data = bytearray()
         toggle = 0
-        while True:
+        for _ in range(_MOST_BYTES // 7):
             segment = self._ask(bytes([0x60 | toggle]), _segment(0, toggle))
             data += segment[1 : 8 - (segment[0] >> 1 & 0x07)]
-            if segment[0] & 0x01:
-                break
+            last = bool(segment[0] & 0x01)
+            if size is not None and (len(data) > size or (last and len(data) < size)):
+                self._abort(sdo_abort.LENGTH)
+            if last:
+                return bytes(data)
             toggle ^= _TOGGLE
-        if size is not None and len(data) != size:
-            self._abort(sdo_abort.LENGTH)
-        return bytes(data)
+        return self._abort(sdo_abort.OUT_OF_MEMORY)
 
     def _block_upload(self, index: int, sub: int) -> bytes:
         request = bytes([_BLOCK_SEGMENTS, 0, 0, 0])
@@ -140,6 +146,8 @@ class SdoClient:
         request = b"\xa3"
         last = False
         while not last:
+            if len(data) > _MOST_BYTES:
+                self._abort(sdo_abort.OUT_OF_MEMORY)
             self._put(request)
             good, last = self._block(data)
             request = bytes([0xA2, good, _BLOCK_SEGMENTS])
@@ -196,17 +204,19 @@ class SdoClient:
         return self._ask(_MULTIPLEXER.pack(command, index, sub) + data, accept)
 
     def _ask(self, request: bytes, accept: Accept) -> bytes:
-        while not self._answers.empty():
+        for _ in range(self._answers.qsize()):
             self.strays += self._answers.get() is not None
         self._put(request)
         deadline = time.monotonic() + self._timeout_s
+        others = 0
         while True:
             frame = self._next(deadline)
             if frame is None:
-                self._give_up()
+                self._give_up(others)
             elif accept(frame):
                 return frame
             else:
+                others += 1
                 self.strays += 1
 
     def _put(self, request: bytes) -> None:
@@ -234,10 +244,11 @@ class SdoClient:
             self._tell(sdo_abort.GENERAL)
             raise SdoCancelledError("the transfer was cancelled")
 
-    def _give_up(self) -> NoReturn:
+    def _give_up(self, others: int = 0) -> NoReturn:
         self._tell(sdo_abort.TIMED_OUT)
         self.strays = 0  # the answer may still come: then it is late
-        raise SdoTimeoutError(f"no answer within {self._timeout_s:g} s")
+        what = f" (frames that do not answer the request: {others})" if others else ""
+        raise SdoTimeoutError(f"no answer within {self._timeout_s:g} s{what}")
 
     def _abort(self, code: int) -> NoReturn:
         """End the transfer for a reason of ours; raises SdoAbortError."""

@@ -10,6 +10,11 @@ SEQUENCE: Final = 0x05040003
 CRC: Final = 0x05040004
 LENGTH: Final = 0x06070010
 GENERAL: Final = 0x08000000
+OUT_OF_MEMORY: Final = 0x05040005
+NO_SUBINDEX: Final = 0x06090011
+NO_DATA: Final = 0x08000024
+ABSENT: Final = (0x06020000, NO_SUBINDEX, NO_DATA)
+"""With which a node says that it has no such object, or nothing in it."""
 
 _TEXTS: Final = {
     0x05030000: "toggle bit not alternated",

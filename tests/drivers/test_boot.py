@@ -52,7 +52,8 @@ def test_no_answer_is_step_b(bus: str) -> None:
     assert "wiring" in str(error)
 
 
-def test_a_mute_drive_is_step_k(rig: Rig) -> None:
+def test_a_mute_drive_is_step_k(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.boot._QUIET_DRIVE_S", 0.2)
     rig.misbehave(5, 1)
     with pytest.raises(BootError) as caught:
         boot(rig.network, 1, DRIVE, SETTINGS)

@@ -18,15 +18,8 @@ from drivers.bus_census import census, flood_text
 from drivers.errors import BootError
 from profiles import Pdo
 
-pytestmark = pytest.mark.usefixtures("brief_wait")
 OPTIONAL = replace(SETTINGS, mandatory=False)
 WRONG = DRIVE.model_copy(update={"product_code": 0x1234})
-
-
-@pytest.fixture
-def brief_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Simulated drives boot at once: do not wait for missing ones as long as for real drives."""
-    monkeypatch.setattr("drivers.boot._BOOT_UP_TIMEOUT_S", 0.4)
 
 
 def test_an_optional_node_that_is_missing_is_told_and_nothing_else(bus: str) -> None:
