@@ -73,6 +73,8 @@ class Conditions:
 
     tight: Callable[[], str]
     """Why the cables do not count as slack, or an empty text."""
+    powered: Callable[[], str]
+    """Which winch has power, or an empty text."""
     stop_requested: Callable[[], bool]
     progress: Callable[[float], None]
     """Told the position in m."""
@@ -82,15 +84,16 @@ def move(rail: RailProfile, axis: RailAxis, target_m: float, ask: Conditions) ->
     """Move the rail to `target_m`; however it ends, the axis is braked and without power.
 
     The robot is written down as not calibrated before the carriage moves. Raises RailError for
-    cables that are tight, a brake that does not hold, a target beyond the travel or a move that
-    does not arrive, RailStoppedError on request, StateFileError and what the axis raises.
+    cables that are tight, winches with power, a brake that does not hold, a target beyond the
+    travel or a move that does not arrive, RailStoppedError on request, StateFileError and what the
+    axis raises.
     """
     if not rail.travel_min_m <= target_m <= rail.travel_max_m:
         raise RailError(
             f"{rail.name}: target {target_m:g} m; allowed: {rail.travel_min_m:g} to "
             f"{rail.travel_max_m:g} m"
         )
-    _refuse_tight(rail, ask)
+    _refuse(rail, ask)
     axis.check()
     start_m = axis.position_m()
     try:
@@ -117,10 +120,13 @@ def move(rail: RailProfile, axis: RailAxis, target_m: float, ask: Conditions) ->
     return Move(start_m, end_m, pushed_m)
 
 
-def _refuse_tight(rail: RailProfile, ask: Conditions) -> None:
+def _refuse(rail: RailProfile, ask: Conditions) -> None:
     tight = ask.tight()
     if tight:
         raise RailError(f"{rail.name}: not moved unless the cables are slack: {tight}")
+    powered = ask.powered()
+    if powered:
+        raise RailError(f"{rail.name}: not moved while a winch has power: {powered}")
 
 
 def _try_brake(rail: RailProfile, axis: RailAxis) -> float | None:
@@ -161,6 +167,9 @@ def _follow(rail: RailProfile, axis: RailAxis, distance_m: float, ask: Condition
         tight = ask.tight()
         if tight:
             raise RailError(f"{rail.name}: stopped, for the cables are not slack any more: {tight}")
+        powered = ask.powered()
+        if powered:
+            raise RailError(f"{rail.name}: stopped, for a winch may have power: {powered}")
         if time.monotonic() - began > allowed_s:
             raise RailError(f"{rail.name}: did not arrive within {allowed_s:.1f} s")
         time.sleep(_LOOK_S)

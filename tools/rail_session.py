@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
 import canopen
@@ -13,6 +13,7 @@ from drivers.errors import BusError
 from drivers.modbus.rail import ModbusRailAxis
 from drivers.modbus.tension import TensionSampler
 from drivers.network import CanNetwork
+from drivers.power_watch import PowerWatch
 from drivers.rail import RailAxis
 from drivers.rail_cia402 import Cia402RailAxis
 from profiles import DriveProfile
@@ -38,17 +39,14 @@ def open_rail(
     """
     with ExitStack() as stack:
         if rail.cia402 is None:
-            axis = ModbusRailAxis(rail)
+            session = stack.enter_context(open_safety(safety_io, out, []))
+            axis = ModbusRailAxis(rail, None if session is None else session.io)
             stack.callback(axis.close)
             axis.open()
             yield axis
             return
+        require_options(rail, bus, safety_io)
         url = _bus_of(rail, bus)
-        if safety_io is None:
-            raise BadInputError(
-                f"--safety-io: {rail.name} needs the one that has its brake, "
-                f"{rail.cia402.brake_axis!r}"
-            )
         safety = stack.enter_context(open_safety(safety_io, out, []))
         assert safety is not None  # one was named
         drive = load_rail_drive(reference, rail.cia402)
@@ -60,6 +58,17 @@ def open_rail(
         stack.callback(network.release, rail.cia402.node_id)
         network.start_heartbeat()  # should we die, the drive stops
         yield Cia402RailAxis(rail, drive, network, report, safety.io)
+
+
+def require_options(rail: RailProfile, bus: str | None, safety_io: str | None) -> None:
+    """Raise BadInputError for what the rail's kind needs and was not given."""
+    if rail.cia402 is None:
+        return
+    _bus_of(rail, bus)
+    if safety_io is None:
+        raise BadInputError(
+            f"--safety-io: {rail.name} needs the one that has its brake, {rail.cia402.brake_axis!r}"
+        )
 
 
 def position_of(reference: str, rail: RailProfile, bus: str | None) -> float:
@@ -77,6 +86,38 @@ def position_of(reference: str, rail: RailProfile, bus: str | None) -> float:
         counts = network.read_int(there.node_id, 0x6064) - there.zero_counts
         sign = there.direction * drive.position_sign
         return sign * counts * there.travel_per_turn_m / turn
+
+
+@contextmanager
+def power_watch(
+    rail: RailProfile, bus: str | None, winch_buses: Sequence[str], out: Output
+) -> Iterator[Callable[[], str]]:
+    """Yield what tells which winch has power, of those on the rail's own bus and on `winch_buses`.
+
+    Raises BadInputError for a bus that cannot be opened.
+    """
+    asked: list[tuple[BusUrl, list[int]]] = []
+    if rail.cia402 is not None:
+        asked.append((_bus_of(rail, bus), [rail.cia402.node_id]))
+    for text in winch_buses:
+        if all(url != _bus_of(rail, text) for url, _ in asked):
+            asked.append((_bus_of(rail, text), []))
+    with ExitStack() as stack:
+        watches = []
+        for url, but in asked:
+            try:
+                watch = PowerWatch(url, but)
+            except BusError as error:
+                raise BadInputError(str(error)) from error
+            stack.callback(watch.close)
+            watches.append(watch)
+        seen = sum(len(watch.nodes) for watch in watches)
+        out.note(
+            f"{seen} drives beside the rail's were asked whether they have power"
+            if seen
+            else "no winch's drive was asked whether it has power (--winch-bus)"
+        )
+        yield lambda: next((text for watch in watches if (text := watch.reason())), "")
 
 
 @contextmanager

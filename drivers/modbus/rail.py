@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Final
 
+from drivers.modbus.safety_io import SafetyIo
 from drivers.modbus.tcp import ModbusTcp
 from drivers.rail import RailError
 from profiles.rail import RailProfile
@@ -18,30 +19,43 @@ class ModbusRailAxis:
     """The axis of a rail of kind "modbus"; implements `drivers.rail.RailAxis`.
 
     Methods raise RailError and ModbusError. Every request feeds the drive's watchdog, so that it
-    stops and brakes by itself once nobody asks any more.
+    stops and brakes by itself once nobody asks any more. Trips of `safety`, if there is one, end
+    the move.
     """
 
-    def __init__(self, rail: RailProfile) -> None:
+    def __init__(self, rail: RailProfile, safety: SafetyIo | None = None) -> None:
         assert rail.modbus is not None  # its kind says so
+        self._safety = safety
         self._rail, self._map = rail, rail.modbus
         there = self._map
         self._client = ModbusTcp(there.host, there.port, there.unit, there.answer_timeout_s)
         self._command = self._count = 0
 
     def open(self) -> None:
-        """Connect, and set the drive's watchdog; nothing moves."""
+        """Connect, and set the drive's watchdog; nothing moves.
+
+        Raises RailError for a drive that somebody else has enabled.
+        """
         watchdog = self._map.watchdog
         if watchdog is not None and watchdog.timeout_register is not None:
             units = round(watchdog.timeout_s / watchdog.timeout_unit_s)
             self._client.write_registers(watchdog.timeout_register, [units])
-        self._status()
+        if self._is(self._map.status.enabled):
+            raise RailError(
+                f"{self._rail.name}: the drive is enabled already: another command moves it, or "
+                "has died (its watchdog takes the power then; otherwise switch it off)"
+            )
 
     def close(self) -> None:
         """Leave the drive."""
         self._client.close()
 
     def check(self) -> None:
-        """Raise RailError when the drive has a fault."""
+        """Raise RailError when the drive has a fault, or the safety I/O has tripped."""
+        if self._safety is not None:
+            tripped = self._safety.alarm() or self._safety.stop_reason()
+            if tripped:
+                raise RailError(f"{self._rail.name}: {tripped}")
         if self._is(self._map.status.fault):
             raise RailError(f"{self._rail.name}: the drive is in fault (its status register)")
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import canopen
 import pytest
 from pymodbus.client import ModbusTcpClient
 from typer.testing import CliRunner
@@ -23,7 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
 from safety_rig import PANEL, Twin, board_file, patient_profile, ready, start, wait_until
 
 from drivers.errors import DriverError
-from profiles.rail import SHIPPED
+from drivers.modbus.rail import ModbusRailAxis
+from drivers.rail import RailError
+from profiles import load_winch
+from profiles.rail import SHIPPED, load_rail
 from sim_bus.physics_board import BoardAxis, PhysicsBoard
 from sim_bus.rail_twin import RailFault
 from sim_bus.safety_twin import Fault
@@ -107,7 +111,8 @@ class Rails:
         self._state_file().write_text(json.dumps(told))
 
     def acknowledge_trip(self) -> None:
-        (self.home / "cdpr-rt" / "safety-io.io.json").unlink()
+        name = f"safety-io.io.127.0.0.1.{self.twin.port}.json"
+        (self.home / "cdpr-rt" / name).unlink()
 
     def _state_file(self) -> Path:
         return self.home / "cdpr-rt" / "calibration.spatial-8.json"
@@ -147,6 +152,14 @@ def rails(parts: Rails) -> Rails:
     parts.break_modbus(RailFault(0))
     parts.forget()
     return parts
+
+
+def await_motion(rails: Rails, kind: str, command: subprocess.Popen[str], past_m: float) -> None:
+    def moves() -> bool:
+        assert command.poll() is None, command.communicate()[1]
+        return rails.position_m(kind) > past_m
+
+    wait_until(moves, 20)
 
 
 def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
@@ -214,11 +227,61 @@ def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
     assert rails.calibration()["calibrated"] is True
     rails.winch.publish(0.0, 0.0, 0.0, 0.0, False)
     command = rails.move("cia402", before + 0.5, *cells)
-    wait_until(lambda: rails.position_m("cia402") > before + 0.01, 20)
+    await_motion(rails, "cia402", command, before + 0.01)
     rails.winch.publish(0.0, 40.0, 0.0, 0.0, False)
     assert "the cables are not slack any more" in result(command, FAILED)["error"]
     assert rails.braked("cia402")
     assert before + 0.01 < rails.position_m("cia402") < before + 0.3
+
+
+def test_a_winch_with_power_refuses_the_move_and_ends_it(rails: Rails) -> None:
+    before = rails.position_m("modbus")
+    bus = f"winches-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    winch = start("up", "winch-mpp0923d", "--bus", f"simbus:{bus}", "--paced")
+    ready(winch)
+    network = canopen.Network()
+    network.connect(interface="simbus", channel=bus)
+    try:
+        node = network.add_node(1, str(load_winch("winch-mpp0923d").drive.eds))
+        node.sdo.RESPONSE_TIMEOUT = 5.0
+        slack = ("--cables-slack-checked", "--winch-bus", f"simbus:{bus}")
+        command = rails.move("modbus", before + 0.5, *slack)
+        await_motion(rails, "modbus", command, before + 0.005)
+        node.sdo[0x6060].raw = 4
+        for word in (6, 7, 15):
+            node.sdo[0x6040].raw = word
+        error = result(command, FAILED)["error"]
+        assert f"a winch may have power: node 1 on simbus:{bus} is" in error
+        assert rails.braked("modbus")
+        assert rails.position_m("modbus") < before + 0.4
+        before = rails.position_m("modbus")
+        error = result(rails.move("modbus", before + 0.1, *slack), FAILED)["error"]
+        assert f"not moved while a winch has power: node 1 on simbus:{bus} is" in error
+        assert rails.position_m("modbus") == before
+    finally:
+        network.disconnect()
+        winch.communicate(b"", timeout=10)
+
+
+def test_a_rail_on_modbus_heeds_the_safety_io_and_one_command(rails: Rails) -> None:
+    before = rails.position_m("modbus")
+    slack = ("--cables-slack-checked", "--safety-io", rails.twin.reference)
+    command = rails.move("modbus", before + 0.5, *slack)
+    await_motion(rails, "modbus", command, before + 0.005)
+    with pytest.raises(RailError, match="enabled already: another command moves it"):
+        ModbusRailAxis(load_rail(rails.modbus)).open()
+    rails.twin.press()
+    assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
+    assert rails.braked("modbus")
+    rails.twin.press(False)
+    rails.acknowledge_trip()
+
+
+def test_a_real_drive_is_not_moved_unasked_because_a_simulated_bus_is_named(rails: Rails) -> None:
+    arguments = ["move", str(rails.modbus), "--to", "0.9", "--cables-slack-checked"]
+    outcome = CliRunner().invoke(rail_commands.app, [*arguments, "--bus", rails.bus])
+    assert isinstance(outcome.exception, BadInputError)
+    assert "not confirmed" in str(outcome.exception)
 
 
 @pytest.mark.parametrize("kind", ["cia402", "modbus"])
@@ -227,7 +290,7 @@ def test_an_interrupted_move_is_stopped_and_braked_and_voids_the_calibration(
 ) -> None:
     before = rails.position_m(kind)
     command = rails.move(kind, before + 0.5)
-    wait_until(lambda: rails.position_m(kind) > before + 0.005, 20)
+    await_motion(rails, kind, command, before + 0.005)
     command.send_signal(signal.SIGINT)
     if kind == "cia402":
         assert abs(rails.speed_at_braking()) < 0.2 * 0.05  # of the move's speed
@@ -241,7 +304,7 @@ def test_an_interrupted_move_is_stopped_and_braked_and_voids_the_calibration(
 def test_a_command_that_dies_leaves_no_rail_that_moves(rails: Rails, kind: str) -> None:
     before = rails.position_m(kind)
     command = rails.move(kind, before + 0.5)
-    wait_until(lambda: rails.position_m(kind) > before + 0.005, 20)
+    await_motion(rails, kind, command, before + 0.005)
     command.kill()
     command.communicate()
     if kind == "cia402":  # the drive misses its master before the I/O does
@@ -255,7 +318,7 @@ def test_a_command_that_dies_leaves_no_rail_that_moves(rails: Rails, kind: str) 
 def test_a_safety_io_that_falls_silent_ends_a_move(rails: Rails) -> None:
     before = rails.position_m("cia402")
     command = rails.move("cia402", before + 0.3)
-    wait_until(lambda: rails.position_m("cia402") > before + 0.005, 20)
+    await_motion(rails, "cia402", command, before + 0.005)
     rails.twin.break_(Fault.SILENT)
     assert "no good poll" in result(command, FAILED)["error"]
     assert rails.position_m("cia402") < before + 0.2
@@ -266,7 +329,7 @@ def test_a_safety_io_that_falls_silent_ends_a_move(rails: Rails) -> None:
 def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
     before = rails.position_m("cia402")
     command = rails.move("cia402", before + 0.5)
-    wait_until(lambda: rails.position_m("cia402") > before + 0.005, 20)
+    await_motion(rails, "cia402", command, before + 0.005)
     rails.twin.press()
     wait_until(lambda: rails.braked("cia402"), 2)
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
@@ -281,9 +344,12 @@ def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
     ("arguments", "said"),
     [
         (("--to", "1.5", "--cables-slack-checked"), "--to 1.5: allowed are 0 to 1.2 m"),
-        (("--to", "0.1"), "the cables must be slack"),
+        (("--to", "0.1", "--safety-io", "nobody"), "the cables must be slack"),
         (("--to", "0.1", "--cables-slack-checked"), "--safety-io: Rail 1"),
-        (("--to", "0.1", "--tension", "rtu-load-cell-1"), "--tension-port"),
+        (
+            ("--to", "0.1", "--safety-io", "nobody", "--tension", "rtu-load-cell-1"),
+            "--tension-port",
+        ),
     ],
 )
 def test_what_a_move_needs_is_said_before_anything_moves(

@@ -15,7 +15,7 @@ from tools.commands.options import JsonOption, SafetyIoOption, YesOption
 from tools.consent import require_consent
 from tools.errors import BadInputError
 from tools.output import Output
-from tools.rail_session import open_rail, position_of, slack_watch
+from tools.rail_session import open_rail, position_of, power_watch, require_options, slack_watch
 from tools.signals import stop_on_signals
 
 app = typer.Typer(help="The rails on which winches stand.", no_args_is_help=True)
@@ -84,6 +84,13 @@ def move_(
         bool,
         typer.Option("--cables-slack-checked", help="You have looked: all cables hang slack."),
     ] = False,
+    winch_bus: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Another CAN bus with winches, whose drives must have no power; may be repeated.",
+            metavar="URL",
+        ),
+    ] = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -94,12 +101,15 @@ def move_(
         raise BadInputError(
             f"--to {to_m:g}: allowed are {profile.travel_min_m:g} to {profile.travel_max_m:g} m"
         )
-    if bus is None or not bus.startswith("simbus:"):
+    require_options(profile, bus, safety_io)
+    simulated = profile.cia402 is not None and bus is not None and bus.startswith("simbus:")
+    if not simulated:
         question = f"{profile.name} moves to {to_m:g} m; robot {profile.robot} must be calibrated"
         require_consent(f"{question} again.", yes)
     with (
         stop_on_signals() as stop_requested,
         slack_watch(profile, tension, tension_port, cables_slack_checked) as tight,
+        power_watch(profile, bus, winch_bus or (), out) as powered,
         open_rail(rail, profile, bus, safety_io, out) as axis,
     ):
         travel_s = abs(to_m - axis.position_m()) / profile.speed_m_s
@@ -111,6 +121,7 @@ def move_(
                 to_m,
                 Conditions(
                     tight,
+                    powered,
                     stop_requested,
                     lambda here: advance(abs(here - begun) / profile.speed_m_s),
                 ),
