@@ -71,8 +71,13 @@ class SessionSafety:
 
 
 def trip_file(reference: str) -> Path:
-    """Return the file in which a safety I/O's trip is kept until it is acknowledged."""
-    return state_path("safety-io", Path(reference.partition("@")[0]).stem)
+    """Return the file in which a safety I/O's trip is kept until it is acknowledged.
+
+    One for each place, as the same profile may be that of several devices. Raises ProfileError.
+    """
+    profile = load_safety_io(reference)
+    name = Path(reference.partition("@")[0]).stem
+    return state_path("safety-io", f"{name}.{profile.host}.{profile.port}")
 
 
 def kept_trip(reference: str) -> dict[str, Any] | None:

@@ -53,6 +53,8 @@ class SlcanLine:
         self._fd: int = self._serial.fileno()
         self._sending = threading.Lock()
         self._rest = b""
+        self._torn = False
+        """Whether the last line went out in part only."""
         self._told_flags = 0
         self._ask_at_s = 0.0
         try:
@@ -203,9 +205,12 @@ class SlcanLine:
     def _put(self, text: bytes) -> None:
         with self._sending:
             deadline = 0.0
+            if self._torn:
+                text = b"\r" + text  # ends the piece of a line, which the adapter refuses
             while True:
                 try:
                     text = text[os.write(self._fd, text) :]
+                    self._torn = bool(text)
                 except BlockingIOError:
                     now = time.monotonic()
                     deadline = deadline or now + SEND_TIMEOUT_S

@@ -206,6 +206,9 @@ class SafetyIo:
                 self._poll()
             except ModbusError as error:
                 self._error = str(error)
+            except Exception as error:
+                # a thread that ended could switch nothing off any more; this counts as silence
+                self._error = f"{type(error).__name__}: {error}"
             self._keep_trip()
             due = max(due + self.profile.poll_period_s, time.monotonic())
             self._ended.wait(due - time.monotonic())

@@ -27,7 +27,7 @@ from profiles import load_winch
 from sim_bus.physics_board import BoardAxis, PhysicsBoard
 from sim_bus.safety_twin import Fault
 from tools.commands import io as io_commands
-from tools.errors import BadInputError
+from tools.errors import BadInputError, WorkFailedError
 
 WINCH = "winch-mpp0923d"
 # what may pass from the reaction of a busy machine until the next look
@@ -178,12 +178,16 @@ def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
     assert not lab.twin.coil(10)
     brake = ("brake", lab.twin.reference, "winch 1", "--seconds", "0.5")
     refused(*brake, said="not confirmed")
-    command = lab.begin("io", *brake, "--yes")
+    command = lab.begin("io", *brake[:-1], "60", "--yes")
     wait_until(lambda: lab.winch.brake_released, 20)
+    command.terminate()
     assert result(command)["ok"]
     assert not lab.winch.brake_released
     with SafetyIo(lab.twin.profile()) as other:
         other.energise()
+        with pytest.raises(WorkFailedError, match="another command uses it"):
+            CliRunner().invoke(io_commands.app, [*brake, "--yes"], catch_exceptions=False)
+        assert not other.alarm()
         assert lab.io("off")["contactor_closed"] is False
         assert not lab.winch.power_allowed
         wait_until(other.alarm)  # it may not switch on again

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any
 
@@ -11,12 +11,14 @@ import typer
 
 from drivers.modbus.io_link import IoLink
 from drivers.modbus.io_rules import IoState
+from drivers.modbus.tcp import ModbusError
 from profiles.safety_io import Brake, Contactor, load_safety_io
 from tools.commands.options import JsonOption, YesOption
 from tools.consent import require_consent
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.safety import connect, kept_trip
+from tools.signals import stop_on_signals
 
 app = typer.Typer(help="The safety I/O beside the drives.", no_args_is_help=True)
 
@@ -110,16 +112,25 @@ def brake(
         if one is None:
             known = ", ".join(repr(name) for name in brakes) or "none"
             raise BadInputError(f"axis {axis!r} has no brake in {io}; with one: {known}")
+        state = link.state()
+        if state.contactor_asked or any(state.brakes_asked.values()):
+            raise WorkFailedError(
+                f"{link.name}: its outputs for contactor or brakes are on: another command uses it "
+                "(or has died: cdpr io off)"
+            )
         require_consent(f"{axis} is held by nothing but its drive then.", yes)
         link.set_watchdog()
-        try:
-            _hold(link, axis, one, True, one.timeout_s)
-            out.say(f"the brake of {axis} is released")
-            _hold(link, axis, one, True, seconds)
-        except KeyboardInterrupt:
-            out.note("stopped on request")
-        finally:
-            _hold(link, axis, one, False, one.timeout_s)
+        with stop_on_signals() as stop_requested:
+            try:
+                _hold(link, axis, one, True, one.timeout_s, stop_requested)
+                if not stop_requested():
+                    out.say(f"the brake of {axis} is released")
+                    _hold(link, axis, one, True, seconds, stop_requested)
+                if stop_requested():
+                    out.note("stopped on request")
+            finally:
+                link.write(one.output.coil, False)  # before anything else can go wrong
+                _hold(link, axis, one, False, one.timeout_s)
         out.say(f"the brake of {axis} is applied")
     out.result({"ok": True, "axis": axis})
 
@@ -131,8 +142,14 @@ def off(io: _IoArgument, as_json: JsonOption = False) -> None:
     with _link(io) as link:
         brakes = [axis.brake for axis in link.profile.axes if axis.brake is not None]
         devices: list[Brake | Contactor] = [*brakes, link.profile.contactor]
-        for device in devices:
-            link.write(device.output.coil, False)
+        refused = []
+        for device in devices:  # each, whatever became of the others
+            try:
+                link.write(device.output.coil, False)
+            except ModbusError as error:
+                refused.append(str(error))
+        if refused:
+            raise WorkFailedError("; ".join(dict.fromkeys(refused)))
         time.sleep(max(device.timeout_s for device in devices))
         state = link.state()
     for line in _lines(state):
@@ -162,9 +179,18 @@ def _link(io: str) -> Iterator[IoLink]:
         link.close()
 
 
-def _hold(link: IoLink, axis: str, brake: Brake, released: bool, seconds: float) -> None:
+def _hold(
+    link: IoLink,
+    axis: str,
+    brake: Brake,
+    released: bool,
+    seconds: float,
+    ended: Callable[[], bool] = lambda: False,
+) -> None:
     """Keep a brake's output for a while; raises WorkFailedError unless its feedback follows."""
-    _keep(link, brake.output.coil, released, seconds)
+    _keep(link, brake.output.coil, released, seconds, ended)
+    if ended():
+        return
     if link.state().brakes_released[axis] != released:
         wanted = "released" if released else "applied"
         raise WorkFailedError(
@@ -173,12 +199,18 @@ def _hold(link: IoLink, axis: str, brake: Brake, released: bool, seconds: float)
         )
 
 
-def _keep(link: IoLink, coil: int, on: bool, seconds: float) -> None:
+def _keep(
+    link: IoLink,
+    coil: int,
+    on: bool,
+    seconds: float,
+    ended: Callable[[], bool] = lambda: False,
+) -> None:
     """Set an output and keep the device's watchdog content for a while."""
     link.feed_watchdog()  # a device whose watchdog has run out takes no outputs
     link.write(coil, on)
     deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
+    while time.monotonic() < deadline and not ended():
         link.feed_watchdog()
         time.sleep(link.profile.poll_period_s)
 

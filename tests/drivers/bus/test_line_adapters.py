@@ -181,6 +181,30 @@ def test_rubbish_between_frames_loses_none(start: Start) -> None:
     port.close()
 
 
+def test_a_line_cut_short_by_an_adapter_that_takes_nothing_is_ended_before_the_next() -> None:
+    host, terminal = pty.openpty()
+    tty.setraw(terminal)
+    line = SlcanLine.__new__(SlcanLine)  # on a channel that is open already
+    line._fd, line._sending, line._torn = terminal, threading.Lock(), False
+    os.set_blocking(terminal, False)
+    sent = frame(0x201, bytes(8))
+    with pytest.raises(BlockingIOError):
+        while True:
+            line.write(sent)
+    os.set_blocking(host, False)
+    text = b""
+    while select.select([host], [], [], 0.2)[0]:
+        text += os.read(host, 1 << 16)
+    line.write(frame(0x123, b"\x01"))
+    while select.select([host], [], [], 0.2)[0]:
+        text += os.read(host, 1 << 16)
+    *whole, piece, last, _ = text.split(b"\r")
+    assert set(whole) == {b"t2018" + bytes(16).replace(b"\0", b"0")}
+    assert last == b"t123101", piece
+    os.close(host)
+    os.close(terminal)
+
+
 def test_trouble_the_adapter_tells_of_reaches_the_acyclic_side_only(start: Start) -> None:
     adapter = start(GOOD | {b"F": b"F00\r", b"t": b"\a"})
     cyclic, acyclic = open_port(adapter.url), open_python_can(adapter.url, [(0x701, 0x7FF)])

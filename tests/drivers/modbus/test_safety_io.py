@@ -20,6 +20,7 @@ from drivers.modbus.safety_io import SafetyIo, SafetyIoError
 from drivers.modbus.tcp import ModbusError
 from sim_bus.physics_board import BoardAxis, PhysicsBoard
 from sim_bus.safety_twin import Fault
+from tools.safety import trip_file
 
 TRIP_S = 0.4
 SLACK_S = 1.0  # of a busy machine
@@ -213,6 +214,27 @@ def test_a_second_command_does_not_take_the_power_from_the_first(
         time.sleep(0.1)
         assert winch.power_allowed
         assert not io.alarm()
+
+
+def test_a_poll_that_fails_in_an_unforeseen_way_is_silence_and_power_still_goes(
+    twin: Twin, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise KeyError("an input that is nowhere")
+
+    with SafetyIo(twin.profile()) as io:
+        io.energise()
+        monkeypatch.setattr("drivers.modbus.safety_io.interpret", fail)
+        wait_until(io.stop_reason)
+        assert "an input that is nowhere" in io.stop_reason()
+        monkeypatch.undo()
+    assert not winch.power_allowed
+
+
+def test_each_place_has_trips_of_its_own() -> None:
+    here, there = (trip_file(f"modbus-remote-io@10.0.0.{i}:502") for i in (1, 2))
+    assert here != there
+    assert trip_file("modbus-remote-io@127.0.0.1:502") == trip_file("modbus-remote-io")
 
 
 def test_a_damaged_trip_file_refuses_until_it_is_acknowledged(twin: Twin, tmp_path: Path) -> None:
