@@ -9,6 +9,10 @@ class TripError(ControlError):
     """The supervisor or the device ended the motion; the message says which limit and value."""
 
 
+class NotInTimeError(TripError):
+    """A device's own procedure took longer than it may; nothing else was wrong."""
+
+
 class InterruptedMotionError(ControlError):
     """The operator asked for a stop; the motion was ended under control."""
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from cdpr_rt.controllers.base import Controller, Idle
-from cdpr_rt.errors import InterruptedMotionError, TripError
+from cdpr_rt.errors import InterruptedMotionError, NotInTimeError, TripError
 from cdpr_rt.exchange import AxisDevice, Setpoint
 from cdpr_rt.rawlog import RawLogWriter
 from cdpr_rt.recorder import Recorder
@@ -105,9 +105,9 @@ class Executive:
     def step(self, each_cycle: Callable[[], bool], timeout_s: float, what: str) -> None:
         """Run cycles without torque, calling `each_cycle` after each exchange, until it is true.
 
-        A device's own procedure (homing, enabling) advances by its `each_cycle`. Raises TripError
-        after `timeout_s` of bus time, or when the device raises an alarm, and
-        InterruptedMotionError on request.
+        A device's own procedure (homing, enabling) advances by its `each_cycle`. Raises
+        NotInTimeError after `timeout_s` of bus time, TripError when the device or a watch ends it,
+        and InterruptedMotionError on request.
         """
         self._refuse_when_stopped(what)
         period = self.device.period_s
@@ -124,7 +124,7 @@ class Executive:
             if done:
                 return
             self._refuse_when_stopped(what)
-        raise TripError(f"{what}: not within {timeout_s:g} s")
+        raise NotInTimeError(f"{what}: not within {timeout_s:g} s")
 
     def _refuse_when_stopped(self, what: str) -> None:
         if self._stop_requested():

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_rt.cogging_profile import DriveIdentity
-from cdpr_rt.errors import TripError
+from cdpr_rt.errors import NotInTimeError, TripError
 from cdpr_rt.executive import Executive, Watch
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.rehearsal import rehearse
@@ -122,9 +122,8 @@ class WinchSession:
         timeout = self.winch.drive.mode_display_timeout_s
         try:
             self.executive.step(self.device.mode_confirmed, timeout, "the mode's confirmation")
-        except TripError as error:
-            tripped = self.device.alarm() or (self.safety is not None and self.safety.tripped)
-            if tripped or self.device.mode_confirmed():
+        except NotInTimeError as error:
+            if self.device.mode_confirmed():
                 raise
             raise self.device.unconfirmed_mode() from error
 

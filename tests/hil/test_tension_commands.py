@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from profiles import load_winch
 from profiles.tension_sensor import SHIPPED
 from profiles.winch_calibration import load_winch_calibration
 from sim_bus.physics_board import PhysicsBoard
+from tools.cli import main
 
 WINCH = "winch-mpp0923d"
 FAILED, BAD_INPUT = 1, 2
@@ -28,18 +32,26 @@ def cdpr(*arguments: str | Path) -> list[str]:
     return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
 
 
+def invoke(*arguments: str | Path, status: int = 0) -> str:
+    """Run a command in this process, which has the libraries loaded; return what it wrote."""
+    out, notes = io.StringIO(), io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(out),
+        redirect_stderr(notes),
+        pytest.raises(SystemExit) as ended,
+    ):
+        patch.setattr(sys, "argv", ["cdpr", *map(str, arguments)])
+        patch.setattr(sys, "stdin", io.StringIO())
+        main()
+    assert (ended.value.code or 0) == status, notes.getvalue()
+    return out.getvalue()
+
+
 def run(*arguments: str | Path, status: int = 0) -> dict[str, Any]:
-    done = subprocess.run(
-        cdpr(*arguments, "--json"),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
+    result: dict[str, Any] = json.loads(
+        invoke(*arguments, "--json", status=status).splitlines()[-1]
     )
-    assert done.returncode == status, done.stderr
-    assert "Traceback" not in done.stderr
-    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return result
 
 
@@ -96,12 +108,19 @@ def gain(result: dict[str, Any], true: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("masses", "turns", "plant", "radius_error", "constant_error", "share"),
+    ("masses", "more", "plant", "radius_error", "constant_error", "share"),
     [
-        ("2,5,9", "2", "[load]\nkind = 'hung_mass'\n", 0.0, 0.04, 0.05),
+        (
+            "2,5,9",
+            ("--speed-mm-s", "60", "--lead-mm", "60"),
+            "[load]\nkind = 'hung_mass'\n",
+            0.0,
+            0.04,
+            0.05,
+        ),
         (
             "2,4,7",
-            "1",
+            ("--turns", "1", "--speed-mm-s", "60", "--lead-mm", "80"),
             "seed = 3\n[motor]\ntorque_constant_error = -0.06\n[[cogging]]\norder = 24\n"
             "amplitude_Nm = 0.04\n[[cogging]]\norder = 4\namplitude_Nm = 0.1\n"
             "kind = 'current_offset'\n[friction]\ndirection_asymmetry = 0.5\n"
@@ -117,7 +136,7 @@ def gain(result: dict[str, Any], true: float) -> None:
 def test_masses_give_gain_and_friction(
     tmp_path: Path,
     masses: str,
-    turns: str,
+    more: tuple[str, ...],
     plant: str,
     radius_error: float,
     constant_error: float,
@@ -127,7 +146,7 @@ def test_masses_give_gain_and_friction(
     out = tmp_path / "out"
     result = run(
         *("tension", "calibrate", WINCH, "--bus", "simbus:", "--masses", masses),
-        *("--plant", tmp_path / "plant.toml", "--out", out, "--turns", turns),
+        *("--plant", tmp_path / "plant.toml", "--out", out, *more),
     )
     true = 0.026 * (1.0 + radius_error) / (1.0 + constant_error)
     gain(result, true)
@@ -154,6 +173,24 @@ def tare(folder: Path, port: str) -> None:
     assert cable["after_N"] == pytest.approx(0.0, abs=0.1)
 
 
+def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
+    """Load cells beside `cdpr drive` keep it from what it would do."""
+    tight = folder / "tight.toml"
+    text = (SHIPPED / "rtu-load-cell-1.toml").read_text()
+    tight.write_text("stop_above_N = 50.0\n" + text + "zero_N = -100.0\n")
+    for command, more in (("enable", ("--seconds", "0.2")), ("jog", ("--seconds", "0.2"))):
+        watched = ("drive", command, WINCH, "--bus", bus, "--port", cells.port, *more)
+        assert run(*watched, "--sensors", "rtu-load-cell-1")["ok"]
+        error = run(*watched, "--sensors", tight, status=FAILED)["error"]
+        assert re.fullmatch(r"winch 1: \d+\.\d N, 50 N allowed", error)
+    cells.tell("broken-wire 1")
+    watched = ("drive", "home", WINCH, "--bus", bus, "--sensors", "rtu-load-cell-1")
+    error = run(*watched, "--port", cells.port, status=FAILED)["error"]
+    assert error == "winch 1: tension sensor: broken wire"
+    cells.tell("mend 1")
+    assert "go together" in run(*watched, status=BAD_INPUT)["error"]
+
+
 def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
     plant = "[load]\nkind = 'fixed_anchor'\npretension_N = 2.0\nanchor_stiffness_N_m = 500.0\n"
     plant += "drum_radius_error = 0.03\n"
@@ -169,6 +206,7 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
         assert cable["valid"] and cable["mean_N"] == pytest.approx(2.0, abs=1.5)
         assert cable["rate_Hz"] > 8.0
         tare(tmp_path, cells.port)
+        watched_session(tmp_path, bus, cells)
         result = run(
             *("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors),
             *("--port", cells.port, "--out", out),
@@ -207,6 +245,14 @@ def test_what_cannot_be_calibrated_is_refused(tmp_path: Path) -> None:
             ("--sensors", "rtu-load-cell-1", "--port", "x", "--highest-n", "200"),
             "up to 104 N",
         ),
+        (("--masses", "nan,2,5"), "at least three different masses"),
+        (("--masses", "2,5,5.0,9"), "at least three different masses"),
+        (("--masses", "5,6,7"), "the heaviest must be at least 2 times the lightest"),
+        (("--masses", "2;5;9"), "numbers in kg are wanted"),
+        (("--masses", "2,5,9", "--port", "x"), "--port and --cable go with --sensors"),
+        (("--sensors", "rtu-load-cell-1"), "--sensors needs --port"),
+        (("--sensors", "rtu-load-cell-1", "--port", "x", "--board", "b"), "--board goes with"),
+        ((), "give either --masses or --sensors"),
     ):
         result = run(*calibrate, *more, status=BAD_INPUT)
         assert message in result["error"]
@@ -217,6 +263,7 @@ def test_slack_that_eats_the_lead_in_refuses_the_result_and_keeps_the_data(tmp_p
     (tmp_path / "plant.toml").write_text("[load]\nkind = 'hung_mass'\nslack_m = 0.3\n")
     result = run(
         *("tension", "calibrate", WINCH, "--bus", "simbus:", "--masses", "2,5,9"),
+        *("--speed-mm-s", "100"),
         *("--plant", tmp_path / "plant.toml", "--out", out),
         status=FAILED,
     )
@@ -229,6 +276,22 @@ def test_slack_that_eats_the_lead_in_refuses_the_result_and_keeps_the_data(tmp_p
         status=BAD_INPUT,
     )
     assert "--overwrite" in result["error"]
+    foreign = out / "raw" / "sweep.raw"
+    foreign.write_text("of a commissioning")
+    real = ("--bus", "socketcan:none", "--masses", "2,5,9", "--out", out, "--overwrite")
+    result = run("tension", "calibrate", WINCH, *real, status=BAD_INPUT)
+    assert "not confirmed" in result["error"]
+    assert (out / "raw" / "mass-2kg.raw").exists()  # nobody agreed to lose it
+    result = run("tension", "calibrate", WINCH, *real, "--yes", status=BAD_INPUT)
+    assert "socketcan:none" in result["error"]
+    assert [path.name for path in (out / "raw").iterdir()] == ["sweep.raw"]
+    (tmp_path / "raw").write_text("a file")
+    result = run(
+        *("tension", "calibrate", WINCH, "--bus", "simbus:x", "--masses", "2,5,9"),
+        *("--out", tmp_path),
+        status=BAD_INPUT,
+    )
+    assert "cannot be written" in result["error"]
 
 
 def test_stopping_lowers_the_mass_and_a_dead_load_cell_stops_the_pull(tmp_path: Path) -> None:
@@ -250,7 +313,18 @@ def test_stopping_lowers_the_mass_and_a_dead_load_cell_stops_the_pull(tmp_path: 
         without_power(shared)
         state = axis.state()
         assert abs(state.motor_rad) < 3.0  # back where it began, the mass on the floor
-        subprocess.run(cdpr("sim", "hang", "7.5", "--board", board), check=True)
+        sign_wrong = tmp_path / "wrong.toml"
+        told = load_winch(WINCH).path.read_text()
+        sign_wrong.write_text(told.replace("cable_sign = 1", "cable_sign = -1"))
+        result = run(
+            *("tension", "calibrate", sign_wrong, "--bus", bus, "--masses", "4,6,8"),
+            *("--board", board, "--out", tmp_path / "wrong", "--speed-mm-s", "120"),
+            status=FAILED,
+        )
+        assert "4 kg were asked for, and the torque is that of 0" in result["error"]
+        assert "cable_sign" in result["error"]
+        without_power(shared)
+        invoke("sim", "hang", "7.5", "--board", board)
         assert axis.hung_mass_kg == 7.5
 
         options = ("--board", board, "--fault", "silent 1")
