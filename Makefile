@@ -4,14 +4,18 @@ VENV := .venv
 STAMP := $(VENV)/.installed
 BIN := $(VENV)/bin
 JOBS ?= 2
+SOAK_MINUTES ?= 10
 
-.PHONY: demo test check lint lock clean
+.PHONY: demo test soak check lint lock clean
 
 demo: $(STAMP)  ## commission one simulated winch on the embedded bus
 	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo --overwrite
 
 test: $(STAMP) check  ## every test; needs nothing but Python
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadscope --no-loadscope-reorder
+
+soak: $(STAMP)  ## ten minutes of hours of bus time with eight drives: no leak, no lost frame
+	$(BIN)/cdpr bench soak --hours 24 --wall-minutes $(SOAK_MINUTES)
 
 check: $(STAMP)  ## formatting, lint, types, import directions
 	$(BIN)/ruff format --check .

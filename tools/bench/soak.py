@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -151,14 +152,19 @@ class Soak:
         self.bus_s = self.wall_s = 0.0
         self._before = Counts.all(session)
 
-    def run(self, seconds: float, advance: Callable[[float], None]) -> None:
-        """Move for `seconds` of bus time; raises WorkFailedError when the motion ends early."""
+    def run(
+        self, seconds: float, advance: Callable[[float], None], most_wall_s: float = math.inf
+    ) -> None:
+        """Move for `seconds` of bus time, or until the leg in which `most_wall_s` have passed.
+
+        Raises WorkFailedError when the motion ends early.
+        """
         self._before = Counts.all(self.session)
         self._sample()
         begin, cycle = time.monotonic(), self.session.device.feedback.cycle
         period_s = self.session.device.period_s
         try:
-            while self.bus_s < seconds - period_s:
+            while self.bus_s < seconds - period_s and self.wall_s < most_wall_s:
                 self._leg(min(_LEG_S, seconds - self.bus_s))
                 self.bus_s = (self.session.device.feedback.cycle - cycle) * period_s
                 self.wall_s = time.monotonic() - begin
@@ -211,8 +217,12 @@ class Soak:
         }
 
 
-def measure(robot: Robot, hours: float, rate_Hz: float | None, out: Output) -> dict[str, Any]:
+def measure(
+    robot: Robot, hours: float, most_wall_s: float, rate_Hz: float | None, out: Output
+) -> dict[str, Any]:
     """Run `robot` on a simulator of its own for `hours` of bus time; return the figures.
+
+    It ends earlier when `most_wall_s` have passed.
 
     `rate_Hz` is another rate of cycles than the robot's: a lower one lets more bus time pass for
     the same frames. Raises WorkFailedError when the motion ends early.
@@ -226,7 +236,7 @@ def measure(robot: Robot, hours: float, rate_Hz: float | None, out: Output) -> d
         Soak(session).run(_WARM_UP_CYCLES * robot.sync_period_s, lambda _: None)
         soak = Soak(session)
         with out.progress(f"{hours:g} h of bus time", seconds) as advance:
-            soak.run(seconds, advance)
+            soak.run(seconds, advance, most_wall_s)
         figures = soak.figures()
         session.disable()
     head = {

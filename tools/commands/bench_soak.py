@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 import typer
@@ -19,6 +20,9 @@ def add(app: typer.Typer) -> None:
 
 def soak(
     hours: Annotated[float, typer.Option(min=1e-4, max=1e4, help="Hours of bus time.")] = 1.0,
+    wall_minutes: Annotated[
+        float, typer.Option(min=0.01, help="End after so many minutes on the clock.")
+    ] = math.inf,
     robot: Annotated[str, typer.Option(help="Robot profile: a name or a path.")] = "spatial-8",
     rate: Annotated[
         float | None,
@@ -31,7 +35,7 @@ def soak(
     Exit status 1 when one does.
     """
     out = Output(as_json)
-    figures = soak_bench.measure(load_robot(robot), hours, rate, out)
+    figures = soak_bench.measure(load_robot(robot), hours, 60.0 * wall_minutes, rate, out)
     for line in _table(figures):
         out.say(line)
     if not figures["ok"]:
