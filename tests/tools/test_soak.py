@@ -65,7 +65,7 @@ def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RobotSe
 def test_a_limit_on_the_clock_ends_it_with_the_leg(session: RobotSession):
     soak = Soak(session)
     soak.run(3600.0, lambda _: None, most_wall_s=0.1)
-    assert 0.1 < soak.wall_s
+    assert soak.wall_s > 0.1
     assert 1.0 < soak.bus_s < 100.0
 
 
