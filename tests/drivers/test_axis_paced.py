@@ -49,14 +49,19 @@ def rig(
             yield rig
 
 
-def _cycles(rig: Rig, count: int) -> list[str]:
-    """Run cycles at their absolute deadlines; return the alarm after each."""
+def _cycles(rig: Rig, count: int, patience_s: float = 1.0) -> list[str]:
+    """Run cycles a period apart; return the alarm after each.
+
+    `patience_s` is how long an answer may take: a busy machine shall not look like a lost drive.
+    """
     alarms = []
     deadline = time.monotonic()
     for _ in range(count):
-        deadline += PERIOD_S
+        deadline = max(deadline + PERIOD_S, time.monotonic())  # what was late is not made up for
         time.sleep(max(0.0, deadline - time.monotonic()))
-        rig.cycle()
+        rig.group.sync()
+        rig.group.receive(time.monotonic() + patience_s)
+        rig.group.transmit()
         alarms.append(rig.group.alarm())
     return alarms
 
@@ -77,7 +82,7 @@ def test_axes_are_exchanged_in_real_time(rig: Rig) -> None:
     assert set(_cycles(rig, 60)) == {""}
     assert (rig.group.feedback.position_rad - before)[0] > 0.1
     assert (rig.group.feedback.position_rad - before)[1] < -0.1
-    assert rig.group.missed - missed < 6  # of 120 answers
+    assert rig.group.missed == missed
 
 
 def test_the_wait_for_an_answer_ends_within_the_period(rig: Rig) -> None:
@@ -91,18 +96,20 @@ def test_the_wait_for_an_answer_ends_within_the_period(rig: Rig) -> None:
         waits.append(time.monotonic() - begin)
         rig.group.transmit()
         time.sleep(1e-3)
-    assert sorted(waits)[len(waits) // 2] == pytest.approx(0.6 * PERIOD_S, rel=0.3)
+    assert 0.59 * PERIOD_S < sorted(waits)[len(waits) // 2] < PERIOD_S
     assert not rig.group.feedback.valid[1]
+    rig.misbehave(2, 0, node=2)
 
 
 def test_two_lost_answers_are_bridged_and_the_third_is_an_alarm(rig: Rig) -> None:
     _enable(rig)
     rig.misbehave(2, 2, node=2)
-    assert "no answer" not in "".join(_cycles(rig, 20))
+    assert "no answer" not in "".join(_cycles(rig, 20, 0.1))
     rig.misbehave(2, 200, node=2)
-    alarms = [text for text in _cycles(rig, 20) if text]
+    alarms = [text for text in _cycles(rig, 5, 0.02) if text]
     assert alarms
     assert "node 2: no answer to SYNC for 3 cycles" in alarms[0]
+    rig.misbehave(2, 0, node=2)
 
 
 def test_an_answer_that_comes_late_is_not_taken_for_the_next_one(rig: Rig) -> None:

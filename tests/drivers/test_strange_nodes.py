@@ -33,8 +33,10 @@ def stock(simulated_bus: str) -> Iterator[canopen.LocalNode]:
     strangers.NOTIFIER_CYCLE = 0.02
     strangers.connect(interface="simbus", channel=simulated_bus[7:])
     lean = dictionary(STRANGER)
+    identity = lean[0x1018]
+    assert isinstance(identity, canopen.objectdictionary.ODRecord)
     for sub in (2, 3, 4):
-        del lean[0x1018][sub]
+        del identity[sub]
     del lean[0x1008]
     node = strangers.create_node(STRANGER, lean)
 
@@ -53,7 +55,7 @@ def stock(simulated_bus: str) -> Iterator[canopen.LocalNode]:
 
 def _no_more_than_mapped(node: canopen.LocalNode) -> Callable[..., None]:
     def on_read(index: int, subindex: int, **_more: object) -> None:
-        if 0x1A00 <= index < 0x1C00 and subindex and subindex > node.sdo[index][0].raw:
+        if 0x1A00 <= index < 0x1C00 and subindex and subindex > node.get_data(index, 0)[0]:
             raise canopen.SdoAbortedError(0x06090011)
 
     return on_read
@@ -63,13 +65,13 @@ LEAN = DRIVE.model_copy(update=dict.fromkeys(("product_code", "revision", "seria
 
 
 def test_what_is_optional_may_be_absent(stock: canopen.LocalNode, network: CanNetwork) -> None:
-    stock.sdo[0x1A00][0].raw = 0
-    stock.add_read_callback(_no_more_than_mapped(stock))
+    stock.set_data(0x1A00, 0, b"\0")
+    stock.add_read_callback(_no_more_than_mapped(stock))  # type: ignore[no-untyped-call]
     report = boot(network, STRANGER, LEAN, SETTINGS)
     assert (report.vendor_id, report.product_code, report.serial) == (0x00CD9A01, 0, 0)
     assert report.device_name == ""
     assert "1800h and 1A00h" in report.changed
-    assert stock.sdo[0x1A00][2].raw == 0x60640020
+    assert stock.get_data(0x1A00, 2) == bytes.fromhex("20006460")
 
 
 def test_what_the_profile_asks_for_must_be_there(

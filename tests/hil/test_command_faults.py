@@ -47,7 +47,7 @@ class Lab:
         self._network.NOTIFIER_CYCLE = 0.05
         self._network.connect(interface="simbus", channel=self.bus.partition(":")[2])
         self.node = self._network.add_node(1, str(EDS))
-        self.node.sdo.RESPONSE_TIMEOUT = 1.0
+        self.node.sdo.RESPONSE_TIMEOUT = 5.0
 
     def reset(self) -> None:
         """Switch the drive off and on."""
@@ -283,13 +283,14 @@ def test_a_simulator_killed_in_mid_sweep(tmp_path: Path) -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_in_mid_sweep(lab: Lab, tmp_path: Path, number: signal.Signals) -> None:
     with sweeping(lab, tmp_path) as command:
-        before = lab.node.sdo[0x6064].raw
         command.send_signal(number)
         told = complaint(command, FAILED)
     assert "stopped on request" in told
     assert lab.state() == OFF
-    # braked, not dropped: at 3 deg/s it stands within a degree
-    assert abs(lab.node.sdo[0x6064].raw - before) < 8192 * 3 / 360
+    # braked, not dropped: it stands where it was when the recording ended
+    log = read_raw_log(tmp_path / "raw" / "sweep-0.raw")
+    stands_rad = lab.node.sdo[0x6064].raw * 2 * np.pi / 8192
+    assert abs(np.degrees(stands_rad - log.column("position_rad")[-1])) < 1.0
     assert rows_of(tmp_path) > 2000
 
 
@@ -317,11 +318,12 @@ def test_a_killed_master_leaves_no_power(lab: Lab, tmp_path: Path) -> None:
         assert lab.state() == ENABLED
         command.kill()
         command.wait()
-        # half a second until bus time runs by itself, half a second until the heartbeat is missed
-        deadline = time.monotonic() + 3.0
-        while lab.state() == ENABLED:
+        # half a second until bus time runs by itself, half a second until the heartbeat is missed,
+        # then the quick stop; on a busy machine the wall is later than bus time
+        deadline = time.monotonic() + 10.0
+        while lab.state() != OFF:
             assert time.monotonic() < deadline
-    assert lab.state() == OFF
+            time.sleep(0.02)
     assert rows_of(tmp_path) > 1000
 
 
