@@ -1,4 +1,4 @@
-"""Readings handed from the sampling thread to the cycle: whole, dated, and not believed for long."""
+"""Readings handed from the sampling thread to the cycle: whole, dated, not believed for long."""
 
 from __future__ import annotations
 
@@ -71,6 +71,19 @@ def test_a_fault_is_told_with_its_cable_and_goes_when_it_is_mended() -> None:
     both.publish(2, 60.0, 100.0, TensionFault.NONE)
     both.update()
     assert both.feedback.valid.all()
+
+
+def test_a_watch_stops_what_pulls_too_hard() -> None:
+    clock = Clock()
+    both = exchange(clock)
+    watch = TensionWatch(both, 80.0)
+    for i, tension in enumerate((20.0, 79.9, 50.0)):
+        both.publish(i, tension, 100.0, TensionFault.NONE)
+    assert watch.stop_reason() == ""
+    both.publish(1, 80.1, 100.0, TensionFault.NONE)
+    assert watch.stop_reason() == "winch 2: 80.1 N, 80 N allowed"
+    both.publish(0, 0.0, 100.0, TensionFault.BROKEN_WIRE)
+    assert watch.stop_reason() == "winch 1: tension sensor: broken wire"
 
 
 @pytest.mark.parametrize("n", [1, 8])

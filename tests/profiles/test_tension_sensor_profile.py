@@ -20,6 +20,11 @@ TEXT = (SHIPPED / "rtu-load-cell-1.toml").read_text(encoding="utf-8")
         ("baudrate = 115200", "baudrate = 115201", "baudrate: value 115201; allowed: 1200 or"),
         ("baudrate = 115200", "baud = 115200", "baud: unknown key; did you mean 'baudrate'"),
         ('type = "int32"', 'type = "int24"', "amplifier.value.type: value 'int24'"),
+        (
+            'address = 0\ntype = "int32"',
+            'address = 65535\ntype = "int32"',
+            "value.address: 65535 for int32; allowed: up to 65534",
+        ),
         ("scale_N = 0.01", "scale_N = 0.0", "amplifier.value.scale_N"),
         ("unit = 1", "unit = 248", r"sensors\[0\].unit: value 248"),
         ("lowest_N = -100.0", "lowest_N = 2000.0", "lowest_N = 2000.0 must be below 1000.0"),
@@ -44,7 +49,7 @@ def test_a_name_that_is_not_there_is_answered_with_those_that_are() -> None:
 
 def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:
     made = WinchCalibration(
-        winch='a "quoted" winch',
+        winch='a "quoted" winch: Förderseil 🏗',
         motor="MPP0923D",
         drive_serial=7,
         date=datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),

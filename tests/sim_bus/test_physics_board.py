@@ -63,6 +63,13 @@ def test_what_is_no_board_is_refused(tmp_path: Path) -> None:
         (tmp_path / "other").write_bytes(content)
         with pytest.raises(BusSetupError, match=r"physics board .*other"):
             PhysicsBoard.attach(tmp_path / "other")
+    with pytest.raises(BusSetupError, match="not a physics board"):
+        PhysicsBoard.create(tmp_path / "other", 1)  # whosever it is
+    assert (tmp_path / "other").read_bytes() == b"x" * 1000
+    left = tmp_path / "left"  # by a simulator that was killed
+    PhysicsBoard.create(left, 1)
+    with PhysicsBoard.create(left, 3) as board:
+        assert board.axes == 3
     with pytest.raises(BusSetupError, match="No such file"):
         PhysicsBoard.create(tmp_path / "missing" / "board", 1)
     with (

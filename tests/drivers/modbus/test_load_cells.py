@@ -116,6 +116,18 @@ def test_a_disturbed_line_is_told_and_harms_no_other_cell(
     assert cells.read(1).fault is TensionFault.NONE
 
 
+def test_a_clock_that_is_set_back_does_not_hold_a_request(
+    rig: LoadCellRig, cells: LoadCells, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig.tell("silent 2")
+    asked, wall = itertools.count(), time.time
+    monkeypatch.setattr(time, "time", lambda: wall() - (6.0 if next(asked) else 0.0))
+    begun = time.monotonic()
+    with pytest.raises(ModbusError, match="no answer within"):
+        cells.read(1)
+    assert time.monotonic() - begun < 4.0
+
+
 def test_over_range_and_broken_wire_are_told_apart(rig: LoadCellRig, cells: LoadCells) -> None:
     rig.tell("over-range 1")
     rig.tell("broken-wire 2")

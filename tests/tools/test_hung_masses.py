@@ -1,0 +1,78 @@
+"""Masses hung by a person: what is asked, what counts as an answer, and what no mass can be."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_rt.errors import RawLogError
+from cdpr_rt.rawlog import RawLogWriter
+from profiles import load_winch
+from tools.errors import BadInputError
+from tools.tension.calibration import recorded_winch
+from tools.tension.masses import by_prompt, check_masses, mass_points
+
+
+@contextmanager
+def ignored(number: int) -> Iterator[None]:
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        assert signal.signal(number, before) == signal.SIG_IGN  # put back as it was
+
+
+def test_only_enter_alone_raises_the_mass(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answers = io.StringIO("no\nwait\n\nfor the next\n")
+    monkeypatch.setattr("sys.stdin", answers)
+    by_prompt(5.0)
+    assert answers.read() == "for the next\n"
+    told = capsys.readouterr().err
+    assert told.count("Hang 5 kg") == 3 and told.count("Enter alone") == 2
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    with pytest.raises(BadInputError, match="nobody has hung 2 kg; the drive is without power"):
+        by_prompt(2.0)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_question(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    outlet, inlet = os.pipe()
+    too_late = threading.Timer(10.0, os.write, (inlet, b"\n"))
+    sent = threading.Timer(0.1, os.kill, (os.getpid(), number))
+    with os.fdopen(outlet) as answers, ignored(number):
+        monkeypatch.setattr("sys.stdin", answers)
+        too_late.start()
+        sent.start()
+        with pytest.raises(BadInputError, match="nobody has hung 5 kg"):
+            by_prompt(5.0)
+        too_late.cancel()
+    os.close(inlet)
+
+
+@pytest.mark.parametrize(
+    "masses", [(2.0, 5.0), (2.0, 5.0, float("nan")), (2.0, 2.0, 5.0), (-1.0, 2.0, 5.0), (4, 5, 6)]
+)
+def test_masses_that_cannot_tell_the_gain_are_refused(masses: tuple[float, ...]) -> None:
+    with pytest.raises(BadInputError, match="--masses: "):
+        check_masses(load_winch("winch-mpp0923d"), masses, 9.81)
+
+
+def test_a_recording_of_something_else_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "raw" / "mass-2kg.raw"
+    log = RawLogWriter(path, ["time_s"], {"identity": {"winch": "w", "motor": "m", "serial": "x"}})
+    log.write(np.zeros((3, 1)))
+    log.close()
+    with pytest.raises(RawLogError, match="not a recording of a hoist"):
+        mass_points([path])
+    with pytest.raises(RawLogError, match="does not say which winch"):
+        recorded_winch(tmp_path)
