@@ -15,7 +15,7 @@ _REQUEST, _ANSWER, _FUNCTION = 0x600, 0x580, 0x780
 _UPLOAD: Final = struct.pack("<BHB4x", 0x40, 0x6041, 0)
 _UPLOADED: Final = struct.pack("<HB", 0x6041, 0)
 _ROUNDS: Final = 2
-_WAIT_S: Final = 0.3
+_WAIT_S: Final = 0.2
 """How long answers are waited for after the last question."""
 _ASK_EVERY_S: Final = 0.25
 _SILENCE_S: Final = 2.0

@@ -67,7 +67,11 @@ class Lab:
         return result(self.begin("drive", action, WINCH, "--bus", self.bus, *behind))
 
     def io(self, action: str) -> dict[str, Any]:
-        return result(self.begin("io", action, self.twin.reference))
+        runner = CliRunner(env={"XDG_STATE_HOME": str(self.folder)})
+        arguments = [action, self.twin.reference, "--json"]
+        outcome = runner.invoke(io_commands.app, arguments, catch_exceptions=False)
+        told: dict[str, Any] = json.loads(outcome.stdout.splitlines()[-1])
+        return told
 
     def moving(self) -> bool:
         return self.winch.state().motor_rad_s > 5.0

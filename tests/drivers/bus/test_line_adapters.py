@@ -181,7 +181,10 @@ def test_rubbish_between_frames_loses_none(start: Start) -> None:
     port.close()
 
 
-def test_a_line_cut_short_by_an_adapter_that_takes_nothing_is_ended_before_the_next() -> None:
+def test_a_line_cut_short_by_an_adapter_that_takes_nothing_is_ended_before_the_next(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("drivers.bus.slcan.SEND_TIMEOUT_S", 0.2)
     host, terminal = pty.openpty()
     tty.setraw(terminal)
     line = SlcanLine.__new__(SlcanLine)  # on a channel that is open already
