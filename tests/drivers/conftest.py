@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from axis_rig import Rig, open_network, open_rig, start_simulator
+from axis_rig import Rig, open_network, open_rig
 
 from drivers.network import CanNetwork
+
+_SIMULATOR = "from sim_bus import clock; clock.HOLD_S = 0.1; from tools.cli import main; main()"
 
 
 @pytest.fixture(scope="module")
 def simulated_bus() -> Iterator[str]:
-    """A bus with the drives 1 and 2."""
-    simulator = start_simulator(nodes=2)
+    """A bus with the drives 1 and 2, whose time stands for a short while only after a SYNC."""
+    bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    command = [sys.executable, "-c", _SIMULATOR, "sim", "up", "winch-mpp0923d", "--bus", bus]
+    command += ["--nodes", "2", "--exit-with-stdin"]
+    simulator = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert simulator.stdout is not None
+    assert b"ready" in simulator.stdout.readline()
     try:
-        yield simulator.bus
+        yield bus
     finally:
-        simulator.stop()
+        simulator.communicate(timeout=10)
 
 
 @pytest.fixture(autouse=True)
@@ -30,6 +40,7 @@ def brief_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("drivers.boot._BOOT_UP_TIMEOUT_S", 0.4)
     monkeypatch.setattr("drivers.boot._LISTEN_SHARE", 0.1)
     monkeypatch.setattr("drivers.network._LOOK_S", 0.02)
+    monkeypatch.setattr("drivers.axis_shutdown._TIMEOUT_S", 0.4)
 
 
 @pytest.fixture(scope="module")

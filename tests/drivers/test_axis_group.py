@@ -199,6 +199,7 @@ def test_what_the_drive_does_unasked_raises_the_alarm(
 ) -> None:
     rig.enable()
     rig.group.set_index(0, 0.0)
+    rig.group._patience_s = 0.4  # of wall time, while bus time stands
     trouble(rig)
     text, elapsed = rig.until_alarm(1.0)
     assert told in text
@@ -210,7 +211,9 @@ def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(rig: Rig) -> None:
     rig.enable()
     with can.Bus(interface="simbus", channel=rig.bus[7:]) as other:
         rig.cycle()
-        # somebody else's controlword comes after ours
+        # somebody else's controlword comes after ours, and both before the next SYNC
+        while (heard := other.recv(5.0)) is not None and heard.arbitration_id != 0x201:
+            pass
         other.send(can.Message(arbitration_id=0x201, data=bytes(4), is_extended_id=False))
         time.sleep(0.05)
         text, _ = rig.until_alarm(0.1)
