@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.realtime import one_core
 from drivers.bus import BusUrl
 from drivers.errors import DriverError
 from drivers.modbus.tension import LoadCells, TensionSampler
@@ -354,4 +355,5 @@ def _hands(
     out.note("starting the simulated drive ...")
     simulator = OwnSimulator(winch.reference, str(url), plant, board=board)
     stack.callback(simulator.stop)
+    stack.enter_context(one_core(simulator.process.pid))
     return url, on_board(board)

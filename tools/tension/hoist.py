@@ -149,7 +149,10 @@ def hoist_points(log: RawLog) -> list[TorquePoint]:
         top = travelled[-1] if winding_in else travelled[0] + 0.5 * _MARGIN_RAD + turns * math.tau
         bounds = top - math.tau * np.arange(turns, -1, -1)
         if bounds[0] < travelled[0] or bounds[-1] > travelled[-1]:
-            raise CalibrationRefusedError(f"{log.path}: the motor did not turn {turns} times")
+            raise CalibrationRefusedError(
+                f"{log.path}: the motor did not make {turns} turns at full speed; give a longer "
+                "--lead-mm or a lower --speed-mm-s"
+            )
         each = side * np.diff(np.interp(bounds, travelled, work[steady])) / math.tau
         _refuse_uneven(each, winding_in, header)
         points.append(TorquePoint(tension, float(each.mean()), winding_in))
