@@ -12,6 +12,9 @@ from drivers.axis_layout import AxisConfig
 from drivers.cia402 import State, fault_text, mode_name
 from drivers.error_control import STATE_NAMES
 
+_MISSES_US = (0x8130, 0x8250)
+"""EMCY of a drive that misses the master's heartbeat or commands."""
+
 
 def alarm_text(axes: Sequence[AxisConfig], ints: Ints) -> str:
     """Return the alarms of all axes in words, the likeliest cause of each axis' first."""
@@ -22,13 +25,17 @@ def alarm_text(axes: Sequence[AxisConfig], ints: Ints) -> str:
 def _of_axis(axis: AxisConfig, column: Ints) -> str:
     bits = int(column[codec.ALARM])
     shown, wanted = int(column[codec.MODE_SHOWN]), int(column[codec.MODE_WANTED])
+    code = int(column[codec.EMERGENCY])
+    emergency = f"EMCY {fault_text(code)}"
+    # while an answer is waited for nothing is sent: that the drive misses us is no cause then
+    misses_us = bits & codec.SILENT and code in _MISSES_US
     texts = (
         (
             codec.RESTARTED,
             "the drive has restarted (unexpected boot-up message), or another device with its "
             "node id was switched on: boot it anew",
         ),
-        (codec.EMERGENCY_MESSAGE, f"EMCY {fault_text(int(column[codec.EMERGENCY]))}"),
+        (0 if misses_us else codec.EMERGENCY_MESSAGE, emergency),
         (codec.FAULT, "the drive is in fault"),
         (codec.WRONG_MODE, f"the drive reports mode {mode_name(shown)}, not {mode_name(wanted)}"),
         (
@@ -49,6 +56,7 @@ def _of_axis(axis: AxisConfig, column: Ints) -> str:
             f"{STATE_NAMES.get(int(column[codec.NMT_STATE]), 'in an unknown state')} "
             f"(state {column[codec.NMT_STATE]})",
         ),
+        (codec.EMERGENCY_MESSAGE if misses_us else 0, emergency),
         (codec.NOT_FINITE, "a torque that is not a finite number was asked for; 0 was sent"),
     )
     return ", ".join(text for bit, text in texts if bits & bit)

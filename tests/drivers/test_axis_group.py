@@ -207,6 +207,15 @@ def test_what_the_drive_does_unasked_raises_the_alarm(
     assert rig.group.feedback.index_known[0] == (trouble is not _restart)
 
 
+def test_the_cause_is_told_before_what_follows_from_it(rig: Rig) -> None:
+    """While the only drive is waited for, it misses the master's heartbeat."""
+    rig.enable()
+    rig.network.write(1, 0x1800, 1, 0x80000181)
+    text, _ = rig.until_alarm(0.1)
+    assert text.startswith("node 1: no answer to SYNC for 1 cycles")
+    assert "EMCY 8130h" in text
+
+
 def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(rig: Rig) -> None:
     rig.enable()
     with can.Bus(interface="simbus", channel=rig.bus[7:]) as other:
