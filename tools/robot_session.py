@@ -230,10 +230,11 @@ def _find_buses(
 
 def _explained(session: RobotSession, error: TripError) -> TripError | DriveFaultError:
     """Return `error` with what the safety I/O and the drives in fault say of it."""
-    reason = str(error) if session.safety is None else session.safety.cause(str(error))
-    if session.device.faulted().any():
-        return DriveFaultError(f"{reason}: {_faults(session)}")
-    return TripError(reason)
+    reason, faulted = str(error), session.device.faulted().any()
+    if faulted:
+        reason = f"{reason}: {_faults(session)}"
+    reason = reason if session.safety is None else session.safety.cause(reason)
+    return (DriveFaultError if faulted else TripError)(reason)
 
 
 def _note(

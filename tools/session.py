@@ -270,11 +270,11 @@ def open_winch(
         try:
             yield WinchSession(winch, network.url, network, device, executive, report, safety)
         except TripError as error:
-            reason = str(error) if safety is None else safety.cause(str(error))
-            if device.faulted().any():
-                code = _fault_of(network, winch.node_id)
-                raise DriveFaultError(f"{reason}: {code}") from error
-            raise TripError(reason) from error
+            reason, faulted = str(error), device.faulted().any()
+            if faulted and (code := _fault_of(network, winch.node_id)) not in reason:
+                reason = f"{reason}: {code}"
+            reason = reason if safety is None else safety.cause(reason)
+            raise (DriveFaultError if faulted else TripError)(reason) from error
 
 
 def note_lacking_guards(node: str, report: BootReport, out: Output) -> None:
