@@ -28,7 +28,7 @@ def switch_off(group: AxisGroup) -> str:
         left = [axis.node_id for axis in group.axes if not _by_sdo(group, axis.node_id)]
     except BusError as error:
         nodes = ", ".join(str(axis.node_id) for axis in group.axes)
-        return f"node {nodes}: not known to be without power, for {error}"
+        return f"node {nodes}: not known to be without power: {error}"
     if not left:
         return ""
     nodes = ", ".join(str(node) for node in left)

@@ -106,6 +106,11 @@ def _open(url: BusUrl, health: BusHealth) -> can.BusABC:
         # vendors' modules raise whatever comes, a NameError where their library is missing
         if isinstance(error.__cause__, BusError):
             raise error.__cause__ from None  # it names the bus already
+        if isinstance(error, NameError):
+            raise BusError(
+                f"{url}: cannot be opened: the vendor's library for {url.interface} is missing "
+                f"({error})"
+            ) from error
         raise BusError(f"{url}: cannot be opened: {error or type(error).__name__}") from error
 
 
