@@ -136,9 +136,10 @@ class RtuServer:
     def _spoil(self, sending: bool, data: bytes) -> bytes:
         """Return the bytes that go out in place of an answer."""
         unit = self._units.get(data[0]) if data else None
-        if not sending or unit is None:
+        if not sending:
             return data
-        if unit.fault is TensionFault.SILENT:
+        # the server answers for units that are not there; on a line nobody does
+        if unit is None or unit.fault is TensionFault.SILENT:
             return b""
         if unit.fault is TensionFault.TRUNCATED:
             return data[: len(data) - 3]
