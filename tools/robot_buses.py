@@ -88,7 +88,10 @@ def _for_all(robot: Robot, names: list[str], text: str) -> dict[str, str]:
     if len(names) == 1:
         return {names[0]: text}
     each = " ".join(f"--bus {name}=URL" for name in names)
-    raise BadInputError(f"--bus {text}: {robot.name} has {len(names)} buses; write {each}")
+    raise BadInputError(
+        f"--bus {text}: {robot.name} has {len(names)} buses; write {each}, or --bus simbus:NAME "
+        "for simulated ones"
+    )
 
 
 def _parse(text: str) -> BusUrl:

@@ -94,5 +94,6 @@ def _explanation(b: BusBudget) -> str:
         f"left is for computing, EMCY and {b.sdo_transfers_s:.0f} SDO transfers a second"
     )
     if b.changes_s and math.isfinite(b.recovery_cycles):
-        text += f", and tells a change in every drive within {b.recovery_cycles:.0f} cycles"
+        cycles = f"{b.recovery_cycles:.0f} cycle{'s' if b.recovery_cycles > 1 else ''}"
+        text += f", and tells a change in every drive within {cycles}"
     return text + f"; SYNC may come up to {b.longest_wait_s * _US:.0f} us late"

@@ -61,7 +61,7 @@ def info(
                 network.read_int(node, 0x1018, sub) for sub in (1, 2, 3, 4)
             )
         except SdoError as error:
-            raise WorkFailedError(f"node {node} does not answer: {error}") from error
+            raise WorkFailedError(f"the drive does not answer: {error}") from error
         rated_Nm = profile.motor.rated_torque_Nm
 
         def read_if_there(index: int, sub: int, otherwise: int) -> int:
@@ -93,6 +93,7 @@ def info(
     told["profile_fits"] = (vendor, product) == (wanted.vendor_id, wanted.product_code)
     for key, value in told.items():
         shown = f"{value:08X}h" if key in ("vendor_id", "product_code", "revision") else value
+        shown = ", ".join(value) if isinstance(value, list) else shown
         out.say(f"{key:24}{shown}")
     out.result({"ok": True, **told})
 

@@ -80,8 +80,11 @@ def panel(
     client = ModbusTcpClient("127.0.0.1", port=port, timeout=2, retries=0)
     try:
         refused = client.write_register(register, value, device_id=unit).isError()
-    except ModbusException as error:
-        raise WorkFailedError(f"127.0.0.1:{port}: nobody answers at the panel: {error}") from None
+    except ModbusException:
+        raise WorkFailedError(
+            f"127.0.0.1:{port}: no simulated safety I/O answers there; `cdpr sim safety-io` tells "
+            "its port"
+        ) from None
     finally:
         client.close()  # type: ignore[no-untyped-call]
     if refused:

@@ -96,9 +96,12 @@ class _Report:
     def _whose(self) -> str:
         motor, drive = self._winch.motor, self._results["drive"]
         if isinstance(drive, Mapping):
-            shown = ("vendor_id", "product_code", "revision", "serial")
-            ids = ", ".join(f"{key.replace('_', ' ')} {drive.get(key, '?')}" for key in shown)
-            drive = f"{drive.get('name', '')} ({ids})"
+            ids = ", ".join(
+                f"{key.replace('_', ' ')} {drive[key]:08X}h"
+                for key in ("vendor_id", "product_code", "revision")
+                if key in drive
+            )
+            drive = f"{drive.get('name', '')} ({ids}, serial {drive.get('serial', '?')})"
         return (
             f"{self._results['winch']} · motor {motor.manufacturer} {motor.model} "
             f"({motor.poles} poles, {number(motor.rated_torque_Nm)} Nm, "
