@@ -64,10 +64,14 @@ def _of_axis(axis: AxisConfig, column: Ints) -> str:
 
 def _silence(column: Ints) -> str:
     return (
-        f"no answer to SYNC for {column[codec.SILENT_CYCLES]} cycles, the last heartbeat "
-        f"{column[codec.HEARTBEAT_AGE]} cycles ago (without heartbeats it lacks power or cable; "
+        f"no answer to SYNC for {_cycles(column[codec.SILENT_CYCLES])}, the last heartbeat "
+        f"{_cycles(column[codec.HEARTBEAT_AGE])} ago (without heartbeats it lacks power or cable; "
         "with them its TPDOs are off or changed: boot it anew)"
     )
+
+
+def _cycles(count: int) -> str:
+    return f"{count} cycle{'' if count == 1 else 's'}"
 
 
 def _unsteadiness(column: Ints) -> str:

@@ -113,7 +113,7 @@ def power_watch(
             watches.append(watch)
         seen = sum(len(watch.nodes) for watch in watches)
         out.note(
-            f"{seen} drives beside the rail's were asked whether they have power"
+            f"drives beside the rail's that were asked whether they have power: {seen}"
             if seen
             else "no winch's drive was asked whether it has power (--winch-bus)"
         )

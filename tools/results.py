@@ -25,8 +25,9 @@ def read_run(paths: Paths) -> dict[str, Any]:
     try:
         run: dict[str, Any] = json.loads(paths.run.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
+        why = (isinstance(error, OSError) and error.strerror) or error
         raise BadInputError(
-            f"{paths.run}: cannot be read ({error}); {paths.out} holds no finished commissioning"
+            f"{paths.run}: cannot be read ({why}); {paths.out} holds no finished commissioning"
         ) from error
     return run
 

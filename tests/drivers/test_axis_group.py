@@ -212,7 +212,7 @@ def test_the_cause_is_told_before_what_follows_from_it(rig: Rig) -> None:
     rig.enable()
     rig.network.write(1, 0x1800, 1, 0x80000181)
     text, _ = rig.until_alarm(0.1)
-    assert text.startswith("node 1: no answer to SYNC for 1 cycles")
+    assert text.startswith("node 1: no answer to SYNC for 1 cycle,")
     assert "EMCY 8130h" in text
 
 
