@@ -9,6 +9,7 @@ from __future__ import annotations
 import mmap
 import os
 import struct
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -22,7 +23,8 @@ _MAX_AXES = 256
 _SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON = range(6)
 _POWER_ALLOWED, _BRAKE_RELEASED, _MASS = range(6, 9)
 _WORDS = 16
-_TRIES = 10_000
+_SPINS, _TRIES = 100, 1000
+_PAUSE_S = 5e-4
 
 
 class BoardState(NamedTuple):
@@ -71,13 +73,15 @@ class BoardAxis:
         words[_SEQUENCE] = (sequence + 1) & 0xFFFFFFFFFFFFFFFF
 
     def state(self) -> BoardState:
-        """Return what the drive last wrote."""
+        """Return what the drive last wrote; after a writer that died in the middle, what stands."""
         words, numbers = self._words, self._numbers
-        for _ in range(_TRIES):
+        for attempt in range(_TRIES):
             before = words[_SEQUENCE]
             time_s, tension, angle, speed, power = numbers[_TIME : _POWER_ON + 1].tolist()
             if not before & 1 and words[_SEQUENCE] == before:
                 break
+            if attempt > _SPINS:  # its process waits for a core, perhaps for ours
+                time.sleep(_PAUSE_S)
         return BoardState(time_s, tension, angle, speed, power != 0.0)
 
     @property
