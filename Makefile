@@ -3,7 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 STAMP := $(VENV)/.installed
 BIN := $(VENV)/bin
-JOBS ?= 2
+# one more than there are cores: some tests wait for time-outs
+JOBS ?= $(shell expr $$(nproc) + 1)
 SOAK_MINUTES ?= 10
 
 .PHONY: demo test soak check lint lock clean
