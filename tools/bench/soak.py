@@ -37,15 +37,17 @@ _PHASE = 0.25
 class Process:
     """What one process holds at one moment."""
 
-    resident_KiB: int
+    memory_KiB: int
+    """Of its own, swapped out or not: what a file backs, the kernel takes and gives as it likes."""
     open_files: int
 
     @classmethod
     def of(cls, pid: int) -> Process:
         """Look at a process of this machine."""
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-        page_KiB = os.sysconf("SC_PAGE_SIZE") // 1024
-        return cls(pages * page_KiB, sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir()))
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+        status = dict(line.split(":", 1) for line in lines)
+        memory = sum(int(status[key].split()[0]) for key in ("RssAnon", "RssShmem", "VmSwap"))
+        return cls(memory, sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir()))
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def growth(samples: Sequence[Process]) -> Process:
     middle = len(samples) // 2
     first, later = samples[:middle], samples[middle:]
     return Process(
-        min(s.resident_KiB for s in later) - min(s.resident_KiB for s in first),
+        min(s.memory_KiB for s in later) - min(s.memory_KiB for s in first),
         min(s.open_files for s in later) - min(s.open_files for s in first),
     )
 
@@ -197,7 +199,7 @@ class Soak:
         leaks = [
             name
             for name, gain in grown.items()
-            if gain.resident_KiB > MEMORY_LIMIT_KiB or gain.open_files > 0
+            if gain.memory_KiB > MEMORY_LIMIT_KiB or gain.open_files > 0
         ]
         return {
             "bus_hours": self.bus_s / _HOUR_S,
@@ -206,9 +208,9 @@ class Soak:
             "us_per_cycle": round(1e6 * self.wall_s / max(1, cycles), 1),
             "bus_hours_in_10_minutes": round(self.bus_s / max(self.wall_s, 1e-9) / 6.0, 2),
             "wall_hours_for_24_bus_hours": round(24.0 * self.wall_s / max(self.bus_s, 1e-9), 2),
-            "memory_growth_KiB": {name: gain.resident_KiB for name, gain in grown.items()},
+            "memory_growth_KiB": {name: gain.memory_KiB for name, gain in grown.items()},
             "open_files_growth": {name: gain.open_files for name, gain in grown.items()},
-            "resident_KiB": {name: s[-1].resident_KiB for name, s in self.samples.items()},
+            "memory_KiB": {name: s[-1].memory_KiB for name, s in self.samples.items()},
             "buses": {verdict.bus: asdict(verdict) | {"lost": verdict.lost} for verdict in buses},
             "missed_answers": sum(verdict.answers_missed for verdict in buses),
             "lost_frames": lost,

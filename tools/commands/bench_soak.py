@@ -75,7 +75,7 @@ def _table(figures: dict[str, Any]) -> list[str]:
         )
     for name, gained in figures["memory_growth_KiB"].items():
         lines.append(
-            f"{name}: {figures['resident_KiB'][name] / 1024:.0f} MiB, grown by {gained} KiB; "
+            f"{name}: {figures['memory_KiB'][name] / 1024:.0f} MiB, grown by {gained} KiB; "
             f"open files grown by {figures['open_files_growth'][name]}"
         )
     return lines
