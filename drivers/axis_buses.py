@@ -90,10 +90,6 @@ class AxisBuses:
                 )
         return self.groups[0].lockstep
 
-    def locate(self, axis: int) -> tuple[AxisGroup, int]:
-        """Return the group that an axis belongs to, and its number there."""
-        return self._where[axis]
-
     # -- one cycle
 
     def sync(self) -> None:

@@ -29,7 +29,6 @@ from drivers.errors import BootError, BusError, DriveFaultError, DriverError, Sd
 from drivers.network import CanNetwork
 from profiles import Robot, RobotAxis
 from tools.bus_fit import require_fit
-from tools.consent import require_consent
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.robot_buses import asks_for_own_simulator, robot_urls
@@ -151,13 +150,6 @@ class RobotSession:
             if self.device.alarm() or not left:
                 raise
             raise TripError(f"{error}: {', '.join(left)}") from error
-
-
-def confirm_robot_motion(urls: Mapping[str, BusUrl], yes: bool, what: str) -> None:
-    """Ask before real motors are energised; raises BadInputError when nobody agrees."""
-    if not all(url.is_simulated for url in urls.values()):
-        where = ", ".join(str(url) for url in urls.values())
-        require_consent(f"{what} on {where}: the motors will turn.", yes)
 
 
 @contextmanager

@@ -67,6 +67,7 @@ class SimBus(PacketBus):
 
     @state.setter
     def state(self, new_state: can.BusState) -> None:
+        # what python-can lays down for a bus without such a switch
         raise NotImplementedError(f"{self.channel_info}: the state cannot be set")
 
     @staticmethod
