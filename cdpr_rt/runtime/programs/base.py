@@ -1,0 +1,56 @@
+"""The interface of what the loop runs while motors have power."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from cdpr_rt.controllers.base import Controller
+from cdpr_rt.errors import ControlError
+from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+
+
+class ProgramError(ControlError):
+    """A program was asked for something it does not do; the message names the key and value."""
+
+
+class Program(Protocol):
+    """A set-point over time and the controller that follows it.
+
+    One program runs at a time. The next one goes on from the set-point and the torque that the
+    last one left, so that neither steps. `update` allocates nothing, does no I/O and knows no
+    clock: time passes by one period a call.
+    """
+
+    name: str
+    controller: Controller
+    """Whose effort and compensation are recorded."""
+    needs_lease: bool
+    """Whether it moves on behalf of somebody, whose disappearance means hold."""
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+
+    def command(self, wanted: Mapping[str, Any]) -> None:
+        """Take over what an operator wants; raises ProgramError and changes nothing then."""
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+
+    def stop(self) -> None:
+        """Begin to brake to a standstill; `update` goes on being called until `at_rest`."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the set-point stands still and nothing is left to do."""
+
+    @property
+    def pose(self) -> FloatArray | None:
+        """Return the platform's pose as this program knows it, (7,), None where it knows none."""
+
+    @property
+    def pose_setpoint(self) -> FloatArray | None:
+        """Return where the platform is to be, (7,), None where it does not say."""
+
+    def progress(self) -> dict[str, Any]:
+        """Return what a person would want to know of it, such as the part done; asked rarely."""

@@ -1,0 +1,67 @@
+"""States of the loop, and what may follow on what."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Final
+
+
+class LoopState(IntEnum):
+    """Where the loop stands; motors have power in `ACTIVE` only."""
+
+    UNCONFIGURED = 0
+    """No bus is open, or the loop is about to open them."""
+    INACTIVE = 1
+    """The drives have booted; no cycles run."""
+    READY = 2
+    """The bus has been checked, cycles run, the drives have no power."""
+    ACTIVE = 3
+    """The drives have power and a program runs."""
+    FAULT = 4
+    """Something ended the motion; it stays until it is acknowledged."""
+
+    @property
+    def label(self) -> str:
+        """What a person calls it."""
+        return self.name.lower()
+
+
+class Transition(IntEnum):
+    """What an operator may ask for."""
+
+    CONFIGURE = 0
+    CHECK = 1
+    ENABLE = 2
+    DISABLE = 3
+    ACKNOWLEDGE = 4
+
+
+ALLOWED: Final[dict[Transition, tuple[LoopState, ...]]] = {
+    Transition.CONFIGURE: (LoopState.UNCONFIGURED, LoopState.INACTIVE),
+    Transition.CHECK: (LoopState.INACTIVE, LoopState.READY),
+    Transition.ENABLE: (LoopState.READY,),
+    Transition.DISABLE: (LoopState.READY, LoopState.ACTIVE),
+    Transition.ACKNOWLEDGE: (LoopState.FAULT,),
+}
+"""The states in which each may be asked for; in all others it is refused."""
+
+
+class Reaction(IntEnum):
+    """What the supervisor does about a limit, in the order of severity."""
+
+    NONE = 0
+    CLAMP = 1
+    """The value is limited, the motion goes on."""
+    HOLD = 2
+    """The set-point stops where it is; the drives keep their power."""
+    CONTROLLED_STOP = 3
+    """The motion is braked under its controller, then the power goes."""
+    QUICK_STOP = 4
+    """The drives brake by themselves (CiA 402 quick stop), then the power goes."""
+    TORQUE_OFF = 5
+    """Torque and power go at once, brakes are applied."""
+
+    @property
+    def label(self) -> str:
+        """What a person calls it."""
+        return self.name.lower().replace("_", " ")

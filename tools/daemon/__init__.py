@@ -1,0 +1,1 @@
+"""The daemon's composition: its processes and what each is given."""
