@@ -38,6 +38,7 @@ _COUNTERS: Final = np.dtype(
         ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not
         ("lease_ns", "<i8"),  # until when somebody holds the right to move
         ("rows", "<u8"),  # rows written since the beginning
+        ("recorded", "<u8"),  # of them, those that are safe in the recording
         ("description", "<u8"),  # versions of the texts; odd while one is being written
         ("status", "<u8"),
         ("commands", "<u8"),  # messages written since the beginning, and those taken
