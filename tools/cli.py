@@ -33,6 +33,7 @@ _COMMANDS = (
     "io",
     "profiles",
     "rail",
+    "run",
     "sim",
     "tension",
 )

@@ -29,9 +29,11 @@ class OwnSimulator:
         truth_log: Path | None = None,
         nodes: int = 1,
         board: Path | None = None,
+        paced: bool = False,
     ) -> None:
         command = [sys.executable, "-m", "tools.cli", "sim", "up", winch, "--bus", bus]
-        command += ["--lockstep", "--exit-with-stdin", "--nodes", str(nodes)]
+        command += ["--paced" if paced else "--lockstep", "--exit-with-stdin"]
+        command += ["--nodes", str(nodes)]
         if plant is not None:
             command += ["--plant", str(plant)]
         if truth_log is not None:
@@ -74,6 +76,11 @@ class OwnSimulator:
     def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
         assert pipe is not None  # opened with PIPE
         return pipe
+
+    @property
+    def lifeline(self) -> int:
+        """Descriptor as long as which is open, here or in a child, the simulator stays."""
+        return self._pipe(self.process.stdin).fileno()
 
     def stop(self) -> None:
         """End the simulator; what it logs is complete afterwards."""

@@ -1,0 +1,175 @@
+"""`cdpr run`: the control loop of a robot as a daemon."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cdpr_rt.runtime.shared_block import MOST_AXES, SharedBlock
+from profiles import Robot, load_robot
+from sim_bus.ready import tell_ready
+from tools.bus_fit import require_fit
+from tools.commands.options import JsonOption, SafetyIoOption, YesOption
+from tools.consent import require_consent
+from tools.daemon.launcher import Launcher
+from tools.daemon.paths import default_recordings, default_socket
+from tools.daemon.settings import Address, RunSettings
+from tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
+from tools.output import Output
+from tools.robot_buses import RobotBusOption, asks_for_own_simulator, robot_urls
+from tools.simulator import OwnSimulator
+
+_RING_S = 4.0
+
+_Robot = Annotated[
+    str,
+    typer.Argument(
+        help="Robot or winch profile: a name or the path of a file.", metavar="ROBOT|WINCH"
+    ),
+]
+_Plant = Annotated[
+    Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")
+]
+_Http = Annotated[
+    str | None,
+    typer.Option(metavar="HOST:PORT", help="Listen there too, besides the Unix socket."),
+]
+_Socket = Annotated[
+    Path | None,
+    typer.Option("--socket", help="Unix socket of the control interface, if not this user's."),
+]
+_KeyFile = Annotated[
+    Path | None,
+    typer.Option(help="Secret that everybody must know who is not on this machine."),
+]
+_Record = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Record into this folder instead of the user's.")
+]
+_NoRecord = Annotated[bool, typer.Option("--no-record", help="Record nothing.")]
+_Live = Annotated[
+    int | None,
+    typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
+]
+_Stream = Annotated[
+    str | None,
+    typer.Option(metavar="HOST:PORT", help="Receive a set-point stream (UDP) there."),
+]
+_ReadOnly = Annotated[
+    bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
+]
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the command."""
+    parent.command()(run)
+
+
+def run(
+    robot: _Robot,
+    bus: RobotBusOption = None,
+    plant: _Plant = None,
+    http: _Http = None,
+    unix: _Socket = None,
+    key_file: _KeyFile = None,
+    record: _Record = None,
+    no_record: _NoRecord = False,
+    live: _Live = None,
+    stream: _Stream = None,
+    read_only: _ReadOnly = False,
+    safety_io: SafetyIoOption = None,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a robot's control loop as a daemon; it stands ready, without power, until enabled.
+
+    Tells on standard output when it is up. Ctrl-C and SIGTERM end it with a controlled stop.
+    """
+    if record is not None and no_record:
+        raise BadInputError("--record and --no-record: one of them")
+    out = Output(as_json)
+    profile = _fitting(load_robot(robot))
+    control = unix or default_socket(profile.profile)
+    _require_free(control)
+    own = asks_for_own_simulator(bus or ())
+    name = f"simbus:own-{os.getpid()}"
+    buses = (name,) if own else tuple(bus or ())
+    settings = RunSettings(
+        robot=profile.reference,
+        name=profile.profile,
+        buses=buses,
+        read_only=read_only,
+        safety_io=safety_io,
+        socket=control,
+        http=None if http is None else Address.parse("--http", http),
+        key_file=key_file,
+        record=None if no_record else record or default_recordings(),
+        live=live,
+        stream=None if stream is None else Address.parse("--stream", stream),
+        launcher_pid=os.getpid(),
+    )
+    _ask(profile, buses, read_only, yes)
+    if plant is not None and not own:
+        raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+    with ExitStack() as stack:
+        keep: tuple[int, ...] = ()
+        if own:
+            out.note(f"starting {len(profile.axes)} simulated drives ...")
+            simulator = OwnSimulator(profile.reference, name, plant, paced=True)
+            stack.callback(simulator.stop)
+            keep = (simulator.lifeline,)
+        _launch(profile, settings, out, keep)
+
+
+def _launch(robot: Robot, settings: RunSettings, out: Output, keep: Sequence[int]) -> None:
+    block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
+    block.counters["start_monotonic_ns"] = time.monotonic_ns()
+    block.counters["start_realtime_ns"] = time.time_ns()
+    settings = settings.model_copy(update={"block_fd": block.fd})
+
+    def ready(status: dict[str, Any]) -> None:
+        told = {"robot": robot.name, "state": status["state"], "socket": str(settings.socket)}
+        tell_ready({**told, "reason": status.get("reason", ""), "pid": os.getpid()})
+
+    launcher = Launcher(settings, block, out.note, ready, keep)
+    status = launcher.run()
+    if status != DONE:
+        raise _ended(launcher.reason, status)
+    out.result({"ok": True})
+
+
+def _ended(reason: str, status: int) -> CommandError:
+    return BadInputError(reason) if status == BAD_INPUT else WorkFailedError(reason)
+
+
+def _fitting(robot: Robot) -> Robot:
+    if len(robot.axes) > MOST_AXES:
+        raise BadInputError(f"{robot.path}: {len(robot.axes)} axes; allowed: 1 to {MOST_AXES}")
+    require_fit(robot)
+    return robot
+
+
+def _require_free(control: Path) -> None:
+    """Raise BadInputError where a daemon listens at `control` already, or none ever could."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
+        try:
+            caller.connect(str(control))
+        except (FileNotFoundError, ConnectionRefusedError):
+            return
+        except OSError as error:
+            raise BadInputError(f"--socket {control}: {error}") from None
+    raise BadInputError(f"--socket {control}: a daemon runs there already; `cdpr stop` ends it")
+
+
+def _ask(robot: Robot, buses: Sequence[str], read_only: bool, yes: bool) -> None:
+    urls = robot_urls(robot, buses).values()
+    real = [str(url) for url in urls if not url.is_simulated]
+    if real and not read_only:
+        where = " and ".join(real)
+        require_consent(f"{robot.name} on {where}: its motors will turn when told to.", yes)

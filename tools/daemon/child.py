@@ -1,0 +1,22 @@
+"""What both of a daemon's processes do at their start: end with their launcher."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+
+_PR_SET_PDEATHSIG = 1
+
+
+def end_with(launcher_pid: int) -> None:
+    """Have the kernel send this process SIGTERM when its launcher ends, however it ends.
+
+    Call it once the process handles SIGTERM; a launcher that has ended already counts as well.
+    Nothing is done for a process that was started without one (0).
+    """
+    if launcher_pid == 0:
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    if os.getppid() != launcher_pid:
+        os.kill(os.getpid(), signal.SIGTERM)

@@ -1,0 +1,129 @@
+"""What a daemon is asked to do, checked once and handed to its processes as JSON."""
+
+from __future__ import annotations
+
+import ipaddress
+import stat
+import sys
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from tools.errors import BadInputError
+
+_SECRET_CHARS = 16
+_OPEN_TO_OTHERS = stat.S_IRWXG | stat.S_IRWXO
+_HIGHEST_PORT = 65535
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach `host`."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+class Address(BaseModel):
+    """A host and port to listen at."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    host: str = Field(min_length=1)
+    port: int = Field(ge=0, le=_HIGHEST_PORT)
+
+    @classmethod
+    def parse(cls, option: str, text: str) -> Address:
+        """Return what `option` was given as HOST:PORT, [HOST]:PORT or PORT alone (loopback).
+
+        Port 0 is any that is free. Raises BadInputError.
+        """
+        host, _, port = text.rpartition(":")
+        host = host.removeprefix("[").removesuffix("]") or "127.0.0.1"
+        if not (port.isascii() and port.isdigit()) or int(port) > _HIGHEST_PORT:
+            raise BadInputError(f"{option} {text}: allowed: HOST:PORT, [IPV6]:PORT or PORT alone")
+        return cls(host=host, port=int(port))
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only this machine can reach it."""
+        return is_loopback(self.host)
+
+    def __str__(self) -> str:
+        return f"{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}"
+
+
+def _absolute(path: Path) -> Path:
+    return path.expanduser().absolute()
+
+
+_Path = Annotated[Path, AfterValidator(_absolute)]
+
+
+class RunSettings(BaseModel):
+    """One daemon: its robot, its buses, and how it is reached.
+
+    The launcher makes it of the command line; both child processes get it as their only argument.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    robot: str
+    """What `load_robot` finds the robot by."""
+    name: str
+    """The robot's short name, in the names of its socket and its recordings."""
+    buses: tuple[str, ...] = ()
+    """What was given with --bus; never `simbus:` alone, its simulator has a name already."""
+    read_only: bool = False
+    safety_io: str | None = None
+    socket: _Path
+    http: Address | None = None
+    key_file: _Path | None = None
+    record: _Path | None = None
+    """Folder for recordings, None to record nothing."""
+    live: int | None = Field(default=None, ge=0, le=_HIGHEST_PORT)
+    """Port of the live view, on loopback."""
+    stream: Address | None = None
+    """Where the set-point stream is received."""
+    launcher_pid: int = 0
+    block_fd: int = -1
+    """The shared memory's descriptor, inherited under the same number."""
+
+    @model_validator(mode="after")
+    def _reachable_with_key_only(self) -> Self:
+        for option, address in (("--http", self.http), ("--stream", self.stream)):
+            if address is not None and not address.is_loopback and self.key_file is None:
+                raise BadInputError(
+                    f"{option} {address}: others can reach it; give a --key-file, or listen at "
+                    "127.0.0.1"
+                )
+        if self.key_file is not None:
+            read_key(self.key_file)
+        return self
+
+    @classmethod
+    def from_argv(cls) -> RunSettings:
+        """Return what the launcher gave this process."""
+        return cls.model_validate_json(sys.argv[1])
+
+
+def read_key(path: Path) -> bytes:
+    """Return the shared secret, the first line of a file that only its owner may read.
+
+    Raises BadInputError.
+    """
+    try:
+        mode = path.stat().st_mode
+        text = path.read_bytes()
+    except OSError as error:
+        raise BadInputError(f"--key-file {path}: cannot be read: {error.strerror}") from None
+    if mode & _OPEN_TO_OTHERS:
+        raise BadInputError(f"--key-file {path}: others may read it; allowed: chmod 600 {path}")
+    key = text.split(b"\n", 1)[0].strip()
+    if len(key) < _SECRET_CHARS or not key.isascii():
+        raise BadInputError(
+            f"--key-file {path}: {len(key)} characters; allowed: {_SECRET_CHARS} or more of ASCII, "
+            f"such as `openssl rand -hex 32` writes"
+        )
+    return key
