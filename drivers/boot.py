@@ -21,7 +21,7 @@ _DEVICE_TYPE, _IDENTITY = 0x1000, 0x1018
 _PROFILE_402 = 402
 _BOOT_UP_TIMEOUT_S = 2.0
 _QUIET_DRIVE_S = 1.0
-_LISTEN_SHARE = 0.5
+_LISTEN_SHARE, _LISTEN_LEAST_S = 0.6, 0.25
 """Of what drives tolerate of a silent master: one of our kind is heard several times in it."""
 _MAY_BE_A_FLOOD = "BK"
 
@@ -125,7 +125,8 @@ def _collect(
 
 
 def _listen(network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]) -> None:
-    listen_s = max(_LISTEN_SHARE * profile.heartbeat_consumer_s for profile, _ in drives.values())
+    waits_s = max(profile.heartbeat_consumer_s for profile, _ in drives.values())
+    listen_s = max(_LISTEN_LEAST_S, _LISTEN_SHARE * waits_s)
     if network.foreign_master.wait(listen_s):
         raise BootError(
             "L", min(drives), "another master's heartbeat is on the bus", "stop that master first"

@@ -17,6 +17,7 @@ from profiles.drive import DriveProfile, Pdo, PdoEntry
 from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings
 from profiles.robot import Robot, RobotAxis, RobotBus
+from profiles.robot_limits import RobotLimits
 from profiles.winch import Winch
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "Robot",
     "RobotAxis",
     "RobotBus",
+    "RobotLimits",
     "Winch",
     "list_profiles",
     "load_all",

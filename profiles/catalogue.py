@@ -1,7 +1,7 @@
 """Find profiles by name or path and load them, references included."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +13,14 @@ from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings, MotorSeries
 from profiles.rail import load_rail
 from profiles.reader import closest, read_toml, read_toml_model
-from profiles.robot import Robot, RobotAxis, RobotFile
+from profiles.robot import (
+    Robot,
+    RobotAxis,
+    RobotFile,
+    default_name,
+    robot_of_winch,
+    watched_by_heartbeat,
+)
 from profiles.safety_io import load_safety_io
 from profiles.tension_sensor import load_tension_sensors
 from profiles.winch import Winch, WinchFile
@@ -100,21 +107,51 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
 def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
     """Return a robot by name or path with the winches it names; raises ProfileError.
 
-    The winches are looked for beside the robot's own file, then among the shipped ones.
+    The winches are looked for beside the robot's own file, then among the shipped ones. Where
+    `name` is that of a winch, the robot has this one axis.
     """
-    path = _require("robots", name, beside)
+    path = _find("robots", name, beside)
+    if path is None or "motor" in read_toml(path):
+        if _find("winches", name, beside) is None:
+            raise _unknown("robots", name, beside, _shipped_names("winches"))
+        return robot_of_winch(load_winch(name, beside))
     file = read_toml_model(path, RobotFile)
-    faults = list(file.faults())
+    _refuse(path, list(file.faults()))
+    axes = _axes(path, file)
+    _refuse(path, list(_too_strong(file, axes)))
+    return Robot(
+        profile=path.stem,
+        path=path.resolve(),
+        axes=tuple(axes),
+        safety_io=_device(path, "safety_io", load_safety_io, file.safety_io),
+        tension_sensors=_device(
+            path, "tension_sensors", load_tension_sensors, file.tension_sensors
+        ),
+        rails=tuple(_beside(path, name) for name in file.rails),
+        **{
+            key: getattr(file, key)
+            for key in RobotFile.model_fields
+            if key not in ("axes", "safety_io", "tension_sensors", "rails")
+        },
+    )
+
+
+def _refuse(path: Path, faults: list[tuple[str, str]]) -> None:
     if faults:
         further = "".join(f"\n{path}: {key}: {problem}" for key, problem in faults[1:])
         raise ProfileError(path, faults[0][0], faults[0][1] + further)
+
+
+def _axes(path: Path, file: RobotFile) -> list[RobotAxis]:
+    """Return the axes with their winches, told what the robot decides."""
     bitrates = {bus.name: bus.bitrate_bit_s for bus in file.buses}
     winches: dict[str, Winch] = {}
     axes = []
     for i, axis in enumerate(file.axes):
         if axis.winch not in winches:
-            winches[axis.winch] = _referred(
-                path, f"axes[{i}].winch", load_winch, axis.winch, path.parent
+            winches[axis.winch] = watched_by_heartbeat(
+                _referred(path, f"axes[{i}].winch", load_winch, axis.winch, path.parent),
+                file.master_heartbeat_s,
             )
         winch = replace(
             winches[axis.winch],
@@ -122,23 +159,24 @@ def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
             master_node_id=file.master_node_id,
             bitrate_bit_s=bitrates[axis.bus],
             sync_period_s=file.sync_period_s,
+            cable_sign=axis.cable_sign or winches[axis.winch].cable_sign,
         )
-        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory))
-    return Robot(
-        profile=path.stem,
-        path=path.resolve(),
-        name=file.name,
-        sync_period_s=file.sync_period_s,
-        master_node_id=file.master_node_id,
-        buses=file.buses,
-        axes=tuple(axes),
-        safety_io=_device(path, "safety_io", load_safety_io, file.safety_io),
-        tension_sensors=_device(
-            path, "tension_sensors", load_tension_sensors, file.tension_sensors
-        ),
-        rails=tuple(_beside(path, name) for name in file.rails),
-        notes=file.notes,
-    )
+        name = axis.name or default_name(i)
+        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name))
+    return axes
+
+
+def _too_strong(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[str, str]]:
+    """Yield (key, problem) for limits that the motors or cables do not bear."""
+    for key, bears, of in (
+        ("torque_Nm", [a.winch.motor.peak_torque_Nm for a in axes], "the motor's peak torque"),
+        ("tension_max_N", [a.winch.cable.breaking_force_N for a in axes], "the breaking force"),
+    ):
+        wanted = getattr(file.limits, key) or ()
+        for i, value in enumerate(wanted):
+            most = bears[i] if len(wanted) > 1 else min(bears)
+            if value > most:
+                yield f"limits.{key}[{i}]", f"value {value:g}; allowed: up to {of} ({most:.6g})"
 
 
 def _device(robot: Path, key: str, load: Callable[[str], object], name: str | None) -> str | None:

@@ -1,14 +1,18 @@
 """Robots: winches on one bus or several, run as one device."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 
 from profiles.reader import Profile, one_of
+from profiles.robot_limits import RobotLimits
 from profiles.winch import BITRATES_bit_s, Winch
+
+HEARTBEATS_WAITED = 1.75
+"""Periods of the master's heartbeat after which its drives take it for lost: fewer than two."""
 
 
 class RobotBus(Profile):
@@ -26,6 +30,8 @@ class AxisFile(Profile):
     bus: str
     node_id: int = Field(ge=1, le=127)
     mandatory: bool = True
+    name: str | None = Field(default=None, min_length=1, max_length=32)
+    cable_sign: Annotated[int, one_of(-1, 1)] | None = None
 
 
 class RobotFile(Profile):
@@ -35,14 +41,21 @@ class RobotFile(Profile):
     notes: tuple[str, ...] = ()
     sync_period_s: float = Field(default=0.001, ge=0.0001, le=1.0)
     master_node_id: int = Field(default=127, ge=1, le=127)
+    master_heartbeat_s: float = Field(default=0.1, ge=0.01, le=10)
     buses: tuple[RobotBus, ...] = Field(min_length=1, max_length=8)
     axes: tuple[AxisFile, ...] = Field(min_length=1, max_length=64)
     safety_io: str | None = None
     tension_sensors: str | None = None
     rails: tuple[str, ...] = ()
+    limits: RobotLimits = RobotLimits()
 
     def faults(self) -> Iterator[tuple[str, str]]:
         """Yield (key, problem) for what contradicts itself."""
+        yield from self.limits.faults(len(self.axes))
+        yield from self._repeated_names()
+        if self.master_heartbeat_s < 2 * self.sync_period_s:
+            allowed = f"allowed: at least two cycles ({2 * self.sync_period_s:g})"
+            yield "master_heartbeat_s", f"value {self.master_heartbeat_s:g}; {allowed}"
         names = [bus.name for bus in self.buses]
         for i, bus in enumerate(self.buses):
             if bus.name in names[:i]:
@@ -72,22 +85,40 @@ class RobotFile(Profile):
                 )
                 yield f"axes[{i}].node_id", problem
 
+    def _repeated_names(self) -> Iterator[tuple[str, str]]:
+        names = [axis.name or default_name(i) for i, axis in enumerate(self.axes)]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                where = f"axes[{names.index(name)}]"
+                yield f"axes[{i}].name", f"value {name!r}; allowed: each once, {where} has it"
+
+
+def default_name(axis: int) -> str:
+    """Return what the axis of this number is called where its file does not say."""
+    return f"axis {axis}"
+
 
 @dataclass(frozen=True)
 class RobotAxis:
-    """One axis: its winch, told the robot's bit rate, cycle and node ids."""
+    """One axis: its winch, told the robot's bit rate, cycle, node ids and heartbeat.
+
+    `name` is what messages call it.
+    """
 
     winch: Winch
     bus: str
     node_id: int
     mandatory: bool
+    name: str
 
 
 @dataclass(frozen=True)
 class Robot:
     """A robot with the winches it names; axes keep the order of its file on whatever bus.
 
-    `safety_io`, `tension_sensors` and `rails` are what their own loaders take.
+    `safety_io`, `tension_sensors` and `rails` are what their own loaders take. The master's
+    heartbeat goes out every `master_heartbeat_s`; the drives stop by themselves (1016h, 6007h)
+    when they miss it for `HEARTBEATS_WAITED` of that.
     """
 
     profile: str
@@ -101,13 +132,50 @@ class Robot:
     tension_sensors: str | None = None
     rails: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    master_heartbeat_s: float = 0.1
+    limits: RobotLimits = field(default_factory=RobotLimits)
+    is_winch: bool = False
+    """Whether it is a single winch, run as a robot of one axis; its file is that of the winch."""
 
     @property
     def reference(self) -> str:
         """What `load_robot` finds this robot by from anywhere: its name, or its file's path."""
-        shipped = self.path.parent == Path(__file__).parent / "robots"
+        kind = "winches" if self.is_winch else "robots"
+        shipped = self.path.parent == Path(__file__).parent / kind
         return self.profile if shipped else str(self.path)
 
     def axes_on(self, bus: str) -> tuple[int, ...]:
         """Return which axes, counted from 0, are on the bus of this name."""
         return tuple(i for i, axis in enumerate(self.axes) if axis.bus == bus)
+
+
+def robot_of_winch(winch: Winch) -> Robot:
+    """Return a winch as the robot of one axis that it is, with a robot's limits and heartbeat."""
+    heartbeat_s = max(0.1, 2 * winch.sync_period_s)
+    bus = RobotBus(name="can0", bitrate_bit_s=winch.bitrate_bit_s)
+    axis = RobotAxis(
+        watched_by_heartbeat(winch, heartbeat_s),
+        bus.name,
+        winch.node_id,
+        mandatory=True,
+        name=default_name(0),
+    )
+    return Robot(
+        profile=winch.profile,
+        path=winch.path,
+        name=winch.name,
+        sync_period_s=winch.sync_period_s,
+        master_node_id=winch.master_node_id,
+        buses=(bus,),
+        axes=(axis,),
+        notes=winch.notes,
+        master_heartbeat_s=heartbeat_s,
+        is_winch=True,
+    )
+
+
+def watched_by_heartbeat(winch: Winch, master_heartbeat_s: float) -> Winch:
+    """Return `winch` with a drive that takes its master for lost in fewer than two heartbeats."""
+    waits_s = HEARTBEATS_WAITED * master_heartbeat_s
+    drive = winch.drive.model_copy(update={"heartbeat_consumer_s": waits_s})
+    return replace(winch, drive=drive)

@@ -83,7 +83,7 @@ def _given(robot: Robot, names: list[str], texts: Sequence[str]) -> dict[str, st
 
 def _for_all(robot: Robot, names: list[str], text: str) -> dict[str, str]:
     url = _parse(text)
-    if url.interface == "simbus" and url.channel:
+    if url.interface == "simbus" and url.channel and not robot.is_winch:
         return {name: simulated_url(url.channel, name) for name in names}
     if len(names) == 1:
         return {names[0]: text}

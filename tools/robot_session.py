@@ -22,7 +22,6 @@ from drivers.axis_buses import AxisBuses, BusAxes
 from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootReports, BootSettings, boot_all
 from drivers.bus import BusUrl, query_status
-from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
 from drivers.cia402 import State, fault_text
 from drivers.data_sheet import load_dictionary
 from drivers.errors import BootError, BusError, DriveFaultError, DriverError, SdoError
@@ -250,11 +249,6 @@ def _own_simulator(
     return simulator.process.pid, name
 
 
-def _heartbeat_s(axes: Sequence[RobotAxis]) -> float:
-    """Return how often the master is heard within what the most impatient drive tolerates."""
-    return min(axis.winch.drive.heartbeat_consumer_s for axis in axes) / HEARTBEATS_IN_TOLERANCE
-
-
 def _open_networks(
     stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl]
 ) -> dict[str, CanNetwork]:
@@ -263,7 +257,7 @@ def _open_networks(
         axes = [robot.axes[i] for i in robot.axes_on(name)]
         nodes = [axis.node_id for axis in axes]
         try:
-            network = CanNetwork(url, nodes, robot.master_node_id, _heartbeat_s(axes))
+            network = CanNetwork(url, nodes, robot.master_node_id, robot.master_heartbeat_s)
         except BusError as error:
             raise BadInputError(f"bus {name}: {error}") from error
         stack.callback(network.close)
@@ -347,8 +341,8 @@ def _device(
             )
             for i in here
         ]
-        heartbeat_s = _heartbeat_s([robot.axes[i] for i in here])
-        buses.append(BusAxes(name, network, configs, [place_of[i] for i in here], heartbeat_s))
+        places = [place_of[i] for i in here]
+        buses.append(BusAxes(name, network, configs, places, robot.master_heartbeat_s))
     return AxisBuses(buses, robot.sync_period_s, robot.master_node_id)
 
 

@@ -94,9 +94,17 @@ class BusBudget:
 
 
 def bus_budget(
-    bus: str, bitrate_bit_s: int, period_s: float, drives: Sequence[tuple[int, DriveProfile]]
+    bus: str,
+    bitrate_bit_s: int,
+    period_s: float,
+    drives: Sequence[tuple[int, DriveProfile]],
+    master_heartbeat_s: float | None = None,
 ) -> BusBudget:
-    """Return the budget of a bus with `drives`, each a node id and its profile."""
+    """Return the budget of a bus with `drives`, each a node id and its profile.
+
+    Where it is not told how often the master sends its heartbeat, it follows from what the
+    drives tolerate.
+    """
     every, waiting = _Frames(), _Frames()
     every.add(_SYNC_BYTES)
     share_bit_s = 0.0
@@ -117,7 +125,8 @@ def bus_budget(
         share_bit_s += worst_case_bits(_HEARTBEAT_BYTES) / drive.heartbeat_producer_s
     if drives:
         tolerated_s = min(drive.heartbeat_consumer_s for _, drive in drives)
-        share_bit_s += worst_case_bits(_HEARTBEAT_BYTES) * HEARTBEATS_IN_TOLERANCE / tolerated_s
+        every_s = master_heartbeat_s or tolerated_s / HEARTBEATS_IN_TOLERANCE
+        share_bit_s += worst_case_bits(_HEARTBEAT_BYTES) / every_s
     return BusBudget(
         bus=bus,
         bitrate_bit_s=bitrate_bit_s,
@@ -143,6 +152,7 @@ def machine_budget(machine: Winch | Robot, period_s: float | None = None) -> lis
             bus.bitrate_bit_s,
             period_s,
             [(axis.node_id, axis.winch.drive) for axis in machine.axes if axis.bus == bus.name],
+            machine.master_heartbeat_s,
         )
         for bus in machine.buses
     ]

@@ -114,8 +114,8 @@ def test_eight_drives_take_two_buses_at_1_kHz():
     four = machine_budget(load_robot("spatial-8"))
     assert [budget.cycle_s for budget in four] == pytest.approx([975e-6] * 2)
     assert all(budget.fits for budget in four)
-    # 65 bits of 4 drives each 100 ms and of the master each 125 ms
-    assert four[0].heartbeat_share == pytest.approx((4 * 65 / 0.1 + 65 / 0.125) * 1e-6)
+    # 65 bits of 4 drives each 100 ms and of the master each 100 ms
+    assert four[0].heartbeat_share == pytest.approx((4 * 65 / 0.1 + 65 / 0.1) * 1e-6)
 
 
 @repeatable
