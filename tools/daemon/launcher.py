@@ -167,7 +167,7 @@ class Launcher:
 
     def _watch_loop(self) -> None:
         if self._loop.end:
-            if self._up and not self.reason:
+            if self._up and not self.reason and self._loop.process.returncode != DONE:
                 self.reason = f"the loop has died: {self._loop.end}"
                 self._block.write_status(
                     {**self._status(), "state": DEAD, "reason": self.reason, "reason_limit": None}
@@ -211,10 +211,11 @@ class Launcher:
         """End the loop under control, then the service, so that the recording is whole."""
         self._manager.tell(STOPPING=1, STATUS="stopping")
         died = bool(self._loop.end) and self._loop.process.returncode != DONE
-        in_time = self._loop.stop(_LOOP_STOP_S)
+        patience_s = _LOOP_STALLED_S if self._stalled else _LOOP_STOP_S
+        in_time = self._loop.stop(patience_s)
         code = self._loop.process.returncode
         if not in_time:
-            self.reason = f"the loop did not stop within {_LOOP_STOP_S:g} s and was killed"
+            self.reason = f"the loop did not stop within {patience_s:g} s and was killed"
         elif code != DONE and not died:
             self.reason = f"the loop {self._loop.end}"
         if self._service is not None and not self._service.stop(_SERVICE_STOP_S):

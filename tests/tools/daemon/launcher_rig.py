@@ -1,0 +1,93 @@
+"""Run as a program: a launcher over stand-ins for its two processes, which do what a file says.
+
+The stand-ins speak as the real ones do through the shared memory, the socket and their exit
+status, and load within a fraction of a second. Who did what, in order, is in the file `log`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import socket
+import sys
+import time
+from pathlib import Path
+
+from cdpr_rt.runtime.shared_block import SharedBlock
+from tools.daemon import launcher
+from tools.daemon.child import end_with
+from tools.daemon.settings import RunSettings
+
+NAME = "stand-in"
+
+
+def main(folder: Path) -> int:
+    launcher.LOOP, launcher.SERVICE = "stand_in_loop", "stand_in_service"  # type: ignore[misc]
+    block = SharedBlock.create(1, 0.1, 100.0)
+    settings = RunSettings(
+        robot=str(folder),
+        name=NAME,
+        socket=folder / "control.sock",
+        launcher_pid=os.getpid(),
+        block_fd=block.fd,
+    )
+
+    def tell(text: str) -> None:
+        print(json.dumps({"told": text, "status": block.status()}), flush=True)
+
+    def ready(status: dict[str, object]) -> None:
+        print(json.dumps({"ready": status}), flush=True)
+
+    daemon = launcher.Launcher(settings, block, tell, ready)
+    code = daemon.run()
+    print(json.dumps({"reason": daemon.reason, "status": block.status()}), flush=True)
+    return code
+
+
+def _note(folder: Path, text: str) -> None:
+    with (folder / "log").open("a") as log:
+        log.write(text + "\n")
+
+
+def _asked_to_end() -> int:
+    reader, writer = os.pipe2(os.O_NONBLOCK)
+    signal.signal(signal.SIGTERM, lambda *_: os.write(writer, b"."))
+    return reader
+
+
+def loop() -> None:
+    """Write a status and turn until told to end, or do as the file `plan.json` says."""
+    settings = RunSettings.from_argv()
+    folder = Path(settings.robot)
+    (folder / "loop.pid").write_text(str(os.getpid()))
+    end = _asked_to_end()
+    end_with(settings.launcher_pid)
+    block = SharedBlock.attach(settings.block_fd)
+    plan = json.loads((folder / "plan.json").read_text())
+    if "refuse" in plan:
+        sys.exit(plan["refuse"])
+    block.write_status({"state": "ready", "reason": ""})
+    while not select.select([end], [], [], 0.02)[0] and not (folder / "shutdown").exists():
+        block.counters["loop_alive_ns"] = time.monotonic_ns()
+    time.sleep(plan.get("stopping_s", 0.0))
+    _note(folder, "loop stopped")
+
+
+def service() -> None:
+    """Open the socket and wait to be told to end."""
+    settings = RunSettings.from_argv()
+    folder = Path(settings.robot)
+    (folder / "service.pid").write_text(str(os.getpid()))
+    end = _asked_to_end()
+    end_with(settings.launcher_pid)
+    settings.socket.unlink(missing_ok=True)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(settings.socket))
+        select.select([end], [], [])
+    _note(folder, "service stopped")
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

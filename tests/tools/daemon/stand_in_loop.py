@@ -1,0 +1,8 @@
+"""Run as a program: stands in for the daemon's loop process."""
+
+from __future__ import annotations
+
+import launcher_rig
+
+if __name__ == "__main__":
+    launcher_rig.loop()

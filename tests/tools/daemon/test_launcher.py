@@ -1,0 +1,213 @@
+"""The process above the daemon's two, with stand-ins for those: who is started, told and ended."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import launcher_rig
+import pytest
+
+TIMEOUT_S = 60.0
+
+
+class Daemon:
+    """A running launcher, and what systemd would hear of it."""
+
+    def __init__(self, folder: Path, plan: dict[str, Any], watchdog_s: float = 0.0) -> None:
+        self.folder = folder
+        (folder / "plan.json").write_text(json.dumps(plan))
+        self.manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.manager.bind(str(folder / "notify"))
+        self.manager.settimeout(TIMEOUT_S)
+        env = {**os.environ, "PYTHONPATH": str(Path(launcher_rig.__file__).parent)}
+        env["NOTIFY_SOCKET"] = str(folder / "notify")
+        if watchdog_s:
+            env["WATCHDOG_USEC"] = str(int(watchdog_s * 1e6))
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "launcher_rig", str(folder)],
+            env=env,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def line(self, key: str) -> dict[str, Any]:
+        """Return the next line that has `key`."""
+        assert self.process.stdout is not None
+        for text in self.process.stdout:
+            told: dict[str, Any] = json.loads(text)
+            if key in told:
+                return told
+        raise AssertionError(f"the launcher ended without a word of {key}")
+
+    def heard(self, wanted: str) -> None:
+        """Wait until systemd hears `wanted`."""
+        while wanted not in self.manager.recv(4096).decode().split("\n"):
+            pass
+
+    def fed(self, seconds: float) -> int:
+        """Return how often the watchdog is fed within `seconds`."""
+        count, end = 0, time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            self.manager.settimeout(left)
+            try:
+                count += self.manager.recv(4096) == b"WATCHDOG=1"
+            except TimeoutError:
+                break
+        return count
+
+    def pid(self, who: str) -> int:
+        return int((self.folder / f"{who}.pid").read_text())
+
+    def log(self) -> list[str]:
+        return (self.folder / "log").read_text().split("\n")[:-1]
+
+    def ends(self) -> int:
+        return self.process.wait(TIMEOUT_S)
+
+
+Start = Callable[..., Daemon]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    daemons = []
+
+    def run(plan: dict[str, Any] | None = None, watchdog_s: float = 0.0) -> Daemon:
+        daemons.append(Daemon(tmp_path, plan or {}, watchdog_s))
+        return daemons[-1]
+
+    yield run
+    for daemon in daemons:
+        for who in ("loop", "service"):
+            _kill(daemon.folder / f"{who}.pid")
+        daemon.process.kill()
+        daemon.process.communicate()
+        daemon.manager.close()
+
+
+def _kill(pid_file: Path) -> None:
+    if pid_file.exists() and _is_child(int(pid_file.read_text())):
+        os.kill(int(pid_file.read_text()), signal.SIGKILL)
+
+
+def _is_child(pid: int) -> bool:
+    try:
+        return b"stand_in" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False
+
+
+def _gone(pid: int) -> bool:
+    end = time.monotonic() + TIMEOUT_S
+    while _is_child(pid) and time.monotonic() < end:
+        time.sleep(0.02)
+    return not _is_child(pid)
+
+
+def test_it_tells_when_both_are_up_and_ends_the_loop_before_the_service(start: Start) -> None:
+    daemon = start({"stopping_s": 0.5})
+    assert daemon.line("ready")["ready"]["state"] == "ready"
+    daemon.heard("READY=1")
+    daemon.process.terminate()
+    daemon.heard("STOPPING=1")
+    assert daemon.ends() == 0
+    # the recording has the controlled stop to its end
+    assert daemon.log() == ["loop stopped", "service stopped"]
+
+
+def test_a_service_that_dies_is_started_again_and_the_loop_goes_on(start: Start) -> None:
+    daemon = start()
+    daemon.line("ready")
+    loop, service = daemon.pid("loop"), daemon.pid("service")
+    os.kill(service, signal.SIGKILL)
+    assert "killed by signal 9" in daemon.line("told")["told"]
+    end = time.monotonic() + TIMEOUT_S
+    while daemon.pid("service") == service and time.monotonic() < end:
+        time.sleep(0.02)
+    assert daemon.pid("service") != service
+    assert daemon.pid("loop") == loop
+    assert _is_child(loop)
+
+
+def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) -> None:
+    daemon = start(watchdog_s=0.4)
+    daemon.line("ready")
+    daemon.heard("WATCHDOG=1")
+    service = daemon.pid("service")
+    os.kill(daemon.pid("loop"), signal.SIGKILL)
+    status = daemon.line("told")["status"]
+    assert (status["state"], status["reason"]) == (
+        "dead",
+        "the loop has died: killed by signal 9",
+    )
+    daemon.heard("STATUS=dead: the loop has died: killed by signal 9")
+    assert daemon.fed(1.0) == 0
+    assert _is_child(service)
+    assert daemon.pid("service") == service
+    daemon.process.terminate()
+    assert "killed by signal 9" in daemon.line("reason")["reason"]
+    assert daemon.ends() == 1
+
+
+def test_the_watchdog_is_fed_while_the_loop_turns_and_no_longer(start: Start) -> None:
+    daemon = start(watchdog_s=0.8)
+    daemon.line("ready")
+    assert daemon.fed(1.5) >= 2
+    loop = daemon.pid("loop")
+    os.kill(loop, signal.SIGSTOP)
+    assert "has not turned" in daemon.line("told")["told"]
+    daemon.fed(0.1)
+    assert daemon.fed(1.0) == 0
+    os.kill(loop, signal.SIGCONT)
+    assert "turns again" in daemon.line("told")["told"]
+    assert daemon.fed(1.5) >= 2
+
+
+def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) -> None:
+    daemon = start()
+    daemon.line("ready")
+    os.kill(daemon.pid("loop"), signal.SIGSTOP)
+    assert "has not turned" in daemon.line("told")["told"]
+    began = time.monotonic()
+    daemon.process.terminate()
+    assert "was killed" in daemon.line("reason")["reason"]
+    assert daemon.ends() == 1
+    assert time.monotonic() - began < 15.0
+    assert daemon.log() == ["service stopped"]
+
+
+@pytest.mark.parametrize("status", [1, 2])
+def test_a_loop_that_cannot_begin_ends_the_daemon_with_its_status(
+    start: Start, status: int
+) -> None:
+    daemon = start({"refuse": status})
+    assert "could not begin" in daemon.line("reason")["reason"]
+    assert daemon.ends() == status
+
+
+def test_a_loop_that_was_told_to_shut_down_ends_the_daemon_well(start: Start) -> None:
+    daemon = start()
+    daemon.line("ready")
+    (daemon.folder / "shutdown").touch()
+    assert daemon.line("reason")["reason"] == ""
+    assert daemon.ends() == 0
+    assert daemon.log() == ["loop stopped", "service stopped"]
+
+
+def test_both_end_by_themselves_when_their_launcher_is_killed(start: Start) -> None:
+    daemon = start()
+    daemon.line("ready")
+    loop, service = daemon.pid("loop"), daemon.pid("service")
+    daemon.process.kill()
+    assert _gone(loop)
+    assert _gone(service)
+    assert sorted(daemon.log()) == ["loop stopped", "service stopped"]
