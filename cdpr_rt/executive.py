@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from cdpr_rt.controllers.base import Controller, Idle
+from cdpr_rt.cycle import Cycle, Lateness, Watch
 from cdpr_rt.errors import InterruptedMotionError, NotInTimeError, TripError
 from cdpr_rt.exchange import AxisDevice, Setpoint
 from cdpr_rt.rawlog import RawLogWriter
 from cdpr_rt.recorder import Recorder
 from cdpr_rt.supervisor import Supervisor
+
+__all__ = ["Executive", "Lateness", "Motion", "Watch"]
 
 _DRAIN_ROWS = 2048
 
@@ -27,29 +28,6 @@ class Motion(Protocol):
 
     def brake(self, time_s: float) -> Motion:
         """Return the motion that stops from the state at `time_s`."""
-
-
-class Watch(Protocol):
-    """Something beside the axes that may end their motion, such as safety I/O.
-
-    Both are asked every cycle and cost next to nothing while all is well.
-    """
-
-    def alarm(self) -> str:
-        """Return why the torque must go at once, or an empty text."""
-
-    def stop_reason(self) -> str:
-        """Return why the motion must be braked to its end, or an empty text."""
-
-
-@dataclass
-class Lateness:
-    """How the paced loop kept its deadlines."""
-
-    cycles: int = 0
-    late: int = 0
-    """Cycles that started more than a tenth of a period after their deadline."""
-    worst_s: float = 0.0
 
 
 class Executive:
@@ -71,15 +49,18 @@ class Executive:
         self.device = device
         self.supervisor = supervisor
         self.setpoint = Setpoint(device.n)
-        self.lateness = Lateness()
         self.on_progress: Callable[[float], None] | None = None
         """Called every few thousand cycles with the time since the motion's start."""
         self._recorder = Recorder(device.n)
         self._log: RawLogWriter | None = None
         self._stop_requested = stop_requested
-        self._watches = tuple(watches)
+        self._cycle = Cycle(device, watches)
         self._idle = Idle(device.n)
-        self._deadline = 0.0
+
+    @property
+    def lateness(self) -> Lateness:
+        """How the deadlines were kept."""
+        return self._cycle.lateness
 
     def run(self, controller: Controller, motion: Motion, log: RawLogWriter | None = None) -> None:
         """Run `controller` along `motion` to its end, recording into `log`.
@@ -97,7 +78,7 @@ class Executive:
             self._follow(controller, motion)
         finally:
             try:
-                self._release()
+                self._cycle.release()
             finally:  # a bus that is gone takes no zero torque, yet the rows are to be kept
                 self._drain()
                 self._log = None
@@ -112,15 +93,15 @@ class Executive:
         self._refuse_when_stopped(what)
         period = self.device.period_s
         for _ in range(max(1, round(timeout_s / period))):
-            self._exchange()
+            self._cycle.exchange()
+            self._look_for_alarm()
+            reason = self._cycle.stop_reason()
+            if reason:
+                self._trip(reason)
             self.setpoint.position_rad[:] = self.device.feedback.position_rad
             self._idle.update(self.device.feedback, self.setpoint, self.device.command.torque_Nm)
             done = each_cycle()
-            self.device.transmit()
-            self._look_for_alarm()
-            reason = self._stop_reason()
-            if reason:
-                self._trip(reason)
+            self._cycle.transmit()
             if done:
                 return
             self._refuse_when_stopped(what)
@@ -138,21 +119,21 @@ class Executive:
         stopping, why = False, ""
         k = 0
         while k <= cycles:
-            self._exchange()
+            self._cycle.exchange()
+            self._look_for_alarm()
             motion.fill(k * period, setpoint)
             controller.update(feedback, setpoint, command.torque_Nm)
             reason = self.supervisor.check(feedback, setpoint, command.torque_Nm)
             if reason:
                 self._trip(reason)
-            device.transmit()
+            self._cycle.transmit()
             recorder.append(feedback, setpoint, command, controller)
-            self._look_for_alarm()
             if recorder.pending() >= _DRAIN_ROWS:
                 self._drain()
                 if self.on_progress is not None:
                     self.on_progress(k * period)
             if not stopping:
-                why = self._stop_reason()
+                why = self._cycle.stop_reason()
                 stopping = bool(why) or self._stop_requested()
                 if stopping:
                     motion = motion.brake(k * period)
@@ -165,48 +146,14 @@ class Executive:
         if stopping:
             raise InterruptedMotionError("stopped on request")
 
-    def _exchange(self) -> None:
-        if not self.device.lockstep:
-            self._await_deadline()
-        self.device.sync()
-        self.device.receive()
-
-    def _await_deadline(self) -> None:
-        now = time.monotonic()
-        period = self.device.period_s
-        self._deadline += period
-        if now > self._deadline + 10 * period or self._deadline - now > period:
-            self._deadline = now  # the loop starts, or stood still: a new time base
-        elif now < self._deadline:
-            time.sleep(self._deadline - now)
-        lag = time.monotonic() - self._deadline
-        self.lateness.cycles += 1
-        self.lateness.late += lag > 0.1 * period
-        self.lateness.worst_s = max(self.lateness.worst_s, lag)
-
     def _look_for_alarm(self) -> None:
-        alarm = self.device.alarm()
+        alarm = self._cycle.device_alarm() or self._cycle.watch_alarm()
         if alarm:
             self._trip(alarm)
-        for watch in self._watches:
-            alarm = watch.alarm()
-            if alarm:
-                self._trip(alarm)
-
-    def _stop_reason(self) -> str:
-        for watch in self._watches:
-            reason = watch.stop_reason()
-            if reason:
-                return reason
-        return ""
 
     def _trip(self, reason: str) -> None:
-        self._release()
+        self._cycle.release()
         raise TripError(reason)
-
-    def _release(self) -> None:
-        self.device.command.torque_Nm[:] = 0.0
-        self.device.transmit()
 
     def _drain(self) -> None:
         if self._log is None:

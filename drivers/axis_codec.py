@@ -245,23 +245,34 @@ def _follow_state(i: int, now: int, ints: Ints) -> None:
 
 
 @jit
+def end_answers(ints: Ints, floats: FloatArray, flags: BoolArray) -> int:
+    """Judge the answers of a cycle once no more of them are waited for.
+
+    Counts silent cycles, irregular answers, frames and heartbeat ages of n axes, and brings `alive`
+    and `rate_ok` up to date. Returns the alarm bits of all axes.
+    """
+    alarms = 0
+    for i in range(ints.shape[1]):
+        _watch(i, ints, floats, flags)
+        alarms |= ints[ALARM, i]
+    return alarms
+
+
+@jit
 def encode(
     frames: Frames,
     answer: Ints,
     controlwords: Ints,
     ints: Ints,
     floats: FloatArray,
-    flags: BoolArray,
 ) -> int:
     """Write controlword and target torque of n axes into their RPDOs `frames` (k, 16).
 
     `answer` (n, 4) holds frame and first byte of either, `controlwords` (9, 9) the word by target
-    and present state. Also closes the cycle: counts silent cycles, irregular answers, frames
-    and heartbeat ages. Returns the alarm bits of all axes.
+    and present state. Returns the alarm bits of all axes.
     """
     alarms = 0
     for i in range(ints.shape[1]):
-        _watch(i, ints, floats, flags)
         units = _torque_units(i, ints, floats)
         floats[SENT_NM, i] = units * floats[NM_PER_UNIT, i]
         word = _controlword(i, controlwords, ints)

@@ -87,7 +87,8 @@ class AxisExchange:
             *arrays, spare.words, spare.flags,
         )  # fmt: skip
         frames = np.zeros_like(self._tx_bytes)
-        codec.encode(frames, layout.answer, CONTROLWORD_TABLE, *arrays, spare.flags)
+        codec.end_answers(*arrays, spare.flags)
+        codec.encode(frames, layout.answer, CONTROLWORD_TABLE, *arrays)
 
     def sync(self) -> None:
         """Send the SYNC that opens the cycle."""
@@ -117,8 +118,14 @@ class AxisExchange:
         bus time stands, and where none answers up to 2 s. Otherwise the wait ends at `deadline_s`
         (monotonic), by default so that a share of the period is left for computing and sending.
         """
-        if not self.lockstep:
-            return self._receive_paced(deadline_s or time.monotonic() + self.paced_wait_s)
+        if self.lockstep:
+            answered = self._receive_in_lockstep()
+        else:
+            answered = self._receive_paced(deadline_s or time.monotonic() + self.paced_wait_s)
+        self._alarms = codec.end_answers(self._ints, self._floats, self._flags)
+        return answered
+
+    def _receive_in_lockstep(self) -> int:
         recv_into, rows = self._port.recv_into, self._rx.rows
         missing, since_s = self.n, 0.0
         while missing:
@@ -228,7 +235,6 @@ class AxisExchange:
             CONTROLWORD_TABLE,
             self._ints,
             self._floats,
-            self._flags,
         )
         send = self._port.send
         try:

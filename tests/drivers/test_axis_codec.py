@@ -48,9 +48,8 @@ class Group:
     def give(self) -> list[tuple[int, bytes]]:
         rpdos, s = self.layout.rpdos, self.state
         raw = rpdos.array.view(np.uint8).reshape(-1, 16)
-        self.alarms = codec.encode(
-            raw, self.layout.answer, CONTROLWORD_TABLE, s.ints, s.floats, s.flags
-        )
+        codec.end_answers(s.ints, s.floats, s.flags)
+        self.alarms = codec.encode(raw, self.layout.answer, CONTROLWORD_TABLE, s.ints, s.floats)
         frames = [CAN_FRAME.unpack(row) for row in rpdos.rows]
         return [(i, data[:length]) for i, length, data in frames]
 

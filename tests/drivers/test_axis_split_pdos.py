@@ -49,9 +49,10 @@ class Pair:
 
     def give(self) -> dict[int, bytes]:
         s, rpdos = self.state, self.layout.rpdos
+        codec.end_answers(s.ints, s.floats, s.flags)
         codec.encode(
             rpdos.array.view(np.uint8).reshape(-1, 16), self.layout.answer, CONTROLWORD_TABLE,
-            s.ints, s.floats, s.flags,
+            s.ints, s.floats,
         )  # fmt: skip
         frames = [CAN_FRAME.unpack(row) for row in rpdos.rows]
         return {identifier: data[:length] for identifier, length, data in frames}
@@ -184,7 +185,7 @@ def test_more_millinewtonmetres_than_16_bits_hold_are_cut_and_not_wrapped(torque
     for _ in range(3):
         codec.encode(
             layout.rpdos.array.view(np.uint8).reshape(-1, 16), layout.answer, CONTROLWORD_TABLE,
-            state.ints, state.floats, state.flags,
+            state.ints, state.floats,
         )  # fmt: skip
         (units,) = struct.unpack("<h", CAN_FRAME.unpack(layout.rpdos.rows[1])[2][:2])
         assert units == math.copysign(32767, torque_Nm)

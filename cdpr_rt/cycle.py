@@ -1,0 +1,115 @@
+"""One cycle of a device, whoever runs it: its deadline, the exchange, alarms, the last command."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from cdpr_rt.exchange import AxisDevice
+
+_LATE_SHARE = 0.1
+_MOST_CYCLES_BEHIND = 10
+
+
+class Watch(Protocol):
+    """Something beside the axes that may end their motion, such as safety I/O.
+
+    Both are asked every cycle and cost next to nothing while all is well.
+    """
+
+    def alarm(self) -> str:
+        """Return why the torque must go at once, or an empty text."""
+
+    def stop_reason(self) -> str:
+        """Return why the motion must be braked to its end, or an empty text."""
+
+
+@dataclass
+class Lateness:
+    """How the paced loop kept its deadlines."""
+
+    cycles: int = 0
+    late: int = 0
+    """Cycles that started more than a tenth of a period after their deadline."""
+    worst_s: float = 0.0
+
+
+class Cycle:
+    """Exchanges a device once a cycle and sends one command in each.
+
+    On a lockstep device the next SYNC goes out as soon as `exchange` is called; otherwise each has
+    an absolute deadline. After `exchange` a cycle is open until `transmit` or `release`.
+    """
+
+    def __init__(self, device: AxisDevice, watches: Sequence[Watch] = ()) -> None:
+        self.device = device
+        self.watches = tuple(watches)
+        self.lateness = Lateness()
+        self.late_s = 0.0
+        """How far this cycle began behind its deadline, 0 in lockstep."""
+        self.began_ns = 0
+        """CLOCK_MONOTONIC when this cycle's SYNC went out."""
+        self._deadline_s = 0.0
+        self._open = False
+        self._released = True
+
+    def exchange(self) -> int:
+        """Wait for the deadline, send SYNC, take in the answers; return how many axes answered."""
+        if not self.device.lockstep:
+            self._await_deadline()
+        self.began_ns = time.monotonic_ns()
+        self._open, self._released = True, False
+        self.device.sync()
+        return self.device.receive()
+
+    def transmit(self) -> None:
+        """Send the command as it stands, and close the cycle."""
+        self._open = self._released = False
+        self.device.transmit()
+
+    def release(self) -> None:
+        """Have the last command be one without torque: in this cycle, or in one of its own."""
+        if self._released:
+            return
+        if not self._open:
+            self.exchange()
+        self.device.command.torque_Nm[:] = 0.0
+        self.transmit()
+        self._released = True
+
+    def device_alarm(self) -> str:
+        """Return why the drives must not go on being driven, or an empty text."""
+        return self.device.alarm()
+
+    def watch_alarm(self) -> str:
+        """Return for what cause beside the axes the torque must go at once, or an empty text."""
+        for watch in self.watches:
+            reason = watch.alarm()
+            if reason:
+                return reason
+        return ""
+
+    def stop_reason(self) -> str:
+        """Return why the motion must be braked to its end, or an empty text."""
+        for watch in self.watches:
+            reason = watch.stop_reason()
+            if reason:
+                return reason
+        return ""
+
+    def _await_deadline(self) -> None:
+        now = time.monotonic()
+        period = self.device.period_s
+        self._deadline_s += period
+        ahead_s = self._deadline_s - now
+        if ahead_s > period or ahead_s < -_MOST_CYCLES_BEHIND * period:
+            self._deadline_s = now  # the loop starts, or stood still: a new time base
+        elif ahead_s > 0.0:
+            time.sleep(ahead_s)
+        self.late_s = time.monotonic() - self._deadline_s
+        lateness = self.lateness
+        lateness.cycles += 1
+        lateness.late += self.late_s > _LATE_SHARE * period
+        lateness.worst_s = max(lateness.worst_s, self.late_s)
