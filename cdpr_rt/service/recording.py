@@ -1,0 +1,222 @@
+"""Records what the loop publishes, every cycle of it, from a thread of the service process."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+from foxglove import Channel, Context
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.cycle_row import Row
+from cdpr_rt.runtime.shared_block import RowReader, SharedBlock, SharedBlockError
+from cdpr_rt.service import recording_schema as topics
+from cdpr_rt.service.recording_events import Events
+from cdpr_rt.service.recording_file import RecordingError, RecordingFile
+from cdpr_rt.service.recording_json import RowTexts
+
+MOST_BYTES: Final = 1 << 30
+RESERVE_BYTES: Final = 64 << 20
+_INTERVAL_S: Final = 0.1
+_SYNC_S: Final = 0.4
+"""With the interval and a disk at its usual pace, nothing older than a second is ever lost."""
+_MOST_ROWS: Final = 4096
+_MOST_REMARKS: Final = 1000
+
+
+class Recorder:
+    """Writes rows, status, description and events of a block into MCAP files in `folder`.
+
+    A file is named NAME-DATE-NNN.mcap; a session keeps its date, the next file begins where one
+    has `most_bytes`. A disk that takes no more, or has less than `reserve_bytes` left, ends the
+    recording for good: `state` says why, and nobody else is concerned. A recorder that follows on
+    another one of the same block goes on at the first row that was not safe yet.
+    """
+
+    def __init__(
+        self,
+        block: SharedBlock,
+        folder: Path,
+        name: str,
+        most_bytes: int = MOST_BYTES,
+        reserve_bytes: int = RESERVE_BYTES,
+    ) -> None:
+        self._block = block
+        self._folder = folder
+        self._name = re.sub(r"[^\w.-]", "_", name)
+        self._most_bytes = most_bytes
+        self._reserve_bytes = reserve_bytes
+        self._wall = WallClock(block)
+        self._texts = RowTexts(block.n)
+        self._reader = RowReader(block)
+        self._reader.next = int(block.counters["recorded"][0])
+        self._context = Context()
+        self._cycle = self._channel(topics.CYCLE, topics.cycle_schema(block.n))
+        self._status = self._channel(topics.STATUS, topics.STATUS_SCHEMA)
+        self._description = self._channel(topics.DESCRIPTION, topics.DESCRIPTION_SCHEMA)
+        self._event = self._channel(topics.EVENTS, topics.EVENT_SCHEMA)
+        self._remarks: deque[dict[str, Any]] = deque(maxlen=_MOST_REMARKS)
+        self._seen: dict[str, int] = {}
+        self._events = Events()
+        self._told_lost = 0
+        self._rows = 0
+        self._bytes = 0
+        self._error = ""
+        self._file: RecordingFile | None = None
+        self._path: Path | None = None
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+
+    def start(self) -> None:
+        """Open the first file and record from now on, until `stop`; see `state` for how it goes."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Record what is left and close the file."""
+        self._end.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def remark(self, text: str, **values: Any) -> None:
+        """Put a text for people among the events, with values that JSON knows; from any thread."""
+        self._remarks.append({"text": text, **values, "stamp_ns": time.monotonic_ns()})
+
+    def state(self) -> dict[str, Any]:
+        """Return how it goes: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
+        file = self._file
+        return {
+            "recording": self._thread.is_alive() and not self._error,
+            "file": str(self._path) if self._path else None,
+            "rows": self._rows,
+            "lost_rows": self._reader.lost,
+            "bytes": self._bytes + (file.size if file else 0),
+            "error": self._error,
+        }
+
+    # -- the thread
+
+    def _run(self) -> None:
+        try:
+            self._open()
+            synced = time.monotonic()
+            while not self._end.wait(_INTERVAL_S):
+                self._take()
+                if time.monotonic() - synced >= _SYNC_S:
+                    synced = time.monotonic()
+                    self._sync()
+            self._take()
+            self._close()
+        except (ControlError, OSError) as error:
+            self._error = str(error)
+        except BaseException as error:
+            self._error = f"the recorder ended: {type(error).__name__}: {error}"
+            raise
+
+    def _channel(self, topic: str, schema: dict[str, Any]) -> Channel:
+        return Channel(topic, schema=schema, context=self._context)
+
+    def _open(self) -> None:
+        date = datetime.fromtimestamp(self._wall.start_ns / 1e9, UTC)
+        session = f"{self._name}-{date:%Y%m%dT%H%M%SZ}"
+        there = [path.stem[-3:] for path in self._folder.glob(f"{session}-*.mcap")]
+        part = 1 + max((int(number) for number in there if number.isdigit()), default=0)
+        metadata = {
+            "robot": self._name,
+            "axes": str(self._block.n),
+            "session": session,
+            "part": str(part),
+            "start_realtime_ns": str(self._wall.start_ns),
+            "start_monotonic_ns": str(self._wall.start_monotonic_ns),
+            "version": version("cdpr-rt"),
+        }
+        self._path = self._folder / f"{session}-{part:03d}.mcap"
+        self._file = RecordingFile(self._path, self._context, metadata)
+        self._seen.clear()
+
+    def _sync(self) -> None:
+        if self._file is None:
+            return
+        self._file.sync()
+        self._block.counters["recorded"][0] = self._reader.next
+        room = os.statvfs(self._folder)
+        if room.f_bavail * room.f_frsize < self._reserve_bytes:
+            self._close()
+            least = self._reserve_bytes >> 20
+            raise RecordingError(f"{self._folder}: recording ended: less than {least} MB free")
+        if self._file.size >= self._most_bytes:
+            self._close()
+            self._open()
+
+    def _close(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            file.close()
+            self._block.counters["recorded"][0] = self._reader.next
+            self._bytes += file.size
+
+    def _take(self) -> None:
+        """Log what has come since the last time."""
+        self._take_text("description", self._description, self._block.description)
+        self._take_text("status", self._status, self._block.status)
+        while (rows := self._reader.read(_MOST_ROWS)).size:
+            self._take_rows(rows)
+        while self._remarks:
+            remark = self._remarks.popleft()
+            self._log_event(remark, int(remark["stamp_ns"]))
+        if self._reader.lost > self._told_lost:
+            lost, self._told_lost = self._reader.lost - self._told_lost, self._reader.lost
+            text = f"{lost} rows were overwritten before they could be recorded"
+            self._log_event({"text": text, "lost_rows": lost}, time.monotonic_ns())
+
+    def _take_text(self, name: str, channel: Channel, read: Callable[[], dict[str, Any]]) -> None:
+        counter = int(self._block.counters[name][0])
+        if counter in (0, self._seen.get(name)):
+            return
+        try:
+            value = read()
+        except SharedBlockError:
+            return  # its writer ended in the middle of it; its end is told elsewhere
+        self._seen[name] = counter
+        now_ns = time.monotonic_ns()
+        channel.log(json.dumps(value).encode(), log_time=self._wall(now_ns))
+        if name == "description":
+            self._events.describe(value)
+        elif event := self._events.of_status(value):
+            self._log_event(event, now_ns)
+
+    def _take_rows(self, rows: Row) -> None:
+        log = self._cycle.base.log
+        stamps = (rows["stamp_ns"] + self._wall.offset_ns).tolist()
+        for text, stamp in zip(self._texts(rows), stamps, strict=True):
+            log(text, stamp)
+        self._rows += rows.size
+        for event, stamp_ns in self._events.of_rows(rows):
+            self._log_event(event, stamp_ns)
+
+    def _log_event(self, event: dict[str, Any], stamp_ns: int) -> None:
+        self._event.log(json.dumps(event).encode(), log_time=self._wall(stamp_ns))
+
+
+class WallClock:
+    """Turns CLOCK_MONOTONIC into the time of day, by one instant: a clock that is set later
+    changes nothing."""
+
+    def __init__(self, block: SharedBlock) -> None:
+        self.start_ns = int(block.counters["start_realtime_ns"][0]) or time.time_ns()
+        """The time of day at the beginning of the session."""
+        monotonic_ns = int(block.counters["start_monotonic_ns"][0]) or time.monotonic_ns()
+        self.start_monotonic_ns = monotonic_ns
+        self.offset_ns = self.start_ns - monotonic_ns
+
+    def __call__(self, stamp_ns: int) -> int:
+        """Return the time of day in ns since 1970."""
+        return stamp_ns + self.offset_ns
