@@ -11,6 +11,10 @@ from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 
 
+# what an axis' last state says: how it goes on
+_RUNNING, _PRESET = 1.0, 2.0
+
+
 @dataclass(frozen=True)
 class PidGains:
     """Gains of one axis: torque per angle error, its integral and its filtered derivative."""
@@ -46,9 +50,12 @@ def _update(
     for i in range(limit.size):
         kp, ki, kd, filter_s = gains[i, 0], gains[i, 1], gains[i, 2], gains[i, 3]
         error = reference[i] - position[i]
-        if state[i, 3] == 0.0:  # first cycle: no error before it to differentiate
+        if state[i, 3] != _RUNNING:  # no error before this one to differentiate
             state[i, 1] = error
-            state[i, 3] = 1.0
+            if state[i, 3] == _PRESET:
+                # what the error and the known torque do not account for is the integral's
+                state[i, 0] -= (kp + ki * period) * error + known[i]
+            state[i, 3] = _RUNNING
         slope = (filter_s * state[i, 2] + error - state[i, 1]) / (filter_s + period)
         integral = state[i, 0] + ki * period * error
         u = kp * error + integral + kd * slope
@@ -95,7 +102,7 @@ class Pid:
         self._limit = np.array(limit_Nm, float)
         self._period_s = period_s
         self._compensation = compensation
-        # integral, last error, filtered slope, started
+        # integral, last error, filtered slope, how to go on
         self._state = np.zeros((len(gains), 4))
         self.effort_Nm = np.zeros(len(gains))
         self.compensation_Nm = np.zeros(len(gains))
@@ -105,6 +112,16 @@ class Pid:
         self._state[:] = 0.0
         if self._compensation is not None:
             self._compensation.reset()
+
+    def take_over(self, torque_Nm: FloatArray) -> None:
+        """Start anew with the torques (n,) that the first `update` is to write, within the limits.
+
+        Whatever the error is then, the integral makes up for it: a controller that held a load is
+        followed by one that holds it.
+        """
+        self.reset()
+        self._state[:, 0] = torque_Nm
+        self._state[:, 3] = _PRESET
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write the limited sum of PID and compensation."""

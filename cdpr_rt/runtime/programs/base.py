@@ -31,6 +31,9 @@ class Program(Protocol):
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
 
+    def check(self, wanted: Mapping[str, Any]) -> None:
+        """Raise ProgramError where `command` would, of a program that need not run."""
+
     def command(self, wanted: Mapping[str, Any]) -> None:
         """Take over what an operator wants; raises ProgramError and changes nothing then."""
 

@@ -1,0 +1,77 @@
+"""What programs have to know of the axes they move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_rt.compensation import AxisCompensation
+from cdpr_rt.controllers.pid import PidGains
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.tuning import stiffest_pid, sweep_gain
+from profiles import RobotAxis
+
+BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
+"""Bandwidths of the position loops that are tried, the stiffest first."""
+CABLE_ACCELERATION_M_S2 = 1.0
+"""Acceleration of the cables, unless a robot says otherwise."""
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """The axes of a robot as arrays (n,) and what holds for all of them, motor side."""
+
+    period_s: float
+    torque_Nm: FloatArray
+    """What the controllers may ask for."""
+    speed_rad_s: FloatArray
+    """The fastest that a set-point moves."""
+    acceleration_rad_s2: FloatArray
+    """The most by which its speed changes."""
+    cable_m_per_rad: FloatArray
+    """Cable paid out per radian, with its sign."""
+    gains: tuple[PidGains, ...]
+    """Of the position loops, one an axis."""
+    sweep_gain_Nm_rad: FloatArray
+    """Of the cogging sweep's proportional controller."""
+    compensation: tuple[AxisCompensation | None, ...] = ()
+    """Cogging and friction of each motor where they are known; empty where none is."""
+
+    @property
+    def n(self) -> int:
+        """How many axes there are."""
+        return len(self.gains)
+
+
+def model_of(
+    axes: Sequence[RobotAxis],
+    period_s: float,
+    latency_s: Sequence[float],
+    torque_Nm: FloatArray,
+    speed_rad_s: FloatArray,
+    cable_acceleration_m_s2: float = CABLE_ACCELERATION_M_S2,
+) -> RobotModel:
+    """Return the model of axes whose loops are as stiff as the latency of each allows.
+
+    `latency_s` (n,) is from the instant an angle was true to the middle of the cycle in which its
+    torque acts; `torque_Nm` and `speed_rad_s` are (n,). The loops are those of the bare rotors.
+    Raises TuningError where a latency is too long for any loop.
+    """
+    cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
+    inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
+    pairs = list(zip(inertia, latency_s, strict=True))
+    designs = {
+        (J, latency): stiffest_pid(J, latency, BANDWIDTHS_Hz, period_s).gains
+        for J, latency in dict.fromkeys(pairs)
+    }
+    return RobotModel(
+        period_s=period_s,
+        torque_Nm=np.array(torque_Nm, float),
+        speed_rad_s=np.array(speed_rad_s, float),
+        acceleration_rad_s2=cable_acceleration_m_s2 / np.abs(cable),
+        cable_m_per_rad=cable,
+        gains=tuple(designs[pair] for pair in pairs),
+        sweep_gain_Nm_rad=np.array([sweep_gain(J, latency) for J, latency in pairs]),
+    )
