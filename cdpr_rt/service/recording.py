@@ -36,23 +36,25 @@ _MOST_REMARKS: Final = 1000
 class Recorder:
     """Writes rows, status, description and events of a block into MCAP files in `folder`.
 
-    A file is named NAME-DATE-NNN.mcap; a session keeps its date, the next file begins where one
+    A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, the next file begins where one
     has `most_bytes`. A disk that takes no more, or has less than `reserve_bytes` left, ends the
-    recording for good: `state` says why, and nobody else is concerned. A recorder that follows on
+    recording for good: `told` says why, and nobody else is concerned. A recorder that follows on
     another one of the same block goes on at the first row that was not safe yet.
     """
+
+    name = "recording"
 
     def __init__(
         self,
         block: SharedBlock,
         folder: Path,
-        name: str,
+        robot: str,
         most_bytes: int = MOST_BYTES,
         reserve_bytes: int = RESERVE_BYTES,
     ) -> None:
         self._block = block
         self._folder = folder
-        self._name = re.sub(r"[^\w.-]", "_", name)
+        self._robot = re.sub(r"[^\w.-]", "_", robot)
         self._most_bytes = most_bytes
         self._reserve_bytes = reserve_bytes
         self._wall = WallClock(block)
@@ -77,7 +79,15 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     def start(self) -> None:
-        """Open the first file and record from now on, until `stop`; see `state` for how it goes."""
+        """Open the first file and record from now on, until `stop`.
+
+        Raises RecordingError where there can be no file.
+        """
+        try:
+            self._open()
+        except ControlError as error:
+            self._error = str(error)
+            raise
         self._thread.start()
 
     def stop(self) -> None:
@@ -90,7 +100,7 @@ class Recorder:
         """Put a text for people among the events, with values that JSON knows; from any thread."""
         self._remarks.append({"text": text, **values, "stamp_ns": time.monotonic_ns()})
 
-    def state(self) -> dict[str, Any]:
+    def told(self) -> dict[str, Any]:
         """Return how it goes: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
         file = self._file
         return {
@@ -106,7 +116,6 @@ class Recorder:
 
     def _run(self) -> None:
         try:
-            self._open()
             synced = time.monotonic()
             while not self._end.wait(_INTERVAL_S):
                 self._take()
@@ -126,11 +135,11 @@ class Recorder:
 
     def _open(self) -> None:
         date = datetime.fromtimestamp(self._wall.start_ns / 1e9, UTC)
-        session = f"{self._name}-{date:%Y%m%dT%H%M%SZ}"
+        session = f"{self._robot}-{date:%Y%m%dT%H%M%SZ}"
         there = [path.stem[-3:] for path in self._folder.glob(f"{session}-*.mcap")]
         part = 1 + max((int(number) for number in there if number.isdigit()), default=0)
         metadata = {
-            "robot": self._name,
+            "robot": self._robot,
             "axes": str(self._block.n),
             "session": session,
             "part": str(part),

@@ -1,0 +1,151 @@
+"""Reads recordings, whole or cut short: cycles as arrays, the other topics as tables of JSON."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import IO, Any, Final
+
+import numpy as np
+import pyarrow as pa
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, Footer, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from numpy.typing import NDArray
+from pyarrow import json as arrow_json
+from zstandard import ZstdError
+
+from cdpr_rt.service.recording_file import RecordingError
+from cdpr_rt.service.recording_schema import CYCLE, DESCRIPTION, EVENTS, STATUS
+
+Columns = dict[str, NDArray[Any]]
+"""Fields of rows: (rows,) each, or (rows, axes); null is nan."""
+
+_BROKEN: Final = (McapError, ZstdError, struct.error, ValueError, EOFError, pa.ArrowInvalid)
+_MOST_CHUNK_BYTES: Final = 1 << 28
+_TYPES: Final = {"number": pa.float64(), "integer": pa.int64(), "boolean": pa.bool_()}
+
+CLOSED, KILLED, CUT = "closed", "not closed", "cut short"
+
+
+class RecordingReader:
+    """One file; `cycles` goes through it, the rest is known when it has.
+
+    Raises RecordingError where the file is missing or no recording. What cannot be read any more
+    ends it like the end of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.metadata: dict[str, str] = {}
+        self.description: dict[str, Any] = {}
+        """What was published last."""
+        self.status: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []
+        """In the order of the file, each with `log_time_ns`, the time of day."""
+        self.ended = CUT
+        """`CLOSED`; `KILLED` where its writer had no time to write the index; `CUT` where the
+        file breaks off."""
+
+    def cycles(self, fields: Collection[str] | None = None) -> Iterator[Columns]:
+        """Yield the rows, some hundred at a time; all fields or only `fields`."""
+        topics: dict[int, str] = {}
+        names: dict[int, dict[str, Any]] = {}
+        schemas: dict[int, Schema] = {}
+        with self._open() as file:
+            for records in self._records(file):
+                rows: list[bytes] = []
+                schema: dict[str, Any] = {}
+                for record in records:
+                    if isinstance(record, Message):
+                        topic = topics.get(record.channel_id, "")
+                        if topic == CYCLE:
+                            rows.append(record.data)
+                            schema = names[record.channel_id]
+                        else:
+                            self._take(topic, record)
+                    elif isinstance(record, Schema):
+                        schemas[record.id] = record
+                    elif isinstance(record, Channel):
+                        topics[record.id] = record.topic
+                        names[record.id] = json.loads(schemas[record.schema_id].data)
+                if rows:
+                    yield _columns(rows, schema["properties"], fields)
+
+    def _open(self) -> IO[bytes]:
+        try:
+            return self.path.open("rb")
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
+
+    def _records(self, file: IO[bytes]) -> Iterator[list[Any]]:
+        """Yield the records of each chunk; note what stands between the chunks."""
+        found = False
+        stream = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_CHUNK_BYTES)
+        try:
+            for record in stream.records:
+                if isinstance(record, Chunk):
+                    yield breakup_chunk(record, validate_crc=True)
+                elif isinstance(record, Metadata) and record.name == "recording":
+                    self.metadata = dict(record.metadata)
+                    found = True
+                elif isinstance(record, Footer):
+                    self.ended = CLOSED if record.summary_start else KILLED
+        except _BROKEN as error:
+            self.ended = CUT
+            if not found:
+                raise RecordingError(f"{self.path}: not a recording: {error}") from None
+        if not found:
+            raise RecordingError(f"{self.path}: an MCAP file, but not a recording of cdpr-rt")
+
+    def _take(self, topic: str, message: Message) -> None:
+        if topic not in (DESCRIPTION, STATUS, EVENTS):
+            return
+        value = json.loads(message.data)
+        if topic == DESCRIPTION:
+            self.description = value
+        else:
+            into = self.status if topic == STATUS else self.events
+            into.append({"log_time_ns": message.log_time, **value})
+
+
+def _columns(
+    rows: list[bytes], properties: dict[str, Any], fields: Collection[str] | None
+) -> Columns:
+    wanted = [name for name in properties if fields is None or name in fields]
+    types, widths = [], {}
+    for name in wanted:
+        one = properties[name]
+        is_array = one["type"] == "array"
+        kind = _TYPES[(one["items"] if is_array else one)["type"]]
+        types.append((name, pa.list_(kind) if is_array else kind))
+        widths[name] = one["minItems"] if is_array else 0
+    text = b"\n".join(rows)
+    table = arrow_json.read_json(
+        pa.BufferReader(text),
+        read_options=arrow_json.ReadOptions(use_threads=False, block_size=len(text) + 1),
+        parse_options=arrow_json.ParseOptions(
+            explicit_schema=pa.schema(types), unexpected_field_behavior="ignore"
+        ),
+    )
+    columns: Columns = {}
+    for name in wanted:
+        values = table[name].combine_chunks()
+        if widths[name]:
+            values = values.flatten()
+        array = values.to_numpy(zero_copy_only=False)
+        columns[name] = array.reshape(len(rows), -1) if widths[name] else array
+    return columns
+
+
+def read_columns(paths: list[Path], fields: Collection[str] | None = None) -> Columns:
+    """Return the rows of several files, one after the other, as whole columns.
+
+    Raises RecordingError.
+    """
+    parts = [columns for path in paths for columns in RecordingReader(path).cycles(fields)]
+    if not parts:
+        raise RecordingError(f"{paths[0]}: holds no cycles")
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
