@@ -7,6 +7,8 @@ import errno
 import re
 import select
 import socket
+import struct
+import time
 from collections.abc import Callable
 
 from sim_bus.errors import BusSetupError
@@ -16,6 +18,9 @@ PACKET_BYTES = 448
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 _SO_SNDBUFFORCE = 32
+_SO_TIMESTAMPNS = 35
+_TIMESPEC = struct.Struct("ll")
+_ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size)
 _SEND_BUFFER_BYTES = 1 << 22
 _BACKLOG = 64
 _PATIENCE = 500
@@ -23,11 +28,17 @@ _PATIENCE_STEP_S = 0.0002
 
 
 class Client:
-    """A peer that sends and takes frames through `sock`."""
+    """A peer that sends and takes frames through `sock`.
 
-    __slots__ = ("dropped", "essential", "filters", "receive", "send", "sock")
+    With `stamped` the kernel tells when each packet was sent, so that it counts as sent then
+    whenever it is taken in.
+    """
 
-    def __init__(self, sock: socket.socket, *, essential: bool = False) -> None:
+    __slots__ = ("dropped", "essential", "filters", "receive", "send", "sent_s", "sock")
+
+    def __init__(
+        self, sock: socket.socket, *, essential: bool = False, stamped: bool = False
+    ) -> None:
         sock.setblocking(False)
         _widen(sock)
         self.sock = sock
@@ -36,7 +47,12 @@ class Client:
         self.filters: list[tuple[int, int]] | None = None
         """Pairs (identifier, mask) as for CAN_RAW_FILTER, None for everything."""
         self.dropped = 0
+        self.sent_s = 0.0
+        """When the last packet was sent, in seconds of the monotonic clock, where stamped."""
         self.receive: Callable[[int], bytes] = sock.recv
+        if stamped:
+            sock.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+            self.receive = self._receive_stamped
         self.send: Callable[[bytes], object] = self._send_patiently if essential else sock.send
 
     def wants(self, can_id: int) -> bool:
@@ -44,6 +60,20 @@ class Client:
         if self.filters is None:
             return True
         return any((can_id & mask) == (wanted & mask) for wanted, mask in self.filters)
+
+    def _receive_stamped(self, size: int) -> bytes:
+        """Return the next packet as `recv` does, and note when it was sent."""
+        packet, ancillary, _, _ = self.sock.recvmsg(size, _ANCILLARY_BYTES)
+        now_s = time.monotonic()
+        if ancillary:
+            seconds, ns = _TIMESPEC.unpack(ancillary[0][2])
+            # the kernel stamps with the clock of the wall; if that was set meanwhile, the packet
+            # counts as sent now at the latest
+            age_s = max(0.0, time.time() - seconds - ns * 1e-9)
+            self.sent_s = now_s - age_s
+        else:
+            self.sent_s = now_s
+        return packet
 
     def _send_patiently(self, frame: bytes) -> None:
         """Send, waiting while the transmit queue of a CAN interface is full."""

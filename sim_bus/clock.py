@@ -31,12 +31,17 @@ class BusClock:
 
     def now(self, wall_s: float) -> float:
         """Return bus time at `wall_s`; never less than what was returned before."""
-        if self.held:
-            if wall_s < self._base_wall_s:
-                return self._base_s
-            self.held = False
+        if self.held and wall_s < self._base_wall_s:
+            return self._base_s
+        self.held = False
         self._last_s = max(self._last_s, self._base_s + wall_s - self._base_wall_s)
         return self._last_s
+
+    def ask(self, wall_s: float) -> float:
+        """Return bus time at `wall_s`, and let it be earlier the next time."""
+        if self.held and wall_s < self._base_wall_s:
+            return self._base_s
+        return max(self._last_s, self._base_s + wall_s - self._base_wall_s)
 
     def sync(self, wall_s: float, period_s: float) -> float:
         """Take a SYNC into account and return the bus time at which it stands.
@@ -56,4 +61,4 @@ class BusClock:
         """Return how long on the wall until bus time `event_s`, or until a held clock runs."""
         if self.held:
             return max(self._base_wall_s - wall_s, 0.0)
-        return max(event_s - self.now(wall_s), 0.0)
+        return max(event_s - self.ask(wall_s), 0.0)

@@ -44,7 +44,7 @@ def handle(hub: Hub, client: Client, packet: bytes) -> bytes | None:
 
 def status(hub: Hub) -> dict[str, Any]:
     """Return what the bus tells about itself; docs/wire.md lists the keys."""
-    now_s = hub.clock.now(time.monotonic())
+    now_s = hub.clock.ask(time.monotonic())
     return {
         "name": hub.name,
         "mode": hub.clock.mode.value,

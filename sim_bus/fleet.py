@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 from sim_bus.clock import ClockMode
 from sim_bus.control import status
-from sim_bus.hub import FINE_WAIT_S, Hub
+from sim_bus.hub import Hub
 from sim_bus.node_protocol import LocalNode
 from sim_bus.server import open_hub, run_until_stopped
+from sim_bus.watcher import FINE_WAIT_S
 
 
 @dataclass(frozen=True)

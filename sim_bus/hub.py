@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import functools
 import math
-import os
-import select
 import socket
 import time
 from collections.abc import Callable, Sequence
@@ -14,17 +12,16 @@ from collections.abc import Callable, Sequence
 from sim_bus.bus_load import BusLoad
 from sim_bus.client import PACKET_BYTES, Client, listening_socket
 from sim_bus.clock import HOLD_S, BusClock, ClockMode
+from sim_bus.contention import Contention
 from sim_bus.control import handle
 from sim_bus.errors import SimulatorError
-from sim_bus.frame import FRAME_BYTES, HEADER, RTR_FLAG, arbitration_key
+from sim_bus.frame import FRAME_BYTES, HEADER, RTR_FLAG
 from sim_bus.node_protocol import LocalNode
 from sim_bus.route import Route
+from sim_bus.watcher import Watcher
 
 _BURST = 64
-_EVENTS = 64
 _MOST_ROUTES = 4096
-FINE_WAIT_S = 0.01
-"""Below this a wait in whole milliseconds, as epoll has it, is too coarse."""
 
 
 class Hub:
@@ -52,6 +49,7 @@ class Hub:
         self.malformed = 0
         self.dropped = 0
         self._paced = mode is ClockMode.PACED
+        self._waiting = Contention(paced=self._paced, bitrate=bitrate)
         self._clients: dict[int, Client] = {}
         self._routes: dict[int, Route] = {}
         self._accepts = [node.accepts for node in self.nodes]
@@ -59,21 +57,17 @@ class Hub:
         self._just_synced = False
         self._leftover = False
         self._batch: list[tuple[int, int, int, Route, bytes, LocalNode]] = []
-        self._poller = select.epoll()
-        self._handlers: dict[int, Callable[[], None]] = {}
+        self._watcher = Watcher()
         self.stopping = False
         """Whether the loop is to end."""
         self._failure: str | None = None
-        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._listener: socket.socket | None = None
-        self.watch(self._wake, lambda: None)
 
     # -- what the loop listens to
 
     def watch(self, descriptor: int, handler: Callable[[], None]) -> None:
         """Call `handler` whenever `descriptor` is readable."""
-        self._poller.register(descriptor, select.EPOLLIN)
-        self._handlers[descriptor] = handler
+        self._watcher.add(descriptor, handler)
 
     def listen(self) -> None:
         """Open the bus under its name.
@@ -86,7 +80,7 @@ class Hub:
 
     def attach(self, sock: socket.socket, *, essential: bool = False) -> None:
         """Let the peer of `sock` take part; the end of an essential one ends the hub."""
-        client = Client(sock, essential=essential)
+        client = Client(sock, essential=essential, stamped=self._paced)
         descriptor = sock.fileno()
         self._clients[descriptor] = client
         self._routes.clear()
@@ -105,8 +99,9 @@ class Hub:
         descriptor = client.sock.fileno()
         if descriptor < 0:
             return
-        del self._clients[descriptor], self._handlers[descriptor]
-        self._poller.unregister(descriptor)
+        del self._clients[descriptor]
+        self._watcher.remove(descriptor)
+        self._waiting.discard(client)
         client.sock.close()
         self._routes.clear()
         if client.essential:
@@ -118,7 +113,7 @@ class Hub:
     def stop(self) -> None:
         """End `run` soon; may be called from a signal handler or another thread."""
         self.stopping = True
-        os.eventfd_write(self._wake, 1)
+        self._watcher.wake()
 
     def run(self) -> None:
         """Carry frames until `stop` is called.
@@ -137,21 +132,22 @@ class Hub:
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when a turn has something to do."""
-        return self._poller.fileno()
+        return self._watcher.fileno()
 
     def turn(self, wait_s: float | None) -> None:
         """Wait up to `wait_s` for something to do (None: for ever), then do it."""
-        if wait_s and wait_s < FINE_WAIT_S:
-            select.select([self._poller], [], [], wait_s)
-            wait_s = 0.0
-        events = self._poller.poll(wait_s, _EVENTS)
+        events = self._watcher.readable(wait_s, exactly=self._paced)
         self._just_synced = False
-        if len(events) == 1:
-            self._handlers[events[0][0]]()
-        elif events:
+        if self._waiting or len(events) > 1:
             self._serve_all(events)
-        if not self.clock.held:
-            self._tick()
+        elif events:
+            self._watcher.handlers[events[0][0]]()
+        if self._paced:
+            # while frames wait time goes on with them, so that none comes too late
+            if not events and not self._waiting:
+                self._tick(self.clock.now(self._watcher.looked_s))
+        elif not self.clock.held:
+            self._tick(self.clock.now(time.monotonic()))
         elif not events:
             self._advance(self.clock.now(time.monotonic()))
         if self._leftover:
@@ -166,12 +162,11 @@ class Hub:
         self._clients.clear()
         if self._listener is not None:
             self._listener.close()
-        self._poller.close()
-        os.close(self._wake)
+        self._watcher.close()
 
     def wait_s(self) -> float | None:
         """Return for how long the next turn may wait, None for ever."""
-        if self._leftover:
+        if self._leftover or self._waiting:
             return 0.0
         if self._just_synced:
             return HOLD_S
@@ -179,13 +174,12 @@ class Hub:
         wait_s = self.clock.wall_wait(time.monotonic(), event_s)
         return None if wait_s == math.inf else wait_s
 
-    def _tick(self) -> None:
-        """Let the nodes' timers run when one is due."""
-        now_s = self.clock.now(time.monotonic())
-        for node in self.nodes:
-            if node.next_event() <= now_s:
-                self._advance(now_s)
-                return
+    def _tick(self, now_s: float) -> bool:
+        """Let the nodes' timers run when one is due; return whether one was."""
+        due = any(node.next_event() <= now_s for node in self.nodes)
+        if due:
+            self._advance(now_s)
+        return due
 
     def _advance(self, now_s: float) -> None:
         self._now_s = now_s
@@ -193,6 +187,13 @@ class Hub:
             node.advance(now_s)
         self._check_accepts()
         self._flush()
+
+    def _reach(self, now_s: float, route: Route) -> None:
+        """Bring those nodes up to the time of a frame which it concerns, or all if one is due."""
+        if not self._tick(now_s):
+            self._now_s = now_s
+            for node in route.nodes:
+                node.advance(now_s)
 
     def _check_accepts(self) -> None:
         for i, node in enumerate(self.nodes):
@@ -209,20 +210,21 @@ class Hub:
             client = self._clients.get(descriptor)
             if client is not None:
                 contenders.append(client)
-            elif descriptor in self._handlers:
-                self._handlers[descriptor]()
-        waiting: dict[Client, tuple[int, bytes]] = {}
+            elif descriptor in self._watcher.handlers:
+                self._watcher.handlers[descriptor]()
+        waiting = self._waiting
         for client in contenders:
-            self._fetch(client, waiting)
-        budget = _BURST
-        while waiting:
-            winner = min(waiting, key=lambda client: waiting[client][0])
-            frame = waiting.pop(winner)[1]
-            budget -= 1
-            if not self._take(frame, winner) and budget > 0:
-                self._fetch(winner, waiting)
+            if client not in waiting:
+                self._fetch(client)
+        for _ in range(_BURST):
+            if not waiting:
+                return
+            winner, frame = waiting.pop()
+            # the sender of a SYNC waits for the answers, unless time has passed meanwhile
+            if not self._take(frame, winner) or self._paced:
+                self._fetch(winner)
 
-    def _fetch(self, client: Client, waiting: dict[Client, tuple[int, bytes]]) -> None:
+    def _fetch(self, client: Client) -> None:
         try:
             packet = client.receive(PACKET_BYTES)
             while len(packet) != FRAME_BYTES:
@@ -234,7 +236,7 @@ class Hub:
         except OSError as error:
             self._remove(client, f"lost: {error.strerror}")
             return
-        waiting[client] = (arbitration_key(HEADER.unpack_from(packet)[0]), packet)
+        self._waiting.add(client, packet)
 
     def _pump(self, client: Client) -> None:
         """Take the frames of one client until none waits or a SYNC has been answered.
@@ -278,9 +280,9 @@ class Hub:
         if route.sync:
             self._sync(frame, source, route, length)
             return True
-        now_s = self.clock.now(time.monotonic())
+        now_s = self.clock.now(source.sent_s if self._paced else time.monotonic())
         if now_s > self._now_s:
-            self._advance(now_s)
+            self._reach(now_s, route)
         if route.acyclic:
             load.acyclic_bits += route.bits[length]
         else:
@@ -307,7 +309,8 @@ class Hub:
         period_s = 0.0
         for node in nodes:
             period_s = max(period_s, node.sync_period_s)
-        self._now_s = now_s = self.clock.sync(time.monotonic(), period_s)
+        wall_s = source.sent_s if self._paced else time.monotonic()
+        self._now_s = now_s = self.clock.sync(wall_s, period_s)
         self._just_synced = self.clock.held
         for node in nodes:
             node.advance(now_s)

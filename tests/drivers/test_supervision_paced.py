@@ -95,6 +95,27 @@ def test_an_answer_that_is_a_cycle_late_is_not_taken_for_the_next_one(rig: Rig) 
     assert False in cycles.rate_ok[10:]
 
 
+def test_a_simulator_that_is_held_up_misses_no_heartbeat(
+    rig: Rig, simulator: tuple[str, int]
+) -> None:
+    """Its process stands still for three times as long as a drive tolerates silence."""
+    consumer_s = 0.25
+    rig.network.write(2, 0x1016, 1, 127 << 16 | round(consumer_s * 1e3))
+    cycles = _Cycles(rig)
+    cycles.run(5)
+    with logged(rig.bus) as log:
+        os.kill(simulator[1], signal.SIGSTOP)
+        try:
+            cycles.run(round(3 * consumer_s / PERIOD_S))
+        finally:
+            os.kill(simulator[1], signal.SIGCONT)
+        cycles.run(10)
+    answered = len(log.of(0x182))
+    assert log.of(0x082) == []
+    assert answered >= 20  # those to the SYNCs that waited too
+    assert rig.network.read_int(2, 0x1001) == 0
+
+
 def test_a_bus_that_takes_no_frames_any_more_is_told_and_not_waited_for(
     rig: Rig, simulator: tuple[str, int]
 ) -> None:
@@ -111,3 +132,4 @@ def test_a_bus_that_takes_no_frames_any_more_is_told_and_not_waited_for(
         assert rig.bus in str(caught.value)
     finally:
         os.kill(simulator[1], signal.SIGCONT)
+        time.sleep(0.5)  # thousands of frames wait before what switches off
