@@ -34,6 +34,7 @@ _COMMANDS = (
     "profiles",
     "rail",
     "run",
+    "service-unit",
     "sim",
     "tension",
 )
@@ -49,7 +50,8 @@ def _register(arguments: list[str]) -> None:
     """Load the commands; only the one that is asked for, since each brings libraries along."""
     asked = [name for name in _COMMANDS if arguments and arguments[0] == name]
     for name in asked or _COMMANDS:
-        importlib.import_module(f"tools.commands.{name}").register(app)
+        module = name.replace("-", "_")
+        importlib.import_module(f"tools.commands.{module}").register(app)
 
 
 def _exit_status(error: BaseException) -> int:

@@ -91,22 +91,65 @@ def run(
 
     Tells on standard output when it is up. Ctrl-C and SIGTERM end it with a controlled stop.
     """
-    if record is not None and no_record:
-        raise BadInputError("--record and --no-record: one of them")
     out = Output(as_json)
-    profile = _fitting(load_robot(robot))
-    control = unix or default_socket(profile.profile)
-    _require_free(control)
-    own = asks_for_own_simulator(bus or ())
-    name = f"simbus:own-{os.getpid()}"
-    buses = (name,) if own else tuple(bus or ())
-    settings = RunSettings(
-        robot=profile.reference,
-        name=profile.profile,
-        buses=buses,
+    profile = load_robot(robot)
+    settings = settings_for(
+        profile,
+        bus=bus,
+        plant=plant,
+        http=http,
+        unix=unix,
+        key_file=key_file,
+        record=record,
+        no_record=no_record,
+        live=live,
+        stream=stream,
         read_only=read_only,
         safety_io=safety_io,
-        socket=control,
+    )
+    _require_free(settings.socket)
+    _ask(profile, settings, yes)
+    with ExitStack() as stack:
+        keep: tuple[int, ...] = ()
+        if asks_for_own_simulator(bus or ()):
+            out.note(f"starting {len(profile.axes)} simulated drives ...")
+            simulator = OwnSimulator(profile.reference, settings.buses[0], plant, paced=True)
+            stack.callback(simulator.stop)
+            keep = (simulator.lifeline,)
+        _launch(profile, settings, out, keep)
+
+
+def settings_for(
+    robot: Robot,
+    *,
+    bus: list[str] | None,
+    plant: Path | None,
+    http: str | None,
+    unix: Path | None,
+    key_file: Path | None,
+    record: Path | None,
+    no_record: bool,
+    live: int | None,
+    stream: str | None,
+    read_only: bool,
+    safety_io: str | None,
+) -> RunSettings:
+    """Return what the options of `cdpr run` ask for; raises BadInputError."""
+    if len(robot.axes) > MOST_AXES:
+        raise BadInputError(f"{robot.path}: {len(robot.axes)} axes; allowed: 1 to {MOST_AXES}")
+    require_fit(robot)
+    if record is not None and no_record:
+        raise BadInputError("--record and --no-record: one of them")
+    own = asks_for_own_simulator(bus or ())
+    if plant is not None and not own:
+        raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+    return RunSettings(
+        robot=robot.reference,
+        name=robot.profile,
+        buses=(f"simbus:own-{os.getpid()}",) if own else tuple(bus or ()),
+        read_only=read_only,
+        safety_io=safety_io,
+        socket=unix or default_socket(robot.profile),
         http=None if http is None else Address.parse("--http", http),
         key_file=key_file,
         record=None if no_record else record or default_recordings(),
@@ -114,17 +157,6 @@ def run(
         stream=None if stream is None else Address.parse("--stream", stream),
         launcher_pid=os.getpid(),
     )
-    _ask(profile, buses, read_only, yes)
-    if plant is not None and not own:
-        raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-    with ExitStack() as stack:
-        keep: tuple[int, ...] = ()
-        if own:
-            out.note(f"starting {len(profile.axes)} simulated drives ...")
-            simulator = OwnSimulator(profile.reference, name, plant, paced=True)
-            stack.callback(simulator.stop)
-            keep = (simulator.lifeline,)
-        _launch(profile, settings, out, keep)
 
 
 def _launch(robot: Robot, settings: RunSettings, out: Output, keep: Sequence[int]) -> None:
@@ -148,13 +180,6 @@ def _ended(reason: str, status: int) -> CommandError:
     return BadInputError(reason) if status == BAD_INPUT else WorkFailedError(reason)
 
 
-def _fitting(robot: Robot) -> Robot:
-    if len(robot.axes) > MOST_AXES:
-        raise BadInputError(f"{robot.path}: {len(robot.axes)} axes; allowed: 1 to {MOST_AXES}")
-    require_fit(robot)
-    return robot
-
-
 def _require_free(control: Path) -> None:
     """Raise BadInputError where a daemon listens at `control` already, or none ever could."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
@@ -167,9 +192,9 @@ def _require_free(control: Path) -> None:
     raise BadInputError(f"--socket {control}: a daemon runs there already; `cdpr stop` ends it")
 
 
-def _ask(robot: Robot, buses: Sequence[str], read_only: bool, yes: bool) -> None:
-    urls = robot_urls(robot, buses).values()
+def _ask(robot: Robot, settings: RunSettings, yes: bool) -> None:
+    urls = robot_urls(robot, settings.buses).values()
     real = [str(url) for url in urls if not url.is_simulated]
-    if real and not read_only:
+    if real and not settings.read_only:
         where = " and ".join(real)
         require_consent(f"{robot.name} on {where}: its motors will turn when told to.", yes)

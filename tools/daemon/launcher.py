@@ -109,6 +109,7 @@ class Launcher:
         self._stalled = False
         self._told = ""
         self._fed = 0.0
+        self._failure = FAILED
         self.reason = ""
         """Why the daemon ended other than on command."""
 
@@ -139,19 +140,25 @@ class Launcher:
                 os.read(wakeup, 4096)
 
     def _finished(self) -> bool:
-        """Whether the loop has ended in a way that ends the daemon: on command, or unable to begin.
+        """Whether the daemon ends: its loop did so on command, or one of the two cannot begin.
 
-        One that died while it was up does not: the service stays and says so.
+        A loop that died while it was up does not end it: the service stays and says so.
         """
         code = self._loop.process.poll()
-        if code is None:
-            return False
         if code == DONE:
             return True
-        if not self._up:
-            self.reason = f"the loop could not begin: {self._loop.end}"
-            return True
+        if code is not None and not self._up:
+            return self._could_not_begin("loop", self._loop)
+        refused = self._service is not None and self._service.process.poll() == BAD_INPUT
+        if refused and self._service is not None and not self._up:
+            return self._could_not_begin("service", self._service)
         return False
+
+    def _could_not_begin(self, name: str, child: Child) -> bool:
+        self.reason = f"the {name} could not begin: {child.end}"
+        if child.process.returncode == BAD_INPUT:
+            self._failure = BAD_INPUT
+        return True
 
     def _turn(self) -> None:
         now = time.monotonic()
@@ -188,8 +195,8 @@ class Launcher:
             if not self._service.end:
                 return
             lived = now - self._service.started
-            self._restarts = 0 if lived > _STEADY_S else self._restarts + 1
-            pause = _RESTART_S[min(self._restarts, len(_RESTART_S) - 1)]
+            self._restarts = 1 if lived > _STEADY_S else self._restarts + 1
+            pause = _RESTART_S[min(self._restarts, len(_RESTART_S)) - 1]
             self._tell(f"the service {self._service.end}; it starts again in {pause:g} s")
             self._service.close()
             self._service, self._restart_at = None, now + pause
@@ -210,19 +217,18 @@ class Launcher:
     def _stop(self) -> int:
         """End the loop under control, then the service, so that the recording is whole."""
         self._manager.tell(STOPPING=1, STATUS="stopping")
-        died = bool(self._loop.end) and self._loop.process.returncode != DONE
-        patience_s = _LOOP_STALLED_S if self._stalled else _LOOP_STOP_S
-        in_time = self._loop.stop(patience_s)
-        code = self._loop.process.returncode
-        if not in_time:
-            self.reason = f"the loop did not stop within {patience_s:g} s and was killed"
-        elif code != DONE and not died:
-            self.reason = f"the loop {self._loop.end}"
+        failure = self._stop_loop()
+        self.reason = self.reason or failure
         if self._service is not None and not self._service.stop(_SERVICE_STOP_S):
             self._tell("the service did not end by itself and was killed")
-        if died and not self._up:
-            return BAD_INPUT if code == BAD_INPUT else FAILED
-        return FAILED if self.reason else DONE
+        return self._failure if self.reason else DONE
+
+    def _stop_loop(self) -> str:
+        """End the loop; return why it did not end well, empty when it did."""
+        patience_s = _LOOP_STALLED_S if self._stalled else _LOOP_STOP_S
+        if not self._loop.stop(patience_s):
+            return f"the loop did not stop within {patience_s:g} s and was killed"
+        return "" if self._loop.process.returncode == DONE else f"the loop {self._loop.end}"
 
     def _silence_s(self) -> float:
         alive = int(self._block.counters["loop_alive_ns"][0])
