@@ -57,7 +57,9 @@ class AxisExchange:
         self._sync_frame = FRAME.pack(_SYNC_ID, 0, bytes(8))
         operational = bytes([_OPERATIONAL_STATE]) + bytes(7)
         self._heartbeat_frame = FRAME.pack(_HEARTBEAT_ID + master_node_id, 1, operational)
-        self._heartbeat_cycles = max(1, round(heartbeat_s / period_s))
+        # by the clock of the bus: cycles that are held up are fewer, not slower heartbeats
+        self._heartbeat_every_s = heartbeat_s - 0.5 * period_s
+        self._heartbeat_at_s = 0.0
         filters = [(i, 0x7FF) for i in self._layout.identifiers]
         self._port = open_port(url, filters, network.health)
         self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
@@ -240,7 +242,9 @@ class AxisExchange:
         try:
             for row in layout.rpdos.rows:
                 send(row)
-            if self.feedback.cycle % self._heartbeat_cycles == 0:
+            now_s = self.feedback.time_s if self.lockstep else time.monotonic()
+            if now_s >= self._heartbeat_at_s:
+                self._heartbeat_at_s = now_s + self._heartbeat_every_s
                 send(self._heartbeat_frame)
         except OSError as error:
             raise self._port.lost(error) from error
@@ -269,6 +273,7 @@ class AxisExchange:
     def _begin_cycling(self) -> None:
         """Take over the master's heartbeat and forget what came while no cycles ran."""
         self.network.claim_cycle()
+        self._heartbeat_at_s = 0.0  # the last one between cycles may be a whole period ago
         for axis in self.axes:
             if has_deadline(axis):
                 self.network.start(axis.node_id, axis.drive.heartbeat_producer_s)

@@ -265,7 +265,9 @@ class CanNetwork(ObjectAccess):
     def release_cycle(self) -> None:
         """Take the master's heartbeat back from the cycle, and the watch on the nodes'."""
         self._errors.restart_watch()
-        self.cycling = False
+        if self.cycling:
+            self.cycling = False
+            self._send_heartbeat()  # the cycle's last one may be a whole period ago
 
     def start_heartbeat(self) -> None:
         """Begin to produce the master's heartbeat; the drives watch it from the first one on."""
