@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import numpy as np
-import pyarrow as pa
+import pyarrow as pa  # type: ignore[import-untyped]
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, Footer, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from numpy.typing import NDArray
-from pyarrow import json as arrow_json
+from pyarrow import json as arrow_json  # type: ignore[import-untyped]
 from zstandard import ZstdError
 
 from cdpr_rt.service.recording_file import RecordingError

@@ -1,0 +1,235 @@
+"""Recording: nothing is missing, whatever ends it, and the stock `mcap` package reads it."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+from recording_rig import (
+    DESCRIPTION,
+    RecorderProcess,
+    block_with_clock,
+    made_rows,
+    put,
+    run_for,
+    stock_cycles,
+    stock_messages,
+)
+
+from cdpr_rt.runtime.shared_block import RowWriter
+from cdpr_rt.runtime.states import Reaction
+from cdpr_rt.service.recording import Recorder
+from cdpr_rt.service.recording_file import RecordingError
+from cdpr_rt.service.recording_reader import CLOSED, CUT, KILLED, RecordingReader, read_columns
+
+
+def _recorded(folder: Path, rows: int = 3000) -> Path:
+    block = block_with_clock()
+    recorder = Recorder(block, folder, "bench", reserve_bytes=0)
+    put(RowWriter(block), made_rows(0, rows))
+    recorder.start()
+    recorder.stop()
+    assert recorder.told()["error"] == ""
+    return Path(recorder.told()["file"])
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _recorded(tmp_path_factory.mktemp("recording"))
+
+
+def _wait_until(done: object, seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not done():  # type: ignore[operator]
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_every_row_is_there_as_it_was(recorded: Path) -> None:
+    messages = stock_messages(recorded, "/cycle")
+    rows = made_rows(0, 3000)
+    assert [value["cycle"] for _, value in messages] == list(range(3000))
+    assert messages[2999][1]["position_rad"] == pytest.approx(rows["position_rad"][2999], abs=1e-9)
+    assert messages[0][1]["cable_length_m"] == [None, None]
+    # the time of day follows from one instant on both clocks
+    assert [at for at, _ in messages] == [
+        1_800_000_000_000_000_000 + k * 1_000_000 for k in range(3000)
+    ]
+    assert stock_messages(recorded, "/description")[0][1] == DESCRIPTION
+    assert stock_messages(recorded, "/status")[0][1]["state"] == "active"
+    assert recorded.name == "bench-20270115T080000Z-001.mcap"
+
+
+def test_read_back_as_columns(recorded: Path) -> None:
+    rows = made_rows(0, 3000)
+    columns = read_columns([recorded])
+    for name in ("cycle", "stamp_ns", "statusword", "valid", "state"):
+        assert (columns[name] == rows[name]).all()
+    for name in ("torque_sent_Nm", "tension_N", "cable_length_m", "pose", "stream_age_s"):
+        assert (
+            abs(columns[name] - rows[name]).max() < 1e-9 or (columns[name] != columns[name]).all()
+        )
+    assert set(read_columns([recorded], ["cycle", "pose"])) == {"cycle", "pose"}
+
+
+def test_killed_it_is_whole_and_the_next_goes_on_without_a_gap(tmp_path: Path) -> None:
+    block = block_with_clock()
+    writer = RowWriter(block)
+    first = RecorderProcess(block, tmp_path)
+    written = run_for(writer, 2.0, 0)
+    first.kill()
+    (path,) = tmp_path.iterdir()
+    kept = stock_cycles(path)
+    assert kept == list(range(len(kept)))
+    assert len(kept) >= written - 1000  # all but the last second, on a busy machine too
+    reader = RecordingReader(path)
+    assert sum(part["cycle"].size for part in reader.cycles()) == len(kept)
+    assert reader.ended == KILLED
+
+    second = RecorderProcess(block, tmp_path)
+    written = run_for(writer, 0.3, written)
+    told = second.stop()
+    assert told["error"] == "" and told["lost_rows"] == 0
+    assert stock_cycles(*sorted(tmp_path.iterdir())) == list(range(written))
+
+
+def test_cut_anywhere_the_rows_before_are_read(recorded: Path, tmp_path: Path) -> None:
+    data = recorded.read_bytes()
+    path = tmp_path / "cut.mcap"
+    counts = []
+    for part in range(1, 25):
+        path.write_bytes(data[: len(data) * part // 24 - 1])
+        reader = RecordingReader(path)
+        cycles = [int(k) for columns in reader.cycles(["cycle"]) for k in columns["cycle"]]
+        assert cycles == list(range(len(cycles)))
+        assert reader.ended == CUT
+        counts.append(len(cycles))
+    assert counts == sorted(counts) and counts[-1] == 3000
+
+
+def test_damaged_in_the_middle_it_is_read_up_to_there(recorded: Path, tmp_path: Path) -> None:
+    data = bytearray(recorded.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 64] = os.urandom(64)
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(data)
+    reader = RecordingReader(path)
+    cycles = [int(k) for columns in reader.cycles(["cycle"]) for k in columns["cycle"]]
+    assert reader.ended == CUT and cycles == list(range(len(cycles)))
+
+
+def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
+    other = tmp_path / "other.mcap"
+    for data in (b"", b"not one", os.urandom(500)):
+        other.write_bytes(data)
+        with pytest.raises(RecordingError, match=r"other\.mcap: not a recording"):
+            list(RecordingReader(other).cycles())
+    with pytest.raises(RecordingError, match="No such file"):
+        list(RecordingReader(tmp_path / "missing.mcap").cycles())
+
+
+def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None:
+    block = block_with_clock()
+    writer = RowWriter(block)
+    recorder = RecorderProcess(block, tmp_path, most_file_bytes=300_000)
+    written = run_for(writer, 1.0, 0)
+    end = time.monotonic() + 20.0
+    while not (told := recorder.told())["error"]:
+        assert time.monotonic() < end
+        written = run_for(writer, 0.2, written)
+    assert "File too large" in told["error"] and "bench-" in told["error"]
+    assert not told["recording"]
+    run_for(writer, 0.3, written)
+    told = recorder.stop()
+    (path,) = tmp_path.iterdir()  # it never began again
+    assert path.stat().st_size <= 300_000
+    kept = stock_cycles(path)
+    assert kept == list(range(len(kept))) and len(kept) > 100
+    # what was not safe is not counted as such
+    assert int(block.counters["recorded"][0]) == len(kept)
+
+
+def test_no_room_at_all_is_said_at_the_start(tmp_path: Path) -> None:
+    folder = tmp_path / "file"
+    folder.write_text("")
+    recorder = Recorder(block_with_clock(), folder, "bench")
+    with pytest.raises(RecordingError, match="cannot record"):
+        recorder.start()
+    recorder.stop()
+    assert not recorder.told()["recording"] and "cannot record" in recorder.told()["error"]
+
+
+def test_it_ends_before_the_disk_is_full(tmp_path: Path) -> None:
+    block = block_with_clock()
+    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=1 << 60)
+    recorder.start()
+    put(RowWriter(block), made_rows(0, 10))
+    _wait_until(lambda: recorder.told()["error"])
+    recorder.stop()
+    assert "MB free" in recorder.told()["error"]
+    (path,) = tmp_path.iterdir()
+    assert stock_cycles(path) == list(range(10))
+
+
+def test_rotated_by_size_each_file_stands_alone(tmp_path: Path) -> None:
+    block = block_with_clock()
+    recorder = Recorder(block, tmp_path, "bench", most_bytes=40_000, reserve_bytes=0)
+    recorder.start()
+    written = run_for(RowWriter(block), 2.5, 0)
+    recorder.stop()
+    paths = sorted(tmp_path.iterdir())
+    assert len(paths) > 2
+    assert [path.stem[-3:] for path in paths] == [f"{k:03d}" for k in range(1, len(paths) + 1)]
+    assert stock_cycles(*paths) == list(range(written))
+    for path in paths:
+        assert stock_messages(path, "/description")[0][1] == DESCRIPTION
+        assert stock_messages(path, "/status")[0][1]["state"] == "active"
+        reader = RecordingReader(path)
+        list(reader.cycles(["cycle"]))
+        assert reader.ended == CLOSED
+    assert recorder.told()["bytes"] == sum(path.stat().st_size for path in paths)
+
+
+def test_lost_rows_are_counted(tmp_path: Path) -> None:
+    block = block_with_clock(seconds=0.5)
+    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
+    put(RowWriter(block), made_rows(0, 2000))
+    recorder.start()
+    recorder.stop()
+    told = recorder.told()
+    assert told["lost_rows"] + told["rows"] == 2000 and told["lost_rows"] >= 1500
+    path = Path(told["file"])
+    assert stock_cycles(path) == list(range(told["lost_rows"], 2000))
+    assert stock_messages(path, "/events")[-1][1]["lost_rows"] == told["lost_rows"]
+
+
+def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
+    block = block_with_clock()
+    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
+    rows = made_rows(0, 100)
+    rows["state"][:10] = 2
+    rows["program"][20:] = 2
+    rows["reaction"][30:50:2], rows["limit"][30:50:2] = Reaction.CLAMP, 4
+    rows["reaction"][60:], rows["limit"][60:] = Reaction.QUICK_STOP, 7
+    rows["limit_axis"][60:] = 1
+    rows["state"][70:] = 4
+    recorder.start()
+    writer = RowWriter(block)
+    put(writer, rows[:65])
+    _wait_until(lambda: recorder.told()["rows"] == 65)
+    block.write_status({"state": "fault", "reason": "right: 31 N below 40 N"})
+    put(writer, rows[65:])
+    recorder.remark("stopped by somebody", client="panel")
+    recorder.stop()
+    events = [value for _, value in stock_messages(Path(recorder.told()["file"]), "/events")]
+    assert [event["text"] for event in events] == [
+        "state ready",
+        "state active",
+        "program jog",
+        "quick stop by limit 7 of right",
+        "state fault",
+        "right: 31 N below 40 N",
+        "stopped by somebody",
+    ]
+    assert [event.get("cycle") for event in events] == [0, 10, 20, 60, 70, None, None]
+    assert events[-1]["client"] == "panel"
