@@ -14,7 +14,7 @@ from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, Footer, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from numpy.typing import NDArray
-from pyarrow import json as arrow_json  # type: ignore[import-untyped]
+from pyarrow import json as arrow_json
 from zstandard import ZstdError
 
 from cdpr_rt.service.recording_file import RecordingError

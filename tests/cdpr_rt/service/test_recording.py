@@ -219,6 +219,7 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
     _wait_until(lambda: recorder.told()["rows"] == 65)
     block.write_status({"state": "fault", "reason": "right: 31 N below 40 N"})
     put(writer, rows[65:])
+    _wait_until(lambda: recorder.told()["rows"] == 100)
     recorder.remark("stopped by somebody", client="panel")
     recorder.stop()
     events = [value for _, value in stock_messages(Path(recorder.told()["file"]), "/events")]
