@@ -1,0 +1,336 @@
+"""The set-point stream over real UDP sockets, among friends and others."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import resource
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.service.lease import Lease
+from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError, is_loopback
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import Standing, StreamSetpoint
+
+KEY = b"a key that is long enough"
+
+
+class Robot:
+    """A receiver with what stands behind it."""
+
+    def __init__(self, key: bytes | None = None, host: str = "127.0.0.1") -> None:
+        self.block = SharedBlock.create(1, 0.1, 1000.0)
+        self.until_ns = 0
+        self.lease = Lease(self._publish)
+        self.stream = SetpointStream(self.block, self.lease, host, 0, key)
+        self.stream.start()
+        self.port = self.stream.port
+
+    def _publish(self, until_ns: int) -> None:
+        self.until_ns = until_ns
+
+    @property
+    def posted(self) -> int:
+        return int(self.block.counters["samples"][0])
+
+    def count(self, name: str) -> int:
+        return int(self.stream.told()["packets"][name])
+
+
+@contextmanager
+def robot(key: bytes | None = None, host: str = "127.0.0.1") -> Iterator[Robot]:
+    one = Robot(key, host)
+    try:
+        yield one
+    finally:
+        one.stream.stop()
+
+
+def until(what: Callable[[], bool], seconds: float = 5.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < deadline, "not in time"
+        time.sleep(0.005)
+
+
+def converse(client: StreamClient, what: Callable[[], bool], seconds: float = 5.0) -> None:
+    """Stream at about 100 Hz until `what`."""
+    deadline = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < deadline, f"not in time; {client.state}"
+        client.send((0.0, 0.0, 0.1))
+        time.sleep(0.01)
+        client.receive()
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> None:
+    with robot(key, host) as there, StreamClient(host, there.port, key) as client:
+        converse(client, lambda: client.answered >= 5)
+        assert client.state is not None
+        assert client.state.standing == Standing.ACCEPTED
+        assert 0.0 < client.round_trip_s < 1.0
+        assert 0.0 <= client.state.round_trip_s < 1.0
+        assert there.posted >= 5
+        assert there.until_ns > time.monotonic_ns()
+        told = there.stream.told()
+        assert told["holder"] is not None
+        assert told["round_trip_s"] is not None
+        client.close()
+        until(lambda: there.stream.told()["holder"] is None)
+        assert there.until_ns == 0
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+def test_a_client_goes_on_after_the_robot_was_away(
+    key: bytes | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cdpr_rt.service.stream_client._SILENCE_S", 0.3)
+    with robot(key) as first:
+        port = first.port
+        client = StreamClient("127.0.0.1", port, key)
+        converse(client, lambda: client.answered >= 2)
+    for _ in range(30):  # nobody listens
+        client.send((0.0, 0.0, 0.0))
+        client.receive()
+        time.sleep(0.01)
+    again = Robot.__new__(Robot)
+    again.block, again.until_ns = SharedBlock.create(1, 0.1, 1000.0), 0
+    again.lease = Lease(again._publish)
+    again.stream = SetpointStream(again.block, again.lease, "127.0.0.1", port, key)
+    again.stream.start()
+    try:
+        converse(client, lambda: again.posted >= 3)
+    finally:
+        client.close()
+        again.stream.stop()
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+def test_the_second_waits_for_the_first(key: bytes | None) -> None:
+    with robot(key) as there, StreamClient("127.0.0.1", there.port, key) as second:
+        with StreamClient("127.0.0.1", there.port, key) as first:
+            converse(first, lambda: first.answered >= 2)
+            converse(second, lambda: there.count("busy") > 0)
+            assert there.stream.told()["holder"] is not None
+        taken = there.count("accepted")
+        converse(second, lambda: there.count("accepted") >= taken + 3)
+
+
+def test_a_wrong_key_is_not_answered() -> None:
+    with robot(KEY) as there:
+        with StreamClient("127.0.0.1", there.port, b"another key that is long") as client:
+            for _ in range(20):
+                assert not client.send((0.0, 0.0, 0.0))
+                assert client.receive() == []
+                time.sleep(0.01)
+        with StreamClient("127.0.0.1", there.port) as client:
+            for _ in range(20):
+                client.send((0.0, 0.0, 0.0))
+                assert client.receive() == []
+        until(lambda: there.count("tag") >= 1 and there.count("size") >= 20)
+        assert (there.posted, there.until_ns) == (0, 0)
+
+
+def test_elsewhere_than_on_loopback_a_key_is_needed() -> None:
+    block, lease = SharedBlock.create(1, 0.1, 1000.0), Lease(lambda _: None)
+    assert is_loopback("127.0.0.1") and is_loopback("::1") and is_loopback("localhost")
+    for host in ("0.0.0.0", "::"):
+        with pytest.raises(StreamError, match="no key is shared"):
+            SetpointStream(block, lease, host).start()
+    with pytest.raises(StreamError, match="no address"):
+        SetpointStream(block, lease, "no such host.invalid").start()
+    with pytest.raises(ControlError, match="at least 16"):
+        SetpointStream(block, lease, "0.0.0.0", 0, b"short")
+    stream = SetpointStream(block, lease, "0.0.0.0", 0, KEY)
+    stream.start()
+    stream.stop()
+
+
+def test_an_address_in_use_is_told() -> None:
+    with robot() as there, StreamClient("127.0.0.1", there.port) as client:
+        converse(client, lambda: client.answered >= 1)  # with the holder's socket in place
+        other = SetpointStream(there.block, there.lease, "127.0.0.1", there.port)
+        with pytest.raises(StreamError, match="in use"):
+            other.start()
+        other.stop()
+
+
+FLOOD = """
+import socket, sys, time
+from cdpr_rt.service.stream_packet import StreamSetpoint
+socks = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(8)]
+for sock in socks:
+    sock.connect(("127.0.0.1", int(sys.argv[1])))
+    sock.setblocking(False)
+parcels = [b"x" * 128, bytes(1400), b"CDPS" + bytes(124)]
+parcels += [StreamSetpoint(5, 1, 1, (0.0, 0.0, 0.0)).pack()]
+print(flush=True)
+while True:
+    for sock in socks:
+        for parcel in parcels:
+            try:
+                sock.send(parcel)
+            except OSError:
+                time.sleep(0.0002)
+"""
+
+
+@contextmanager
+def flooding(port: int) -> Iterator[None]:
+    """Send nonsense and strangers' set-points as fast as a process of its own can."""
+    command = [sys.executable, "-c", FLOOD, str(port)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            process.stdout.readline()
+            yield
+        finally:
+            process.kill()
+
+
+def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
+    with robot() as there, StreamClient("127.0.0.1", there.port) as client:
+        converse(client, lambda: client.answered >= 2)
+        with flooding(there.port):
+            until(lambda: there.count("magic") > 1000)
+            size_kB = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            cpu_s, begin_s = time.process_time(), time.monotonic()
+            sent, posted = client.sent, there.posted
+            converse(client, lambda: client.sent >= sent + 60, 20.0)
+            share = (time.process_time() - cpu_s) / (time.monotonic() - begin_s)
+            until(lambda: there.posted >= posted + 60)
+            assert share < 0.6
+            assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < size_kB + 20_000
+            assert there.count("busy") > 0
+
+
+# -- fuzz
+
+HEAD = struct.Struct("<4sBBHI")
+FLOATS = st.floats(allow_nan=True, allow_infinity=True)
+BYTES64 = st.integers(0, (1 << 64) - 1)
+SIGNED64 = st.integers(-(1 << 63), (1 << 63) - 1)
+SETPOINTS = st.builds(
+    lambda session, sequence, sent, echo, held, floats, buttons, right: StreamSetpoint(
+        session, sequence, sent, tuple(floats[:3]), tuple(floats[3:7]), floats[7], buttons,
+        echo, held, right,
+    ).pack(),
+    st.sampled_from([0, 1, 99, 0xFFFFFFFF]), BYTES64, SIGNED64, SIGNED64, SIGNED64,
+    st.lists(FLOATS | st.sampled_from([0.0, 1.0]), min_size=8, max_size=8),
+    st.integers(0, 0xFFFFFFFF), st.binary(min_size=16, max_size=16),
+)  # fmt: skip
+HEADED = st.builds(
+    lambda magic, version, kind, status, session, rest: HEAD.pack(
+        magic, version, kind, status, session
+    ) + rest,
+    st.sampled_from([b"CDPS", b"XXXX"]), st.integers(0, 3), st.integers(0, 7),
+    st.integers(0, 65535), st.integers(0, 0xFFFFFFFF),
+    st.sampled_from([12, 52, 84, 116, 148, 180]).flatmap(
+        lambda size: st.binary(min_size=size, max_size=size)
+    ),
+)  # fmt: skip
+
+
+def mangled(data: bytes, cut: int, at: int, bit: int) -> bytes:
+    if at < len(data):
+        data = data[:at] + bytes([data[at] ^ 1 << bit]) + data[at + 1 :]
+    return data[: len(data) - cut] if cut else data
+
+
+HOSTILE = (
+    st.binary(max_size=300)
+    | HEADED
+    | SETPOINTS
+    | st.builds(
+        mangled,
+        SETPOINTS | st.just(StreamSetpoint(1, 1, 1, (0.0, 0.0, 0.0)).pack()),
+        st.sampled_from([0, 0, 1, 32]),
+        st.integers(0, 170),
+        st.integers(0, 7),
+    )
+)
+
+
+PLAUSIBLE = st.builds(
+    lambda sent, floats, scale: StreamSetpoint(
+        1, 0, sent, tuple(floats), (0.6, 0.0, -0.8, 0.0), scale
+    ),
+    st.integers(-10, (1 << 63) - 1),
+    st.lists(st.floats(-15.0, 15.0), min_size=3, max_size=3),
+    st.floats(0.0, 2.0),
+)
+
+
+@pytest.fixture(scope="module", params=[None, KEY], ids=["open", "keyed"])
+def besieged(request: pytest.FixtureRequest) -> Iterator[tuple[Robot, StreamClient]]:
+    key = request.param
+    with robot(key) as there, StreamClient("127.0.0.1", there.port, key) as client:
+        converse(client, lambda: client.answered >= 2)
+        yield there, client
+
+
+@settings(
+    max_examples=120, deadline=None, derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)  # fmt: skip
+@given(packets=st.lists(HOSTILE, min_size=1, max_size=12))
+def test_nothing_hostile_gets_through_or_disturbs(
+    besieged: tuple[Robot, StreamClient], packets: list[bytes]
+) -> None:
+    there, client = besieged
+    holder = there.stream.told()["holder"]
+    before = there.posted, there.count("accepted")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as enemy:
+        for packet in packets:
+            enemy.sendto(packet, ("127.0.0.1", there.port))
+    client.send((0.0, 0.0, 0.2), scale=0.5)
+    until(lambda: there.posted > before[0])
+    assert (there.posted, there.count("accepted")) == (before[0] + 1, before[1] + 1)
+    assert there.stream.told()["holder"] == holder
+    sample = there.block.samples[before[0] % len(there.block.samples)]
+    assert sample["position_m"].tolist() == [0.0, 0.0, 0.2]
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(packets=st.lists(HOSTILE | PLAUSIBLE, min_size=1, max_size=12))
+def test_whatever_reaches_the_loop_can_be_worked_with(
+    alone: tuple[Robot, socket.socket, Iterator[int]], packets: list[bytes | StreamSetpoint]
+) -> None:
+    there, sender, numbers = alone
+    total = sum(there.stream.told()["packets"].values()) + len(packets)
+    for packet in packets:
+        good = isinstance(packet, StreamSetpoint)
+        sender.send(replace(packet, sequence=next(numbers)).pack() if good else packet)
+    until(lambda: sum(there.stream.told()["packets"].values()) >= total)
+    samples = there.block.samples
+    for sample in samples[: min(there.posted, len(samples))]:
+        assert all(math.isfinite(x) and abs(x) <= 20.0 for x in sample["position_m"].tolist())
+        assert math.hypot(*sample["quaternion"].tolist()) == pytest.approx(1.0)
+        assert 0.0 < sample["scale"] <= 100.0
+        assert sample["sent_ns"] >= 0
+    assert any(thread.name == "set-point stream" for thread in threading.enumerate())
+
+
+@pytest.fixture(scope="module")
+def alone() -> Iterator[tuple[Robot, socket.socket, Iterator[int]]]:
+    with robot() as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", there.port))
+        sender.send(StreamSetpoint(1, 1, 1, (0.0, 0.0, 0.0)).pack())
+        yield there, sender, itertools.count(2)
+        assert there.posted > 100  # some of it was good
