@@ -1,0 +1,258 @@
+"""Live view: what Foxglove shows of a running robot, over WebSocket on this machine alone."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any, Final
+
+from foxglove import Channel, Context, start_server
+from foxglove.channels import FrameTransformChannel, LogChannel, PoseInFrameChannel
+from foxglove.messages import (
+    FrameTransform,
+    Log,
+    LogLevel,
+    Pose,
+    PoseInFrame,
+    Quaternion,
+    Timestamp,
+    Vector3,
+)
+from foxglove.websocket import WebSocketServer
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.cycle_row import Row
+from cdpr_rt.runtime.shared_block import RowReader, SharedBlock, SharedBlockError
+from cdpr_rt.runtime.states import LoopState, Reaction
+from cdpr_rt.service.recording import WallClock
+from cdpr_rt.service.recording_events import Events
+
+RATE_Hz: Final = 50.0
+_BACKLOG: Final = 128
+"""Messages kept for a client that reads slowly; the oldest are dropped for it."""
+_AXIS_FIELDS: Final = {
+    "setpoint_deg": ("setpoint_rad", True),
+    "position_deg": ("position_rad", True),
+    "velocity_deg_s": ("velocity_rad_s", True),
+    "torque_sent_Nm": ("torque_sent_Nm", False),
+    "torque_actual_Nm": ("torque_actual_Nm", False),
+    "compensation_Nm": ("compensation_Nm", False),
+    "cable_length_m": ("cable_length_m", False),
+}
+_TIMES: Final = ("lateness_s", "exchange_s", "compute_s")
+
+
+class LiveViewError(ControlError):
+    """The live view cannot listen at its port."""
+
+
+class LiveView:
+    """Shows the newest row of a block `RATE_Hz` times a second to whoever connects.
+
+    Only what is subscribed to is prepared. Clients cannot change anything.
+    """
+
+    name = "live_view"
+
+    def __init__(self, block: SharedBlock, robot: str, port: int) -> None:
+        self._block = block
+        self._robot = robot
+        self._port = port
+        self._wall = WallClock(block)
+        self._reader = RowReader(block)
+        self._events = Events()
+        self._versions = {"description": 0, "status": 0}
+        self._context = Context()
+        self._topics: _Topics | None = None
+        self._server: WebSocketServer | None = None
+        self._messages = 0
+        self._error = ""
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="live view", daemon=True)
+
+    def start(self) -> None:
+        """Listen on loopback; raises LiveViewError where the port is not free."""
+        try:
+            self._server = start_server(
+                name=f"cdpr-rt {self._robot}",
+                host="127.0.0.1",
+                port=self._port,
+                context=self._context,
+                message_backlog_size=_BACKLOG,
+            )
+        except Exception as error:
+            self._error = f"port {self._port}: {error}"
+            raise LiveViewError(f"live view: {self._error}") from error
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Say goodbye to all clients."""
+        self._end.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        if self._server is not None:
+            self._server.stop()
+
+    def told(self) -> dict[str, Any]:
+        """Return the URL to connect to, the number of moments shown, and what is wrong."""
+        url = f"ws://127.0.0.1:{self._server.port}" if self._server else None
+        return {"url": url, "moments": self._messages, "error": self._error}
+
+    def _run(self) -> None:
+        try:
+            while not self._end.wait(1.0 / RATE_Hz):
+                self._show()
+        except BaseException as error:
+            self._error = f"the live view ended: {type(error).__name__}: {error}"
+            raise
+
+    def _show(self) -> None:
+        description = self._changed("description")
+        if description:
+            self._describe(description)
+        rows = self._reader.read()
+        if self._topics is None:
+            return  # nobody has said yet what the axes are called
+        events = [(event["text"], stamp) for event, stamp in self._events.of_rows(rows)]
+        status = self._changed("status")
+        if status and (reason := self._events.of_status(status)):
+            events.append((reason["text"], time.monotonic_ns()))
+        for text, stamp_ns in events:
+            self._topics.show_event(text, self._wall(stamp_ns))
+        if rows.size:
+            self._topics.show(rows, self._wall(int(rows["stamp_ns"][-1])))
+            self._messages += 1
+
+    def _describe(self, description: dict[str, Any]) -> None:
+        self._events.describe(description)
+        names = [str(axis.get("name", "")) for axis in description.get("axes", [])]
+        if self._topics is None or names != self._topics.given:
+            if self._topics is not None:
+                self._topics.close()
+            self._topics = _Topics(self._context, names, self._block.n)
+
+    def _changed(self, name: str) -> dict[str, Any] | None:
+        version = int(self._block.counters[name][0])
+        if version == self._versions[name]:
+            return None
+        try:
+            value = self._block.description() if name == "description" else self._block.status()
+        except SharedBlockError:
+            return None
+        self._versions[name] = version
+        return value
+
+
+class _Topics:
+    """The channels of one robot; axes by their names, which message paths can spell."""
+
+    def __init__(self, context: Context, given: Sequence[str], n: int) -> None:
+        self.given = list(given)
+        names = [*given, *(f"axis_{k + 1}" for k in range(len(given), n))][:n]
+        self._names = [re.sub(r"\W", "_", name) for name in names]
+        axis = _schema("Axis", dict.fromkeys((*_AXIS_FIELDS, "error_deg"), "number"))
+        axes = {"type": "object", "title": "cdpr_rt.Axes"}
+        axes["properties"] = dict.fromkeys(self._names, axis)  # type: ignore[assignment]
+        self._axes = Channel("/axes", schema=axes, context=context)
+        tensions = _schema("Tensions", dict.fromkeys(self._names, "number"))
+        self._tensions = Channel("/tensions", schema=tensions, context=context)
+        timing = {name.replace("_s", "_ms"): "number" for name in _TIMES}
+        counts = dict.fromkeys(("missed", "late_cycles", "answered"), "integer")
+        self._timing = Channel(
+            "/cycle_time", schema=_schema("CycleTime", {**timing, **counts}), context=context
+        )
+        words = dict.fromkeys(("state", "reaction"), "string")
+        self._state = Channel("/state", schema=_schema("State", words), context=context)
+        self._pose = PoseInFrameChannel("/pose", context=context)
+        self._wanted = PoseInFrameChannel("/pose_setpoint", context=context)
+        self._frame = FrameTransformChannel("/tf", context=context)
+        self._log = LogChannel("/log", context=context)
+
+    def close(self) -> None:
+        """Take all channels back."""
+        for channel in (self._axes, self._tensions, self._timing, self._state):
+            channel.close()
+        for typed in (self._pose, self._wanted, self._frame, self._log):
+            typed.close()
+
+    def show_event(self, text: str, time_ns: int) -> None:
+        """Put a line into the log."""
+        line = Log(timestamp=_stamp(time_ns), level=LogLevel.Info, message=text, name="cdpr-rt")
+        self._log.log(line, log_time=time_ns)
+
+    def show(self, rows: Row, time_ns: int) -> None:
+        """Show the last of `rows`, and the longest times of all of them."""
+        row = rows[-1]
+        for channel, value in (
+            (self._axes, self._axes_of),
+            (self._tensions, self._tensions_of),
+            (self._state, _state_of),
+        ):
+            if channel.base.has_sinks():
+                channel.base.log(json.dumps(value(row)).encode(), time_ns)
+        if self._timing.base.has_sinks():
+            self._timing.base.log(json.dumps(_timing_of(rows)).encode(), time_ns)
+        self._show_pose(row["pose"].tolist(), self._pose, time_ns)
+        self._show_pose(row["pose_setpoint"].tolist(), self._wanted, time_ns)
+
+    def _axes_of(self, row: Row) -> dict[str, Any]:
+        table: dict[str, dict[str, float]] = {name: {} for name in self._names}
+        for field, (column, is_angle) in _AXIS_FIELDS.items():
+            for name, value in zip(self._names, row[column].tolist(), strict=True):
+                if math.isfinite(value):
+                    table[name][field] = math.degrees(value) if is_angle else value
+        for one in table.values():
+            if {"setpoint_deg", "position_deg"} <= one.keys():
+                one["error_deg"] = one["setpoint_deg"] - one["position_deg"]
+        return table
+
+    def _tensions_of(self, row: Row) -> dict[str, Any]:
+        named = zip(self._names, row["tension_N"].tolist(), strict=True)
+        return {name: value for name, value in named if math.isfinite(value)}
+
+    def _show_pose(self, pose: list[float], channel: PoseInFrameChannel, time_ns: int) -> None:
+        if not all(math.isfinite(value) for value in pose):
+            return
+        x, y, z, qw, qx, qy, qz = pose
+        place, turned = Vector3(x=x, y=y, z=z), Quaternion(x=qx, y=qy, z=qz, w=qw)
+        stamp = _stamp(time_ns)
+        shown = PoseInFrame(
+            timestamp=stamp, frame_id="base", pose=Pose(position=place, orientation=turned)
+        )
+        channel.log(shown, log_time=time_ns)
+        if channel is self._pose:
+            transform = FrameTransform(
+                timestamp=stamp,
+                parent_frame_id="base",
+                child_frame_id="platform",
+                translation=place,
+                rotation=turned,
+            )
+            self._frame.log(transform, log_time=time_ns)
+
+
+def _schema(title: str, fields: dict[str, str]) -> dict[str, Any]:
+    properties = {name: {"type": kind} for name, kind in fields.items()}
+    return {"type": "object", "title": f"cdpr_rt.{title}", "properties": properties}
+
+
+def _stamp(time_ns: int) -> Timestamp:
+    return Timestamp(sec=time_ns // 1_000_000_000, nsec=time_ns % 1_000_000_000)
+
+
+def _state_of(row: Row) -> dict[str, Any]:
+    state, reaction = int(row["state"]), int(row["reaction"])
+    return {
+        "state": LoopState(state).label if state in list(LoopState) else str(state),
+        "reaction": Reaction(reaction).label if reaction in list(Reaction) else str(reaction),
+    }
+
+
+def _timing_of(rows: Row) -> dict[str, Any]:
+    longest = {name.replace("_s", "_ms"): 1e3 * float(rows[name].max()) for name in _TIMES}
+    counts = {name: int(rows[name][-1]) for name in ("missed", "late_cycles", "answered")}
+    return {**longest, **counts}
