@@ -11,6 +11,8 @@ from cdpr_rt.errors import InterruptedMotionError, NotInTimeError, TripError
 from cdpr_rt.exchange import AxisDevice, Setpoint
 from cdpr_rt.rawlog import RawLogWriter
 from cdpr_rt.recorder import Recorder
+from cdpr_rt.runtime.estimate import Estimator
+from cdpr_rt.runtime.states import Reaction
 from cdpr_rt.supervisor import Supervisor
 
 __all__ = ["Executive", "Lateness", "Motion", "Watch"]
@@ -48,6 +50,7 @@ class Executive:
     ) -> None:
         self.device = device
         self.supervisor = supervisor
+        self.estimator = Estimator(device.n, device.period_s)
         self.setpoint = Setpoint(device.n)
         self.on_progress: Callable[[float], None] | None = None
         """Called every few thousand cycles with the time since the motion's start."""
@@ -72,6 +75,7 @@ class Executive:
         self._refuse_when_stopped("the motion")
         controller.reset()
         self.supervisor.reset()
+        self.estimator.reset()
         self._recorder.clear()
         self._log = log
         try:
@@ -113,6 +117,7 @@ class Executive:
 
     def _follow(self, controller: Controller, motion: Motion) -> None:
         device, setpoint, recorder = self.device, self.setpoint, self._recorder
+        estimator = self.estimator
         feedback, command = device.feedback, device.command
         period = device.period_s
         cycles = round(motion.duration_s / period)
@@ -123,9 +128,11 @@ class Executive:
             self._look_for_alarm()
             motion.fill(k * period, setpoint)
             controller.update(feedback, setpoint, command.torque_Nm)
-            reason = self.supervisor.check(feedback, setpoint, command.torque_Nm)
-            if reason:
-                self._trip(reason)
+            estimator.update(feedback)
+            supervisor = self.supervisor
+            supervisor.check(feedback, estimator.estimate, setpoint, command.torque_Nm)
+            if supervisor.reaction > Reaction.CLAMP:
+                self._trip(supervisor.reason())
             self._cycle.transmit()
             recorder.append(feedback, setpoint, command, controller)
             if recorder.pending() >= _DRAIN_ROWS:

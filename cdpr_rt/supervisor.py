@@ -1,111 +1,325 @@
-"""The last word between controller and drives: limits that stop the motion, with the reason."""
+"""The last word between controller and drives: every limit, and what is done about it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 
 from cdpr_rt.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
 from cdpr_rt.jit import jit
+from cdpr_rt.limits import DEFAULT_REACTIONS, TEXTS, Limit, Limits
+from cdpr_rt.runtime.estimate import AxisEstimate
+from cdpr_rt.runtime.states import Reaction
 
-_OK, _MISSED, _SPEED, _FOLLOWING, _NOT_FINITE = 0, 1, 2, 3, 4
+__all__ = ["Limit", "Limits", "Supervisor"]
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What the supervisor tolerates: one figure for every axis, or (n,) for each its own."""
+# kernels take plain numbers
+_TORQUE, _TORQUE_RATE = int(Limit.TORQUE), int(Limit.TORQUE_RATE)
+_SPEED, _FOLLOWING_ERROR = int(Limit.SPEED), int(Limit.FOLLOWING_ERROR)
+_CABLE_LENGTH, _TENSION_SENSOR = int(Limit.CABLE_LENGTH), int(Limit.TENSION_SENSOR)
+_TENSION_LOW, _TENSION_HIGH = int(Limit.TENSION_LOW), int(Limit.TENSION_HIGH)
+_SLACK, _BROKEN_CABLE = int(Limit.SLACK), int(Limit.BROKEN_CABLE)
+_STALE, _LATE, _NOT_FINITE = int(Limit.STALE), int(Limit.LATE), int(Limit.NOT_FINITE)
+_MISSED, _MISSED_IN_WINDOW = int(Limit.MISSED), int(Limit.MISSED_IN_WINDOW)
 
-    torque_Nm: float | FloatArray
-    """Torque is clamped to this."""
-    speed_rad_s: float | FloatArray
-    following_error_rad: float | FloatArray
-    missed_cycles: int = 3
-    """Consecutive cycles without an answer that are bridged."""
+_FIGURES: Final = tuple(name for name in Limits.__dataclass_fields__ if name != "reactions")
+_LIMITS: Final = np.dtype([(name, "<f8") for name in _FIGURES])
+_PAST: Final = np.dtype(
+    [
+        ("torque", "<f8"),  # as passed on in the last cycle
+        ("missed", "<f8"),  # consecutive
+        ("in_window", "<f8"),
+        ("stale", "<f8"),
+        ("low_s", "<f8"),  # since the tension was last sufficient
+        ("slack_s", "<f8"),
+        ("tight_rad", "<f8"),  # motor angle when it was
+        ("may_be_low", "<f8"),  # whether it was since enabling, or since this was told last
+        ("may_be_slack", "<f8"),
+    ]
+)
+_VERDICT: Final = np.dtype(
+    [("reaction", "<i8"), ("limit", "<i8"), ("axis", "<i8"), ("value", "<f8"), ("allowed", "<f8")]
+)
+# a cable is not broken where this much was paid out while its tension fell
+_PAID_OUT_m: Final = 5e-4
+
+
+@jit
+def _judge(
+    verdict: Any, limit: int, reaction: int, axis: int, value: float, allowed: float
+) -> None:
+    """Keep the most severe of what was exceeded in this cycle, the first of equals."""
+    if reaction > verdict[0]["reaction"]:
+        verdict[0]["reaction"], verdict[0]["limit"], verdict[0]["axis"] = reaction, limit, axis
+        verdict[0]["value"], verdict[0]["allowed"] = value, allowed
+
+
+@jit
+def _bound_torque(
+    i: int, lim: Any, past: Any, reactions: Any, verdict: Any, period: float, torque: FloatArray
+) -> None:
+    wanted = torque[i]
+    if not np.isfinite(wanted):
+        _judge(verdict, _NOT_FINITE, reactions[_NOT_FINITE], i, wanted, 0.0)
+        wanted = 0.0
+    most, rate = lim["torque_Nm"], lim["torque_rate_Nm_s"]
+    if abs(wanted) > most:
+        _judge(verdict, _TORQUE, reactions[_TORQUE], i, wanted, most)
+        wanted = min(max(wanted, -most), most)
+    step = wanted - past["torque"]
+    if abs(step) > rate * period:
+        _judge(verdict, _TORQUE_RATE, reactions[_TORQUE_RATE], i, step / period, rate)
+        wanted = past["torque"] + min(max(step, -rate * period), rate * period)
+    past["torque"] = torque[i] = wanted
+
+
+@jit
+def _watch_answers(
+    i: int, lim: Any, past: Any, reactions: Any, verdict: Any, valid: bool, fair: bool, window: Any
+) -> None:
+    # window: one flag for this cycle of the window; it still holds that of one window ago
+    missed = 0 if valid else 1
+    past["missed"] = 0.0 if valid else past["missed"] + 1.0
+    past["in_window"] += missed - window[i]
+    window[i] = missed
+    past["stale"] = 0.0 if fair else past["stale"] + 1.0
+    if past["missed"] > lim["missed_cycles"]:
+        _judge(verdict, _MISSED, reactions[_MISSED], i, past["missed"], lim["missed_cycles"])
+    if past["in_window"] > lim["missed_in_window"]:
+        reaction = reactions[_MISSED_IN_WINDOW]
+        allowed = lim["missed_in_window"]
+        _judge(verdict, _MISSED_IN_WINDOW, reaction, i, past["in_window"], allowed)
+    if past["stale"] > lim["stale_cycles"]:
+        _judge(verdict, _STALE, reactions[_STALE], i, past["stale"], lim["stale_cycles"])
+
+
+@jit
+def _watch_motion(
+    i: int,
+    lim: Any,
+    reactions: Any,
+    verdict: Any,
+    error: float,
+    velocity: float,
+    length: float,
+    paying_out: float,
+) -> None:
+    # a value that is not a number is not within its limit either
+    if not abs(velocity) <= lim["speed_rad_s"]:
+        _judge(verdict, _SPEED, reactions[_SPEED], i, velocity, lim["speed_rad_s"])
+    if not abs(error) <= lim["following_error_rad"]:
+        allowed = lim["following_error_rad"]
+        _judge(verdict, _FOLLOWING_ERROR, reactions[_FOLLOWING_ERROR], i, error, allowed)
+    # beyond a length only the way back is open
+    if length > lim["cable_length_max_m"] and paying_out > 0.0:
+        allowed = lim["cable_length_max_m"]
+        _judge(verdict, _CABLE_LENGTH, reactions[_CABLE_LENGTH], i, length, allowed)
+    if length < lim["cable_length_min_m"] and paying_out < 0.0:
+        allowed = lim["cable_length_min_m"]
+        _judge(verdict, _CABLE_LENGTH, reactions[_CABLE_LENGTH], i, length, allowed)
+
+
+@jit
+def _watch_tension(
+    i: int,
+    lim: Any,
+    past: Any,
+    reactions: Any,
+    verdict: Any,
+    elapsed: float,
+    tension: float,
+    position: float,
+    cable_m_per_rad: float,
+) -> None:
+    if tension > lim["tension_max_N"]:
+        allowed = lim["tension_max_N"]
+        _judge(verdict, _TENSION_HIGH, reactions[_TENSION_HIGH], i, tension, allowed)
+    if not tension < lim["tension_min_N"]:
+        past["low_s"] = past["slack_s"] = 0.0
+        past["tight_rad"] = position
+        if tension >= lim["tension_min_N"]:
+            past["may_be_low"] = past["may_be_slack"] = 1.0
+        return
+    past["low_s"] += elapsed
+    past["slack_s"] = past["slack_s"] + elapsed if tension < lim["slack_N"] else 0.0
+    paid_out = (position - past["tight_rad"]) * cable_m_per_rad
+    at_once = past["low_s"] <= lim["broken_within_s"] and paid_out < _PAID_OUT_m
+    # each is told once, so that the cable can be tightened, and again when it was tight
+    if past["may_be_slack"] and past["slack_s"] > 0.0 and at_once:
+        past["may_be_low"] = past["may_be_slack"] = 0.0
+        allowed = lim["tension_min_N"]
+        _judge(verdict, _BROKEN_CABLE, reactions[_BROKEN_CABLE], i, tension, allowed)
+    elif past["may_be_slack"] and past["slack_s"] > lim["slack_s"]:
+        past["may_be_low"] = past["may_be_slack"] = 0.0
+        _judge(verdict, _SLACK, reactions[_SLACK], i, tension, lim["slack_N"])
+    elif past["may_be_low"] and past["low_s"] > lim["slack_s"]:
+        past["may_be_low"] = 0.0
+        allowed = lim["tension_min_N"]
+        _judge(verdict, _TENSION_LOW, reactions[_TENSION_LOW], i, tension, allowed)
 
 
 @jit
 def _check(
-    limits: FloatArray,
-    state: FloatArray,
+    limits: Any,
+    past: Any,
+    window: Any,
+    reactions: Any,
+    verdict: Any,
     period: float,
+    elapsed: float,
     position: FloatArray,
-    reference: FloatArray,
+    wanted: FloatArray,
+    wanted_velocity: FloatArray,
     valid: BoolArray,
+    alive: BoolArray,
+    rate_ok: BoolArray,
+    velocity: FloatArray,
+    cable_m_per_rad: FloatArray,
+    length: FloatArray,
+    tension: FloatArray,
+    sensor_ok: BoolArray,
     torque: FloatArray,
-) -> tuple[int, int, float]:
-    # columns of limits: torque, speed, following error, misses
-    # columns of state: last position, low-passed speed, consecutive misses, started
+) -> int:
+    verdict[0]["reaction"] = verdict[0]["limit"] = 0
+    if elapsed - period > limits[0]["late_s"]:
+        _judge(verdict, _LATE, reactions[_LATE], -1, elapsed - period, limits[0]["late_s"])
     for i in range(torque.size):
-        if not np.isfinite(torque[i]):
-            return _NOT_FINITE, i, torque[i]
-        torque[i] = min(max(torque[i], -limits[i, 0]), limits[i, 0])
+        lim, own = limits[i], past[i]
+        _bound_torque(i, lim, own, reactions, verdict, period, torque)
+        fair = alive[i] and rate_ok[i]
+        _watch_answers(i, lim, own, reactions, verdict, valid[i], fair, window)
         if not valid[i]:
-            state[i, 2] += 1.0
-            if state[i, 2] > limits[i, 3]:
-                return _MISSED, i, state[i, 2]
             continue
-        if state[i, 3] == 0.0:
-            state[i, 0] = position[i]
-            state[i, 3] = 1.0
-        elapsed = period * (1.0 + state[i, 2])
-        state[i, 2] = 0.0
-        # one encoder step a cycle is hundreds of counts a second: judge the speed over 10 ms
-        weight = elapsed / (elapsed + 0.01)
-        state[i, 1] += weight * ((position[i] - state[i, 0]) / elapsed - state[i, 1])
-        state[i, 0] = position[i]
-        if abs(state[i, 1]) > limits[i, 1]:
-            return _SPEED, i, state[i, 1]
-        error = reference[i] - position[i]
-        if abs(error) > limits[i, 2]:
-            return _FOLLOWING, i, error
-    return _OK, 0, 0.0
+        error, paying_out = wanted[i] - position[i], wanted_velocity[i] * cable_m_per_rad[i]
+        _watch_motion(i, lim, reactions, verdict, error, velocity[i], length[i], paying_out)
+        if not sensor_ok[i]:
+            _judge(verdict, _TENSION_SENSOR, reactions[_TENSION_SENSOR], i, np.nan, np.nan)
+        per_rad = cable_m_per_rad[i]
+        _watch_tension(i, lim, own, reactions, verdict, elapsed, tension[i], position[i], per_rad)
+    return int(verdict[0]["reaction"])
 
 
 class Supervisor:
-    """Clamps torque and says when a motion must end; latches nothing, the executive stops."""
+    """Clamps torque and says what must be done about the worst of what is exceeded.
 
-    def __init__(self, limits: Limits, n: int, period_s: float) -> None:
+    It latches nothing: whoever runs the cycle acts. `names` are what messages call the axes.
+    """
+
+    def __init__(self, limits: Limits, n: int, period_s: float, names: Sequence[str] = ()) -> None:
         self.limits = limits
-        columns = (
-            limits.torque_Nm,
-            limits.speed_rad_s,
-            limits.following_error_rad,
-            float(limits.missed_cycles),
-        )
-        self._limits = np.stack([np.broadcast_to(c, (n,)) for c in columns], axis=1).astype(float)
-        self._state = np.zeros((n, 4))
+        self._names = tuple(names) or tuple(f"axis {i}" for i in range(n))
+        self._limits = np.zeros(n, _LIMITS)
+        for name in _FIGURES:
+            self._limits[name] = getattr(limits, name)
+        wanted = DEFAULT_REACTIONS | dict(limits.reactions)
+        self._reactions = np.array([wanted.get(limit, 0) for limit in Limit], np.int64)
+        self._past = np.zeros(n, _PAST)
+        self._window = np.zeros((limits.window_cycles, n), np.int64)
+        self._turn = 0
+        self._verdict = np.zeros(1, _VERDICT)
+        self._told = ""
         self._period_s = period_s
 
-    def reset(self) -> None:
-        """Forget speeds and misses, before a motion starts."""
-        self._state[:] = 0.0
+    def reset(self, torque_Nm: FloatArray | float = 0.0) -> None:
+        """Forget the past, before motors are driven; `torque_Nm` is what they are driven with."""
+        self._past[:] = np.zeros(1, _PAST)
+        self._past["torque"] = torque_Nm
+        self._window[:] = 0
+        self._verdict[:] = np.zeros(1, _VERDICT)
+        self._told = ""
 
-    def check(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> str:
-        """Clamp `torque_Nm` (n,) in place; return why the motion must end, or an empty text."""
-        code, axis, value = _check(
+    def check(
+        self,
+        feedback: AxisFeedback,
+        estimate: AxisEstimate,
+        setpoint: Setpoint,
+        torque_Nm: FloatArray,
+    ) -> int:
+        """Clamp `torque_Nm` (n,) in place; return the `Reaction` that this cycle calls for."""
+        self._turn = (self._turn + 1) % len(self._window)
+        self._told = ""
+        return _check(
             self._limits,
-            self._state,
+            self._past,
+            self._window[self._turn],
+            self._reactions,
+            self._verdict,
             self._period_s,
+            estimate.elapsed_s,
             feedback.position_rad,
             setpoint.position_rad,
+            setpoint.velocity_rad_s,
             feedback.valid,
+            feedback.alive,
+            feedback.rate_ok,
+            estimate.velocity_rad_s,
+            estimate.cable_m_per_rad,
+            estimate.cable_length_m,
+            estimate.tension_N,
+            estimate.sensor_ok,
             torque_Nm,
         )
-        return self._reason(code, axis, value) if code != _OK else ""
 
-    def _reason(self, code: int, axis: int, value: float) -> str:
-        _, speed, following, misses = self._limits[axis]
-        if code == _MISSED:
-            return f"axis {axis}: no feedback for {value:.0f} cycles, {misses:.0f} allowed"
-        if code == _SPEED:
-            return (
-                f"axis {axis}: speed {np.degrees(value):.0f} deg/s, "
-                f"{np.degrees(speed):.0f} deg/s allowed"
-            )
-        if code == _FOLLOWING:
-            return (
-                f"axis {axis}: following error {np.degrees(value):.1f} deg, "
-                f"{np.degrees(following):.1f} deg allowed"
-            )
-        return f"axis {axis}: the controller's torque is {value}, a finite number is required"
+    def report(self, limit: Limit, reason: str) -> int:
+        """Take in what another found, such as a drive's alarm; return the `Reaction` to it.
+
+        It counts until the next `check`, and beside what that one found only if it is worse.
+        """
+        reaction = int(self._reactions[limit])
+        if reaction > self._verdict["reaction"][0]:
+            self._verdict[0] = (reaction, limit, -1, math.nan, math.nan)
+            self._told = reason
+        return int(self._verdict["reaction"][0])
+
+    @property
+    def reaction(self) -> Reaction:
+        """What the last cycle called for."""
+        return Reaction(int(self._verdict["reaction"][0]))
+
+    @property
+    def limit(self) -> Limit:
+        """What was exceeded, NONE where nothing was."""
+        return Limit(int(self._verdict["limit"][0]))
+
+    @property
+    def axis(self) -> int:
+        """Which axis exceeded it, -1 where it is of none alone."""
+        return int(self._verdict["axis"][0]) if self.limit else -1
+
+    @property
+    def value(self) -> float:
+        """What it was, in the SI unit `unit`; nan where it has no value."""
+        return float(self._verdict["value"][0])
+
+    @property
+    def allowed(self) -> float:
+        """What it may be."""
+        return float(self._verdict["allowed"][0])
+
+    def reason(self) -> str:
+        """Return what was exceeded, by which axis and how far, or an empty text."""
+        limit = self.limit
+        if self._told or not limit:
+            return self._told
+        text, factor, _ = TEXTS[limit]
+        told = text.format(factor * self.value, factor * self.allowed)
+        return told if self.axis < 0 else f"{self._names[self.axis]}: {told}"
+
+    def details(self) -> dict[str, Any] | None:
+        """Return the same for a program, None where nothing was exceeded."""
+        limit = self.limit
+        if not limit:
+            return None
+        figures = [x if math.isfinite(x) else None for x in (self.value, self.allowed)]
+        return {
+            "limit": limit.key,
+            "axis": self.axis,
+            "value": figures[0],
+            "allowed": figures[1],
+            "unit": TEXTS[limit][2] if limit in TEXTS else "",
+            "reaction": self.reaction.label,
+        }

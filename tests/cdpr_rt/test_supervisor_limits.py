@@ -1,59 +1,477 @@
-"""Limits of each axis its own: the one that is exceeded ends the motion, with its own figure."""
+"""Every limit, one by one: what trips it and what just does not, and what is done then."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
 from cdpr_rt.exchange import AxisFeedback, Setpoint
-from cdpr_rt.supervisor import Limits, Supervisor
+from cdpr_rt.limits import DEFAULT_REACTIONS
+from cdpr_rt.runtime.estimate import AxisEstimate
+from cdpr_rt.runtime.states import Reaction
+from cdpr_rt.supervisor import Limit, Limits, Supervisor
 
 PERIOD_S = 1e-3
-EACH = Limits(
+SAFE = Limits(
     torque_Nm=np.array([1.0, 2.0]),
     speed_rad_s=np.array([10.0, 20.0]),
     following_error_rad=np.array([0.1, 0.2]),
+    torque_rate_Nm_s=1e4,
+    cable_length_min_m=0.5,
+    cable_length_max_m=np.array([3.0, 4.0]),
+    tension_min_N=20.0,
+    tension_max_N=100.0,
+    slack_N=5.0,
+    slack_s=0.0995,
+    broken_within_s=0.02,
+    missed_cycles=3,
+    missed_in_window=5,
+    window_cycles=50,
+    stale_cycles=10,
+    late_s=0.02,
 )
 
 
-def feedback(*position: float) -> AxisFeedback:
-    seen = AxisFeedback(2)
-    seen.valid[:] = True
-    seen.position_rad[:] = position
-    return seen
+class Cycle:
+    """What one cycle sees of two axes, both well; tests change it."""
+
+    def __init__(self) -> None:
+        self.feedback, self.estimate = AxisFeedback(2), AxisEstimate(2)
+        self.setpoint, self.torque = Setpoint(2), np.zeros(2)
+        for flags in (self.feedback.valid, self.feedback.alive, self.feedback.rate_ok):
+            flags[:] = True
+        self.estimate.elapsed_s = PERIOD_S
+        self.estimate.cable_m_per_rad[:] = 0.026
+        self.estimate.cable_length_m[:] = 2.0
+        self.estimate.tension_N[:] = 50.0
+
+    def check(self, supervisor: Supervisor) -> int:
+        return supervisor.check(self.feedback, self.estimate, self.setpoint, self.torque)
+
+
+Change = Callable[[Cycle, int], None]
+
+
+def run(change: Change, limits: Limits = SAFE, cycles: int = 400) -> tuple[Supervisor, int, Cycle]:
+    """Run 50 cycles in which all is well, then some with `change`; return the first that trips.
+
+    Its number is counted from the change, -1 where there is none.
+    """
+    supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
+    supervisor.reset()
+    for _ in range(50):
+        assert cycle.check(supervisor) == Reaction.NONE
+    for k in range(cycles):
+        change(cycle, k)
+        if cycle.check(supervisor) != Reaction.NONE:
+            return supervisor, k, cycle
+    return supervisor, -1, cycle
+
+
+def torque(value: float) -> Change:
+    def change(cycle: Cycle, _k: int) -> None:
+        cycle.torque[:] = (0.0, value)
+
+    return change
+
+
+def torque_by_steps(step_Nm: float) -> Change:
+    def change(cycle: Cycle, k: int) -> None:
+        cycle.torque[1] = step_Nm * (k % 2)
+
+    return change
+
+
+def speed(value: float) -> Change:
+    def change(cycle: Cycle, _k: int) -> None:
+        cycle.estimate.velocity_rad_s[1] = value
+
+    return change
+
+
+def behind(value: float) -> Change:
+    def change(cycle: Cycle, _k: int) -> None:
+        cycle.setpoint.position_rad[1] = value
+
+    return change
+
+
+def length(value_m: float, wanted_rad_s: float) -> Change:
+    def change(cycle: Cycle, _k: int) -> None:
+        cycle.estimate.cable_length_m[1] = value_m
+        cycle.setpoint.velocity_rad_s[1] = wanted_rad_s
+
+    return change
+
+
+def tension(value_N: float, after_cycles: int = 0, paid_out_rad: float = 0.0) -> Change:
+    """Fall to a tension within some cycles, as the motor pays out."""
+
+    def change(cycle: Cycle, k: int) -> None:
+        fallen = min(1.0, (k + 1) / (after_cycles + 1))
+        cycle.estimate.tension_N[1] = 50.0 + fallen * (value_N - 50.0)
+        cycle.feedback.position_rad[1] = fallen * paid_out_rad
+        cycle.setpoint.position_rad[1] = fallen * paid_out_rad
+
+    return change
+
+
+def missed(which: Callable[[int], bool]) -> Change:
+    def change(cycle: Cycle, k: int) -> None:
+        cycle.feedback.valid[1] = not which(k)
+
+    return change
+
+
+def flag(name: str, cycles: int) -> Change:
+    def change(cycle: Cycle, k: int) -> None:
+        getattr(cycle.feedback, name)[1] = k >= cycles
+
+    return change
+
+
+def sensor(is_ok: bool) -> Change:
+    def change(cycle: Cycle, _k: int) -> None:
+        cycle.estimate.sensor_ok[1] = is_ok
+
+    return change
+
+
+def late(value_s: float) -> Change:
+    def change(cycle: Cycle, _k: int) -> None:
+        cycle.estimate.elapsed_s = PERIOD_S + value_s
+
+    return change
+
+
+@dataclass(frozen=True)
+class Case:
+    """One limit: what trips it and when, what does not, and what it says."""
+
+    limit: Limit
+    trips: Change
+    told: str
+    at: int = 0
+    """In which cycle after the change."""
+    value: float = math.nan
+    axis: int = 1
+    does_not: tuple[Change, ...] = field(default_factory=tuple)
+
+
+CASES = [
+    Case(
+        Limit.TORQUE,
+        torque(-2.01),
+        "axis 1: torque -2.01 Nm, 2 Nm allowed",
+        value=-2.01,
+        does_not=(torque(2.0),),
+    ),
+    Case(
+        Limit.TORQUE_RATE,
+        torque_by_steps(1.5),
+        "axis 1: torque rate 1.5e+03 Nm/s, 1e+03 Nm/s allowed",
+        at=1,
+        value=1500.0,
+        does_not=(torque_by_steps(0.99),),
+    ),
+    Case(
+        Limit.SPEED,
+        speed(-20.1),
+        "axis 1: speed -1152 deg/s, 1146 deg/s allowed",
+        value=-20.1,
+        does_not=(speed(19.9), speed(-19.9)),
+    ),
+    Case(Limit.SPEED, speed(math.nan), "axis 1: speed nan deg/s, 1146 deg/s allowed", does_not=()),
+    Case(
+        Limit.FOLLOWING_ERROR,
+        behind(0.21),
+        "axis 1: following error 12.0 deg, 11.5 deg allowed",
+        value=0.21,
+        does_not=(behind(0.19), behind(-0.19)),
+    ),
+    Case(
+        Limit.FOLLOWING_ERROR,
+        behind(math.nan),
+        "axis 1: following error nan deg, 11.5 deg allowed",
+    ),
+    Case(
+        Limit.CABLE_LENGTH,
+        length(4.01, 0.1),
+        "axis 1: cable length 4.010 m, 4.000 m allowed",
+        value=4.01,
+        # on the way back, at rest, and where the length is not known
+        does_not=(length(3.99, 0.1), length(4.01, -0.1), length(4.01, 0.0), length(math.nan, 0.1)),
+    ),
+    Case(
+        Limit.CABLE_LENGTH,
+        length(0.49, -0.1),
+        "axis 1: cable length 0.490 m, 0.500 m allowed",
+        value=0.49,
+        does_not=(length(0.51, -0.1), length(0.49, 0.1)),
+    ),
+    Case(
+        Limit.TENSION_HIGH,
+        tension(101.0),
+        "axis 1: tension 101.0 N, 100.0 N allowed",
+        value=101.0,
+        does_not=(tension(99.0), tension(math.nan)),
+    ),
+    Case(
+        Limit.TENSION_LOW,
+        tension(15.0),
+        "axis 1: tension 15.0 N, at least 20.0 N required",
+        at=99,
+        value=15.0,
+        does_not=(tension(21.0),),
+    ),
+    Case(
+        Limit.SLACK,
+        tension(2.0, paid_out_rad=0.2),
+        "axis 1: the cable is slack: tension 2.0 N, slack below 5.0 N",
+        at=99,
+        value=2.0,
+    ),
+    Case(
+        Limit.BROKEN_CABLE,
+        tension(0.0, after_cycles=20),
+        "axis 1: the cable seems broken: tension fell to 4.8 N at once, from above 20.0 N",
+        at=18,
+        value=50.0 / 21.0 * 2,
+    ),
+    Case(
+        Limit.TENSION_SENSOR,
+        sensor(False),
+        "axis 1: the tension sensor gives no valid reading",
+        does_not=(sensor(True),),
+    ),
+    Case(
+        Limit.STALE,
+        flag("alive", 1000),
+        "axis 1: feedback silent or irregular for 11 cycles, 10 allowed",
+        at=10,
+        value=11.0,
+        does_not=(flag("alive", 10),),
+    ),
+    Case(
+        Limit.STALE,
+        flag("rate_ok", 1000),
+        "axis 1: feedback silent or irregular for 11 cycles, 10 allowed",
+        at=10,
+        value=11.0,
+        does_not=(flag("rate_ok", 10),),
+    ),
+    Case(
+        Limit.MISSED,
+        missed(lambda _k: True),
+        "axis 1: no feedback for 4 cycles, 3 allowed",
+        at=3,
+        value=4.0,
+        does_not=(missed(lambda k: k in (0, 1, 2, 60, 61, 62)),),
+    ),
+    Case(
+        Limit.MISSED_IN_WINDOW,
+        missed(lambda k: k % 8 == 0),
+        "axis 1: 6 answers missed in a window, 5 allowed",
+        at=40,
+        value=6.0,
+        does_not=(missed(lambda k: k % 10 == 0),),
+    ),
+    Case(
+        Limit.LATE,
+        late(0.021),
+        "the loop was held up for 21 ms, 20 ms allowed",
+        axis=-1,
+        value=0.021,
+        does_not=(late(0.019),),
+    ),
+    Case(
+        Limit.NOT_FINITE,
+        torque(math.nan),
+        "axis 1: the controller's torque is nan, a finite number is required",
+    ),
+]
+
+
+NAMES = [f"{i} {case.limit.key}" for i, case in enumerate(CASES)]
+
+
+@pytest.mark.parametrize("case", CASES, ids=NAMES)
+def test_a_limit_trips_in_the_cycle_in_which_it_is_exceeded(case: Case):
+    limits = SAFE if case.limit is not Limit.TORQUE_RATE else with_rate(1000.0)
+    supervisor, when, _ = run(case.trips, limits)
+    assert (supervisor.limit, when) == (case.limit, case.at)
+    assert (supervisor.axis, supervisor.reaction) == (case.axis, DEFAULT_REACTIONS[case.limit])
+    assert supervisor.reason() == case.told
+    if not math.isnan(case.value):
+        assert supervisor.value == pytest.approx(case.value)
+    for change in case.does_not:
+        other, when, _ = run(change, limits)
+        assert (when, other.reason(), other.details()) == (-1, "", None)
+
+
+@pytest.mark.parametrize("case", CASES, ids=NAMES)
+@pytest.mark.parametrize("reaction", [Reaction.CONTROLLED_STOP, Reaction.TORQUE_OFF])
+def test_a_limit_is_answered_as_the_robot_wants_it(case: Case, reaction: Reaction):
+    values = {name: getattr(SAFE, name) for name in SAFE.__dataclass_fields__}
+    rate = 1000.0 if case.limit is Limit.TORQUE_RATE else 1e4
+    wanted = Limits(**values | {"reactions": {case.limit: reaction}, "torque_rate_Nm_s": rate})
+    supervisor, when, _ = run(case.trips, wanted)
+    assert (supervisor.limit, when, supervisor.reaction) == (case.limit, case.at, reaction)
+
+
+def test_no_limit_of_the_kernel_is_left_untried():
+    others = {Limit.NONE, Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.DRIVE}
+    assert {case.limit for case in CASES} == set(Limit) - others
+    assert set(DEFAULT_REACTIONS) == set(Limit) - {Limit.NONE}
+
+
+def with_rate(rate_Nm_s: float) -> Limits:
+    values = {name: getattr(SAFE, name) for name in SAFE.__dataclass_fields__}
+    return Limits(**values | {"torque_rate_Nm_s": rate_Nm_s})
+
+
+# -- clamping
 
 
 def test_torque_is_clamped_to_each_axis_own_limit():
-    torque = np.array([-5.0, 5.0])
-    assert Supervisor(EACH, 2, PERIOD_S).check(feedback(0, 0), Setpoint(2), torque) == ""
-    np.testing.assert_array_equal(torque, [-1.0, 2.0])
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    cycle.torque[:] = -5.0, 5.0
+    assert cycle.check(supervisor) == Reaction.CLAMP
+    np.testing.assert_array_equal(cycle.torque, [-1.0, 2.0])
 
 
-@pytest.mark.parametrize(("axis", "allowed"), [(0, 5.7), (1, 11.5)])
-def test_each_axis_has_its_own_following_error(axis: int, allowed: float):
-    supervisor, wanted = Supervisor(EACH, 2, PERIOD_S), Setpoint(2)
-    wanted.position_rad[axis] = 0.99 * EACH.following_error_rad[axis]  # type: ignore[index]
-    assert supervisor.check(feedback(0, 0), wanted, np.zeros(2)) == ""
-    wanted.position_rad[axis] *= 1.03
-    reason = supervisor.check(feedback(0, 0), wanted, np.zeros(2))
-    assert reason.startswith(f"axis {axis}: following error")
-    assert f"{allowed} deg allowed" in reason
+def test_torque_rises_and_falls_no_faster_than_its_rate():
+    supervisor, cycle = Supervisor(with_rate(100.0), 2, PERIOD_S), Cycle()
+    supervisor.reset(np.array([0.5, -0.5]))
+    sent = [[0.5, -0.5]]
+    for k in range(40):
+        cycle.torque[:] = (0.9, 1.9) if k < 25 else (-0.9, -1.9)
+        cycle.check(supervisor)
+        sent.append(cycle.torque.tolist())
+    steps = np.diff(np.array(sent), axis=0)
+    assert np.abs(steps).max() == pytest.approx(0.1)
+    assert sent[4][0] == pytest.approx(0.9)
+    assert sent[24][1] == pytest.approx(1.9)
+    assert sent[-1] == pytest.approx([-0.6, 0.4])
 
 
-@pytest.mark.parametrize(("axis", "allowed"), [(0, 573), (1, 1146)])
-def test_each_axis_has_its_own_speed(axis: int, allowed: float):
-    def run(speed_rad_s: float) -> str:
-        supervisor, wanted = Supervisor(EACH, 2, PERIOD_S), Setpoint(2)
-        for k in range(200):
-            wanted.position_rad[axis] = k * PERIOD_S * speed_rad_s
-            seen = feedback(*wanted.position_rad)
-            if reason := supervisor.check(seen, wanted, np.zeros(2)):
-                return reason
-        return ""
-
-    assert run(0.99 * EACH.speed_rad_s[axis]) == ""  # type: ignore[index]
-    assert f"{allowed} deg/s allowed" in run(1.05 * EACH.speed_rad_s[axis])  # type: ignore[index]
+def test_a_torque_that_is_no_number_is_not_passed_on():
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    cycle.torque[:] = math.nan, math.inf
+    assert cycle.check(supervisor) == Reaction.QUICK_STOP
+    np.testing.assert_array_equal(cycle.torque, [0.0, 0.0])
 
 
 def test_one_figure_serves_all_axes():
-    torque = np.array([-5.0, 5.0])
-    Supervisor(Limits(1.5, 1.0, 1.0), 2, PERIOD_S).check(feedback(0, 0), Setpoint(2), torque)
-    np.testing.assert_array_equal(torque, [-1.5, 1.5])
+    supervisor, cycle = Supervisor(Limits(1.5, 1.0, 1.0), 2, PERIOD_S), Cycle()
+    cycle.torque[:] = -5.0, 5.0
+    cycle.check(supervisor)
+    np.testing.assert_array_equal(cycle.torque, [-1.5, 1.5])
+
+
+# -- what is reported
+
+
+def test_the_worst_of_a_cycle_is_what_counts():
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    cycle.torque[:] = 5.0  # to be clamped
+    cycle.estimate.tension_N[0] = 110.0
+    cycle.setpoint.position_rad[1] = 1.0
+    assert cycle.check(supervisor) == Reaction.QUICK_STOP
+    assert (supervisor.limit, supervisor.axis) == (Limit.FOLLOWING_ERROR, 1)
+    assert supervisor.details() == {
+        "limit": "following_error",
+        "axis": 1,
+        "value": 1.0,
+        "allowed": 0.2,
+        "unit": "rad",
+        "reaction": "quick stop",
+    }
+    cycle.setpoint.position_rad[1] = 0.0
+    assert cycle.check(supervisor) == Reaction.CONTROLLED_STOP
+    assert (supervisor.limit, supervisor.axis) == (Limit.TENSION_HIGH, 0)
+
+
+def test_axes_are_called_by_their_names():
+    supervisor = Supervisor(SAFE, 2, PERIOD_S, ["left", "right"])
+    cycle = Cycle()
+    cycle.setpoint.position_rad[1] = 1.0
+    cycle.check(supervisor)
+    assert supervisor.reason().startswith("right: following error")
+
+
+def test_what_others_find_counts_where_it_is_worse():
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    cycle.check(supervisor)
+    assert supervisor.report(Limit.SAFETY_STOP, "a door is open") == Reaction.CONTROLLED_STOP
+    assert supervisor.report(Limit.DRIVE, "node 2: overcurrent") == Reaction.QUICK_STOP
+    assert supervisor.report(Limit.SAFETY_STOP, "a door is open") == Reaction.QUICK_STOP
+    assert supervisor.reason() == "node 2: overcurrent"
+    assert supervisor.details() == {
+        "limit": "drive",
+        "axis": -1,
+        "value": None,
+        "allowed": None,
+        "unit": "",
+        "reaction": "quick stop",
+    }
+    assert supervisor.report(Limit.SAFETY_ALARM, "emergency stop") == Reaction.TORQUE_OFF
+    assert cycle.check(supervisor) == Reaction.NONE
+    assert (supervisor.reason(), supervisor.limit, supervisor.axis) == ("", Limit.NONE, -1)
+
+
+# -- cables
+
+
+def test_a_cable_that_was_never_tight_is_not_slack():
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    cycle.estimate.tension_N[:] = 0.0
+    assert {cycle.check(supervisor) for _ in range(500)} == {Reaction.NONE}
+
+
+def test_slack_is_told_once_until_the_cable_was_tight_again():
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    told = []
+    for tension_N in (50.0, 10.0, 2.0, 10.0, 50.0, 10.0, 2.0):
+        cycle.estimate.tension_N[1] = tension_N
+        for _ in range(150):
+            if cycle.check(supervisor):
+                told.append((tension_N, supervisor.limit))
+    low, slack = (10.0, Limit.TENSION_LOW), (2.0, Limit.SLACK)
+    assert told == [low, slack, low, slack]
+
+
+def test_a_cable_from_which_tension_was_paid_out_is_not_broken():
+    # the same fall of tension, with 0.5 mm and more of cable
+    supervisor, when, _ = run(tension(0.0, after_cycles=20, paid_out_rad=0.06))
+    assert (supervisor.limit, when) == (Limit.TENSION_LOW, 111)
+    supervisor, *_ = run(tension(0.0, after_cycles=20, paid_out_rad=-0.06))
+    assert supervisor.limit is Limit.BROKEN_CABLE
+
+
+# -- memory
+
+
+def test_what_left_the_window_counts_no_more():
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    tripped = []
+    for k in range(200):
+        # five in every window of fifty, at times that shift
+        cycle.feedback.valid[1] = k % 50 not in (1, 11, 21, 31, 41)
+        tripped.append(cycle.check(supervisor))
+    assert not any(tripped)
+    cycle.feedback.valid[1] = False
+    assert cycle.check(supervisor) == Reaction.CONTROLLED_STOP
+
+
+def test_reset_forgets_everything():
+    supervisor, when, cycle = run(missed(lambda k: k % 8 == 0))
+    assert when > 0
+    supervisor.reset()
+    assert (supervisor.reason(), supervisor.reaction) == ("", Reaction.NONE)
+    cycle.feedback.valid[:] = True
+    assert cycle.check(supervisor) == Reaction.NONE

@@ -12,6 +12,7 @@ import numpy as np
 
 from cdpr_rt.errors import RawLogError, TripError
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
+from cdpr_rt.runtime.states import Reaction
 from cdpr_rt.tension_gain import CalibrationRefusedError, TorquePoint
 from drivers.modbus.tension import TensionSampler
 from profiles import Winch
@@ -64,7 +65,7 @@ class _Puller:
     def __init__(self, session: WinchSession, plan: AnchorPlan) -> None:
         device, winch = session.device, session.winch
         self._device = device
-        self._supervisor = session.executive.supervisor
+        self._executive = session.executive
         self._setpoint = session.executive.setpoint
         self._period_s = device.period_s
         inertia = winch.motor.rotor_inertia_kg_m2
@@ -93,9 +94,12 @@ class _Puller:
         torque = self._stiffness_Nm_rad * (self._wanted_rad - position)
         torque += self._damping_Nms_rad * (self.wanted_rad_s - self._speed_rad_s)
         command.torque_Nm[0] = min(self._limit_Nm, max(-self._limit_Nm, torque))
-        reason = self._supervisor.check(feedback, self._setpoint, command.torque_Nm)
-        if reason:
-            raise TripError(f"{reason}; is the cable made fast?")
+        supervisor = self._executive.supervisor
+        estimator = self._executive.estimator
+        estimator.update(feedback)
+        supervisor.check(feedback, estimator.estimate, self._setpoint, command.torque_Nm)
+        if supervisor.reaction > Reaction.CLAMP:
+            raise TripError(f"{supervisor.reason()}; is the cable made fast?")
         return float(command.torque_Nm[0])
 
 
