@@ -45,11 +45,11 @@ mpl.rcParams.update(
 
 
 def canvas(
-    rows: int = 1, columns: int = 1, height: float = 3.0, sharex: bool = False
+    rows: int = 1, columns: int = 1, height: float = 3.0, sharex: bool = False, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure of the report's width and its axes, row by row; `height` in inch a row."""
     figure = Figure(figsize=(7.4, height * rows), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False, sharex=sharex)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     return figure, [ax for row in axes for ax in row]
 
 
