@@ -38,6 +38,8 @@ class Events:
 
     def of_rows(self, rows: Row) -> list[tuple[dict[str, Any], int]]:
         """Return what changed within `rows` (m,) and since the last ones, with stamps."""
+        if not rows.size:
+            return []
         seen = np.stack([rows[name].astype(np.int64) for name in _WATCHED], axis=1)
         seen[seen[:, 2] <= Reaction.CLAMP, 2:] = 0
         last = self._last if self._last is not None else (-1, *seen[0, 1:])

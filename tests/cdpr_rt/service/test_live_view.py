@@ -1,0 +1,163 @@
+"""The live view, watched by a WebSocket client that knows Foxglove's protocol and nothing else."""
+
+import asyncio
+import json
+import math
+import struct
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import jsonschema_rs
+import numpy as np
+import pytest
+from recording_rig import block_with_clock, made_rows, put
+from websockets.asyncio.client import connect
+
+from cdpr_rt.runtime.cycle_row import Row
+from cdpr_rt.runtime.shared_block import RowWriter, SharedBlock
+from cdpr_rt.service.foxglove_view import LiveView, LiveViewError
+
+_PROTOCOL = "foxglove.sdk.v1"
+
+
+@contextmanager
+def _running(block: SharedBlock) -> Iterator[LiveView]:
+    view = LiveView(block, "bench", 0)
+    view.start()
+    try:
+        yield view
+    finally:
+        view.stop()
+
+
+@contextmanager
+def _repeating(block: SharedBlock, row: Row) -> Iterator[None]:
+    """Write one row over and over, as a loop at 1 kHz would."""
+    end = threading.Event()
+    writer = RowWriter(block)
+
+    def write() -> None:
+        while not end.wait(0.005):
+            for _ in range(5):
+                put(writer, row)
+
+    thread = threading.Thread(target=write)
+    thread.start()
+    try:
+        yield
+    finally:
+        end.set()
+        thread.join()
+
+
+async def _watch(
+    url: str, seconds: float
+) -> tuple[dict[str, dict[str, Any]], dict[str, list[tuple[int, bytes]]]]:
+    """Subscribe to all topics; return the channels and the messages of each, with log times."""
+    channels: dict[int, dict[str, Any]] = {}
+    messages: dict[str, list[tuple[int, bytes]]] = {}
+    async with connect(url, subprotocols=[_PROTOCOL]) as socket:  # type: ignore[list-item]
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            try:
+                text = await asyncio.wait_for(socket.recv(), left)
+            except TimeoutError:
+                break
+            if isinstance(text, bytes):
+                subscription, log_time = struct.unpack_from("<IQ", text, 1)
+                topic = channels[subscription]["topic"]
+                messages.setdefault(topic, []).append((log_time, text[13:]))
+            elif (told := json.loads(text))["op"] == "advertise":
+                new = {channel["id"]: channel for channel in told["channels"]}
+                channels |= new
+                wanted = [{"id": number, "channelId": number} for number in new]
+                await socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+    return {channel["topic"]: channel for channel in channels.values()}, messages
+
+
+def test_a_client_sees_axes_tensions_pose_and_times() -> None:
+    block = block_with_clock()
+    row = made_rows(100, 1)
+    row["position_rad"], row["setpoint_rad"] = [[math.pi, 1.0]], [[math.pi / 2, 1.0]]
+    row["tension_N"] = [[55.0, np.nan]]
+    row["compute_s"] = 2e-4
+    row["pose"] = [1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]
+    with _running(block) as view, _repeating(block, row):
+        channels, messages = asyncio.run(_watch(view.told()["url"], 2.0))
+    for topic in ("/axes", "/tensions", "/cycle_time", "/state"):
+        check = jsonschema_rs.Draft7Validator(json.loads(channels[topic]["schema"]))
+        for _, data in messages[topic]:
+            check.validate(json.loads(data))
+    time_ns, data = messages["/axes"][-1]
+    axes = json.loads(data)
+    assert axes["left"]["position_deg"] == pytest.approx(180.0)
+    assert axes["left"]["error_deg"] == pytest.approx(-90.0)
+    assert "cable_length_m" not in axes["right"]  # what is not known is not there
+    assert time_ns == 1_800_000_000_100_000_000
+    assert json.loads(messages["/tensions"][-1][1]) == {"left": 55.0}
+    assert json.loads(messages["/cycle_time"][-1][1])["compute_ms"] == pytest.approx(0.2)
+    assert json.loads(messages["/state"][-1][1]) == {"state": "active", "reaction": "none"}
+    assert channels["/pose"]["schemaName"] == "foxglove.PoseInFrame"
+    assert struct.pack("<d", 3.0) in messages["/pose"][-1][1]
+    assert "/pose_setpoint" in channels and "/pose_setpoint" not in messages
+    # decimated: some, but by far not all of the rows
+    assert 10 < len(messages["/axes"]) <= 2.0 * 50 + 5
+
+
+def test_what_happens_goes_into_the_log() -> None:
+    block = block_with_clock()
+    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+        url = view.told()["url"]
+
+        def trip() -> None:
+            time.sleep(0.7)
+            block.write_status({"state": "fault", "reason": "cable of left: 2 N"})
+
+        thread = threading.Thread(target=trip)
+        thread.start()
+        _, messages = asyncio.run(_watch(url, 1.5))
+        thread.join()
+    assert any(b"cable of left: 2 N" in data for _, data in messages["/log"])
+
+
+def test_a_port_in_use_is_said() -> None:
+    block = block_with_clock()
+    with _running(block) as view:
+        port = int(view.told()["url"].rsplit(":", 1)[1])
+        second = LiveView(block, "bench", port)
+        with pytest.raises(LiveViewError, match=f"port {port}"):
+            second.start()
+        assert f"port {port}" in second.told()["error"]
+        second.stop()
+
+
+def test_a_client_that_does_not_read_holds_nobody_up() -> None:
+    block = block_with_clock()
+
+    lazily: Any = {"subprotocols": [_PROTOCOL], "max_queue": 1, "close_timeout": 0.1}
+
+    async def beside_one_that_sleeps(url: str) -> int:
+        async with connect(url, **lazily) as lazy:
+            await lazy.recv()
+            told = json.loads(await lazy.recv())
+            wanted = [{"id": c["id"], "channelId": c["id"]} for c in told["channels"]]
+            await lazy.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+            _, messages = await _watch(url, 1.5)
+            return len(messages["/axes"])
+
+    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+        assert asyncio.run(beside_one_that_sleeps(view.told()["url"])) > 10
+        assert view.told()["error"] == ""
+
+
+def test_it_stays_where_no_cycles_run() -> None:
+    block = block_with_clock()
+    with _running(block) as view:
+        time.sleep(0.2)
+        assert view.told()["error"] == ""
+        with _repeating(block, made_rows(100, 1)):
+            _, messages = asyncio.run(_watch(view.told()["url"], 0.7))
+    assert messages["/axes"]
