@@ -1,0 +1,21 @@
+"""`cdpr doctor` on a machine with a real CAN interface."""
+
+from pathlib import Path
+
+import pytest
+
+from tools.can_interfaces import list_interfaces
+from tools.host_checks import look_around
+
+pytestmark = pytest.mark.vcan
+
+
+def test_the_interface_is_found_with_its_queue() -> None:
+    interface = next(one for one in list_interfaces() if one.name == "vcan0")
+    assert interface.is_virtual
+    assert (interface.is_up, interface.state, interface.bitrate_bit_s) == (True, "up", 0)
+    queue = Path("/sys/class/net/vcan0/tx_queue_len").read_text()
+    assert interface.queue_frames == int(queue)
+    findings = {finding.what: finding for finding in look_around()}
+    assert "vcan0" in findings["SocketCAN"].found
+    assert f"queue of {interface.queue_frames} frames" in findings["CAN vcan0"].found
