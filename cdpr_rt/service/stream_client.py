@@ -18,8 +18,8 @@ from cdpr_rt.service.stream_packet import (
     Hello,
     PacketError,
     Standing,
+    StreamAnswer,
     StreamSetpoint,
-    StreamState,
     Welcome,
     parse,
     right_digest,
@@ -51,7 +51,7 @@ class StreamClient:
         self._sock.connect(address)
         self._shared = None if key is None else stream_key(key)
         self._right = NO_RIGHT if token is None else right_digest(token)
-        self.state: StreamState | None = None
+        self.state: StreamAnswer | None = None
         """The newest answer, None before the first."""
         self.round_trip_s = math.nan
         """Delay there and back of the newest answer."""
@@ -98,9 +98,9 @@ class StreamClient:
         self.sent += 1
         return True
 
-    def receive(self) -> list[StreamState]:
+    def receive(self) -> list[StreamAnswer]:
         """Take the answers that have come, in their order of arrival; perhaps none."""
-        answers: list[StreamState] = []
+        answers: list[StreamAnswer] = []
         while True:
             try:
                 data = self._sock.recv(LONGEST_BYTES + 1)
@@ -113,7 +113,7 @@ class StreamClient:
             if isinstance(answer, Welcome):
                 self._key = session_key(self._shared or b"", answer.robot_nonce, self._session)
                 self._heard_ns = now_ns
-            elif isinstance(answer, StreamState):
+            elif isinstance(answer, StreamAnswer):
                 self._note(answer, now_ns)
                 answers.append(answer)
 
@@ -148,7 +148,7 @@ class StreamClient:
             self._greeted_ns = now_ns
             self._put(seal(Hello(self._session, self._nonce), self._shared))
 
-    def _open(self, data: bytes) -> Welcome | StreamState | None:
+    def _open(self, data: bytes) -> Welcome | StreamAnswer | None:
         """Return an answer that is meant for this session, None for anything else."""
         try:
             packet = parse(data, self._shared if not self.ready else self._key)
@@ -157,12 +157,12 @@ class StreamClient:
         if isinstance(packet, Welcome):
             mine = not self.ready and packet.nonce == self._nonce
         else:
-            mine = isinstance(packet, StreamState) and self.ready
+            mine = isinstance(packet, StreamAnswer) and self.ready
         if not mine or packet.session != self._session:
             return None
-        return packet if isinstance(packet, Welcome | StreamState) else None
+        return packet if isinstance(packet, Welcome | StreamAnswer) else None
 
-    def _note(self, answer: StreamState, now_ns: int) -> None:
+    def _note(self, answer: StreamAnswer, now_ns: int) -> None:
         self._heard_ns = now_ns
         self.answered += 1
         if self.state is None or answer.robot_ns >= self._echo_ns:

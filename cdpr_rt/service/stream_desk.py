@@ -22,8 +22,8 @@ from cdpr_rt.service.stream_packet import (
     Kind,
     PacketError,
     Standing,
+    StreamAnswer,
     StreamSetpoint,
-    StreamState,
     Welcome,
     parse,
     peek,
@@ -246,14 +246,14 @@ class StreamDesk:
         if packet.echo_ns > 0 and 0 <= there_and_back_ns < _LONGEST_ROUND_TRIP_NS:
             self.round_trip_s = there_and_back_ns * 1e-9
 
-    def _state(self, packet: StreamSetpoint, standing: Standing, now_ns: int) -> StreamState:
+    def _state(self, packet: StreamSetpoint, standing: Standing, now_ns: int) -> StreamAnswer:
         block = self._block
         written = int(block.counters["rows"][0])
         told = packet.session, standing, packet.sequence, packet.sent_ns, now_ns
         if not written:
-            return StreamState(*told, round_trip_s=self.round_trip_s)
+            return StreamAnswer(*told, round_trip_s=self.round_trip_s)
         row = block.rows[(written - 1) % block.capacity]
-        return StreamState(
+        return StreamAnswer(
             *told,
             int(row["state"]),
             int(row["program"]),

@@ -140,7 +140,7 @@ class StreamSetpoint:
 
 
 @dataclass(frozen=True)
-class StreamState:
+class StreamAnswer:
     """The robot's answer to one set-point."""
 
     session: int
@@ -184,7 +184,7 @@ class Bye:
         return _BYE.pack(MAGIC, VERSION, Kind.BYE, 0, self.session, self.sequence)
 
 
-Packet = Hello | Welcome | StreamSetpoint | StreamState | Bye
+Packet = Hello | Welcome | StreamSetpoint | StreamAnswer | Bye
 _SIZES: Final = {
     Kind.HELLO: _GREETING.size,
     Kind.WELCOME: _GREETING.size,
@@ -290,7 +290,7 @@ def _parse_setpoint(data: bytes) -> StreamSetpoint:
     )  # fmt: skip
 
 
-def _parse_state(data: bytes) -> StreamState:
+def _parse_state(data: bytes) -> StreamAnswer:
     values = _STATE.unpack_from(data)
     try:
         standing = Standing(values[3])
@@ -298,7 +298,7 @@ def _parse_state(data: bytes) -> StreamState:
         raise PacketError(Fault.ABSURD, f"status {values[3]} is unknown") from None
     session, state, program, reaction, limit = values[4:9]
     sequence, sent_ns, robot_ns = values[9:12]
-    return StreamState(
+    return StreamAnswer(
         session, standing, sequence, sent_ns, robot_ns, state, program, reaction, limit,
         values[12:19], values[19:26], values[26],
     )  # fmt: skip

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import hmac
 import math
+import struct
 from dataclasses import replace
 
 import pytest
@@ -17,8 +20,8 @@ from cdpr_rt.service.stream_packet import (
     Hello,
     PacketError,
     Standing,
+    StreamAnswer,
     StreamSetpoint,
-    StreamState,
     Welcome,
     parse,
     right_digest,
@@ -56,11 +59,11 @@ class Desk:
         key: bytes | None = None,
         address: tuple[str, int] = HERE,
         ms: float = 20.0,
-    ) -> StreamState:
+    ) -> StreamAnswer:
         data = self.take(seal(packet, key), address, ms)
         assert data is not None
         state = parse(data, key)
-        assert isinstance(state, StreamState)
+        assert isinstance(state, StreamAnswer)
         return state
 
     def greet(self, session: int = 7, address: tuple[str, int] = HERE) -> bytes:
@@ -160,7 +163,7 @@ def test_other_versions_kinds_and_lengths_are_dropped_and_counted() -> None:
         good[:5] + b"\x09" + good[6:],
         seal(BASE, stream_key(KEY)),  # tagged, and no key is shared
         Welcome(7, bytes(16), bytes(16)).pack(),
-        StreamState(7, Standing.ACCEPTED, 1, 1, 1).pack(),
+        StreamAnswer(7, Standing.ACCEPTED, 1, 1, 1).pack(),
     ):
         assert desk.take(data) is None
     counts = desk.desk.counts
@@ -322,7 +325,7 @@ def test_what_was_refused_is_of_no_use_later(obstacle: str) -> None:
     data = desk.take(heard)
     assert data is not None
     state = parse(data, key)
-    assert isinstance(state, StreamState)
+    assert isinstance(state, StreamAnswer)
     assert state.standing in (Standing.BUSY, Standing.NO_RIGHT)
     posted = desk.posted
     assert desk.take(heard, ms=free_after_ms) is None
@@ -347,3 +350,44 @@ def test_answers_cannot_be_made_without_the_key() -> None:
     assert caught.value.fault == Fault.TAG
     with pytest.raises(PacketError):
         parse(data, stream_key(KEY))
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+def test_a_sender_written_after_the_documentation_gets_on(key: bytes | None) -> None:
+    """Offsets and formulas as docs/setpoint-stream.md has them, without the module's help."""
+
+    def sealed(body: bytearray, secret: bytes) -> bytes:
+        tag = hmac.new(secret, body, hashlib.sha256).digest()
+        return bytes(body) + (tag if key else b"")
+
+    def packet(kind: int, size: int) -> bytearray:
+        body = bytearray(size)
+        struct.pack_into("<4sBBHI", body, 0, b"CDPS", 1, kind, 0, 4711)
+        return body
+
+    desk = Desk(key)
+    secret = hmac.new(key or b"", b"cdpr-rt set-point stream 1", hashlib.sha256).digest()
+    hello = packet(1, 64)
+    hello[16:32] = b"0123456789abcdef"
+    welcome = desk.take(sealed(hello, secret))
+    assert welcome is not None
+    assert (len(welcome), welcome[5], welcome[16:32]) == (96 if key else 64, 2, hello[16:32])
+    nonce = welcome[32:48] + struct.pack("<I", 4711)
+    secret = hmac.new(secret, nonce, hashlib.sha256).digest()
+    body = packet(3, 128)
+    struct.pack_into("<I", body, 12, 5)
+    struct.pack_into("<Qqqq", body, 16, 1, 123456789, desk.now_ns, 20 * MS)
+    struct.pack_into("<3d4dd", body, 48, 0.1, 0.2, 0.3, 0.0, 1.0, 0.0, 0.0, 0.25)
+    answer = desk.take(sealed(body, secret), ms=50.0)
+    assert answer is not None
+    assert len(answer) == (192 if key else 160)
+    assert struct.unpack_from("<BHI", answer, 5) == (4, 1, 4711)
+    assert struct.unpack_from("<Qqq", answer, 16) == (1, 123456789, desk.now_ns)
+    assert struct.unpack_from("<d", answer, 152)[0] == pytest.approx(0.03)
+    sample = desk.block.samples[0]
+    assert sample["position_m"].tolist() == [0.1, 0.2, 0.3]
+    assert (sample["buttons"], sample["scale"]) == (5, 0.25)
+    bye = packet(5, 24)
+    struct.pack_into("<Q", bye, 16, 2)
+    assert desk.take(sealed(bye, secret)) is None
+    assert desk.desk.holder is None
