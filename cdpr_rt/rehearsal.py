@@ -10,7 +10,9 @@ from cdpr_rt.controllers.pid import Pid, PidGains
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.exchange import AxisCommand, AxisFeedback
 from cdpr_rt.executive import Executive
+from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.supervisor import Limits, Supervisor
+from cdpr_rt.tension import TensionFeedback
 from cdpr_rt.trajectory import Leg
 
 
@@ -56,3 +58,4 @@ def rehearse(n: int, period_s: float) -> None:
     )
     for controller in controllers:
         executive.run(controller, Leg(still, still, 0.0, period_s))
+    Estimator(n, period_s).update(executive.device.feedback, TensionFeedback(n))

@@ -1,0 +1,109 @@
+"""A robot's file as the arrays of those of its axes that are run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.limits import DEFAULT_REACTIONS, Limits, reactions_of
+from cdpr_rt.runtime.estimate import WinchArrays
+from profiles import Robot, RobotAxis
+from profiles.winch_calibration import WinchCalibration
+
+SPEED_SHARE: Final = 0.2
+"""Of the motors' rated speed, where a robot's file says no other."""
+TORQUE_RISE_S: Final = 0.005
+"""In which the whole torque may be built up, where a robot's file says no other rate."""
+CABLE_SAFETY: Final = 5.0
+"""Breaking force over the highest tension, where a robot's file says no other."""
+SLACK_SHARE: Final = 0.25
+"""Of the least tension, where a robot's file does not say what is slack."""
+
+
+def limits_of(robot: Robot, booted: Sequence[int] | None = None) -> Limits:
+    """Return the limits of a robot's axes, those without a figure in its file filled in.
+
+    `booted` are the numbers of the axes that are run, in the robot's file; all if left out.
+    """
+    numbers = range(len(robot.axes)) if booted is None else booted
+    axes, told = [robot.axes[i] for i in numbers], robot.limits
+
+    def each(values: tuple[float, ...] | None, otherwise: FloatArray | float) -> FloatArray:
+        if values is None:
+            return np.broadcast_to(otherwise, (len(axes),)).astype(float)
+        return np.array([values[i if len(values) > 1 else 0] for i in numbers])
+
+    motors = [axis.winch.motor for axis in axes]
+    torque_Nm = each(told.torque_Nm, np.array([motor.rated_torque_Nm for motor in motors]))
+    speed = SPEED_SHARE * np.array([motor.rated_speed_rad_s for motor in motors])
+    strength = np.array([axis.winch.cable.breaking_force_N for axis in axes])
+    least_N = each(told.tension_min_N, -math.inf)
+    return Limits(
+        torque_Nm=torque_Nm,
+        torque_rate_Nm_s=each(told.torque_rate_Nm_s, torque_Nm / TORQUE_RISE_S),
+        speed_rad_s=each(told.speed_rad_s, speed),
+        following_error_rad=each(told.following_error_rad, math.inf),
+        cable_length_min_m=each(told.cable_length_min_m, -math.inf),
+        cable_length_max_m=each(told.cable_length_max_m, math.inf),
+        tension_min_N=least_N,
+        tension_max_N=each(told.tension_max_N, strength / CABLE_SAFETY),
+        slack_N=each(told.slack_N, SLACK_SHARE * least_N),
+        slack_s=told.slack_s,
+        broken_within_s=told.broken_within_s,
+        missed_cycles=told.missed_cycles,
+        missed_in_window=told.missed_in_window,
+        window_cycles=told.window_cycles,
+        stale_cycles=told.stale_cycles,
+        late_s=told.late_s,
+        reactions=reactions_of(told.reactions),
+    )
+
+
+def winches_of(
+    axes: Sequence[RobotAxis], calibrations: Mapping[int, WinchCalibration] | None = None
+) -> WinchArrays:
+    """Return what the estimate needs of the axes; `calibrations` by their place among these.
+
+    Without a calibration the tension follows from drum and gear, friction left out.
+    """
+    known = calibrations or {}
+    cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
+    measured = {i: known[i] for i in range(len(axes)) if i in known}
+
+    def each(key: str, otherwise: FloatArray) -> FloatArray:
+        return np.array(
+            [getattr(measured[i], key) if i in measured else otherwise[i] for i in range(len(axes))]
+        )
+
+    none = np.zeros(len(axes))
+    return WinchArrays(
+        cable_m_per_rad=cable,
+        gain_m=each("gain_m", np.abs(cable)),
+        bias_Nm=each("bias_Nm", none),
+        friction_Nm=each("friction_Nm", none),
+        friction_per_N_m=each("friction_per_N_m", none),
+        inertia_kg_m2=np.array([axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]),
+    )
+
+
+def described(limits: Limits, n: int) -> dict[str, Any]:
+    """Return limits for a robot's description: arrays over the axes, None where there is none."""
+    told: dict[str, Any] = {}
+    for name in limits.__dataclass_fields__:
+        value = getattr(limits, name)
+        if name != "reactions":
+            each = np.broadcast_to(value, (n,)) if isinstance(value, np.ndarray) else value
+            told[name] = _finite(each)
+    wanted = DEFAULT_REACTIONS | dict(limits.reactions)
+    told["reactions"] = {limit.key: reaction.label for limit, reaction in wanted.items()}
+    return told
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [_finite(float(x)) for x in value]
+    return value if math.isfinite(value) else None
