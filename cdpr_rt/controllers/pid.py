@@ -10,7 +10,6 @@ import numpy as np
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 
-
 # what an axis' last state says: how it goes on
 _RUNNING, _PRESET = 1.0, 2.0
 

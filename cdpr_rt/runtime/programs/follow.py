@@ -1,0 +1,99 @@
+"""Cables that follow the set-point stream."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.approach import approach
+from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.jit import jit
+from cdpr_rt.runtime.pose_stream import PoseStream, StreamState
+from cdpr_rt.runtime.programs.axis_program import AxisProgram, Loop
+from cdpr_rt.runtime.programs.model import RobotModel
+
+_LEAD_S = 0.3
+
+
+@jit
+def _lead(
+    scale: float,
+    pose: FloatArray,
+    last: FloatArray,
+    cable: FloatArray,
+    speed: FloatArray,
+    acceleration: FloatArray,
+    position: FloatArray,
+    target: FloatArray,
+) -> None:
+    """Move the targets on by what the hand has moved, but not out of the axes' reach."""
+    for i in range(min(3, target.size)):
+        target[i] += scale * (pose[i] - last[i]) / cable[i]
+        # an axis that is slower than the hand is not to run on after the hand has stopped
+        reach = speed[i] * (0.5 * speed[i] / acceleration[i] + _LEAD_S)
+        target[i] = min(max(target[i], position[i] - reach), position[i] + reach)
+        last[i] = pose[i]
+
+
+class FollowProgram(AxisProgram):
+    """Pays out cable as the hand that leads moves: x, y and z of the stream are axes 0, 1 and 2.
+
+    What counts is how far the hand has moved since the stream began, times its scale. All other
+    axes stay. In silence the motion ends at the last sample, and is braked when that lasts.
+    """
+
+    name = "follow"
+    needs_lease = True
+
+    def __init__(self, model: RobotModel, loop: Loop, stream: PoseStream) -> None:
+        super().__init__(model, loop)
+        self.stream = stream
+        self._epoch = -1
+        self._last = np.zeros(3)
+        self._target = np.zeros(model.n)
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque; brakes until the stream begins."""
+        super().start(feedback, setpoint, torque_Nm)
+        self.stream.reset()
+
+    def progress(self) -> dict[str, Any]:
+        """Return what the stream is worth and what became of its samples."""
+        stream = self.stream
+        return {
+            "stream": stream.state.name.lower(),
+            "session": stream.session,
+            "delay_s": stream.delay_s,
+            **stream.counts(),
+        }
+
+    def _move(self, setpoint: Setpoint) -> bool:
+        stream, model = self.stream, self._model
+        if stream.update() is StreamState.STOPPED:
+            at_rest = self._brake(setpoint)
+            self._target[:] = setpoint.position_rad
+            return at_rest
+        if stream.epoch != self._epoch:
+            self._epoch = stream.epoch
+            self._last[:] = stream.pose[:3]
+        _lead(
+            stream.scale,
+            stream.pose,
+            self._last,
+            model.cable_m_per_rad,
+            model.speed_rad_s,
+            model.acceleration_rad_s2,
+            setpoint.position_rad,
+            self._target,
+        )
+        approach(
+            self._target,
+            model.speed_rad_s,
+            model.acceleration_rad_s2,
+            model.period_s,
+            setpoint.position_rad,
+            setpoint.velocity_rad_s,
+            setpoint.acceleration_rad_s2,
+        )
+        return False
