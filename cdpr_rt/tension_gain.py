@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
+import scipy
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import FloatArray
@@ -128,7 +128,7 @@ def _least_squares(
         freedom = max(1.0, samples * (1.0 - alike) / (1.0 + alike) - unknowns)
     spread = float(residual @ residual) / freedom
     variance = spread * np.diag(np.linalg.inv(scaled.T @ scaled))
-    width = float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * np.sqrt(variance)
+    width = float(scipy.special.stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * np.sqrt(variance)
     return solution / scale, width / scale, math.sqrt(float(np.mean(residual**2)))
 
 

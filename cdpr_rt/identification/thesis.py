@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import convolve1d
+import scipy
 
 from cdpr_rt.compensation import FrictionFeedforward
 from cdpr_rt.exchange import BoolArray, FloatArray
@@ -108,7 +108,7 @@ def filter_weights(size: int) -> FloatArray:
 
 def savitzky_golay(curves: FloatArray, size: int) -> FloatArray:
     """Return periodic curves (k, m) filtered over `size` samples, an odd number."""
-    return np.asarray(convolve1d(curves, filter_weights(size), axis=1, mode="wrap"))
+    return np.asarray(scipy.ndimage.convolve1d(curves, filter_weights(size), axis=1, mode="wrap"))
 
 
 def _average(parts: list[Stretch]) -> tuple[FloatArray, BoolArray]:

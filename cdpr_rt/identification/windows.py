@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
 from cdpr_rt.exchange import BoolArray, FloatArray
 from cdpr_rt.identification.sweep import SweepData, period_s
@@ -138,21 +138,24 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     rows = (run.time_s.size - 1) // step - 4
     if rows < 1:
         return None
+    ndimage = scipy.ndimage  # loaded here, since it takes longer than many a command
     noise = reading_noise_rad(run)
     smoothing = _SMOOTHING * noise / (speed if quick else _SMOOTHING_SPEED_rad_s)
     smoothing = min(max(smoothing, period if quick else _SMOOTHING_s), 4.0 * spacing) / period
     deviation = run.angle_rad - run.setpoint_rad
-    angle = run.setpoint_rad + gaussian_filter1d(deviation, 0.5 * smoothing, mode="nearest")
-    drift = gaussian_filter1d(deviation, smoothing, order=1, mode="nearest") / period
+    angle = run.setpoint_rad + ndimage.gaussian_filter1d(deviation, 0.5 * smoothing, mode="nearest")
+    drift = ndimage.gaussian_filter1d(deviation, smoothing, order=1, mode="nearest") / period
     velocity = run.setpoint_velocity_rad_s + drift
     cycle = np.arange(run.time_s.size)
     torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
     centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
-    boxed = uniform_filter1d(uniform_filter1d(run.angle_rad - run.angle_rad[0], step), step)
+    boxed = ndimage.uniform_filter1d(
+        ndimage.uniform_filter1d(run.angle_rad - run.angle_rad[0], step), step
+    )
     smooth_torque = np.convolve(torque, _HELD, mode="same")
     for _ in range(4):
-        smooth_torque = uniform_filter1d(smooth_torque, step)
-    mean = uniform_filter1d(velocity, 2 * step + 1)[centre]
+        smooth_torque = ndimage.uniform_filter1d(smooth_torque, step)
+    mean = ndimage.uniform_filter1d(velocity, 2 * step + 1)[centre]
     direction = np.sign(mean)
     quasi_static = speed < _QUASI_STATIC_rad_s
     set_speed = run.setpoint_velocity_rad_s[centre]
