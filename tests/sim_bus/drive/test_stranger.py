@@ -108,8 +108,9 @@ def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
     assert node.homing(timeout=10)
     assert node.is_homed()
     # The zero is where the index is: 123.4° from where the rotor stood.
-    stood = node.sdo[0x6064].raw - node.sdo[0x6063].raw
-    assert abs(stood + round(123.4 / 360 * 8192)) <= 10
+    # The two are read one after the other, so the rotor must have come to rest.
+    stood = -round(123.4 / 360 * 8192)
+    assert wait_for(lambda: abs(node.sdo[0x6064].raw - node.sdo[0x6063].raw - stood) <= 10)
 
     emergencies: list[int] = []
     node.emcy.add_callback(lambda error: emergencies.append(error.code))
