@@ -36,6 +36,7 @@ _COUNTERS: Final = np.dtype(
         ("start_monotonic_ns", "<i8"),  # the same instant on both clocks, taken once
         ("start_realtime_ns", "<i8"),
         ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not
+        ("service_alive_ns", "<i8"),  # of the service's last turn, 0 before the first
         ("lease_ns", "<i8"),  # until when somebody holds the right to move
         ("rows", "<u8"),  # rows written since the beginning
         ("recorded", "<u8"),  # of them, those that are safe in the recording

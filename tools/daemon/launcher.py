@@ -30,6 +30,8 @@ _LOOP_STOP_S = 20.0
 _SERVICE_STOP_S = 10.0
 # the loop turns at every cycle, or some ten times a second where no cycles run
 _LOOP_STALLED_S = 2.0
+# the service turns some ten times a second; a disk may hold it up
+_SERVICE_STALLED_S = 10.0
 # a service that dies at once is not started in a tight circle
 _RESTART_S = (0.1, 0.5, 2.0, 5.0)
 _STEADY_S = 30.0
@@ -181,7 +183,7 @@ class Launcher:
                 )
                 self._tell(f"{self.reason}; the drives stop by themselves. The service stays")
             return
-        stalled = self._up and self._silence_s() > _LOOP_STALLED_S
+        stalled = self._up and self._silence_s("loop_alive_ns") > _LOOP_STALLED_S
         if stalled != self._stalled:
             self._stalled = stalled
             self._tell(
@@ -193,6 +195,7 @@ class Launcher:
     def _watch_service(self, now: float) -> None:
         if self._service is not None:
             if not self._service.end:
+                self._watch_service_turns()
                 return
             lived = now - self._service.started
             self._restarts = 1 if lived > _STEADY_S else self._restarts + 1
@@ -201,7 +204,15 @@ class Launcher:
             self._service.close()
             self._service, self._restart_at = None, now + pause
         elif now >= self._restart_at:
+            self._block.counters["service_alive_ns"] = 0
             self._service = Child(SERVICE, self._settings)
+
+    def _watch_service_turns(self) -> None:
+        silent_s = self._silence_s("service_alive_ns")
+        if self._service is not None and silent_s > _SERVICE_STALLED_S:
+            self._tell(f"the service has not turned for {_SERVICE_STALLED_S:g} s and is killed")
+            self._service.process.kill()
+            self._service.process.wait()
 
     def _report(self, status: dict[str, Any], now: float) -> None:
         """Keep the service manager informed; its watchdog is fed while the loop lives and turns."""
@@ -230,8 +241,8 @@ class Launcher:
             return f"the loop did not stop within {patience_s:g} s and was killed"
         return "" if self._loop.process.returncode == DONE else f"the loop {self._loop.end}"
 
-    def _silence_s(self) -> float:
-        alive = int(self._block.counters["loop_alive_ns"][0])
+    def _silence_s(self, counter: str) -> float:
+        alive = int(self._block.counters[counter][0])
         return (time.monotonic_ns() - alive) / 1e9 if alive else 0.0
 
     def _status(self) -> dict[str, Any]:

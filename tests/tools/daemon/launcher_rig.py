@@ -25,6 +25,7 @@ NAME = "stand-in"
 
 def main(folder: Path) -> int:
     launcher.LOOP, launcher.SERVICE = "stand_in_loop", "stand_in_service"  # type: ignore[misc]
+    launcher._LOOP_STALLED_S = launcher._SERVICE_STALLED_S = 1.0  # type: ignore[misc]
     block = SharedBlock.create(1, 0.1, 100.0)
     settings = RunSettings(
         robot=str(folder),
@@ -82,10 +83,12 @@ def service() -> None:
     (folder / "service.pid").write_text(str(os.getpid()))
     end = _asked_to_end()
     end_with(settings.launcher_pid)
+    block = SharedBlock.attach(settings.block_fd)
     settings.socket.unlink(missing_ok=True)
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(settings.socket))
-        select.select([end], [], [])
+        while not select.select([end], [], [], 0.02)[0]:
+            block.counters["service_alive_ns"] = time.monotonic_ns()
     _note(folder, "service stopped")
 
 

@@ -124,12 +124,18 @@ def test_it_tells_when_both_are_up_and_ends_the_loop_before_the_service(start: S
     assert daemon.log() == ["loop stopped", "service stopped"]
 
 
-def test_a_service_that_dies_is_started_again_and_the_loop_goes_on(start: Start) -> None:
+@pytest.mark.parametrize(
+    ("number", "told"),
+    [(signal.SIGKILL, "killed by signal 9"), (signal.SIGSTOP, "has not turned")],
+)
+def test_a_service_that_dies_or_hangs_is_started_again_and_the_loop_goes_on(
+    start: Start, number: signal.Signals, told: str
+) -> None:
     daemon = start()
     daemon.line("ready")
     loop, service = daemon.pid("loop"), daemon.pid("service")
-    os.kill(service, signal.SIGKILL)
-    assert "killed by signal 9" in daemon.line("told")["told"]
+    os.kill(service, number)
+    assert told in daemon.line("told")["told"]
     end = time.monotonic() + TIMEOUT_S
     while daemon.pid("service") == service and time.monotonic() < end:
         time.sleep(0.02)
@@ -150,7 +156,7 @@ def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) 
         "the loop has died: killed by signal 9",
     )
     daemon.heard("STATUS=dead: the loop has died: killed by signal 9")
-    assert daemon.fed(1.0) == 0
+    assert daemon.fed(0.5) == 0
     assert _is_child(service)
     assert daemon.pid("service") == service
     daemon.process.terminate()
@@ -159,17 +165,17 @@ def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) 
 
 
 def test_the_watchdog_is_fed_while_the_loop_turns_and_no_longer(start: Start) -> None:
-    daemon = start(watchdog_s=0.8)
+    daemon = start(watchdog_s=0.4)
     daemon.line("ready")
-    assert daemon.fed(1.5) >= 2
+    assert daemon.fed(0.8) >= 2
     loop = daemon.pid("loop")
     os.kill(loop, signal.SIGSTOP)
     assert "has not turned" in daemon.line("told")["told"]
     daemon.fed(0.1)
-    assert daemon.fed(1.0) == 0
+    assert daemon.fed(0.6) == 0
     os.kill(loop, signal.SIGCONT)
     assert "turns again" in daemon.line("told")["told"]
-    assert daemon.fed(1.5) >= 2
+    assert daemon.fed(0.8) >= 2
 
 
 def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) -> None:
