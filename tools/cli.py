@@ -31,6 +31,7 @@ _COMMANDS = (
     "doctor",
     "drive",
     "io",
+    "log",
     "profiles",
     "rail",
     "run",

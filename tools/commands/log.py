@@ -1,0 +1,89 @@
+"""`cdpr log`: what is in the daemon's recordings, as figures, tables and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tools.commands.options import JsonOption
+from tools.errors import BadInputError
+from tools.output import Output
+from tools.recordings.export import check_target, export
+from tools.recordings.picture import FIELDS, draw
+from tools.recordings.selection import Selection, fields_of, files_of
+from tools.recordings.summary import summarise, told
+
+app = typer.Typer(
+    help="The daemon's recordings: what is in them, as tables and pictures.", no_args_is_help=True
+)
+
+_FilesArgument = Annotated[
+    list[Path], typer.Argument(help="Recordings (*.mcap), or a folder of them.", metavar="FILE")
+]
+_FromOption = Annotated[
+    float, typer.Option("--from", help="Seconds after the first cycle.", min=0.0)
+]
+_UntilOption = Annotated[
+    float, typer.Option("--until", help="Seconds after the first cycle; the end by default.")
+]
+_EVENTS_SHOWN = 30
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the command group."""
+    parent.add_typer(app, name="log")
+
+
+@app.command()
+def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
+    """Say what is in recordings: how long, what happened, what is missing, how they ended."""
+    out = Output(as_json)
+    results = []
+    for path in files_of(files):
+        results.append(summarise(path))
+        for line in told(results[-1], _EVENTS_SHOWN):
+            out.say(line)
+    out.result({"ok": True, "recordings": results})
+
+
+@app.command("export")
+def export_command(
+    files: _FilesArgument,
+    target: Annotated[Path, typer.Option("--out", help="A name ending in .csv or .parquet.")],
+    fields: Annotated[
+        str | None, typer.Option(help="Only these fields, with commas; all by default.")
+    ] = None,
+    from_s: _FromOption = 0.0,
+    until_s: _UntilOption = float("inf"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the cycles of recordings, one after the other, into one table."""
+    out = Output(as_json)
+    check_target(target, overwrite)
+    rows = export(Selection(files, fields_of(fields), from_s, until_s), target)
+    out.say(f"{target}: {rows} rows")
+    out.result({"ok": True, "out": target, "rows": rows})
+
+
+@app.command()
+def plot(
+    files: _FilesArgument,
+    target: Annotated[
+        Path | None, typer.Option("--out", help="A name ending in .png; beside FILE by default.")
+    ] = None,
+    axis: Annotated[list[str] | None, typer.Option(help="Only this axis; may be repeated.")] = None,
+    from_s: _FromOption = 0.0,
+    until_s: _UntilOption = float("inf"),
+    as_json: JsonOption = False,
+) -> None:
+    """Draw motion, torques, tensions and the timing of the cycles into a picture."""
+    out = Output(as_json)
+    path = target or files_of(files)[0].with_suffix(".png")
+    if path.suffix != ".png":
+        raise BadInputError(f"--out {path}: allowed: a name that ends in .png")
+    rows = draw(Selection(files, FIELDS, from_s, until_s), axis, path)
+    out.say(f"{path}: {rows} cycles")
+    out.result({"ok": True, "out": path, "rows": rows})

@@ -1,0 +1,1 @@
+"""What `cdpr log` does with recordings."""

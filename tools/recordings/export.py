@@ -1,0 +1,74 @@
+"""Recordings as tables for other programs: CSV or Parquet."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa  # type: ignore[import-untyped]
+from pyarrow import csv, parquet
+
+from cdpr_rt.service.recording_reader import Columns
+from tools.errors import BadInputError, WorkFailedError
+from tools.recordings.selection import Selection
+
+FORMATS = (".csv", ".parquet")
+
+
+def check_target(path: Path, overwrite: bool) -> None:
+    """Raise BadInputError where `path` cannot be written to."""
+    if path.suffix not in FORMATS:
+        raise BadInputError(f"--out {path}: allowed: a name that ends in {' or '.join(FORMATS)}")
+    if path.exists() and not overwrite:
+        raise BadInputError(f"--out {path}: exists already; give --overwrite to write over it")
+
+
+def export(selection: Selection, path: Path) -> int:
+    """Write the rows to `path`, one column for each field and axis; return their number.
+
+    Raises BadInputError where there are none, WorkFailedError where it cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    count, writer = 0, None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for columns in selection.rows():
+            table = _table(columns)
+            if writer is None:
+                writer = _writer(part, table.schema)
+            writer.write_table(table)
+            count += table.num_rows
+        if writer is None:
+            names = ", ".join(str(reader.path) for reader in selection.readers)
+            raise BadInputError(f"{names}: no cycles in what was asked for")
+        if isinstance(writer, parquet.ParquetWriter):
+            described = [reader.description for reader in selection.readers]
+            writer.add_key_value_metadata({"description": json.dumps(described[-1])})
+        writer.close()
+        part.replace(path)
+    except OSError as error:
+        raise WorkFailedError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+    return count
+
+
+def _writer(path: Path, schema: Any) -> Any:
+    if path.name.endswith(".csv.part"):
+        return csv.CSVWriter(path, schema)
+    return parquet.ParquetWriter(path, schema, compression="zstd")
+
+
+def _table(columns: Columns) -> Any:
+    """Return flat columns, `name[0]` and so on for arrays; what is not known is null."""
+    flat: dict[str, Any] = {}
+    for name, values in columns.items():
+        if values.ndim == 1:
+            flat[name] = pa.array(values, from_pandas=True)
+        else:
+            for k in range(values.shape[1]):
+                flat[f"{name}[{k}]"] = pa.array(values[:, k], from_pandas=True)
+    return pa.table(flat)

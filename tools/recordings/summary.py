@@ -1,0 +1,121 @@
+"""What is in a recording, in figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.recording_reader import Columns
+from tools.recordings.selection import ELAPSED, Selection
+
+_FIELDS = ("cycle", "state", "lateness_s", "exchange_s", "compute_s", "late_cycles", "missed")
+
+
+@dataclass
+class _Count:
+    """Figures of one file, gathered as its rows come."""
+
+    rows: int = 0
+    missing_cycles: int = 0
+    restarts: int = 0
+    first_s: float = 0.0
+    last_s: float = 0.0
+    longest: dict[str, float] = field(default_factory=dict)
+    states_s: dict[str, float] = field(default_factory=dict)
+    began: dict[str, int] = field(default_factory=dict)
+    last: dict[str, int] = field(default_factory=dict)
+
+    def add(self, rows: Columns) -> None:
+        """Take in some rows."""
+        elapsed, cycle = rows[ELAPSED], rows["cycle"]
+        if self.rows == 0:
+            self.first_s = float(elapsed[0])
+            self.began = {name: int(rows[name][0]) for name in ("missed", "late_cycles")}
+        else:
+            elapsed = np.concatenate([[self.last_s], elapsed])
+            cycle = np.concatenate([[self.last["cycle"]], cycle])
+        steps = np.diff(cycle)
+        self.missing_cycles += int((steps[steps > 1] - 1).sum())
+        self.restarts += int((steps <= 0).sum())
+        spent = np.diff(elapsed)
+        state = rows["state"][-spent.size :] if spent.size else rows["state"][:0]
+        for value in np.unique(state):
+            label = LoopState(value).label if value in list(LoopState) else str(value)
+            passed = float(spent[state == value].sum())
+            self.states_s[label] = self.states_s.get(label, 0.0) + passed
+        for name in ("lateness_s", "exchange_s", "compute_s"):
+            self.longest[name] = max(self.longest.get(name, 0.0), float(rows[name].max()))
+        self.last = {name: int(rows[name][-1]) for name in ("cycle", "missed", "late_cycles")}
+        self.last_s = float(rows[ELAPSED][-1])
+        self.rows += rows["cycle"].size
+
+    def result(self) -> dict[str, Any]:
+        """Return the figures for people and programs."""
+        counted = {name: self.last[name] - self.began[name] for name in self.began}
+        return {
+            "rows": self.rows,
+            "seconds": self.last_s - self.first_s,
+            "missing_cycles": self.missing_cycles,
+            "restarts": self.restarts,
+            **counted,
+            **{f"longest_{name}": value for name, value in self.longest.items()},
+            "states_s": self.states_s,
+        }
+
+
+def summarise(path: Path) -> dict[str, Any]:
+    """Return the figures of one file. Raises BadInputError where it is no recording."""
+    selection = Selection([path], _FIELDS)
+    count = _Count()
+    for rows in selection.rows():
+        count.add(rows)
+    (reader,) = selection.readers
+    return {
+        "file": str(path),
+        "bytes": path.stat().st_size,
+        "ended": reader.ended,
+        "robot": reader.metadata.get("robot"),
+        "session": reader.metadata.get("session"),
+        "part": int(reader.metadata.get("part", 1)),
+        "axes": [axis.get("name") for axis in reader.description.get("axes", [])],
+        "period_s": reader.description.get("period_s"),
+        **count.result(),
+        "events": reader.events,
+    }
+
+
+def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
+    """Return the figures of one file as lines for people."""
+    end = {"closed": "", "not closed": ", not closed by its writer", "cut short": ", cut short"}
+    lines = [
+        f"{figures['file']}: {figures['robot']}, {len(figures['axes'])} axes, "
+        f"{figures['bytes'] / 1e6:.1f} MB{end[figures['ended']]}"
+    ]
+    states = ", ".join(f"{name} {time_s:.1f} s" for name, time_s in figures["states_s"].items())
+    lines.append(f"  {figures['rows']} cycles in {figures['seconds']:.1f} s ({states})")
+    lines.append(
+        f"  {figures['missing_cycles']} cycles not recorded, {figures.get('late_cycles', 0)} late, "
+        f"{figures.get('missed', 0)} answers missed"
+    )
+    if figures["rows"]:
+        longest = [
+            f"{what} {1e3 * figures[f'longest_{name}']:.3f} ms"
+            for what, name in (
+                ("late by", "lateness_s"),
+                ("answers after", "exchange_s"),
+                ("computing", "compute_s"),
+            )
+        ]
+        lines.append(f"  at most: {', '.join(longest)}")
+    events = figures["events"]
+    if len(events) > most_events:
+        lines.append(f"  ({len(events) - most_events} earlier events are in --json)")
+    for event in events[-most_events:]:
+        at = f"{event['time_s']:10.3f} s" if "time_s" in event else " " * 12
+        lines.append(f"  {at}  {event['text']}")
+    return lines
