@@ -72,7 +72,7 @@ class AxisBuses:
             raise
         self.axes = tuple(group.axes[i] for group, i in self._in_order())
         self.feedback, self.command = room.feedback(), room.command()
-        self._moves = _Moves(order, self.feedback, self.command)
+        self._moves = Moves(order, self.feedback, self.command)
         if self._moves.needed:
             self.feedback, self.command = self._moves.feedback, self._moves.command
         self.transmits = 0
@@ -277,7 +277,7 @@ def _lives(group: AxisGroup, step: Any) -> bool:
     return True
 
 
-class _Moves:
+class Moves:
     """Moves values between arrays in the order of the buses and arrays in the device's order."""
 
     def __init__(self, order: Sequence[int], feedback: AxisFeedback, command: AxisCommand) -> None:
