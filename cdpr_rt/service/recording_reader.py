@@ -96,7 +96,8 @@ class RecordingReader:
         except _BROKEN as error:
             self.ended = CUT
             if not found:
-                raise RecordingError(f"{self.path}: not a recording: {error}") from None
+                reason = str(error) or "nothing in it"
+                raise RecordingError(f"{self.path}: not a recording: {reason}") from None
         if not found:
             raise RecordingError(f"{self.path}: an MCAP file, but not a recording of cdpr-rt")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import pyarrow as pa  # type: ignore[import-untyped]
 from pyarrow import csv, parquet
@@ -31,35 +31,37 @@ def export(selection: Selection, path: Path) -> int:
     Raises BadInputError where there are none, WorkFailedError where it cannot be written.
     """
     part = path.with_name(path.name + ".part")
-    count, writer = 0, None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        for columns in selection.rows():
-            table = _table(columns)
-            if writer is None:
-                writer = _writer(part, table.schema)
-            writer.write_table(table)
-            count += table.num_rows
-        if writer is None:
-            names = ", ".join(str(reader.path) for reader in selection.readers)
-            raise BadInputError(f"{names}: no cycles in what was asked for")
-        if isinstance(writer, parquet.ParquetWriter):
-            described = [reader.description for reader in selection.readers]
-            writer.add_key_value_metadata({"description": json.dumps(described[-1])})
-        writer.close()
+        with part.open("wb") as file:
+            count = _write(selection, file, path.suffix)
         part.replace(path)
+        return count
     except OSError as error:
         raise WorkFailedError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
+    count, writer = 0, None
+    for columns in selection.rows():
+        table = _table(columns)
+        if writer is None and suffix == ".csv":
+            writer = csv.CSVWriter(file, table.schema)
+        elif writer is None:
+            writer = parquet.ParquetWriter(file, table.schema, compression="zstd")
+        writer.write_table(table)
+        count += table.num_rows
+    if writer is None:
+        names = ", ".join(str(reader.path) for reader in selection.readers)
+        raise BadInputError(f"{names}: no cycles in what was asked for")
+    if suffix == ".parquet":
+        described = json.dumps(selection.readers[-1].description)
+        writer.add_key_value_metadata({"description": described})
+    writer.close()
     return count
-
-
-def _writer(path: Path, schema: Any) -> Any:
-    if path.name.endswith(".csv.part"):
-        return csv.CSVWriter(path, schema)
-    return parquet.ParquetWriter(path, schema, compression="zstd")
 
 
 def _table(columns: Columns) -> Any:
