@@ -1,0 +1,120 @@
+"""The right to move: one client at a time holds it, and loses it by silence."""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from cdpr_rt.errors import ControlError
+
+SHORTEST_S: Final = 0.2
+LONGEST_S: Final = 10.0
+
+
+class LeaseError(ControlError):
+    """The right to move is not this client's; the message says whose it is."""
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who may move, and for how long without another sign of life."""
+
+    client: str
+    left_s: float
+
+
+class Lease:
+    """Given to one client under a token; any thread may use it.
+
+    `publish` is told the instant (CLOCK_MONOTONIC, ns) until which somebody holds it, 0 when nobody
+    does. The loop compares that instant with its own clock: it needs nobody to tell it that the
+    holder, or this whole process, has fallen silent.
+    """
+
+    def __init__(
+        self, publish: Callable[[int], None], clock_ns: Callable[[], int] = time.monotonic_ns
+    ) -> None:
+        self._publish = publish
+        self._clock_ns = clock_ns
+        self._lock = threading.Lock()
+        self._client = ""
+        self._token = ""
+        self._ttl_ns = self._until_ns = 0
+        publish(0)
+
+    def take(self, client: str, ttl_s: float) -> str:
+        """Give the right to `client` for `ttl_s` at a time; return the token that renews it.
+
+        Raises LeaseError where another holds it, whatever it calls itself.
+        """
+        if not SHORTEST_S <= ttl_s <= LONGEST_S:
+            raise LeaseError(f"ttl_s {ttl_s:g}; allowed: {SHORTEST_S:g} to {LONGEST_S:g} s")
+        with self._lock:
+            left_s = self._left_s()
+            if left_s > 0.0:
+                raise LeaseError(
+                    f"{self._client} holds the right to move, for {left_s:.1f} s more at least"
+                )
+            self._client, self._token = client, secrets.token_urlsafe(18)
+            self._ttl_ns = round(ttl_s * 1e9)
+            self._extend()
+            return self._token
+
+    def renew(self, token: str | None) -> float:
+        """Extend it by its whole time; return that time in s.
+
+        Raises LeaseError where `token` is not, or is no longer, that of the holder.
+        """
+        with self._lock:
+            self._require(token)
+            self._extend()
+            return self._ttl_ns * 1e-9
+
+    def release(self, token: str | None) -> None:
+        """Give it back; a program that moves on somebody's behalf holds then. As `renew`."""
+        with self._lock:
+            self._require(token)
+            self._token = ""
+            self._until_ns = 0
+            self._publish(0)
+
+    def holder(self) -> Holder | None:
+        """Return who holds it, None where nobody does."""
+        with self._lock:
+            left_s = self._left_s()
+            return Holder(self._client, left_s) if left_s > 0.0 else None
+
+    def find(self, digest: bytes, digest_of: Callable[[str], bytes]) -> str | None:
+        """Return the holder's token if `digest_of` makes `digest` of it, None otherwise.
+
+        For a second connection of the holder that does not send the token itself.
+        """
+        with self._lock:
+            held = self._left_s() > 0.0
+            same = hmac.compare_digest(digest_of(self._token), digest)
+            return self._token if held and same else None
+
+    def _left_s(self) -> float:
+        return (self._until_ns - self._clock_ns()) * 1e-9
+
+    def _extend(self) -> None:
+        self._until_ns = self._clock_ns() + self._ttl_ns
+        self._publish(self._until_ns)
+
+    def _require(self, token: str | None) -> None:
+        held = self._left_s() > 0.0
+        if not token:
+            who = f"{self._client} holds it" if held else "nobody holds it"
+            raise LeaseError(f"this needs the right to move; {who}")
+        if not hmac.compare_digest(token.encode(), self._token.encode()):
+            who = f"{self._client} holds it" if held else "it was given back or taken over"
+            raise LeaseError(f"the right to move is not this client's; {who}")
+        if not held:
+            raise LeaseError(
+                f"the right to move has run out: {self._client} was silent for too long"
+            )

@@ -1,0 +1,235 @@
+"""The service's end of the shared memory: what the loop says, and commands to it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import select
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.shared_block import MESSAGE_BYTES, SharedBlock, SharedBlockError
+from cdpr_rt.service.events import EventLog
+from cdpr_rt.service.rows import plain
+
+DEAD: Final = "dead"
+STARTING: Final = "starting"
+_POLL_BUSY_S, _POLL_IDLE_S = 0.004, 0.05
+_MOST_PENDING = 32
+_SILENT_S = 5.0
+_ALIKE: Final = frozenset({"hold", "disable", "shutdown", "acknowledge", "configure", "check"})
+"""Commands that say nothing but their name: asked for twice at once, they are sent once."""
+
+
+class LoopGoneError(ControlError):
+    """No loop takes commands: it has not begun, has ended, or does not turn."""
+
+
+class LoopBusyError(ControlError):
+    """The loop takes no more commands for now, or has not answered in time."""
+
+
+class CommandTooLongError(ControlError):
+    """The command does not fit into a message."""
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What the loop answered."""
+
+    ok: bool
+    text: str
+    state: str
+
+
+class LoopLink:
+    """Commands with their replies, the loop's texts, and whether it lives.
+
+    All of it belongs to one asyncio loop, in which `watch` runs; other threads may read `status`,
+    `description`, `state` and `wall_ns`.
+    """
+
+    def __init__(self, block: SharedBlock, clock_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        self.block = block
+        self.events = EventLog(self.wall_ns)
+        self._clock_ns = clock_ns
+        self._texts: dict[str, tuple[int, dict[str, Any]]] = {}
+        self._pending: dict[int, asyncio.Future[Reply]] = {}
+        self._alike: dict[str, asyncio.Future[Reply]] = {}
+        self._wake = asyncio.Event()
+        self._loop = _Life()
+        self._told = ("", "")
+        while block.take_reply() is not None:  # to a service that is no more
+            pass
+
+    # -- what the loop says
+
+    def status(self) -> dict[str, Any]:
+        """Return the loop's own status, {} before its first."""
+        return self._text("status", self.block.status)
+
+    def description(self) -> dict[str, Any]:
+        """Return the robot's description, {} before the loop has published it."""
+        return self._text("description", self.block.description)
+
+    def state(self) -> str:
+        """Return the loop's state by name, or "starting", or "dead"."""
+        if self.dead:
+            return DEAD
+        return str(self.status().get("state", STARTING))
+
+    @property
+    def dead(self) -> bool:
+        """Whether a loop has been there and is no more."""
+        return self._loop.ended(int(self.block.counters["loop_pid"][0]))
+
+    @property
+    def ended_how(self) -> str:
+        """What is known of the loop's end, "" while it lives."""
+        if not self.dead:
+            return ""
+        status = self.status()
+        # the launcher sees the exit status and writes it down in the loop's place
+        told = str(status.get("reason", "")) if status.get("state") == DEAD else ""
+        return told or "the loop has died"
+
+    def silent_s(self) -> float:
+        """Return how long ago the loop turned last, 0 before its first turn."""
+        alive_ns = int(self.block.counters["loop_alive_ns"][0])
+        return max(0.0, (self._clock_ns() - alive_ns) * 1e-9) if alive_ns else 0.0
+
+    def wall_ns(self) -> int:
+        """Return the time of day, ns since 1970, unmoved by a clock that is set meanwhile."""
+        counters = self.block.counters
+        start_ns = int(counters["start_realtime_ns"][0])
+        if start_ns == 0:
+            return time.time_ns()
+        return start_ns + self._clock_ns() - int(counters["start_monotonic_ns"][0])
+
+    def _text(self, name: str, read: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        version = int(self.block.counters[name][0])
+        known = self._texts.get(name, (-1, {}))
+        if version == known[0]:
+            return known[1]
+        try:
+            value: dict[str, Any] = plain(read())
+        except (SharedBlockError, ValueError):  # its writer ended in the middle of it
+            return known[1]
+        self._texts[name] = version, value
+        return value
+
+    # -- commands
+
+    async def command(self, do: str, wait_s: float, **fields: Any) -> Reply:
+        """Send a command, return the loop's reply to it.
+
+        Raises LoopGoneError, LoopBusyError (also after `wait_s` without a reply) and
+        CommandTooLongError.
+        """
+        self._require_loop()
+        future = self._alike.get(do)
+        if future is None:
+            future = self._send(do, fields)
+        try:
+            return await asyncio.wait_for(asyncio.shield(future), wait_s)
+        except TimeoutError:
+            raise LoopBusyError(
+                f"the loop has not answered {do!r} within {wait_s:g} s; look at the status"
+            ) from None
+
+    def _require_loop(self) -> None:
+        if self.dead:
+            raise LoopGoneError(self.ended_how)
+        if int(self.block.counters["loop_pid"][0]) == 0:
+            raise LoopGoneError("the loop has not started yet")
+        if self.silent_s() > _SILENT_S:
+            raise LoopGoneError(f"the loop has not turned for {self.silent_s():.1f} s")
+
+    def _send(self, do: str, fields: dict[str, Any]) -> asyncio.Future[Reply]:
+        if len(self._pending) >= _MOST_PENDING:
+            raise LoopBusyError(f"{_MOST_PENDING} commands wait for the loop already")
+        try:
+            number = self.block.post_command({"do": do, **fields})
+        except SharedBlockError as error:
+            if "bytes" in str(error):
+                raise CommandTooLongError(f"a command has {MESSAGE_BYTES} bytes at most") from None
+            raise LoopBusyError(str(error)) from None
+        future: asyncio.Future[Reply] = asyncio.get_running_loop().create_future()
+        self._pending[number] = future
+        if do in _ALIKE:
+            self._alike[do] = future
+        future.add_done_callback(lambda done: self._forget(number, do, done))
+        self._wake.set()
+        return future
+
+    def _forget(self, number: int, do: str, done: asyncio.Future[Reply]) -> None:
+        self._pending.pop(number, None)
+        if self._alike.get(do) is done:
+            del self._alike[do]
+        if not done.cancelled():
+            done.exception()  # seen, also where nobody waits any more
+
+    # -- the work in the background
+
+    async def watch(self) -> None:
+        """Take replies and note what changes, until cancelled."""
+        looked_s = 0.0
+        while True:
+            self._take_replies()
+            now_s = time.monotonic()
+            if now_s - looked_s >= _POLL_IDLE_S:
+                looked_s = now_s
+                self._look()
+            self._wake.clear()
+            pause_s = _POLL_BUSY_S if self._pending else _POLL_IDLE_S
+            try:
+                await asyncio.wait_for(self._wake.wait(), pause_s)
+            except TimeoutError:
+                continue
+
+    def _take_replies(self) -> None:
+        while (reply := self.block.take_reply()) is not None:
+            future = self._pending.get(int(reply.get("to", 0)))
+            if future is not None and not future.done():
+                text, state = str(reply.get("text", "")), str(reply.get("state", ""))
+                future.set_result(Reply(bool(reply.get("ok")), text, state))
+
+    def _look(self) -> None:
+        dead = self.dead
+        if dead:
+            for future in list(self._pending.values()):
+                if not future.done():
+                    future.set_exception(LoopGoneError(self.ended_how))
+        status = self.status()
+        state = self.state()
+        reason = self.ended_how or str(status.get("reason", ""))
+        before = self._told
+        self._told = state, reason
+        if state != before[0]:
+            self.events.add("state", state, program=status.get("program"))
+        if reason and reason != before[1]:
+            self.events.add("reason", reason, limit=status.get("reason_limit"))
+
+
+class _Life:
+    """Whether the loop's process runs, by a descriptor that names it and no successor."""
+
+    def __init__(self) -> None:
+        self._pid = self._fd = 0
+        self._ended = False
+
+    def ended(self, pid: int) -> bool:
+        if self._ended or pid == 0:
+            return self._ended
+        if pid != self._pid:
+            try:
+                self._fd = os.pidfd_open(pid)
+            except ProcessLookupError:
+                self._ended = True
+                return True
+            self._pid = pid
+        self._ended = bool(select.select([self._fd], [], [], 0)[0])
+        return self._ended

@@ -1,0 +1,155 @@
+"""Listening: sockets, and connections that nobody can hold open for nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import socket
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import uvicorn
+from starlette.types import ASGIApp
+from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.service.auth import MOST_BODY_BYTES
+
+_MOST_CONNECTIONS: Final = 64
+_MOST_OF_ONE: Final = 24
+_REQUEST_S, _ANSWER_S, _LOOK_S = 10.0, 90.0, 2.0
+_LEAVE_S: Final = 5.0
+_MOST_UNSENT_BYTES: Final = 1 << 20
+
+
+class ListenError(ControlError):
+    """An address cannot be listened at; the message says which and why."""
+
+
+class _Http(H11Protocol):
+    """Ends a connection that neither asks anything nor takes its answer, and one too many."""
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        peers = [getattr(one, "client", None) for one in self.connections]
+        of_this = sum(peer[0] == self.client[0] for peer in peers if peer and self.client)
+        if len(peers) > _MOST_CONNECTIONS or of_this > _MOST_OF_ONE:
+            transport.abort()
+            return
+        self._watch(None, 0.0)
+
+    def _watch(self, before: object, waited_s: float) -> None:
+        if self not in self.connections:  # lost, or a WebSocket's by now
+            return
+        answering = self.cycle is not None and not self.cycle.response_complete
+        phase = (self.cycle, answering)
+        waited_s = waited_s + _LOOK_S if phase == before else 0.0
+        if waited_s > (_ANSWER_S if answering else _REQUEST_S):
+            self.transport.abort()
+            return
+        self.loop.call_later(_LOOK_S, self._watch, phase, waited_s)
+
+
+class _WebSocket(WebSocketsSansIOProtocol):
+    """Lets its handler cut the connection, and does so itself where nothing is read."""
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        # answers to pings are queued without limit otherwise
+        if self.transport.get_write_buffer_size() > _MOST_UNSENT_BYTES:
+            self.transport.abort()
+
+    async def run_asgi(self) -> None:
+        self.scope["state"]["abort"] = self.transport.abort
+        try:
+            await super().run_asgi()
+        finally:
+            self.loop.call_later(_LEAVE_S, self.transport.abort)
+
+
+class Server(uvicorn.Server):
+    """Serves an application on one socket, in the caller's asyncio loop, under its signals."""
+
+    def __init__(self, app: ASGIApp, listener: socket.socket) -> None:
+        super().__init__(
+            uvicorn.Config(
+                app,
+                http=_Http,
+                ws=_WebSocket,
+                lifespan="off",
+                log_config=None,
+                access_log=False,
+                server_header=False,
+                proxy_headers=False,
+                ws_max_size=MOST_BODY_BYTES,
+                ws_per_message_deflate=False,
+                ws_ping_interval=5.0,
+                ws_ping_timeout=5.0,
+                timeout_keep_alive=10,
+                timeout_graceful_shutdown=2,
+                h11_max_incomplete_event_size=MOST_BODY_BYTES,
+            )
+        )
+        self._listener = listener
+
+    async def run_until_told(self) -> None:
+        """Serve until `should_exit` is set."""
+        await self.serve(sockets=[self._listener])
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave signals to the process."""
+        yield
+
+
+def listen_unix(path: Path) -> socket.socket:
+    """Return a socket at `path` that this user alone may connect to; raises ListenError.
+
+    What a daemon that was killed has left there is replaced, a daemon that answers is not.
+    """
+    if path.exists() or path.is_symlink():
+        if not stat.S_ISSOCK(path.lstat().st_mode):
+            raise ListenError(f"socket {path}: is something else than a socket")
+        if _answers(path):
+            raise ListenError(f"socket {path}: another daemon listens there")
+        path.unlink()
+    listener = socket.socket(socket.AF_UNIX)
+    mask = os.umask(0o177)
+    try:
+        listener.bind(str(path))
+        listener.listen()  # whoever sees the socket can connect
+    except OSError as error:
+        listener.close()
+        raise ListenError(f"socket {path}: {error.strerror or error}") from None
+    finally:
+        os.umask(mask)
+    return listener
+
+
+def listen_tcp(host: str, port: int) -> socket.socket:
+    """Return a socket at one address of `host`; raises ListenError."""
+    try:
+        family, kind, proto, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, proto)
+    except OSError as error:
+        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind(address)
+    except OSError as error:
+        listener.close()
+        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
+    return listener
+
+
+def _answers(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX) as probe:
+        probe.settimeout(1.0)
+        failed = probe.connect_ex(str(path))
+    return failed not in (errno.ECONNREFUSED, errno.ENOENT)

@@ -1,0 +1,206 @@
+"""What the control interface stands on: the loop's link, the right to move, and the parts."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from typing import Any, Final
+
+from cdpr_rt.runtime.cycle_row import SCALARS
+from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.service.lease import Lease, LeaseError
+from cdpr_rt.service.link import LoopLink, Reply
+from cdpr_rt.service.part import Part
+from cdpr_rt.service.rows import newest_row, plain, row_table
+
+_TURN_S = 0.2
+_AXIS_FIELDS: Final = (
+    "setpoint_rad",
+    "position_rad",
+    "velocity_rad_s",
+    "torque_actual_Nm",
+    "torque_sent_Nm",
+    "tension_N",
+    "tension_measured",
+    "cable_length_m",
+    "statusword",
+    "valid",
+    "alive",
+    "index_known",
+)
+_DESCRIBED: Final = ("name", "bus", "node_id", "winch")
+WAIT_S: Final = {
+    "configure": 60.0,
+    "check": 30.0,
+    "enable": 30.0,
+    "disable": 30.0,
+    "acknowledge": 60.0,
+    "shutdown": 30.0,
+}
+"""How long a reply may take; all others come within a few cycles."""
+_WAIT_S = 3.0
+
+
+class Service:
+    """One daemon's service: made once, used by all routes."""
+
+    def __init__(self, block: SharedBlock, robot: str) -> None:
+        self.robot = robot
+        self.block = block
+        self.link = LoopLink(block)
+        self.lease = Lease(self._publish)
+        self.events = self.link.events
+        self.parts: list[Part] = []
+        self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
+        """Figures of the service itself, shown as the part `service`."""
+        self.background: list[Callable[[], Coroutine[Any, Any, None]]] = []
+        """What else runs while the service does, until cancelled."""
+        self.http: tuple[str, int] | None = None
+        """Where it listens on TCP, None where it does not."""
+        self._held_by = ""
+
+    def count_refusal(self) -> None:
+        """Count a request that was refused at the door."""
+        self.counts["refused"] += 1
+
+    def _publish(self, until_ns: int) -> None:
+        self.block.counters["lease_ns"][0] = until_ns
+
+    def start_parts(self, parts: Sequence[Part]) -> None:
+        """Start each; one that cannot start is left out, and an event says why."""
+        for part in parts:
+            try:
+                part.start()
+            except Exception as error:
+                self.events.add(part.name, f"{part.name}: cannot start: {error}")
+            else:
+                self.parts.append(part)
+
+    def stop_parts(self) -> None:
+        """End all that have started, whatever becomes of one."""
+        for part in reversed(self.parts):
+            try:
+                part.stop()
+            except Exception as error:
+                self.events.add(part.name, f"{part.name}: did not end well: {error}")
+
+    # -- commands
+
+    async def ask(
+        self,
+        do: str,
+        client: str,
+        token: str | None,
+        gone: Callable[[], Awaitable[bool]],
+        **fields: Any,
+    ) -> Reply:
+        """Send a command that needs the right to move; keep that right alive while it is done.
+
+        It lapses when the client has `gone` meanwhile. Raises LeaseError and what
+        `LoopLink.command` raises.
+        """
+        self.lease.renew(token)
+        work = asyncio.ensure_future(self.tell(do, client, **fields))
+        while True:
+            done, _ = await asyncio.wait({work}, timeout=_TURN_S)
+            if done:
+                break
+            if not await gone():
+                try:
+                    self.lease.renew(token)
+                except LeaseError:  # given back meanwhile, by the same client
+                    continue
+        return work.result()
+
+    async def tell(self, do: str, client: str, **fields: Any) -> Reply:
+        """Send a command that anybody may give; raises what `LoopLink.command` raises."""
+        reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
+        if do != "set" or not reply.ok:
+            result = "" if reply.ok else f": refused: {reply.text}"
+            self.events.add("command", f"{do} by {client}{result}")
+        return reply
+
+    # -- what there is to see
+
+    def status(self) -> dict[str, Any]:
+        """Return everything at a glance, as `models.Status`."""
+        link = self.link
+        told = link.status()
+        row = newest_row(self.block)
+        counters = self.block.counters
+        return {
+            "program": None,
+            "reason_limit": None,
+            "read_only": False,
+            "lockstep": False,
+            "notices": [],
+            **told,
+            "robot": self.robot,
+            "state": link.state(),
+            "reason": link.ended_how or str(told.get("reason", "")),
+            "loop": {
+                "pid": int(counters["loop_pid"][0]),
+                "alive": not link.dead and int(counters["loop_pid"][0]) != 0,
+                "silent_s": link.silent_s(),
+            },
+            "control": self.control(),
+            "cycle": None if row is None else row_table(row, SCALARS),
+            "axes": self._axes(row),
+            "parts": self.part_figures(),
+        }
+
+    def control(self) -> dict[str, Any]:
+        """Return who holds the right to move."""
+        holder = self.lease.holder()
+        if holder is None:
+            return {"held": False, "client": None, "left_s": 0.0}
+        return {"held": True, "client": holder.client, "left_s": holder.left_s}
+
+    def part_figures(self) -> dict[str, dict[str, Any]]:
+        """Return what each part tells of itself, and the service's own figures."""
+        where = None if self.http is None else f"{self.http[0]}:{self.http[1]}"
+        figures: dict[str, dict[str, Any]] = {"service": {"http": where, **self.counts}}
+        for part in self.parts:
+            try:
+                figures[part.name] = plain(part.told())
+            except Exception as error:
+                figures[part.name] = {"error": str(error)}
+        return figures
+
+    def _axes(self, row: Any) -> list[dict[str, Any]]:
+        described = self.link.description().get("axes") or [{} for _ in range(self.block.n)]
+        axes = [{key: axis.get(key) for key in _DESCRIBED} for axis in described]
+        if row is None:
+            return axes
+        table = row_table(row, _AXIS_FIELDS)
+        return [
+            {**axis, **{name: table[name][number] for name in _AXIS_FIELDS}}
+            for number, axis in enumerate(axes[: self.block.n])
+        ]
+
+    # -- in the background
+
+    async def watch(self) -> None:
+        """Follow the loop and who holds the right to move, until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            for work in (self.link.watch, self._watch_holder, *self.background):
+                tasks.create_task(work())
+
+    async def _watch_holder(self) -> None:
+        while True:
+            self._note_holder()
+            self.block.counters["service_alive_ns"][0] = time.monotonic_ns()
+            await asyncio.sleep(_TURN_S / 4)
+
+    def _note_holder(self) -> None:
+        holder = self.lease.holder()
+        client = holder.client if holder else ""
+        if client != self._held_by:
+            gone, self._held_by = self._held_by, client
+            text = (
+                f"{client} may move"
+                if client
+                else f"{gone} does not hold the right to move any more"
+            )
+            self.events.add("control", text)

@@ -1,0 +1,124 @@
+"""The daemon's second process: control interface, recorder, live view, set-point stream."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import sys
+from functools import partial
+from typing import Any
+
+from starlette.types import ASGIApp
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.service.app import create_app
+from cdpr_rt.service.auth import Door, Gate
+from cdpr_rt.service.foxglove_view import LiveView
+from cdpr_rt.service.part import Part
+from cdpr_rt.service.recording import Recorder
+from cdpr_rt.service.server import ListenError, Server, listen_tcp, listen_unix
+from cdpr_rt.service.service import Service
+from cdpr_rt.service.setpoint_stream import SetpointStream
+from tools.daemon.child import end_with
+from tools.daemon.settings import RunSettings, read_key
+from tools.errors import DONE, FAILED, CommandError
+
+_LOG = logging.getLogger("cdpr.service")
+
+
+def main() -> int:
+    """Serve until SIGTERM; return the exit status."""
+    logging.basicConfig(level=logging.ERROR, format="service: %(message)s", stream=sys.stderr)
+    settings = RunSettings.from_argv()
+    block = SharedBlock.attach(settings.block_fd)
+    block.counters["service_pid"] = os.getpid()
+    try:
+        asyncio.run(_serve(settings, Service(block, settings.name)))
+    except (ControlError, CommandError) as error:
+        print(f"service: {error}", file=sys.stderr)
+        return FAILED
+    return DONE
+
+
+def build_parts(settings: RunSettings, service: Service) -> list[Part]:
+    """Return what was asked for beside the control interface, not started yet."""
+    parts: list[Part] = []
+    block, lease = service.block, service.lease
+    if settings.record is not None:
+        recorder = Recorder(block, settings.record, settings.name)
+        service.events.listeners.append(partial(_note, recorder))
+        parts.append(recorder)
+    if settings.live is not None:
+        parts.append(LiveView(block, settings.name, settings.live))
+    if settings.stream is not None:
+        host, port = settings.stream.host, settings.stream.port
+        key = None if settings.stream.is_loopback else _key(settings)
+        parts.append(SetpointStream(block, lease, host, port, key))
+    return parts
+
+
+def _note(recorder: Recorder, text: str, kind: str, detail: dict[str, Any]) -> None:
+    """Have an event recorded, beside the states and reasons that the recorder finds by itself."""
+    if kind not in ("state", "reason"):
+        recorder.remark(text, kind=kind, **detail)
+
+
+async def _serve(settings: RunSettings, service: Service) -> None:
+    app = create_app(service)
+    servers = _listen(settings, app, service)
+    service.start_parts(build_parts(settings, service))
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, ended.set)
+    end_with(settings.launcher_pid)
+    watching = asyncio.create_task(service.watch())
+    serving = [asyncio.create_task(server.run_until_told()) for server in servers]
+    waiting = asyncio.create_task(ended.wait())
+    try:
+        done, _ = await asyncio.wait(
+            {watching, waiting, *serving}, return_when=asyncio.FIRST_COMPLETED
+        )
+        for task in done - {waiting}:
+            task.result()  # raises what ended it
+    finally:
+        for server in servers:
+            server.should_exit = True
+        await asyncio.gather(*serving, return_exceptions=True)
+        watching.cancel()
+        waiting.cancel()
+        service.stop_parts()
+        settings.socket.unlink(missing_ok=True)
+
+
+def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Server]:
+    """Return the servers; the Unix socket must be had, an address on TCP need not.
+
+    A robot in motion is not let go because somebody else has taken its port.
+    """
+    refused = service.count_refusal
+    servers = [Server(Gate(app, Door(local=True), refused), listen_unix(settings.socket))]
+    address = settings.http
+    if address is None:
+        return servers
+    door = Door.named(_key(settings), address.host)
+    try:
+        listener = listen_tcp(address.host, address.port)
+    except ListenError as error:
+        service.events.add("http", f"--http {error}")
+        _LOG.error("--http %s", error)
+    else:
+        service.http = listener.getsockname()[:2]
+        servers.append(Server(Gate(app, door, refused), listener))
+    return servers
+
+
+def _key(settings: RunSettings) -> bytes | None:
+    return None if settings.key_file is None else read_key(settings.key_file)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
