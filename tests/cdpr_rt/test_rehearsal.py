@@ -17,6 +17,7 @@ from cdpr_rt.rehearsal import rehearse
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.states import Reaction
 from cdpr_rt.supervisor import Limits, Supervisor
+from cdpr_rt.tension import TensionFeedback
 from cdpr_rt.trajectory import Leg
 
 CYCLE = (
@@ -53,12 +54,14 @@ def test_the_cycle_compiles_nothing_after_it(n: int) -> None:
     known = AxisCompensation(np.zeros((2, 720)), look_ahead_s=1e-3)
     limit = np.full(n, 0.75)
     pid = Pid([PidGains(1.0, 1.0, 0.1, 1e-3)] * n, limit, 1e-3, Compensation([known] * n, 1e-3))
+    read = TensionFeedback(n)
+    read.valid[:] = True
     supervisor, estimator = Supervisor(Limits(3.0, 100.0, 6.0), n, 1e-3), Estimator(n, 1e-3)
     for controller in (Proportional(np.full(n, 2.0), limit), pid):
         controller.reset()
         Leg(rows[0], np.full(n, 0.05), 3.0, 0.5).fill(0.7, setpoint)
         controller.update(feedback, setpoint, torque)
-        estimator.update(feedback)
+        estimator.update(feedback, read)
         assert supervisor.check(feedback, estimator.estimate, setpoint, torque) == Reaction.NONE
     assert Recorder(n).pending() == 0
     assert compiled() == before

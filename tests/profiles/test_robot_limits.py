@@ -1,0 +1,211 @@
+"""A robot's limits, reactions, names and heartbeat: what its file may say and what follows."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdpr_rt.limits import DEFAULT_REACTIONS, Limit
+from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
+from cdpr_rt.runtime.states import Reaction
+from drivers.bus.budget import machine_budget
+from profiles import ProfileError, load_robot
+from profiles.reader import validated
+from profiles.robot_limits import Reactions, RobotLimits
+
+FILE = """
+name = "Two"
+{top}
+[[buses]]
+name = "can0"
+[[axes]]
+winch = "winch-mpp0923d"
+bus = "can0"
+node_id = 1
+{first}
+[[axes]]
+winch = "winch-mpp0923d"
+bus = "can0"
+node_id = 2
+{second}
+[limits]
+{limits}
+[limits.reactions]
+{reactions}
+"""
+
+
+def robot_file(folder: Path, **parts: str) -> Path:
+    path = folder / "two.toml"
+    keys = ("top", "first", "second", "limits", "reactions")
+    path.write_text(FILE.format(**{key: parts.get(key, "") for key in keys}))
+    return path
+
+
+def test_a_robot_that_says_nothing_has_safe_limits(tmp_path: Path) -> None:
+    robot = load_robot(robot_file(tmp_path))
+    limits, motor = limits_of(robot), robot.axes[0].winch.motor
+    np.testing.assert_allclose(limits.torque_Nm, [motor.rated_torque_Nm] * 2)
+    np.testing.assert_allclose(limits.torque_rate_Nm_s, [motor.rated_torque_Nm / 5e-3] * 2)
+    np.testing.assert_allclose(limits.speed_rad_s, [0.2 * motor.rated_speed_rad_s] * 2)
+    np.testing.assert_allclose(limits.following_error_rad, [1.0] * 2)
+    breaking_N = robot.axes[0].winch.cable.breaking_force_N
+    np.testing.assert_allclose(limits.tension_max_N, [breaking_N / 5.0] * 2)
+    for unknown in (limits.cable_length_max_m, -np.asarray(limits.cable_length_min_m)):
+        np.testing.assert_array_equal(unknown, [math.inf] * 2)
+    np.testing.assert_array_equal(limits.tension_min_N, [-math.inf] * 2)
+    np.testing.assert_array_equal(limits.slack_N, [-math.inf] * 2)
+    assert limits.reactions == DEFAULT_REACTIONS
+
+
+def test_figures_are_one_for_all_or_one_for_each(tmp_path: Path) -> None:
+    text = "torque_Nm = [1.0, 2]\nspeed_rad_s = 30\ntension_min_N = [10.0, 20.0]"
+    robot = load_robot(robot_file(tmp_path, limits=text, reactions='tension_low = "quick stop"'))
+    limits = limits_of(robot)
+    np.testing.assert_array_equal(limits.torque_Nm, [1.0, 2.0])
+    np.testing.assert_array_equal(limits.speed_rad_s, [30.0, 30.0])
+    np.testing.assert_array_equal(limits.slack_N, [2.5, 5.0])
+    assert limits.reactions[Limit.TENSION_LOW] is Reaction.QUICK_STOP
+    # an optional axis that did not boot is left out
+    second = limits_of(robot, [1])
+    np.testing.assert_array_equal(second.torque_Nm, [2.0])
+    np.testing.assert_array_equal(second.tension_min_N, [20.0])
+    told = described(limits, 2)
+    assert (told["torque_Nm"], told["cable_length_max_m"]) == ([1.0, 2.0], [None, None])
+    assert (told["reactions"]["tension_low"], told["reactions"]["torque"]) == (
+        "quick stop",
+        "clamp",
+    )
+
+
+@pytest.mark.parametrize(
+    ("parts", "key", "problem"),
+    [
+        ({"limits": "torque_Nm = [1.0, 2.0, 3.0]"}, "limits.torque_Nm", "allowed: 1 or 2"),
+        ({"limits": "torque_Nm = 12.0"}, "limits.torque_Nm[0]", "the motor's peak torque (11.55)"),
+        ({"limits": "torque_Nm = 0.0"}, "limits.torque_Nm[0]", "greater than 0"),
+        ({"limits": "torque_Nm = true"}, "limits.torque_Nm[0]", "a valid number"),
+        ({"limits": 'torque_Nm = "much"'}, "limits.torque_Nm[0]", "a valid number"),
+        ({"limits": "torque_Nm = inf"}, "limits.torque_Nm[0]", "a finite number"),
+        ({"limits": "torque = 1.0"}, "limits.torque", "did you mean 'torque_Nm'?"),
+        ({"limits": "tension_max_N = 1e6"}, "limits.tension_max_N[0]", "the breaking force"),
+        (
+            {"limits": "tension_min_N = 20.0\ntension_max_N = [30.0, 10.0]"},
+            "limits",
+            "tension_min_N[1]: value 20; allowed: below tension_max_N (10)",
+        ),
+        ({"limits": "slack_N = 2.0"}, "limits", "slack_N: allowed: along with tension_min_N"),
+        ({"limits": "missed_cycles = -1"}, "limits.missed_cycles", "greater than or equal to 0"),
+        (
+            {"reactions": 'speed = "clamp"'},
+            "limits.reactions.speed",
+            "'quick stop' or 'torque off'",
+        ),
+        ({"reactions": 'safety_alarm = "hold"'}, "limits.reactions.safety_alarm", "'torque off'"),
+        ({"reactions": 'sped = "hold"'}, "limits.reactions.sped", "did you mean 'speed'?"),
+        ({"first": 'name = "axis 1"'}, "axes[1].name", "each once, axes[0] has it"),
+        ({"first": 'name = "a"', "second": 'name = "a"'}, "axes[1].name", "axes[0] has it"),
+        ({"first": "cable_sign = 0"}, "axes[0].cable_sign", "-1 or 1"),
+        ({"top": "master_heartbeat_s = 0.001"}, "master_heartbeat_s", "equal to 0.01"),
+        (
+            {"top": "master_heartbeat_s = 0.01\nsync_period_s = 0.01"},
+            "master_heartbeat_s",
+            "at least two cycles (0.02)",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    tmp_path: Path, parts: dict[str, str], key: str, problem: str
+) -> None:
+    with pytest.raises(ProfileError) as caught:
+        load_robot(robot_file(tmp_path, **parts))
+    assert caught.value.key == key
+    assert problem in str(caught.value)
+
+
+LABELS = [reaction.label for reaction in Reaction if reaction]
+
+
+@pytest.mark.parametrize("name", list(Reactions.model_fields))
+def test_a_reaction_may_only_be_more_severe(name: str) -> None:
+    least = DEFAULT_REACTIONS[Limit[name.upper()]]
+    for label, reaction in zip(LABELS, list(Reaction)[1:], strict=True):
+        table = {"reactions": {name: label}}
+        if reaction >= least:
+            told = validated(Path("x.toml"), table, RobotLimits)
+            assert getattr(told.reactions, name) == label
+        else:
+            with pytest.raises(ProfileError, match="allowed: "):
+                validated(Path("x.toml"), table, RobotLimits)
+
+
+ANYTHING = st.one_of(
+    st.floats(),
+    st.integers(),
+    st.booleans(),
+    st.text(max_size=8),
+    st.lists(st.floats(), max_size=3),
+)
+KEYS = st.sampled_from([*RobotLimits.model_fields, "torque", ""])
+
+
+@settings(max_examples=300, derandomize=True, deadline=None)
+@given(st.dictionaries(KEYS, ANYTHING, max_size=4))
+def test_whatever_a_file_says_is_understood_or_refused(table: dict[str, object]) -> None:
+    arrays = {k: tuple(v) if isinstance(v, list) else v for k, v in table.items()}
+    try:
+        told = validated(Path("x.toml"), arrays, RobotLimits)
+    except ProfileError as error:
+        assert "x.toml" in str(error)
+        return
+    figures = [getattr(told, key) for key in RobotLimits.model_fields if key != "reactions"]
+    for figure in figures:
+        for value in figure if isinstance(figure, tuple) else (figure,):
+            assert value is None or (math.isfinite(value) and value >= 0)
+
+
+# -- names, directions, heartbeat
+
+
+def test_axes_have_names_and_directions(tmp_path: Path) -> None:
+    robot = load_robot(robot_file(tmp_path, first='name = "top left"', second="cable_sign = -1"))
+    assert [axis.name for axis in robot.axes] == ["top left", "axis 1"]
+    assert [axis.winch.cable_sign for axis in robot.axes] == [1, -1]
+    arrays = winches_of(robot.axes)
+    assert arrays.cable_m_per_rad[0] == -arrays.cable_m_per_rad[1] == pytest.approx(0.026)
+    assert (arrays.gain_m > 0.0).all()
+
+
+def test_drives_miss_their_master_in_fewer_than_two_heartbeats(tmp_path: Path) -> None:
+    robot = load_robot(robot_file(tmp_path, top="master_heartbeat_s = 0.04"))
+    for axis in robot.axes:
+        assert 1.5 * 0.04 < axis.winch.drive.heartbeat_consumer_s < 2 * 0.04
+    (often,) = machine_budget(robot)
+    (usual,) = machine_budget(load_robot(robot_file(tmp_path)))
+    more_bits_s = (often.heartbeat_share - usual.heartbeat_share) * 1e6
+    assert more_bits_s == pytest.approx(65 / 0.04 - 65 / 0.1)
+
+
+def test_a_winch_is_a_robot_of_one_axis() -> None:
+    robot = load_robot("winch-mpp0923d")
+    assert robot.is_winch
+    assert [axis.name for axis in robot.axes] == ["axis 0"]
+    assert robot.axes[0].winch.drive.heartbeat_consumer_s < 2 * robot.master_heartbeat_s
+    assert limits_of(robot).torque_Nm == pytest.approx([3.0])
+    assert load_robot(robot.reference) == robot
+    assert load_robot(robot.path) == robot
+    with pytest.raises(ProfileError, match=r"did you mean 'winch-mpp0923d'\?"):
+        load_robot("winch-mpp0923")
+
+
+def test_eight_drives_on_one_bus_take_it_to_95_percent() -> None:
+    robot = load_robot("one-bus-8")
+    (budget,) = machine_budget(robot)
+    assert budget.fits
+    assert 0.95 <= 1.0 / robot.sync_period_s / budget.highest_rate_Hz < 0.96
+    assert len(load_robot("bench-2").axes) == 2
