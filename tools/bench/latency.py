@@ -78,6 +78,7 @@ def draw(figures: dict[str, Any], late: Lateness, path: Path) -> None:
         ax.axvline(1e6 / figures["rate_Hz"], color="#555555", lw=0.9, ls="--")
         ax.set_title(text)
         ax.set_xlabel("wake-up behind its deadline, µs")
+    axes[0].set_ylim(0.7, 4.0 * figures["wakeups"])  # shared; room above for words
     axes[0].set_ylabel(f"cycles of {figures['wakeups']} per bar")
     axes[0].annotate(
         "one period",
@@ -109,7 +110,6 @@ def _histogram(ax: Axes, times: Times, bins: Any, label: str, colour: str) -> No
     ax.hist(values, bins=bins, histtype="step", color=colour, label=label)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.set_ylim(bottom=0.7)
 
 
 def _figures(times: Times) -> dict[str, float]:
