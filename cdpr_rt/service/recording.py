@@ -23,6 +23,7 @@ from cdpr_rt.service import recording_schema as topics
 from cdpr_rt.service.recording_events import Events
 from cdpr_rt.service.recording_file import RecordingError, RecordingFile
 from cdpr_rt.service.recording_json import RowTexts
+from cdpr_rt.service.rows import plain
 
 MOST_BYTES: Final = 1 << 30
 RESERVE_BYTES: Final = 64 << 20
@@ -196,7 +197,7 @@ class Recorder:
             return  # its writer ended in the middle of it; its end is told elsewhere
         self._seen[name] = counter
         now_ns = time.monotonic_ns()
-        channel.log(json.dumps(value).encode(), log_time=self._wall(now_ns))
+        channel.log(_text(value), log_time=self._wall(now_ns))
         if name == "description":
             self._events.describe(value)
         elif event := self._events.of_status(value):
@@ -212,7 +213,12 @@ class Recorder:
             self._log_event(event, stamp_ns)
 
     def _log_event(self, event: dict[str, Any], stamp_ns: int) -> None:
-        self._event.log(json.dumps(event).encode(), log_time=self._wall(stamp_ns))
+        self._event.log(_text(event), log_time=self._wall(stamp_ns))
+
+
+def _text(value: dict[str, Any]) -> bytes:
+    """Return strict JSON, whatever the value holds."""
+    return json.dumps(plain(value), default=str).encode()
 
 
 class WallClock:

@@ -220,7 +220,7 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
     block.write_status({"state": "fault", "reason": "right: 31 N below 40 N"})
     put(writer, rows[65:])
     _wait_until(lambda: recorder.told()["rows"] == 100)
-    recorder.remark("stopped by somebody", client="panel")
+    recorder.remark("stopped by somebody", client="panel", at=float("nan"), by=Path("x"))
     recorder.stop()
     events = [value for _, value in stock_messages(Path(recorder.told()["file"]), "/events")]
     assert [event["text"] for event in events] == [
@@ -233,4 +233,4 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
         "stopped by somebody",
     ]
     assert [event.get("cycle") for event in events] == [0, 10, 20, 60, 70, None, None]
-    assert events[-1]["client"] == "panel"
+    assert events[-1]["client"] == "panel" and events[-1]["at"] is None
