@@ -6,7 +6,6 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,21 +17,19 @@ from cdpr_rt.executive import Executive, Watch
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.rehearsal import rehearse
 from cdpr_rt.supervisor import Limits, Supervisor
-from drivers.axis_buses import AxisBuses, BusAxes
-from drivers.axis_layout import AxisConfig
-from drivers.boot import BootReport, BootReports, BootSettings, boot_all
+from drivers.axis_buses import AxisBuses
+from drivers.boot import BootReport
 from drivers.bus import BusUrl, query_status
-from drivers.cia402 import State, fault_text
-from drivers.data_sheet import load_dictionary
-from drivers.errors import BootError, BusError, DriveFaultError, DriverError, SdoError
+from drivers.cia402 import State
+from drivers.errors import DriveFaultError
 from drivers.network import CanNetwork
 from profiles import Robot, RobotAxis
 from tools.bus_fit import require_fit
-from tools.errors import BadInputError, WorkFailedError
+from tools.errors import BadInputError
 from tools.output import Output
+from tools.robot_boot import boot_notes, boot_robot, device_of, faults_text, open_networks
 from tools.robot_buses import asks_for_own_simulator, robot_urls
 from tools.safety import SessionSafety, open_safety
-from tools.session import note_lacking_guards
 from tools.signals import stop_on_signals
 from tools.simulator import OwnSimulator
 
@@ -181,13 +178,14 @@ def open_robot(
         reference = safety_io or (robot.safety_io if real else None)
         rehearse(len(robot.axes), robot.sync_period_s)  # compiling may keep a poll waiting
         safety = stack.enter_context(open_safety(reference, out, nodes))
-        networks = _open_networks(stack, robot, urls)
+        networks = open_networks(stack, robot, urls)
         begin = time.monotonic()
-        booted, absent = _boot(stack, robot, networks, torque_share)
+        booted, absent = boot_robot(stack, robot, networks, torque_share)
         boot_s = time.monotonic() - begin
-        _note(robot, booted, absent, out)
+        for note in boot_notes(robot, booted, absent):
+            out.note(note)
         axes = [robot.axes[i] for i in booted]
-        device = stack.enter_context(_device(robot, networks, booted, torque_share))
+        device = stack.enter_context(device_of(robot, networks, booted, torque_share))
         if safety is not None:
             stack.callback(safety.drop_brakes)
         for network in networks.values():
@@ -223,19 +221,9 @@ def _explained(session: RobotSession, error: TripError) -> TripError | DriveFaul
     """Return `error` with what the safety I/O and the drives in fault say of it."""
     reason, faulted = str(error), session.device.faulted().any()
     if faulted:
-        reason = f"{reason}: {_faults(session)}"
+        reason = f"{reason}: {faults_text(session.axes, session.device, session.networks)}"
     reason = reason if session.safety is None else session.safety.cause(reason)
     return (DriveFaultError if faulted else TripError)(reason)
-
-
-def _note(
-    robot: Robot, booted: Mapping[int, BootReport], absent: Mapping[int, str], out: Output
-) -> None:
-    for i, report in booted.items():
-        axis = robot.axes[i]
-        note_lacking_guards(f"bus {axis.bus} node {axis.node_id}", report, out)
-    for i, reason in absent.items():
-        out.note(f"axis {i} (optional) is left out: {reason}")
 
 
 def _own_simulator(
@@ -247,103 +235,6 @@ def _own_simulator(
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return simulator.process.pid, name
-
-
-def _open_networks(
-    stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl]
-) -> dict[str, CanNetwork]:
-    networks: dict[str, CanNetwork] = {}
-    for name, url in urls.items():
-        axes = [robot.axes[i] for i in robot.axes_on(name)]
-        nodes = [axis.node_id for axis in axes]
-        try:
-            network = CanNetwork(url, nodes, robot.master_node_id, robot.master_heartbeat_s)
-        except BusError as error:
-            raise BadInputError(f"bus {name}: {error}") from error
-        stack.callback(network.close)
-        for axis in axes:
-            eds = axis.winch.drive.eds
-            network.add_node(axis.node_id, load_dictionary(eds, axis.node_id))
-        networks[name] = network
-    return networks
-
-
-def _boot(
-    stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_share: float
-) -> tuple[dict[int, BootReport], dict[int, str]]:
-    """Boot all buses at the same time; return reports, and why optional axes did not, by axis."""
-    with ThreadPoolExecutor(max_workers=len(networks)) as pool:
-        pending: dict[str, Future[BootReports]] = {}
-        for name, network in networks.items():
-            wanted = {
-                axis.node_id: (axis.winch.drive, _settings(robot, axis, torque_share))
-                for axis in (robot.axes[i] for i in robot.axes_on(name))
-            }
-            pending[name] = pool.submit(boot_all, network, wanted)
-    failures: list[DriverError] = []
-    booted: dict[int, BootReport] = {}
-    absent: dict[int, str] = {}
-    for name, job in pending.items():
-        try:
-            reports = job.result()
-        except (BootError, BusError) as error:
-            failures.append(error)
-            error.add_note(f"on bus {name}")
-            continue
-        for i in robot.axes_on(name):
-            node_id = robot.axes[i].node_id
-            if node_id in reports:
-                booted[i] = reports[node_id]
-                stack.callback(networks[name].release, node_id)
-            else:
-                absent[i] = str(reports.missing[node_id])
-    if failures:
-        raise WorkFailedError("; ".join(_told(error) for error in failures)) from failures[0]
-    if not booted:
-        raise WorkFailedError(f"{robot.name}: no drive booted; {'; '.join(absent.values())}")
-    return dict(sorted(booted.items())), absent
-
-
-def _told(error: DriverError) -> str:
-    *others, where = error.__notes__
-    return f"{where}: " + "; ".join([str(error), *others])
-
-
-def _settings(robot: Robot, axis: RobotAxis, torque_share: float) -> BootSettings:
-    motor = axis.winch.motor
-    return BootSettings(
-        robot.master_node_id,
-        robot.sync_period_s,
-        torque_share * motor.rated_torque_Nm,
-        rated_torque_Nm=motor.rated_torque_Nm,
-        counts_per_turn=axis.winch.encoder_counts_per_turn,
-        mandatory=axis.mandatory,
-    )
-
-
-def _device(
-    robot: Robot,
-    networks: Mapping[str, CanNetwork],
-    booted: Mapping[int, BootReport],
-    torque_share: float,
-) -> AxisBuses:
-    place_of = {i: place for place, i in enumerate(booted)}
-    buses = []
-    for name, network in networks.items():
-        here = [i for i in robot.axes_on(name) if i in booted]
-        if not here:
-            continue
-        configs = [
-            AxisConfig.from_boot(
-                robot.axes[i].winch.drive,
-                booted[i],
-                torque_share * robot.axes[i].winch.motor.rated_torque_Nm,
-            )
-            for i in here
-        ]
-        places = [place_of[i] for i in here]
-        buses.append(BusAxes(name, network, configs, places, robot.master_heartbeat_s))
-    return AxisBuses(buses, robot.sync_period_s, robot.master_node_id)
 
 
 def _executive(
@@ -360,18 +251,3 @@ def _executive(
     )
     supervisor = Supervisor(limits, device.n, device.period_s)
     return Executive(device, supervisor, stop_requested, watches)
-
-
-def _faults(session: RobotSession) -> str:
-    """Return what each drive in fault says of it."""
-    texts = []
-    for axis, faulted in zip(session.axes, session.device.faulted(), strict=True):
-        if not faulted:
-            continue
-        try:
-            code = session.networks[axis.bus].read_int(axis.node_id, 0x603F)
-            why = fault_text(code) if code else "no code given (603Fh = 0)"
-        except (SdoError, BusError):
-            why = "the drive does not say why"
-        texts.append(f"bus {axis.bus} node {axis.node_id}: {why}")
-    return "; ".join(texts)

@@ -257,7 +257,9 @@ def open_winch(
         device = stack.enter_context(_axis(winch, network, report, limit))
         if safety is not None:
             stack.callback(safety.drop_brakes)
-        note_lacking_guards(f"node {winch.node_id}", report, out)
+        lacking = lacking_guards(f"node {winch.node_id}", report)
+        if lacking:
+            out.note(lacking)
         network.start_heartbeat()
         if not device.lockstep:
             for notice in stack.enter_context(paced_realtime()):
@@ -277,13 +279,12 @@ def open_winch(
             raise (DriveFaultError if faulted else TripError)(reason) from error
 
 
-def note_lacking_guards(node: str, report: BootReport, out: Output) -> None:
-    """Say so where a drive lacks what makes it stop by itself."""
+def lacking_guards(node: str, report: BootReport) -> str:
+    """Return what to look at where a drive lacks what makes it stop by itself, else nothing."""
     lacking = [name for name in report.absent if name.startswith(_GUARDS)]
-    if lacking:
-        out.note(
-            f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
-        )
+    if not lacking:
+        return ""
+    return f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
 
 
 def boot_settings(winch: Winch) -> BootSettings:

@@ -1,0 +1,363 @@
+"""The control loop of the daemon: one cycle after the other, whatever state the robot is in."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.cycle import Cycle
+from cdpr_rt.errors import ControlError
+from cdpr_rt.exchange import FloatArray, Setpoint
+from cdpr_rt.limits import Limit
+from cdpr_rt.runtime import procedures
+from cdpr_rt.runtime.cycle_rows import CycleRows
+from cdpr_rt.runtime.estimate import Estimator
+from cdpr_rt.runtime.job import Job
+from cdpr_rt.runtime.lifecycle import Lifecycle
+from cdpr_rt.runtime.machine import Machine
+from cdpr_rt.runtime.orders import Orders
+from cdpr_rt.runtime.programs.base import Program
+from cdpr_rt.runtime.shared_block import SAMPLES, SharedBlock
+from cdpr_rt.runtime.states import LoopState, Reaction
+from cdpr_rt.runtime.status import StatusPage
+from cdpr_rt.supervisor import Supervisor
+
+IDLE, HOLD = "idle", "hold"
+_TURN_S = 0.005
+_AT_ONCE_AFTER_S = 1.0
+"""A second request to end, so long after the first, takes the power at once."""
+_NOBODY_LEADS = "nobody holds the right to move any more"
+
+
+@dataclass(frozen=True)
+class LoopParts:
+    """What the loop runs besides the machine; all made for its n axes."""
+
+    programs: Mapping[str, Program]
+    """By name, in the order of their numbers; `idle` and `hold` are among them."""
+    supervisor: Supervisor
+    estimator: Estimator
+    punctual: Callable[[], Sequence[str]] = tuple
+    """Called once before the first paced cycle; returns what was not allowed, for people."""
+    cores: frozenset[int] = field(default_factory=lambda: frozenset(os.sched_getaffinity(0)))
+    """Where slow work beside the cycle may run."""
+
+
+class ControlLoop:
+    """Runs the machine's axes until it is told to end; shares nothing but `block`.
+
+    Within a cycle nothing is allocated that stays, waited for, or logged. Commands are looked at
+    after the cycle's own command has been sent; what takes several cycles is a generator that is
+    advanced once a cycle, what takes longer runs in a thread beside it.
+    """
+
+    def __init__(self, block: SharedBlock, machine: Machine, parts: LoopParts) -> None:
+        self.block = block
+        self.machine = machine
+        self.parts = parts
+        self.programs = list(parts.programs.values())
+        self.life = Lifecycle()
+        self.program = parts.programs[IDLE]
+        self.program_number = 0
+        self.setpoint = Setpoint(block.n)
+        self.cycling = False
+        """Whether cycles run."""
+        self.driving = False
+        """Whether the drives have power and obey the program."""
+        self.reacting = Reaction.NONE
+        """What ends the present motion, NONE while nothing does."""
+        self.ended = False
+        self.missed = 0
+        self.cycle: Cycle | None = None
+        self.notices: list[str] = []
+        self.lost_bus = ""
+        """Why cycles cannot go on, as a bus has gone away."""
+        self.exchange_s = 0.0
+        """From the last SYNC to its last answer."""
+        self._stop_requests = 0
+        self._stopping_since_s = 0.0
+        self._job: Job[Any] | None = None
+        self._program_error = ""
+        self._punctual = False
+        self._rows = CycleRows(block)
+        self._asked: FloatArray = np.zeros(block.n)
+        self._alive = block.counters["loop_alive_ns"]
+        self._lease = block.counters["lease_ns"]
+        self._samples, self._arrived = block.counters["samples"], block.samples["arrived_ns"]
+        self._last_ns = 0
+        self._orders = Orders(self)
+        self.status = StatusPage(self)
+        self._procedure: Iterator[None] | None = None
+
+    # -- running
+
+    def run(self) -> None:
+        """Boot, check, then turn until told to end; the drives have no power afterwards."""
+        try:
+            self.begin(procedures.start_up(self))
+            while not self.ended:
+                self.turn()
+        finally:
+            self.machine.close()
+            self.status.publish()
+
+    def turn(self) -> None:
+        """Run one cycle, or wait a moment where none run; then what may follow it."""
+        self._alive[0] = time.monotonic_ns()
+        if self.cycling:
+            self._run_cycle()
+        else:
+            time.sleep(_TURN_S)
+        self._watch_lease()
+        self._watch_stop_requests()
+        self._orders.take()
+        self._advance()
+        self.status.look()
+
+    def request_stop(self) -> None:
+        """Have the loop end under control; asked again later, at once. For signal handlers."""
+        self._stop_requests += 1
+
+    def start_cycles(self) -> None:
+        """Run cycles from the next turn on, over the device that the machine has opened."""
+        device = self.machine.device
+        assert device is not None  # it has been opened
+        if not device.lockstep and not self._punctual:
+            self._punctual = True
+            self.notices += self.parts.punctual()
+        if self.cycle is None or self.cycle.device is not device:
+            self.cycle = Cycle(device, self.machine.watches)
+        self.parts.estimator.reset()
+        self._rows.follow(self.cycle, self.setpoint, self.parts.estimator.estimate)
+        self._last_ns = 0
+        self.lost_bus = ""
+        self.cycling = True
+        self.switch(IDLE)
+
+    def stop_cycles(self) -> None:
+        """Run no cycles for now."""
+        self.cycling = self.driving = False
+
+    def _run_cycle(self) -> None:
+        cycle, machine, program = self.cycle, self.machine, self.program
+        assert cycle is not None  # cycles run
+        device = cycle.device
+        feedback, torque = device.feedback, device.command.torque_Nm
+        answered = 0
+        try:
+            answered = cycle.exchange()
+        except machine.failures as error:
+            self.lost_bus = str(error)
+        came_ns = time.monotonic_ns()
+        self.exchange_s = (came_ns - cycle.began_ns) * 1e-9
+        self.missed += device.n - answered
+        estimator = self.parts.estimator
+        estimator.update(feedback, machine.read_tension(), self._elapsed_s(cycle))
+        try:
+            program.update(feedback, self.setpoint, torque)
+        except Exception as error:  # whatever a program does wrong: its drives are stopped
+            torque[:] = np.nan
+            self._program_error = f"program {program.name}: {type(error).__name__}: {error}"
+        self._asked[:] = torque
+        reaction = self._judge(cycle, torque)
+        try:
+            cycle.transmit()
+        except machine.failures as error:
+            self.lost_bus = str(error)
+        sent_ns = time.monotonic_ns()
+        supervisor = self.parts.supervisor
+        limit = int(supervisor.limit) if reaction else 0
+        self._rows.write(
+            program,
+            feedback.cycle,
+            feedback.time_s,
+            cycle.began_ns,
+            cycle.late_s,
+            self.exchange_s,
+            (sent_ns - came_ns) * 1e-9,
+            self.missed,
+            cycle.lateness.late,
+            program.stream_age_s,
+            self.life.state,
+            self.program_number,
+            reaction,
+            limit,
+            supervisor.axis if limit else -1,
+            answered,
+        )
+
+    def _elapsed_s(self, cycle: Cycle) -> float:
+        """Return the time since the last SYNC, 0 where it was one period."""
+        last_ns, self._last_ns = self._last_ns, cycle.began_ns
+        if cycle.device.lockstep or last_ns == 0:
+            return 0.0
+        return (cycle.began_ns - last_ns) * 1e-9
+
+    def stream_age_s(self) -> float:
+        """Return the age of the newest sample of the set-point stream, nan without one."""
+        samples = int(self._samples[0])
+        if samples == 0:
+            return math.nan
+        arrived_ns = int(self._arrived[(samples - 1) % SAMPLES])
+        return (time.monotonic_ns() - arrived_ns) * 1e-9
+
+    # -- judging
+
+    def _judge(self, cycle: Cycle, torque: FloatArray) -> int:
+        """Clamp the torque; react to what was exceeded or has failed; return the reaction."""
+        supervisor = self.parts.supervisor
+        reaction = 0
+        if self.driving:
+            estimate = self.parts.estimator.estimate
+            reaction = supervisor.check(cycle.device.feedback, estimate, self.setpoint, torque)
+        else:
+            torque[:] = 0.0
+        failure = self.lost_bus or cycle.device_alarm()
+        alarm, stop = cycle.watch_alarm(), cycle.stop_reason()
+        if failure or alarm or stop:
+            if not self.driving:
+                supervisor.reset()
+            for limit, reason in (
+                (Limit.DRIVE, failure),
+                (Limit.SAFETY_ALARM, alarm),
+                (Limit.SAFETY_STOP, stop),
+            ):
+                if reason:
+                    reaction = supervisor.report(limit, reason)
+        if reaction > Reaction.CLAMP:
+            self._react(Reaction(reaction), torque)
+        return reaction
+
+    def _react(self, reaction: Reaction, torque: FloatArray) -> None:
+        supervisor, state = self.parts.supervisor, self.life.state
+        if state not in (LoopState.READY, LoopState.ACTIVE) or reaction <= self.reacting:
+            return  # in a fault it is known already; while the bus is checked the check sees it
+        reason, self._program_error = self._program_error or supervisor.reason(), ""
+        if reaction is Reaction.HOLD:
+            if self.program.name != HOLD and self.driving:
+                self.life.blame(reason, supervisor.details())
+                self.switch(HOLD)
+            return
+        self.life.blame(reason, supervisor.details())
+        if state is LoopState.ACTIVE:
+            self.stop(reaction, LoopState.FAULT, torque)
+        else:
+            self.machine.power_off()
+            self.begin(procedures.fall(self))
+        self.status.touch()
+
+    def stop(self, reaction: Reaction, then: LoopState, torque: FloatArray | None = None) -> None:
+        """End the motion as `reaction` says and go to state `then`."""
+        self.reacting = reaction
+        if reaction is Reaction.CONTROLLED_STOP and self.driving:
+            self.program.stop()
+        else:
+            if reaction is Reaction.QUICK_STOP:
+                self.machine.quick_stop()
+            else:
+                self.machine.power_off()
+            self.driving = False
+            if torque is not None:
+                torque[:] = 0.0
+            self.switch(IDLE)
+        self.begin(procedures.come_to_rest(self, then))
+
+    # -- programs
+
+    def drive(self) -> None:
+        """Hold the axes, whose drives have got their power."""
+        self.parts.supervisor.reset()
+        self.driving = True
+        self.switch(HOLD)
+
+    def switch(self, name: str, wanted: Mapping[str, Any] | None = None) -> None:
+        """Go on with another program; raises ProgramError and goes on as before."""
+        program = self.parts.programs[name]
+        if wanted is not None:
+            program.check(wanted)
+        cycle = self.cycle
+        assert cycle is not None  # cycles run
+        device = cycle.device
+        if not self.driving and not self.machine.read_only:
+            device.command.torque_Nm[:] = 0.0
+        program.start(device.feedback, self.setpoint, device.command.torque_Nm)
+        if wanted is not None:
+            program.command(wanted)
+        self.program = program
+        self.program_number = self.programs.index(program)
+        self._rows.control(program, self._asked)
+        self.status.touch()
+
+    @property
+    def has_lease(self) -> bool:
+        """Whether somebody holds the right to move."""
+        return int(self._lease[0]) > time.monotonic_ns()
+
+    def _watch_lease(self) -> None:
+        if not self.driving or self.reacting or not self.program.needs_lease or self.has_lease:
+            return
+        self.life.blame(f"{self.program.name}: {_NOBODY_LEADS}; held")
+        self.switch(HOLD)
+
+    # -- what takes longer than a cycle
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being done that takes longer."""
+        return self._procedure is not None
+
+    def begin(self, procedure: Iterator[None]) -> None:
+        """Advance `procedure` once a turn from now on, in place of any other."""
+        before, self._procedure = self._procedure, procedure
+        if before is not None:
+            self._orders.done(f"given up: {self.life.reason or 'something else came first'}")
+        self.status.touch()
+
+    def _advance(self) -> None:
+        procedure = self._procedure
+        if procedure is None:
+            return
+        try:
+            next(procedure)
+            return
+        except StopIteration:
+            told = ""
+        except ControlError as error:
+            told = str(error)
+        if self._procedure is procedure:
+            self._procedure = None
+            self._orders.done(told)
+        self.status.touch()
+
+    def _watch_stop_requests(self) -> None:
+        if not self._stop_requests or (self._job is not None and not self._job.done):
+            return
+        now_s = time.monotonic()
+        if not self._stopping_since_s:
+            self._stopping_since_s = now_s
+            self._stop_requests = 1
+            self.begin(procedures.shut_down(self))
+        elif not self.busy and not self.ended:
+            self.begin(procedures.shut_down(self))  # something worse had come between
+        elif self._stop_requests > 1:
+            self._stop_requests = 1
+            if self.driving and now_s - self._stopping_since_s > _AT_ONCE_AFTER_S:
+                self.machine.power_off()
+                self.driving = False
+                self.switch(IDLE)
+
+    def job(self, work: Callable[[], Any]) -> Job[Any]:
+        """Start slow work beside the cycle."""
+        self._job = Job(work, set(self.parts.cores))
+        return self._job
+
+    def cycles_in(self, seconds: float) -> int:
+        """Return how many cycles a time lasts, at least one."""
+        cycle = self.cycle
+        return max(1, round(seconds / (cycle.device.period_s if cycle else _TURN_S)))

@@ -1,0 +1,176 @@
+"""Commands that come through the shared memory: looked at one a turn, answered when done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, cast
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime import procedures
+from cdpr_rt.runtime.lifecycle import RefusedError
+from cdpr_rt.runtime.shared_block import SharedBlockError
+from cdpr_rt.runtime.states import LoopState, Transition
+
+if TYPE_CHECKING:
+    from cdpr_rt.runtime.loop import ControlLoop
+
+Order = Mapping[str, Any]
+_MOST_TEXT = 1500
+
+
+class Orders:
+    """Takes commands, refuses what the state forbids, and answers each of them once."""
+
+    def __init__(self, loop: ControlLoop) -> None:
+        self._loop = loop
+        self._counters = loop.block.counters
+        self._pending: list[int] = []
+        """Numbers of the commands that are answered when the present procedure ends."""
+        self._doing: dict[str, Callable[[Order], Iterator[None] | None]] = {
+            "configure": self._configure,
+            "check": self._check,
+            "enable": self._enable,
+            "disable": self._disable,
+            "acknowledge": self._acknowledge,
+            "program": self._program,
+            "set": self._set,
+            "hold": self._hold,
+            "shutdown": self._shutdown,
+        }
+
+    def take(self) -> None:
+        """Look at one command, if there is one."""
+        counters = self._counters
+        if counters["commands"][0] == counters["commands_taken"][0]:
+            return
+        try:
+            order = self._loop.block.take_command()
+        except ValueError:  # no JSON: nobody can be answered
+            counters["commands_taken"][0] += 1
+            return
+        if isinstance(order, dict):
+            self._obey(order)
+
+    def _obey(self, order: Order) -> None:
+        number = order.get("number")
+        number = number if isinstance(number, int) else 0
+        doing = self._doing.get(cast(str, order.get("do")))
+        try:
+            if doing is None:
+                raise RefusedError(f"do: {order.get('do')!r}; allowed: {', '.join(self._doing)}")
+            procedure = doing(order)
+        except ControlError as error:
+            self._reply(number, str(error))
+            return
+        if procedure is None:
+            self._reply(number, "")
+            return
+        self._loop.begin(procedure)
+        self._pending = [number]
+
+    def done(self, told: str) -> None:
+        """Answer what the procedure that has ended was for; `told` is why it failed, if it did."""
+        pending, self._pending = self._pending, []
+        for number in pending:
+            self._reply(number, told)
+
+    def _reply(self, number: int, told: str) -> None:
+        state = self._loop.life.state.label
+        reply = {"to": number, "ok": not told, "text": told[:_MOST_TEXT], "state": state}
+        try:
+            self._loop.block.post_reply(reply)
+        except SharedBlockError:
+            return  # nobody takes them
+
+    # -- what each does: at once, or by a procedure
+
+    def _configure(self, _order: Order) -> Iterator[None]:
+        self._require(Transition.CONFIGURE)
+        return procedures.configure(self._loop)
+
+    def _check(self, _order: Order) -> Iterator[None]:
+        self._require(Transition.CHECK)
+        return procedures.check(self._loop)
+
+    def _acknowledge(self, _order: Order) -> Iterator[None]:
+        self._require(Transition.ACKNOWLEDGE)
+        return procedures.acknowledge(self._loop)
+
+    def _enable(self, order: Order) -> Iterator[None]:
+        self._refuse_read_only("enable")
+        self._require(Transition.ENABLE)
+        name = self._known(order.get("program") or "hold")
+        self._require_lease("enable")
+        return procedures.enable(self._loop, name, self._wanted(order))
+
+    def _disable(self, _order: Order) -> Iterator[None] | None:
+        self._refuse_read_only("disable")
+        loop = self._loop
+        loop.life.require(Transition.DISABLE)
+        if loop.reacting:
+            raise RefusedError("disable: the motion is being ended already")
+        if loop.life.state is LoopState.READY:
+            return None
+        return procedures.disable(loop)
+
+    def _shutdown(self, _order: Order) -> None:
+        self._loop.request_stop()
+
+    def _hold(self, _order: Order) -> None:
+        self._run("hold", {})
+
+    def _program(self, order: Order) -> None:
+        name = self._known(order.get("program"))
+        self._require_lease("program")
+        self._run(name, self._wanted(order))
+
+    def _set(self, order: Order) -> None:
+        self._require_running("set")
+        self._require_lease("set")
+        self._loop.program.command(self._wanted(order))
+        self._loop.status.touch()
+
+    def _run(self, name: str, wanted: Mapping[str, Any]) -> None:
+        self._require_running(name)
+        self._loop.switch(name, wanted)
+
+    # -- what stands against it
+
+    def _require(self, transition: Transition) -> None:
+        self._loop.life.require(transition)
+        if self._loop.busy:
+            raise RefusedError(f"{transition.name.lower()}: another command is being carried out")
+
+    def _require_running(self, what: str) -> None:
+        loop = self._loop
+        shadow = loop.machine.read_only and loop.life.state is LoopState.READY
+        if (loop.driving and not loop.busy) or shadow:
+            return
+        if loop.driving:
+            raise RefusedError(f"{what}: another command is being carried out")
+        raise RefusedError(
+            f"{what}: not in state {loop.life.state.label}; allowed in {LoopState.ACTIVE.label}"
+        )
+
+    def _require_lease(self, what: str) -> None:
+        if not self._loop.has_lease:
+            raise RefusedError(f"{what}: nobody holds the right to move; take it first")
+
+    def _refuse_read_only(self, what: str) -> None:
+        if self._loop.machine.read_only:
+            raise RefusedError(f"{what}: this daemon only listens (--read-only)")
+
+    def _known(self, name: Any) -> str:
+        programs = self._loop.parts.programs
+        if not isinstance(name, str) or name not in programs:
+            raise RefusedError(f"program: {name!r}; allowed: {', '.join(programs)}")
+        return name
+
+    @staticmethod
+    def _wanted(order: Order) -> Mapping[str, Any]:
+        wanted = order.get("wanted")
+        if wanted is None:
+            return {}
+        if not isinstance(wanted, dict):
+            raise RefusedError(f"wanted: {wanted!r}; allowed: a table")
+        return wanted

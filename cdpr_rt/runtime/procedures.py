@@ -1,0 +1,276 @@
+"""What takes the loop more than a cycle: booting, checking, enabling, stopping.
+
+Each is a generator that the loop advances once a turn, after the cycle's command has been sent. It
+may be dropped at any `yield`; whatever drops it says how things go on. Where it cannot be done it
+raises ControlError, which goes to whoever asked.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.lifecycle import RefusedError
+from cdpr_rt.runtime.states import LoopState, Reaction
+
+if TYPE_CHECKING:
+    from cdpr_rt.runtime.loop import ControlLoop
+
+CHECK_S: Final = 0.25
+"""For how long cycles are looked at before the bus counts as good."""
+_CHECK_CYCLES: Final = 20
+_MISSED_SHARE: Final = 0.02
+_SETTLE_CYCLES: Final = 5
+_MODE_S: Final = 2.0
+_POWER_ON_S: Final = 4.0
+_REST_S: Final = 5.0
+_BRAKES_S: Final = 2.0
+_POWER_OFF_S: Final = 3.0
+_POWER_OFF_AT_LAST_S: Final = 0.5
+_FAULT_RESET_S: Final = 2.0
+
+
+def start_up(loop: ControlLoop) -> Iterator[None]:
+    """Boot and check; the reason stays where either fails."""
+    try:
+        yield from configure(loop)
+        yield from check(loop)
+    except ControlError as error:
+        loop.life.blame(str(error))
+
+
+def configure(loop: ControlLoop) -> Iterator[None]:
+    """Boot the drives; inactive then, unconfigured where it fails."""
+    life, machine = loop.life, loop.machine
+    loop.stop_cycles()
+    if machine.device is not None:
+        yield from _slowly(loop, machine.close)
+    life.enter(LoopState.UNCONFIGURED)
+    life.forget()
+    try:
+        yield from _slowly(loop, machine.open)
+    except ControlError as error:
+        life.blame(str(error))
+        raise
+    life.enter(LoopState.INACTIVE)
+
+
+def check(loop: ControlLoop) -> Iterator[None]:
+    """Run cycles without power and look at every answer; ready then, inactive where it fails."""
+    life, machine = loop.life, loop.machine
+    if loop.cycling:
+        loop.stop_cycles()
+        yield from _slowly(loop, machine.pause)
+    life.enter(LoopState.INACTIVE)
+    life.forget()
+    try:
+        yield from _slowly(loop, machine.prepare)
+        gc.collect()  # while nothing is late by it; in paced cycles the collector is off
+        loop.start_cycles()
+        yield from _look_at_cycles(loop)
+    except ControlError as error:
+        life.blame(str(error))
+        loop.stop_cycles()
+        yield from _leave_cycles(loop)
+        raise
+    life.enter(LoopState.READY)
+    if machine.read_only:
+        loop.switch("hold")
+
+
+def _look_at_cycles(loop: ControlLoop) -> Iterator[None]:
+    machine, cycle = loop.machine, loop.cycle
+    assert cycle is not None  # cycles run
+    device = cycle.device
+    waits = _until(loop, machine.prepared, _MODE_S, "the drives' confirmation of their modes")
+    for _ in waits:
+        _refuse_trouble(loop)
+        yield
+    for _ in range(_SETTLE_CYCLES):
+        yield
+    missed, cycles = loop.missed, max(_CHECK_CYCLES, round(CHECK_S / device.period_s))
+    late, slowest_s = cycle.lateness.late, 0.0
+    for _ in range(cycles):
+        yield
+        _refuse_trouble(loop)
+        if not machine.unpowered() and not machine.read_only:
+            raise RefusedError(f"check: a drive has power: {', '.join(machine.states())}")
+        slowest_s = max(slowest_s, loop.exchange_s)
+    missed = loop.missed - missed
+    loop.status.check = {
+        "cycles": cycles,
+        "missed": missed,
+        "late": cycle.lateness.late - late,
+        "slowest_exchange_s": slowest_s,
+    }
+    if missed > _MISSED_SHARE * cycles * device.n:
+        raise RefusedError(
+            f"check: {missed} of {cycles * device.n} answers did not come in time; see `cdpr bus "
+            "monitor`"
+        )
+
+
+def _refuse_trouble(loop: ControlLoop) -> None:
+    assert loop.cycle is not None  # cycles run
+    trouble = loop.lost_bus or loop.cycle.device_alarm() or loop.cycle.watch_alarm()
+    trouble = trouble or loop.cycle.stop_reason()
+    if trouble:
+        raise RefusedError(f"check: {trouble}")
+
+
+def enable(loop: ControlLoop, program: str, wanted: Mapping[str, Any] | None) -> Iterator[None]:
+    """Give the drives power, hold, release the brakes, then run `program`."""
+    life, machine = loop.life, loop.machine
+    loop.parts.programs[program].check(wanted or {})
+    life.forget()
+    machine.power_on()
+    life.enter(LoopState.ACTIVE)
+    waits = _until(loop, machine.powered, _POWER_ON_S, "the power of all drives")
+    try:
+        yield from waits
+    except ControlError as error:
+        life.blame(f"{error}: {', '.join(machine.states())}")
+        loop.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
+        raise ControlError(life.reason) from error
+    loop.drive()
+    machine.set_brakes(True)
+    while not machine.brakes_are(True):
+        yield
+    if program != "hold":
+        loop.switch(program, wanted or {})
+
+
+def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
+    """See to the end of a motion that has been ended, until the drives have no power."""
+    life, machine = loop.life, loop.machine
+    if loop.driving:
+        for _ in range(loop.cycles_in(_REST_S)):
+            if loop.program.at_rest:
+                break
+            yield
+        loop.switch("hold")
+        machine.set_brakes(False)
+        for _ in range(loop.cycles_in(_BRAKES_S)):
+            if machine.brakes_are(False):
+                break
+            yield
+        machine.power_off()
+        loop.driving = False
+        loop.switch("idle")
+    else:
+        machine.set_brakes(False)
+    for _ in range(loop.cycles_in(_POWER_OFF_S)):
+        if machine.unpowered():
+            break
+        yield
+    machine.power_off()
+    for _ in range(loop.cycles_in(_POWER_OFF_AT_LAST_S)):
+        yield  # one command at least, so that it is sent
+        if machine.unpowered():
+            break
+    if not machine.unpowered():
+        doubt = f"not known to be without power: {', '.join(machine.states())}"
+        life.blame(f"{life.reason}; {doubt}" if life.reason else doubt)
+        then = LoopState.FAULT
+    life.enter(then)
+    loop.reacting = Reaction.NONE
+    if then is LoopState.FAULT:
+        yield from _explain(loop)
+
+
+def fall(loop: ControlLoop) -> Iterator[None]:
+    """Go to fault from a state without power."""
+    loop.life.enter(LoopState.FAULT)
+    loop.driving = False
+    loop.machine.set_brakes(False)
+    yield
+    loop.reacting = Reaction.NONE
+    yield from _explain(loop)
+
+
+def _explain(loop: ControlLoop) -> Iterator[None]:
+    """Ask drives and guards what they say of the reason, and leave a bus that has gone."""
+    life, machine = loop.life, loop.machine
+    found: list[str] = []
+    yield from _slowly(loop, lambda: found.append(machine.explain(life.reason)))
+    if found:
+        life.blame(found[0], life.details)
+    if loop.lost_bus:
+        loop.stop_cycles()
+        yield from _leave_cycles(loop)
+
+
+def disable(loop: ControlLoop) -> Iterator[None]:
+    """Stop under control and take the power away."""
+    if loop.life.state is LoopState.ACTIVE:
+        loop.reacting = Reaction.CONTROLLED_STOP
+        if loop.driving:
+            loop.program.stop()
+        else:
+            loop.machine.power_off()
+        yield from come_to_rest(loop, LoopState.READY)
+    loop.life.forget()
+
+
+def acknowledge(loop: ControlLoop) -> Iterator[None]:
+    """Clear what was latched, boot anew where that is needed, and check."""
+    life, machine = loop.life, loop.machine
+    before = life.reason
+    try:
+        if machine.device is not None:
+            yield from _slowly(loop, machine.acknowledge)
+        if loop.cycling and machine.intact():
+            machine.reset_faults()
+            yield
+            yield from _until(loop, machine.faultless, _FAULT_RESET_S, "the reset of all faults")
+        else:
+            yield from configure(loop)
+        yield from check(loop)
+    except ControlError as error:
+        life.enter(LoopState.FAULT)
+        life.blame(f"{error} (before: {before})" if before not in str(error) else str(error))
+        raise
+
+
+def shut_down(loop: ControlLoop) -> Iterator[None]:
+    """Stop under control, leave the drives without power, and end the loop."""
+    if loop.life.state is LoopState.ACTIVE:
+        if loop.reacting is Reaction.NONE:
+            yield from disable(loop)
+        else:
+            yield from come_to_rest(loop, LoopState.READY)
+    loop.stop_cycles()
+    doubt: list[str] = []
+    yield from _slowly(loop, lambda: doubt.append(loop.machine.close()))
+    if any(doubt):
+        loop.life.blame(doubt[0])
+    loop.life.enter(LoopState.UNCONFIGURED)
+    loop.ended = True
+
+
+def _until(
+    loop: ControlLoop, done: Callable[[], bool], within_s: float, what: str
+) -> Iterator[None]:
+    for _ in range(loop.cycles_in(within_s)):
+        if done():
+            return
+        yield
+    raise RefusedError(f"{what}: not within {within_s:g} s")
+
+
+def _leave_cycles(loop: ControlLoop) -> Iterator[None]:
+    """Have the drives left alone for a while; a bus that is gone is no error here."""
+    try:
+        yield from _slowly(loop, loop.machine.pause)
+    except ControlError:
+        return
+
+
+def _slowly(loop: ControlLoop, work: Callable[[], Any]) -> Iterator[None]:
+    """Run `work` in a thread beside the loop until it is done; raises what it raises."""
+    job = loop.job(work)
+    while not job.done:
+        yield
+    job.result()

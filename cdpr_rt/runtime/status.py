@@ -1,0 +1,82 @@
+"""What the loop says of itself, published when it changes."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from cdpr_rt.runtime.shared_block import SharedBlockError
+
+if TYPE_CHECKING:
+    from cdpr_rt.runtime.loop import ControlLoop
+
+_LOOK_NS = 500_000_000
+
+
+class StatusPage:
+    """Writes the status into the shared memory: at a change, and now and then what has grown."""
+
+    def __init__(self, loop: ControlLoop) -> None:
+        self._loop = loop
+        self.check: dict[str, Any] = {}
+        """What the last check of the bus has seen."""
+        self._changed = True
+        self._looked_ns = 0
+        self._written: dict[str, Any] = {}
+        self._told = (loop.life.state, "")
+
+    def touch(self) -> None:
+        """Tell that something may have changed."""
+        self._changed = True
+
+    def look(self) -> None:
+        """Publish what has changed; called every turn."""
+        life = self._loop.life
+        now_ns = time.monotonic_ns()
+        told = self._told
+        if life.state is not told[0] or life.reason is not told[1]:
+            self._told = life.state, life.reason
+            self._changed = True
+        if self._changed or now_ns - self._looked_ns > _LOOK_NS:
+            self._changed = False
+            self._looked_ns = now_ns
+            self.publish()
+
+    def publish(self) -> None:
+        """Write the status where it is another than before."""
+        status = self._status()
+        if status == self._written:
+            return
+        try:
+            self._loop.block.write_status(status)
+        except SharedBlockError:  # a program that tells too much of itself
+            self._loop.block.write_status({**status, "program_progress": {}, "buses": {}})
+        self._written = status
+
+    def _status(self) -> dict[str, Any]:
+        loop, life = self._loop, self._loop.life
+        lateness = None if loop.cycle is None else loop.cycle.lateness
+        return {
+            "state": life.state.label,
+            "since_ns": life.since_ns,
+            "reason": life.reason,
+            "reason_limit": life.details,
+            "program": loop.program.name,
+            "program_number": loop.program_number,
+            "program_progress": dict(loop.program.progress()),
+            "driving": loop.driving,
+            "reacting": loop.reacting.label,
+            "busy": loop.busy,
+            "read_only": loop.machine.read_only,
+            "lockstep": loop.cycle is not None and loop.cycle.device.lockstep,
+            "notices": [*loop.notices, *loop.machine.notices],
+            "safety": loop.machine.safety,
+            "buses": loop.machine.bus_state(),
+            "check": self.check,
+            "count": {
+                "missed": loop.missed,
+                "cycles": 0 if loop.cycle is None else loop.cycle.device.feedback.cycle,
+                "late": 0 if lateness is None else lateness.late,
+                "worst_late_s": 0.0 if lateness is None else lateness.worst_s,
+            },
+        }

@@ -1,0 +1,123 @@
+"""The daemon's real-time process: one robot's control loop, from boot to controlled stop."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.exchange import AxisFeedback, Setpoint
+from cdpr_rt.realtime import stay_realtime
+from cdpr_rt.runtime.estimate import Estimator
+from cdpr_rt.runtime.loop import ControlLoop, LoopParts
+from cdpr_rt.runtime.programs.model import model_of
+from cdpr_rt.runtime.programs.registry import build_programs, rehearse_programs
+from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
+from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.supervisor import Supervisor
+from profiles import Robot, load_robot
+from profiles.errors import ProfileError
+from tools.bus_fit import require_fit
+from tools.daemon.child import end_with
+from tools.daemon.machine import RobotMachine
+from tools.daemon.settings import RunSettings
+from tools.errors import BAD_INPUT, DONE, CommandError
+from tools.session import latency_s
+
+
+def main() -> int:
+    """Run the loop that the launcher has asked for; return the exit status."""
+    settings = RunSettings.from_argv()
+    block = SharedBlock.attach(settings.block_fd)
+    try:
+        robot = load_robot(settings.robot)
+        require_fit(robot)
+        machine = RobotMachine(robot, settings)
+    except (ProfileError, CommandError) as error:
+        print(f"cdpr: {error}", file=sys.stderr)
+        return BAD_INPUT
+    parts = loop_parts(robot, block)
+    block.write_description(description(robot, parts))
+    loop = ControlLoop(block, machine, parts)
+    _end_on_signals(loop)
+    end_with(settings.launcher_pid)
+    counters = block.counters
+    counters["start_realtime_ns"], counters["start_monotonic_ns"] = (
+        time.time_ns(),
+        time.monotonic_ns(),
+    )
+    counters["loop_pid"] = os.getpid()
+    loop.run()
+    return DONE
+
+
+def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
+    """Return what the loop of `robot` runs, compiled and ready."""
+    axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
+    limits = limits_of(robot)
+    latencies = [latency_s(axis.winch) for axis in axes]
+    model = model_of(axes, period_s, latencies, limits)
+    programs = build_programs(model, block)
+    names = [axis.name for axis in axes]
+    parts = LoopParts(
+        programs=programs,
+        supervisor=Supervisor(limits, n, period_s, names),
+        estimator=Estimator(n, period_s, winches_of(axes)),
+        punctual=stay_realtime,
+    )
+    rehearse_programs(programs, n)
+    _rehearse_judgement(parts, n)
+    return parts
+
+
+def _rehearse_judgement(parts: LoopParts, n: int) -> None:
+    """Have the estimate's and the supervisor's kernels compiled as well."""
+    feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
+    feedback.valid[:] = True
+    parts.estimator.update(feedback)
+    parts.supervisor.check(feedback, parts.estimator.estimate, setpoint, torque)
+    parts.estimator.reset()
+    parts.supervisor.reset()
+
+
+def description(robot: Robot, parts: LoopParts) -> dict[str, Any]:
+    """Return what people and programs should know of a robot that is run."""
+    return {
+        "robot": robot.name,
+        "reference": robot.reference,
+        "period_s": robot.sync_period_s,
+        "master_heartbeat_s": robot.master_heartbeat_s,
+        "axes": [
+            {
+                "name": axis.name,
+                "bus": axis.bus,
+                "node_id": axis.node_id,
+                "winch": axis.winch.reference,
+                "motor": axis.winch.motor.model,
+                "gear_ratio": axis.winch.gear_ratio,
+                "drum_radius_m": axis.winch.drum_radius_m,
+                "cable_m_per_motor_rad": axis.winch.cable_m_per_motor_rad,
+            }
+            for axis in robot.axes
+        ],
+        "limits": described(parts.supervisor.limits, len(robot.axes)),
+        "programs": list(parts.programs),
+        "notes": list(robot.notes),
+    }
+
+
+def _end_on_signals(loop: ControlLoop) -> None:
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        loop.request_stop()
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, stop)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

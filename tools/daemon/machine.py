@@ -1,0 +1,236 @@
+"""The daemon's machine: a robot's drives on their buses, its brakes and its safety I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import wraps
+from typing import Any, Concatenate, Final, ParamSpec, TypeVar
+
+from cdpr_rt.cycle import Watch
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.machine import MachineError
+from cdpr_rt.tension import TensionFeedback
+from drivers.axis_buses import AxisBuses
+from drivers.cia402 import POWER_OFF, State
+from drivers.errors import BusError, DriverError
+from drivers.network import CanNetwork
+from profiles import Robot
+from profiles.errors import ProfileError
+from tools.daemon.settings import RunSettings
+from tools.errors import CommandError
+from tools.robot_boot import boot_notes, boot_robot, device_of, faults_text, open_networks
+from tools.robot_buses import robot_urls
+from tools.safety import SessionSafety, connect
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+_ERRORS: Final = (DriverError, CommandError, ProfileError, ControlError, OSError)
+_TORQUE_SHARE: Final = 1.0
+
+
+def _told(
+    work: Callable[Concatenate[RobotMachine, _P], _T],
+) -> Callable[Concatenate[RobotMachine, _P], _T]:
+    """Have everything that goes wrong in `work` raised as MachineError."""
+
+    @wraps(work)
+    def told(machine: RobotMachine, /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        try:
+            return work(machine, *args, **kwargs)
+        except _ERRORS as error:
+            notes = getattr(error, "__notes__", [])
+            raise MachineError("; ".join([str(error), *notes])) from error
+
+    return told
+
+
+class RobotMachine:
+    """All axes of `robot` on the buses that `settings` name; implements `Machine`."""
+
+    failures: tuple[type[Exception], ...] = (BusError,)
+    read_only = False
+
+    def __init__(self, robot: Robot, settings: RunSettings) -> None:
+        self._robot = robot
+        self._urls = robot_urls(robot, settings.buses)
+        real = not all(url.is_simulated for url in self._urls.values())
+        self._reference = settings.safety_io or (robot.safety_io if real else None)
+        self._device: AxisBuses | None = None
+        self.watches: Sequence[Watch] = ()
+        self.notices: Sequence[str] = ()
+        self._networks: dict[str, CanNetwork] = {}
+        self._safety: SessionSafety | None = None
+        self._stack = ExitStack()
+
+    # -- slow
+
+    @_told
+    def open(self) -> None:
+        """Open the buses and boot the drives; they are left without power."""
+        with ExitStack() as stack:
+            self._safety = self._open_safety(stack)
+            networks = open_networks(stack, self._robot, self._urls)
+            booted, absent = boot_robot(stack, self._robot, networks, _TORQUE_SHARE)
+            if absent:
+                raise MachineError(
+                    "; ".join(f"axis {i}: {reason}" for i, reason in absent.items())
+                    + " (the daemon runs all axes of a robot or none)"
+                )
+            device = device_of(self._robot, networks, booted, _TORQUE_SHARE)
+            stack.callback(device.close)
+            for network in networks.values():
+                network.start_heartbeat()
+            self._stack = stack.pop_all()
+        self._networks = networks
+        self.notices = boot_notes(self._robot, booted, absent)
+        self.watches = () if self._safety is None else (self._safety.io,)
+        self._device = device
+
+    def _open_safety(self, stack: ExitStack) -> SessionSafety | None:
+        if self._reference is None:
+            return None
+        io = stack.enter_context(connect(self._reference))
+        return SessionSafety(io, [axis.node_id for axis in self._robot.axes])
+
+    @_told
+    def prepare(self) -> None:
+        """Close the contactor and have each drive take torques."""
+        if self._safety is not None and not self._safety.io.state.contactor_closed:
+            self._safety.io.energise()
+        device = self._booted
+        device.ask_mode(device.torque_modes)
+
+    @_told
+    def acknowledge(self) -> None:
+        """Forget what the safety I/O has latched, whose cause is gone."""
+        if self._safety is not None and self._safety.tripped:
+            self._safety.io.acknowledge()
+
+    @_told
+    def pause(self) -> None:
+        """Leave the drives, which have no power, for a while without cycles."""
+        self._booted.stop_cycling()
+
+    @_told
+    def explain(self, reason: str) -> str:
+        """Return `reason` with what drives and safety I/O say of it."""
+        device = self.device
+        if device is not None and device.faulted().any():
+            faults = faults_text(self._robot.axes, device, self._networks)
+            reason = reason if faults in reason else f"{reason}: {faults}"
+        return reason if self._safety is None else self._safety.cause(reason)
+
+    @_told
+    def close(self) -> str:
+        """Take the power from the drives and leave the buses; return what stayed uncertain."""
+        device, self._device = self._device, None
+        self.watches = ()
+        doubt = ""
+        try:
+            if device is not None:
+                if self._safety is not None:
+                    self._safety.drop_brakes()
+                doubt = device.close()
+        finally:
+            self._stack.close()
+        return doubt
+
+    @property
+    def _booted(self) -> AxisBuses:
+        if self.device is None:
+            raise MachineError("the drives have not booted")
+        return self.device
+
+    @property
+    def device(self) -> AxisBuses | None:
+        """The booted axes, None until `open` and after `close`."""
+        return self._device
+
+    # -- in a cycle
+
+    def read_tension(self) -> TensionFeedback | None:
+        """Return the tensions as last read, None where none are measured."""
+        return None
+
+    def bus_state(self) -> dict[str, Any]:
+        """Return what is known of each bus, by its name."""
+        return {
+            name: {
+                "url": str(url),
+                "state": str(self._networks[name].health.text) if name in self._networks else "",
+            }
+            for name, url in self._urls.items()
+        }
+
+    @property
+    def safety(self) -> str:
+        """What guards the power besides the bus, for people."""
+        return "" if self._safety is None else self._safety.io.name
+
+    @_told
+    def prepared(self) -> bool:
+        """Whether the drives confirm the mode in which they take torques."""
+        return self._booted.mode_confirmed()
+
+    @_told
+    def power_on(self) -> None:
+        """Ask all drives for their power."""
+        self._booted.request(State.OPERATION_ENABLED)
+
+    def power_off(self) -> None:
+        """Take torque and power from all drives with this cycle's command."""
+        if self.device is not None:
+            self.device.request(State.SWITCH_ON_DISABLED)
+
+    def quick_stop(self) -> None:
+        """Have all drives brake by themselves, then switch off, from this cycle's command on."""
+        if self.device is not None:
+            self.device.request(State.QUICK_STOP)
+
+    def powered(self) -> bool:
+        """Whether all drives have their power and obey."""
+        return self.device is not None and self.device.reached(State.OPERATION_ENABLED)
+
+    def unpowered(self) -> bool:
+        """Whether no drive that can be heard has power."""
+        return self.device is None or all(state in POWER_OFF for state in self.device.states())
+
+    def reset_faults(self) -> None:
+        """Forget latched alarms and have faults reset in the cycles that follow."""
+        if self.device is not None:
+            self.device.acknowledge_fault()
+
+    def intact(self) -> bool:
+        """Whether every drive answers and needs no new boot."""
+        device = self.device
+        return device is not None and bool(
+            device.feedback.alive.all() and device.feedback.valid.all()
+        )
+
+    def faultless(self) -> bool:
+        """Whether no drive is in fault."""
+        faults = (State.FAULT, State.FAULT_REACTION)
+        return self.device is not None and not any(s in faults for s in self.device.states())
+
+    def set_brakes(self, released: bool) -> None:
+        """Have the brakes released or applied; does not wait for them."""
+        if self._safety is not None and self._safety.braked:
+            move = self._safety.io.release_brakes if released else self._safety.io.apply_brakes
+            move(*self._safety.braked)
+
+    def brakes_are(self, released: bool) -> bool:
+        """Whether the brakes have followed; true where there are none."""
+        if self._safety is None or not self._safety.braked:
+            return True
+        told = self._safety.io.state.brakes_released
+        return all(told[axis] == released for axis in self._safety.braked)
+
+    def states(self) -> list[str]:
+        """Return what each drive says of itself, in the standard's words."""
+        if self.device is None:
+            return []
+        return [
+            f"{axis.name} is {state.label}"
+            for axis, state in zip(self._robot.axes, self.device.states(), strict=True)
+        ]

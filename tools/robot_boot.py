@@ -1,0 +1,151 @@
+"""A robot's drives booted on its buses, as one device: what every session begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
+
+from drivers.axis_buses import AxisBuses, BusAxes
+from drivers.axis_layout import AxisConfig
+from drivers.boot import BootReport, BootReports, BootSettings, boot_all
+from drivers.bus import BusUrl
+from drivers.cia402 import fault_text
+from drivers.data_sheet import load_dictionary
+from drivers.errors import BootError, BusError, DriverError, SdoError
+from drivers.network import CanNetwork
+from profiles import Robot, RobotAxis
+from tools.errors import BadInputError, WorkFailedError
+from tools.session import lacking_guards
+
+
+def open_networks(
+    stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl]
+) -> dict[str, CanNetwork]:
+    """Open the buses of `robot`; `stack` closes them. Raises BadInputError."""
+    networks: dict[str, CanNetwork] = {}
+    for name, url in urls.items():
+        axes = [robot.axes[i] for i in robot.axes_on(name)]
+        nodes = [axis.node_id for axis in axes]
+        try:
+            network = CanNetwork(url, nodes, robot.master_node_id, robot.master_heartbeat_s)
+        except BusError as error:
+            raise BadInputError(f"bus {name}: {error}") from error
+        stack.callback(network.close)
+        for axis in axes:
+            eds = axis.winch.drive.eds
+            network.add_node(axis.node_id, load_dictionary(eds, axis.node_id))
+        networks[name] = network
+    return networks
+
+
+def boot_robot(
+    stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_share: float
+) -> tuple[dict[int, BootReport], dict[int, str]]:
+    """Boot all buses at the same time; return reports, and why optional axes did not, by axis.
+
+    `stack` leaves the drives alone again. Raises WorkFailedError for a mandatory one that does not
+    boot.
+    """
+    with ThreadPoolExecutor(max_workers=len(networks)) as pool:
+        pending: dict[str, Future[BootReports]] = {}
+        for name, network in networks.items():
+            wanted = {
+                axis.node_id: (axis.winch.drive, _settings(robot, axis, torque_share))
+                for axis in (robot.axes[i] for i in robot.axes_on(name))
+            }
+            pending[name] = pool.submit(boot_all, network, wanted)
+    failures: list[DriverError] = []
+    booted: dict[int, BootReport] = {}
+    absent: dict[int, str] = {}
+    for name, job in pending.items():
+        try:
+            reports = job.result()
+        except (BootError, BusError) as error:
+            failures.append(error)
+            error.add_note(f"on bus {name}")
+            continue
+        for i in robot.axes_on(name):
+            node_id = robot.axes[i].node_id
+            if node_id in reports:
+                booted[i] = reports[node_id]
+                stack.callback(networks[name].release, node_id)
+            else:
+                absent[i] = str(reports.missing[node_id])
+    if failures:
+        raise WorkFailedError("; ".join(_told(error) for error in failures)) from failures[0]
+    if not booted:
+        raise WorkFailedError(f"{robot.name}: no drive booted; {'; '.join(absent.values())}")
+    return dict(sorted(booted.items())), absent
+
+
+def _told(error: DriverError) -> str:
+    *others, where = error.__notes__
+    return f"{where}: " + "; ".join([str(error), *others])
+
+
+def _settings(robot: Robot, axis: RobotAxis, torque_share: float) -> BootSettings:
+    motor = axis.winch.motor
+    return BootSettings(
+        robot.master_node_id,
+        robot.sync_period_s,
+        torque_share * motor.rated_torque_Nm,
+        rated_torque_Nm=motor.rated_torque_Nm,
+        counts_per_turn=axis.winch.encoder_counts_per_turn,
+        mandatory=axis.mandatory,
+    )
+
+
+def device_of(
+    robot: Robot,
+    networks: Mapping[str, CanNetwork],
+    booted: Mapping[int, BootReport],
+    torque_share: float,
+) -> AxisBuses:
+    """Return the axes that have booted as one device; raises the drivers' errors."""
+    place_of = {i: place for place, i in enumerate(booted)}
+    buses = []
+    for name, network in networks.items():
+        here = [i for i in robot.axes_on(name) if i in booted]
+        if not here:
+            continue
+        configs = [
+            AxisConfig.from_boot(
+                robot.axes[i].winch.drive,
+                booted[i],
+                torque_share * robot.axes[i].winch.motor.rated_torque_Nm,
+            )
+            for i in here
+        ]
+        places = [place_of[i] for i in here]
+        buses.append(BusAxes(name, network, configs, places, robot.master_heartbeat_s))
+    return AxisBuses(buses, robot.sync_period_s, robot.master_node_id)
+
+
+def boot_notes(
+    robot: Robot, booted: Mapping[int, BootReport], absent: Mapping[int, str]
+) -> list[str]:
+    """Return what people should know of the drives that have booted, and of those that have not."""
+    notes = []
+    for i, report in booted.items():
+        axis = robot.axes[i]
+        notes.append(lacking_guards(f"bus {axis.bus} node {axis.node_id}", report))
+    notes += [f"axis {i} (optional) is left out: {reason}" for i, reason in absent.items()]
+    return [note for note in notes if note]
+
+
+def faults_text(
+    axes: Sequence[RobotAxis], device: AxisBuses, networks: Mapping[str, CanNetwork]
+) -> str:
+    """Return what each drive in fault says of it, asked by SDO."""
+    texts = []
+    for axis, faulted in zip(axes, device.faulted(), strict=True):
+        if not faulted:
+            continue
+        try:
+            code = networks[axis.bus].read_int(axis.node_id, 0x603F)
+            why = fault_text(code) if code else "no code given (603Fh = 0)"
+        except (SdoError, BusError):
+            why = "the drive does not say why"
+        texts.append(f"bus {axis.bus} node {axis.node_id}: {why}")
+    return "; ".join(texts)
