@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
 from cdpr_rt.runtime.states import Reaction
 from drivers.bus.budget import machine_budget
 from profiles import ProfileError, load_robot
+from profiles.catalogue import SHIPPED
 from profiles.reader import validated
 from profiles.robot_limits import Reactions, RobotLimits
 
@@ -209,3 +211,28 @@ def test_eight_drives_on_one_bus_take_it_to_95_percent() -> None:
     assert budget.fits
     assert 0.95 <= 1.0 / robot.sync_period_s / budget.highest_rate_Hz < 0.96
     assert len(load_robot("bench-2").axes) == 2
+
+
+# -- what the documentation says
+
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_the_documented_robot_is_one(tmp_path: Path) -> None:
+    text = (DOCS / "describing-your-robot.md").read_text()
+    robot, _devices, limits = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    winch = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
+    (tmp_path / "my-winch.toml").write_text(winch)
+    path = tmp_path / "my-robot.toml"
+    path.write_text(robot + limits)
+    told = load_robot(path)
+    assert [axis.name for axis in told.axes] == ["axis 0", "right"]
+    figures = re.findall(r"^([a-z]\w+) = ", limits.partition("[limits.reactions]")[0], re.M)
+    assert figures == [key for key in RobotLimits.model_fields if key != "reactions"]
+
+
+def test_the_documented_reactions_are_the_defaults() -> None:
+    text = (DOCS / "supervisor.md").read_text()
+    rows = re.findall(r"^\| `(\w+)` \|.*\| ([a-z ]+) \|$", text, re.M)
+    assert rows == [(limit.key, reaction.label) for limit, reaction in DEFAULT_REACTIONS.items()]
