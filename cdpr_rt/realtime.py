@@ -16,6 +16,8 @@ _PRIORITY = 50
 _SWITCH_INTERVAL_S = 1e-4
 _CORES_NEEDED = 2
 _ISOLATED = Path("/sys/devices/system/cpu/isolated")
+_CLAIM = "\0cdpr-rt/core/{}"
+_claims: list[socket.socket] = []  # held until the process ends
 
 
 def _lock_memory() -> str:
@@ -52,12 +54,28 @@ def stay_realtime() -> list[str]:
 
 
 def _take_core() -> str:
+    """Take a core for good that no other loop on this machine has: an isolated one if possible.
+
+    The isolated ones are not among those on which a process may run until it asks for them.
+    """
     usable = os.sched_getaffinity(0)
-    if len(usable) < _CORES_NEEDED:
+    isolated = _isolated_cores()
+    if len(usable | isolated) < _CORES_NEEDED:
         return f"{len(usable)} core for everything: the loop has none to itself"
-    isolated = usable & _isolated_cores()
-    os.sched_setaffinity(0, {max(isolated or usable)})
-    return "" if isolated else "no core is isolated (isolcpus=): others may run on the loop's core"
+    ordinary = sorted(usable - isolated)[1:]  # the first is left to the rest of the machine
+    for core in (*sorted(isolated, reverse=True), *reversed(ordinary)):
+        claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            claim.bind(_CLAIM.format(core))
+            os.sched_setaffinity(0, {core})
+        except OSError:  # somebody has it, or it is not for this control group
+            claim.close()
+            continue
+        _claims.append(claim)
+        if core in isolated:
+            return ""
+        return "no core is isolated (isolcpus=): others may run on the loop's core"
+    return "every core has a loop already: this one has none to itself"
 
 
 def _isolated_cores() -> set[int]:
@@ -122,7 +140,7 @@ def _free_core(usable: set[int]) -> Iterator[int | None]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
         for core in sorted(usable, reverse=True):
             try:
-                claim.bind(f"\0cdpr-rt/core/{core}")
+                claim.bind(_CLAIM.format(core))
             except OSError:
                 continue
             yield core
