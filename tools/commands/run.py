@@ -26,7 +26,7 @@ from tools.output import Output
 from tools.robot_buses import RobotBusOption, asks_for_own_simulator, robot_urls
 from tools.simulator import OwnSimulator
 
-_RING_S = 4.0
+_RING_S = 15.0  # longer than a service that hangs is waited for and started again
 
 _Robot = Annotated[
     str,
