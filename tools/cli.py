@@ -39,6 +39,13 @@ _COMMANDS = (
     "sim",
     "tension",
 )
+_OF_A_DAEMON = {
+    "daemon_motion": ("controller", "jog", "move"),
+    "daemon_state": ("ack", "check", "disable", "enable", "hold", "status", "stop"),
+}
+_MODULES = {name: name.replace("-", "_") for name in _COMMANDS} | {
+    name: module for module, names in _OF_A_DAEMON.items() for name in names
+}
 _INTERRUPTED = 130
 
 
@@ -49,9 +56,8 @@ def _group() -> None:
 
 def _register(arguments: list[str]) -> None:
     """Load the commands; only the one that is asked for, since each brings libraries along."""
-    asked = [name for name in _COMMANDS if arguments and arguments[0] == name]
-    for name in asked or _COMMANDS:
-        module = name.replace("-", "_")
+    asked = _MODULES.get(arguments[0]) if arguments else None
+    for module in [asked] if asked else dict.fromkeys(_MODULES.values()):
         importlib.import_module(f"tools.commands.{module}").register(app)
 
 

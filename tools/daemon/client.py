@@ -1,0 +1,214 @@
+"""The daemon as a client sees it: over its Unix socket, or over TCP with the key."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import httpx
+import typer
+
+from tools.daemon.paths import find_sockets
+from tools.daemon.settings import read_key
+from tools.errors import BadInputError, CommandError, WorkFailedError
+
+RobotOption = Annotated[
+    str | None, typer.Option("--robot", help="Which robot's daemon, where several run.")
+]
+SocketOption = Annotated[
+    Path | None, typer.Option("--socket", help="The daemon's Unix socket, if not this user's.")
+]
+UrlOption = Annotated[
+    str | None, typer.Option("--url", metavar="http://HOST:PORT", help="A daemon elsewhere.")
+]
+KeyFileOption = Annotated[
+    Path | None, typer.Option("--key-file", help="File with the key for --url.")
+]
+_TIMEOUT = httpx.Timeout(5.0, read=70.0)
+_BAD_INPUT: Final = frozenset({400, 401, 403, 404, 405, 413, 422})
+_LEASE_S = 2.0
+
+
+class NoDaemonError(WorkFailedError):
+    """Nobody answers."""
+
+
+class Daemon:
+    """Requests to one daemon; what it refuses is raised as the command's error."""
+
+    def __init__(self, http: httpx.Client, where: str) -> None:
+        self._http = http
+        self.where = where
+        self.name = f"{getpass.getuser()}@{socket.gethostname()}"[:64]
+
+    def get(self, path: str) -> dict[str, Any]:
+        """Return what is at `path`."""
+        return self._ask("GET", path)
+
+    def post(
+        self, path: str, body: dict[str, Any] | None = None, token: str | None = None
+    ) -> dict[str, Any]:
+        """Give a command in this user's name; return the answer."""
+        return self._ask("POST", path, {"client": self.name, **(body or {})}, token)
+
+    @contextmanager
+    def control(self) -> Iterator[Control]:
+        """Hold the right to move; motion is held before it is given back, whatever happens."""
+        token = str(self.post("/control", {"ttl_s": _LEASE_S})["token"])
+        control = Control(self, token)
+        try:
+            yield control
+        except BaseException:
+            with suppress(CommandError):
+                control.hold()
+            raise
+        finally:
+            with suppress(CommandError):
+                self._ask("DELETE", "/control", token=token)
+
+    def renew(self, token: str) -> None:
+        """Keep the right to move."""
+        self._ask("PUT", "/control", token=token)
+
+    def _ask(
+        self,
+        method: str,
+        path: str,
+        body: dict[str, Any] | None = None,
+        token: str | None = None,
+    ) -> dict[str, Any]:
+        headers = {} if token is None else {"X-Control-Token": token}
+        try:
+            response = self._http.request(method, path, json=body, headers=headers)
+        except (httpx.ConnectError, httpx.ConnectTimeout) as error:
+            raise NoDaemonError(
+                f"no daemon answers at {self.where} ({error}); `cdpr run ROBOT` starts one"
+            ) from None
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
+            raise NoDaemonError(f"{self.where}: {error or type(error).__name__}") from None
+        try:
+            answer = response.json()
+        except ValueError:
+            answer = None
+        if not isinstance(answer, dict):
+            raise WorkFailedError(f"{self.where}: does not answer as a daemon does")
+        if response.is_success:
+            return answer
+        message = str(answer.get("error", response.reason_phrase))
+        if response.status_code in _BAD_INPUT:
+            raise BadInputError(message)
+        raise WorkFailedError(message)
+
+
+class Control:
+    """The right to move, while it is held."""
+
+    def __init__(self, daemon: Daemon, token: str) -> None:
+        self.daemon = daemon
+        self._token = token
+
+    def post(self, path: str, body: dict[str, Any]) -> dict[str, Any]:
+        """Give a command that needs the right."""
+        return self.daemon.post(path, body, self._token)
+
+    def renew(self) -> None:
+        """Keep the right."""
+        self.daemon.renew(self._token)
+
+    def hold(self) -> None:
+        """Stop the motion, stay there."""
+        self.daemon.post("/hold")
+
+
+@contextmanager
+def open_daemon(
+    robot: str | None, unix: Path | None, url: str | None, key_file: Path | None
+) -> Iterator[Daemon]:
+    """Yield the daemon that the options name, the only one there is where they name none.
+
+    Raises BadInputError and NoDaemonError.
+    """
+    if url is not None:
+        if robot is not None or unix is not None:
+            raise BadInputError("--url: not together with --robot or --socket")
+        headers = {}
+        if key_file is not None:
+            headers["Authorization"] = f"Bearer {read_key(key_file).decode()}"
+        try:
+            http = httpx.Client(base_url=url, headers=headers, timeout=_TIMEOUT, trust_env=False)
+        except (httpx.InvalidURL, ValueError) as error:
+            raise BadInputError(f"--url {url}: {error}") from None
+        if http.base_url.scheme != "http":
+            raise BadInputError(f"--url {url}: allowed: http://HOST:PORT")
+        with http:
+            yield Daemon(http, url)
+        return
+    path = unix or _only_socket(robot)
+    transport = httpx.HTTPTransport(uds=str(path))
+    with httpx.Client(transport=transport, base_url="http://daemon", timeout=_TIMEOUT) as http:
+        yield Daemon(http, str(path))
+
+
+def _only_socket(robot: str | None) -> Path:
+    found = [path for path in find_sockets(robot) if _is_alive(path)]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        whose = "" if robot is None else f" for {robot}"
+        raise NoDaemonError(f"no daemon runs{whose}; `cdpr run {robot or 'ROBOT'}` starts one")
+    if robot is not None:  # this user's before the system's
+        return found[0]
+    names = ", ".join(path.stem for path in found)
+    raise BadInputError(f"{len(found)} daemons run: choose one by --robot ({names})")
+
+
+def _is_alive(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX) as probe:
+        probe.settimeout(1.0)
+        return probe.connect_ex(str(path)) == 0
+
+
+def axis_values(texts: list[str], axes: list[dict[str, Any]], unit: str) -> dict[int, float]:
+    """Return the numbers given as AXIS=NUMBER, by the axis' place; raises BadInputError.
+
+    A number alone is for the robot's only axis.
+    """
+    names = [str(axis.get("name")) for axis in axes]
+    values: dict[int, float] = {}
+    for text in texts:
+        name, equals, number = text.rpartition("=")
+        if not equals and len(names) == 1:
+            name = names[0]
+        if name not in names:
+            raise BadInputError(f"{text}: allowed: AXIS={unit} with axis {', '.join(names)}")
+        try:
+            values[names.index(name)] = float(number)
+        except ValueError:
+            raise BadInputError(f"{text}: {number!r} is no number of {unit}") from None
+    return values
+
+
+def key_values(texts: list[str]) -> dict[str, Any]:
+    """Return what was given as KEY=VALUE, the value as JSON; raises BadInputError."""
+    values: dict[str, Any] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not equals or not key:
+            raise BadInputError(f"{text}: allowed: KEY=VALUE")
+        try:
+            values[key] = json.loads(value, parse_constant=_refuse(text))
+        except ValueError:
+            raise BadInputError(f"{text}: {value!r} is not JSON, such as 1.5 or [1, 2]") from None
+    return values
+
+
+def _refuse(text: str) -> Callable[[str], Any]:
+    def refuse(constant: str) -> Any:
+        raise BadInputError(f"{text}: {constant} is no number")
+
+    return refuse

@@ -1,0 +1,95 @@
+"""A daemon's status for people."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+_COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
+
+
+def status_text(status: dict[str, Any]) -> Group:
+    """Return what `cdpr status` shows."""
+    return Group(*_lines(status), _axes(status))
+
+
+def _lines(status: dict[str, Any]) -> list[Text]:
+    state = status["state"]
+    how = ["read-only"] * bool(status["read_only"]) + ["lockstep"] * bool(status["lockstep"])
+    first = Text.assemble(
+        f"{status['robot']}: ",
+        (state, f"bold {_COLOURS.get(state, 'yellow')}"),
+        f", program {status['program']}" if status["program"] else "",
+        "".join(f", {word}" for word in how),
+    )
+    lines = [first]
+    if status["reason"]:
+        lines.append(Text(f"reason: {status['reason']}", style="yellow"))
+    control = status["control"]
+    if control["held"]:
+        lines.append(Text(f"moved by {control['client']}"))
+    cycle = status["cycle"]
+    if cycle:
+        lines.append(
+            Text(
+                f"cycle {cycle['cycle']}, {cycle['time_s']:.1f} s: answers after "
+                f"{_us(cycle['exchange_s'])}, computed in {_us(cycle['compute_s'])}; "
+                f"{cycle['missed']} answers missed, {cycle['late_cycles']} cycles late"
+            )
+        )
+    if status["loop"]["silent_s"] > 1.0:
+        silent_s = status["loop"]["silent_s"]
+        lines.append(Text(f"the loop has not turned for {silent_s:.1f} s", style="red"))
+    recording = status["parts"].get("recording")
+    if recording:
+        lines.append(Text(_recording(recording)))
+    lines += [Text(f"note: {notice}", style="dim") for notice in status["notices"]]
+    return lines
+
+
+def _recording(told: dict[str, Any]) -> str:
+    if not told.get("recording"):
+        return f"nothing is recorded: {told.get('error') or 'ended'}"
+    lost = f", {told['lost_rows']} cycles lost" if told.get("lost_rows") else ""
+    return f"recording {told['file']}, {told['bytes'] / 1e6:.1f} MB{lost}"
+
+
+def _axes(status: dict[str, Any]) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    table.add_column("axis")
+    for title in ("angle deg", "set deg", "speed deg/s", "torque Nm", "tension N", "cable m"):
+        table.add_column(title, justify="right")
+    table.add_column("")
+    for axis in status["axes"]:
+        tension = _figure(axis.get("tension_N"), 1)
+        measured = "" if axis.get("tension_measured") or tension == "-" else "~"
+        table.add_row(
+            str(axis.get("name")),
+            _figure(axis.get("position_rad"), 2, math.degrees(1.0)),
+            _figure(axis.get("setpoint_rad"), 2, math.degrees(1.0)),
+            _figure(axis.get("velocity_rad_s"), 2, math.degrees(1.0)),
+            _figure(axis.get("torque_actual_Nm"), 3),
+            f"{measured}{tension}",
+            _figure(axis.get("cable_length_m"), 4),
+            _trouble(axis),
+        )
+    return table
+
+
+def _trouble(axis: dict[str, Any]) -> Text:
+    if axis.get("alive") is None:
+        return Text("")
+    words = ["silent"] * (not axis["alive"]) + ["not valid"] * (not axis["valid"])
+    return Text(", ".join(words), style="red")
+
+
+def _figure(value: float | None, digits: int, factor: float = 1.0) -> str:
+    return "-" if value is None else f"{factor * value:.{digits}f}"
+
+
+def _us(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e6 * seconds:.0f} us"
