@@ -277,7 +277,8 @@ class CanNetwork(ObjectAccess):
         thread.start()
 
     def _produce(self) -> None:
-        while not self._stop.wait(self._heartbeat_s):
+        # twice as often as promised: this thread has to wait for the interpreter at times
+        while not self._stop.wait(0.5 * self._heartbeat_s):
             if not self.cycling:
                 self._send_heartbeat()
 

@@ -47,10 +47,9 @@ def main() -> int:
     _end_on_signals(loop)
     end_with(settings.launcher_pid)
     counters = block.counters
-    counters["start_realtime_ns"], counters["start_monotonic_ns"] = (
-        time.time_ns(),
-        time.monotonic_ns(),
-    )
+    if counters["start_monotonic_ns"][0] == 0:
+        counters["start_monotonic_ns"] = time.monotonic_ns()
+        counters["start_realtime_ns"] = time.time_ns()
     counters["loop_pid"] = os.getpid()
     loop.run()
     return DONE
