@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from functools import cache
 from typing import NoReturn
 
 import typer
@@ -58,7 +59,13 @@ def _register(arguments: list[str]) -> None:
     """Load the commands; only the one that is asked for, since each brings libraries along."""
     asked = _MODULES.get(arguments[0]) if arguments else None
     for module in [asked] if asked else dict.fromkeys(_MODULES.values()):
-        importlib.import_module(f"tools.commands.{module}").register(app)
+        _load(module)
+
+
+@cache
+def _load(module: str) -> None:
+    """Add the commands of a module, once however often `main` runs in this process."""
+    importlib.import_module(f"tools.commands.{module}").register(app)
 
 
 def _exit_status(error: BaseException) -> int:
