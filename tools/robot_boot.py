@@ -40,19 +40,20 @@ def open_networks(
 
 
 def boot_robot(
-    stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_share: float
+    stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_Nm: Sequence[float]
 ) -> tuple[dict[int, BootReport], dict[int, str]]:
     """Boot all buses at the same time; return reports, and why optional axes did not, by axis.
 
-    `stack` leaves the drives alone again. Raises WorkFailedError for a mandatory one that does not
+    Each drive's torque is limited (6072h) to `torque_Nm`, one for each axis of the robot. `stack`
+    leaves the drives alone again. Raises WorkFailedError for a mandatory one that does not
     boot.
     """
     with ThreadPoolExecutor(max_workers=len(networks)) as pool:
         pending: dict[str, Future[BootReports]] = {}
         for name, network in networks.items():
             wanted = {
-                axis.node_id: (axis.winch.drive, _settings(robot, axis, torque_share))
-                for axis in (robot.axes[i] for i in robot.axes_on(name))
+                axis.node_id: (axis.winch.drive, _settings(robot, axis, most_Nm))
+                for axis, most_Nm in ((robot.axes[i], torque_Nm[i]) for i in robot.axes_on(name))
             }
             pending[name] = pool.submit(boot_all, network, wanted)
     failures: list[DriverError] = []
@@ -84,12 +85,12 @@ def _told(error: DriverError) -> str:
     return f"{where}: " + "; ".join([str(error), *others])
 
 
-def _settings(robot: Robot, axis: RobotAxis, torque_share: float) -> BootSettings:
+def _settings(robot: Robot, axis: RobotAxis, torque_Nm: float) -> BootSettings:
     motor = axis.winch.motor
     return BootSettings(
         robot.master_node_id,
         robot.sync_period_s,
-        torque_share * motor.rated_torque_Nm,
+        torque_Nm,
         rated_torque_Nm=motor.rated_torque_Nm,
         counts_per_turn=axis.winch.encoder_counts_per_turn,
         mandatory=axis.mandatory,
@@ -100,7 +101,7 @@ def device_of(
     robot: Robot,
     networks: Mapping[str, CanNetwork],
     booted: Mapping[int, BootReport],
-    torque_share: float,
+    torque_Nm: Sequence[float],
 ) -> AxisBuses:
     """Return the axes that have booted as one device; raises the drivers' errors."""
     place_of = {i: place for place, i in enumerate(booted)}
@@ -110,12 +111,7 @@ def device_of(
         if not here:
             continue
         configs = [
-            AxisConfig.from_boot(
-                robot.axes[i].winch.drive,
-                booted[i],
-                torque_share * robot.axes[i].winch.motor.rated_torque_Nm,
-            )
-            for i in here
+            AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i]) for i in here
         ]
         places = [place_of[i] for i in here]
         buses.append(BusAxes(name, network, configs, places, robot.master_heartbeat_s))

@@ -180,12 +180,13 @@ def open_robot(
         safety = stack.enter_context(open_safety(reference, out, nodes))
         networks = open_networks(stack, robot, urls)
         begin = time.monotonic()
-        booted, absent = boot_robot(stack, robot, networks, torque_share)
+        torque_Nm = [torque_share * axis.winch.motor.rated_torque_Nm for axis in robot.axes]
+        booted, absent = boot_robot(stack, robot, networks, torque_Nm)
         boot_s = time.monotonic() - begin
         for note in boot_notes(robot, booted, absent):
             out.note(note)
         axes = [robot.axes[i] for i in booted]
-        device = stack.enter_context(device_of(robot, networks, booted, torque_share))
+        device = stack.enter_context(device_of(robot, networks, booted, torque_Nm))
         if safety is not None:
             stack.callback(safety.drop_brakes)
         for network in networks.values():

@@ -7,9 +7,12 @@ from contextlib import ExitStack
 from functools import wraps
 from typing import Any, Concatenate, Final, ParamSpec, TypeVar
 
+import numpy as np
+
 from cdpr_rt.cycle import Watch
 from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.machine import MachineError
+from cdpr_rt.runtime.robot_arrays import limits_of
 from cdpr_rt.tension import TensionFeedback
 from drivers.axis_buses import AxisBuses
 from drivers.cia402 import POWER_OFF, State
@@ -26,7 +29,6 @@ from tools.safety import SessionSafety, connect
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _ERRORS: Final = (DriverError, CommandError, ProfileError, ControlError, OSError)
-_TORQUE_SHARE: Final = 1.0
 
 
 def _told(
@@ -71,13 +73,14 @@ class RobotMachine:
         with ExitStack() as stack:
             self._safety = self._open_safety(stack)
             networks = open_networks(stack, self._robot, self._urls)
-            booted, absent = boot_robot(stack, self._robot, networks, _TORQUE_SHARE)
+            torque_Nm = np.asarray(limits_of(self._robot).torque_Nm).tolist()
+            booted, absent = boot_robot(stack, self._robot, networks, torque_Nm)
             if absent:
                 raise MachineError(
                     "; ".join(f"axis {i}: {reason}" for i, reason in absent.items())
                     + " (the daemon runs all axes of a robot or none)"
                 )
-            device = device_of(self._robot, networks, booted, _TORQUE_SHARE)
+            device = device_of(self._robot, networks, booted, torque_Nm)
             stack.callback(device.close)
             for network in networks.values():
                 network.start_heartbeat()
