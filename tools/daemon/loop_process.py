@@ -24,6 +24,7 @@ from profiles import Robot, load_robot
 from profiles.errors import ProfileError
 from tools.bus_fit import require_fit
 from tools.daemon.child import end_with
+from tools.daemon.listening_machine import ListeningMachine
 from tools.daemon.machine import RobotMachine
 from tools.daemon.settings import RunSettings
 from tools.errors import BAD_INPUT, DONE, CommandError
@@ -37,7 +38,8 @@ def main() -> int:
     try:
         robot = load_robot(settings.robot)
         require_fit(robot)
-        machine = RobotMachine(robot, settings)
+        kind = ListeningMachine if settings.read_only else RobotMachine
+        machine = kind(robot, settings)
     except (ProfileError, CommandError) as error:
         print(f"cdpr: {error}", file=sys.stderr)
         return BAD_INPUT

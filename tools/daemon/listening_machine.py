@@ -1,0 +1,151 @@
+"""The daemon's machine where another master runs the robot: it listens, and sends nothing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any, Final
+
+from cdpr_rt.cycle import Watch
+from cdpr_rt.runtime.machine import MachineError
+from cdpr_rt.tension import TensionFeedback
+from drivers.cia402 import POWER_OFF, State
+from drivers.errors import BusError, DriverError
+from drivers.listening import HeardBus, ListeningDevice, heard_axis
+from profiles import Robot
+from tools.daemon.settings import RunSettings
+from tools.robot_buses import robot_urls
+
+_MASTER_S: Final = 1.0
+_NOTICE: Final = "read-only: nothing is sent; another master runs the drives"
+
+
+class ListeningMachine:
+    """All axes of `robot`, heard on the buses that `settings` name; implements `Machine`.
+
+    What would have to be sent is refused, or left undone where it is part of an ending.
+    """
+
+    failures: tuple[type[Exception], ...] = (BusError,)
+    read_only = True
+    watches: Sequence[Watch] = ()
+    notices: Sequence[str] = (_NOTICE,)
+    safety = ""
+    """The other master's affair."""
+
+    def __init__(self, robot: Robot, settings: RunSettings) -> None:
+        self._robot = robot
+        self._urls = robot_urls(robot, settings.buses)
+        self._device: ListeningDevice | None = None
+        self._patient_until_s = 0.0
+
+    @property
+    def device(self) -> ListeningDevice | None:
+        """The axes that are heard, None until `open` and after `close`."""
+        return self._device
+
+    # -- slow
+
+    def open(self) -> None:
+        """Join the buses; raises MachineError."""
+        robot = self._robot
+        buses = []
+        for name, url in self._urls.items():
+            places = robot.axes_on(name)
+            axes = [heard_axis(robot.axes[i].winch, robot.axes[i].node_id) for i in places]
+            buses.append(HeardBus(name, url, axes, places))
+        try:
+            self._device = ListeningDevice(buses, robot.sync_period_s)
+        except DriverError as error:
+            raise MachineError(str(error)) from error
+
+    def prepare(self) -> None:
+        """Begin to wait for the other master's SYNC."""
+        self._patient_until_s = time.monotonic() + _MASTER_S
+
+    def acknowledge(self) -> None:
+        """Do nothing: there is no guard here that latches."""
+
+    def pause(self) -> None:
+        """Do nothing: the drives do not notice."""
+
+    def explain(self, reason: str) -> str:
+        """Return `reason`; the drives are not asked for more."""
+        return reason
+
+    def close(self) -> str:
+        """Leave the buses; return an empty text, as nothing is uncertain."""
+        device, self._device = self._device, None
+        return "" if device is None else device.close()
+
+    # -- in a cycle
+
+    def read_tension(self) -> TensionFeedback | None:
+        """Return None: load cells answer one master only."""
+        return None
+
+    def bus_state(self) -> dict[str, Any]:
+        """Return where each bus is found, and whether a master is heard."""
+        state = "closed" if self._device is None else "listening" if self._led else "no master"
+        return {name: {"url": str(url), "state": state} for name, url in self._urls.items()}
+
+    @property
+    def _led(self) -> bool:
+        return self._device is not None and self._device.silent_s < _MASTER_S
+
+    def prepared(self) -> bool:
+        """Whether a master runs the axes; raises MachineError after a while without."""
+        if not self._led and time.monotonic() > self._patient_until_s:
+            raise MachineError(
+                f"no SYNC came for {_MASTER_S:g} s: no other master runs {self._robot.name}; "
+                "start it, then check again"
+            )
+        return self._led
+
+    def power_on(self) -> None:
+        """Refuse, by MachineError."""
+        raise MachineError(_NOTICE)
+
+    def power_off(self) -> None:
+        """Do nothing: the power is the other master's affair."""
+
+    def quick_stop(self) -> None:
+        """Do nothing, as `power_off`."""
+
+    def powered(self) -> bool:
+        """Return False: no drive obeys this loop."""
+        return False
+
+    def unpowered(self) -> bool:
+        """Whether no drive that can be heard has power."""
+        return self._device is None or all(state in POWER_OFF for state in self._device.states())
+
+    def reset_faults(self) -> None:
+        """Forget what was heard of faults; the drives keep theirs."""
+        if self._device is not None:
+            self._device.forget_alarms()
+
+    def intact(self) -> bool:
+        """Whether the buses are there."""
+        return self._device is not None
+
+    def faultless(self) -> bool:
+        """Whether no drive is in fault."""
+        faults = (State.FAULT, State.FAULT_REACTION)
+        return self._device is not None and not any(s in faults for s in self._device.states())
+
+    def set_brakes(self, released: bool) -> None:
+        """Do nothing, as `power_off`."""
+
+    def brakes_are(self, released: bool) -> bool:  # noqa: ARG002  # there are none here
+        """Return True: nobody waits for them."""
+        return True
+
+    def states(self) -> list[str]:
+        """Return what each drive says of itself, in the standard's words."""
+        if self._device is None:
+            return []
+        return [
+            f"{axis.name} is {state.label}"
+            for axis, state in zip(self._robot.axes, self._device.states(), strict=True)
+        ]
