@@ -49,7 +49,7 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     block, lease = service.block, service.lease
     if settings.record is not None:
         recorder = Recorder(block, settings.record, settings.name)
-        service.events.listeners.append(partial(_note, recorder, service))
+        service.events.listeners.append(partial(_note, recorder))
         parts.append(recorder)
     if settings.live is not None:
         parts.append(LiveView(block, settings.name, settings.live))
@@ -60,14 +60,9 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     return parts
 
 
-def _note(
-    recorder: Recorder, service: Service, text: str, kind: str, detail: dict[str, Any]
-) -> None:
-    """Have an event recorded, beside the states and reasons that the recorder finds by itself.
-
-    Those it finds in what the loop publishes: a dead loop's end is not among them.
-    """
-    if kind not in ("state", "reason") or service.link.dead:
+def _note(recorder: Recorder, text: str, kind: str, detail: dict[str, Any]) -> None:
+    """Have an event recorded, beside the states and reasons that the recorder finds by itself."""
+    if kind not in ("state", "reason"):
         recorder.remark(text, kind=kind, **detail)
 
 
