@@ -26,6 +26,8 @@ from tools.output import Output
 from tools.signals import stop_on_signals
 
 _RENEW_S, _DEADMAN_S = 0.1, 0.6
+_SETTLE_S = 2.0
+_REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
 _STANDING = frozenset({"hold", "idle"})
 
 
@@ -167,8 +169,21 @@ def _await_end(
     return False
 
 
+def _at_rest(axis: dict[str, Any]) -> bool:
+    angle, wanted = axis.get("position_rad"), axis.get("setpoint_rad")
+    speed = axis.get("velocity_rad_s")
+    if angle is None or wanted is None or speed is None:
+        return True
+    return abs(speed) < _REST_RAD_S and abs(angle - wanted) < _REST_RAD
+
+
 def _finish(daemon: Daemon, out: Output, **figures: Any) -> None:
+    """Say where the axes are once they have settled, or after a while where they have not."""
+    deadline = time.monotonic() + _SETTLE_S
     status = daemon.get("/status")
+    while not all(map(_at_rest, status["axes"])) and time.monotonic() < deadline:
+        time.sleep(_RENEW_S)
+        status = daemon.get("/status")
     for axis in status["axes"]:
         angle = axis.get("position_rad")
         shown = "-" if angle is None else f"{math.degrees(angle):.3f} deg"

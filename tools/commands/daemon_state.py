@@ -50,7 +50,8 @@ def status(
         if watch:
             told = _watch(daemon, out, told)
         else:
-            out.text.print(status_text(told))
+            for part in status_text(told).renderables:
+                out.text.print(part, soft_wrap=True)
     out.result({"ok": told["state"] not in ("fault", "dead"), **told})
 
 
@@ -78,10 +79,10 @@ def check(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Boot the drives if they are not, and check the bus without power; ready afterwards."""
+    """Boot the drives anew and check the bus without power; ready afterwards."""
     out = Output(as_json)
     with open_daemon(robot, socket, url, key_file) as daemon:
-        if daemon.get("/status")["state"] == "unconfigured":
+        if daemon.get("/status")["state"] in ("unconfigured", "inactive"):
             daemon.post("/configure")
         _tell(out, daemon.post("/check"))
 

@@ -64,8 +64,9 @@ class Daemon:
         try:
             yield control
         except BaseException:
-            with suppress(CommandError):
-                control.hold()
+            if control.obeyed:
+                with suppress(CommandError):
+                    control.hold()
             raise
         finally:
             with suppress(CommandError):
@@ -111,10 +112,14 @@ class Control:
     def __init__(self, daemon: Daemon, token: str) -> None:
         self.daemon = daemon
         self._token = token
+        self.obeyed = False
+        """Whether a command has been carried out."""
 
     def post(self, path: str, body: dict[str, Any]) -> dict[str, Any]:
         """Give a command that needs the right."""
-        return self.daemon.post(path, body, self._token)
+        answer = self.daemon.post(path, body, self._token)
+        self.obeyed = True
+        return answer
 
     def renew(self) -> None:
         """Keep the right."""
