@@ -174,7 +174,7 @@ def _at_rest(axis: dict[str, Any]) -> bool:
     speed = axis.get("velocity_rad_s")
     if angle is None or wanted is None or speed is None:
         return True
-    return abs(speed) < _REST_RAD_S and abs(angle - wanted) < _REST_RAD
+    return bool(abs(speed) < _REST_RAD_S and abs(angle - wanted) < _REST_RAD)
 
 
 def _finish(daemon: Daemon, out: Output, **figures: Any) -> None:
