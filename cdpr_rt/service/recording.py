@@ -70,6 +70,7 @@ class Recorder:
         self._remarks: deque[dict[str, Any]] = deque(maxlen=_MOST_REMARKS)
         self._seen: dict[str, int] = {}
         self._events = Events()
+        self._told_status: dict[str, Any] = {}
         self._told_lost = 0
         self._rows = 0
         self._bytes = 0
@@ -177,8 +178,11 @@ class Recorder:
         """Log what has come since the last time."""
         self._take_text("description", self._description, self._block.description)
         self._take_text("status", self._status, self._block.status)
+        before = self._rows
         while (rows := self._reader.read(_MOST_ROWS)).size:
             self._take_rows(rows)
+        if self._rows == before and (event := self._events.of_state(self._told_status)):
+            self._log_event(event, time.monotonic_ns())
         while self._remarks:
             remark = self._remarks.popleft()
             self._log_event(remark, int(remark["stamp_ns"]))
@@ -200,7 +204,9 @@ class Recorder:
         channel.log(_text(value), log_time=self._wall(now_ns))
         if name == "description":
             self._events.describe(value)
-        elif event := self._events.of_status(value):
+            return
+        self._told_status = value
+        if event := self._events.of_status(value):
             self._log_event(event, now_ns)
 
     def _take_rows(self, rows: Row) -> None:

@@ -22,6 +22,7 @@ class Events:
         self._programs: list[str] = []
         self._axes: list[str] = []
         self._last: tuple[int, ...] | None = None
+        self._label = ""
         self._reason = ""
 
     def describe(self, description: dict[str, Any]) -> None:
@@ -36,6 +37,16 @@ class Events:
             return None
         return {"text": self._reason, "limit": status.get("reason_limit")}
 
+    def of_state(self, status: dict[str, Any]) -> dict[str, Any] | None:
+        """Return a change of state that only `status` tells; to be asked while no cycles run."""
+        label = str(status.get("state") or "")
+        if label in ("", self._label):
+            return None
+        self._label = label
+        number = LoopState[label.upper()].value if label.upper() in LoopState.__members__ else -1
+        self._last = (number, *(self._last or (0,) * len(_WATCHED))[1:])
+        return {"text": f"state {label}"}
+
     def of_rows(self, rows: Row) -> list[tuple[dict[str, Any], int]]:
         """Return what changed within `rows` (m,) and since the last ones, with stamps."""
         if not rows.size:
@@ -45,6 +56,7 @@ class Events:
         last = self._last if self._last is not None else (-1, *seen[0, 1:])
         before = np.vstack([np.array(last), seen[:-1]])
         self._last = tuple(int(value) for value in seen[-1])
+        self._label = _label(LoopState, self._last[0])
         events = []
         for k in np.flatnonzero((seen != before).any(axis=1)):
             event = {

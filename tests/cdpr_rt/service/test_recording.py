@@ -234,3 +234,24 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
     ]
     assert [event.get("cycle") for event in events] == [0, 10, 20, 60, 70, None, None]
     assert events[-1]["client"] == "panel" and events[-1]["at"] is None
+
+
+def test_states_without_cycles_are_events_too(tmp_path: Path) -> None:
+    block = block_with_clock()
+    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
+    block.write_status({"state": "unconfigured", "reason": ""})
+    recorder.start()
+    time.sleep(0.4)
+    writer = RowWriter(block)
+    put(writer, made_rows(0, 50))
+    _wait_until(lambda: recorder.told()["rows"] == 50)
+    block.write_status({"state": "dead", "reason": "the loop has died: killed by signal 9"})
+    time.sleep(0.4)
+    recorder.stop()
+    texts = [value["text"] for _, value in stock_messages(Path(recorder.told()["file"]), "/events")]
+    assert sorted(texts) == [
+        "state active",
+        "state dead",
+        "state unconfigured",
+        "the loop has died: killed by signal 9",
+    ]
