@@ -35,21 +35,29 @@ def _schedule_fifo(also: int = 0) -> str:
     return ""
 
 
-def stay_realtime() -> list[str]:
-    """Make the calling thread punctual for the rest of the process' life.
+def settle_memory() -> list[str]:
+    """Lock memory and freeze what the garbage collector knows, which is off from now on.
 
-    It gets SCHED_FIFO and a core, preferably an isolated one; memory is locked, the garbage
-    collector frozen and off, and a thread that holds the interpreter gives it up sooner. Threads
-    that it starts later are ordinary ones on its core until they say otherwise. Returns what was
-    not allowed, in words with the remedy.
+    For a process that has all it needs. Returns what was not allowed, in words with the remedy.
     """
-    notices = [_lock_memory(), _schedule_fifo(os.SCHED_RESET_ON_FORK)]
-    if not notices[1]:  # where others may come between, being moved is better than waiting
-        notices.append(_take_core())
-    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+    notice = _lock_memory()
     gc.collect()
     gc.freeze()
     gc.disable()
+    return [notice] if notice else []
+
+
+def stay_punctual() -> list[str]:
+    """Make the calling thread punctual for the rest of the process' life.
+
+    It gets SCHED_FIFO and a core, preferably an isolated one, and a thread that holds the
+    interpreter gives it up sooner. Threads that it starts later are ordinary ones on its core until
+    they say otherwise. Returns what was not allowed, in words with the remedy.
+    """
+    notices = [_schedule_fifo(os.SCHED_RESET_ON_FORK)]
+    if not notices[0]:  # where others may come between, being moved is better than waiting
+        notices.append(_take_core())
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
     return [notice for notice in notices if notice]
 
 

@@ -157,6 +157,11 @@ class AxisBuses:
         for group in self.groups:
             group.stop_cycling()
 
+    def tolerate_silence(self, cycles: int) -> None:
+        """Bridge so many cycles without an answer; see `AxisGroup.tolerate_silence`."""
+        for group in self.groups:
+            group.tolerate_silence(cycles)
+
     def request(self, state: State) -> None:
         """Ask all axes for a state; see `AxisGroup.request`. Where one refuses, none is enabled."""
         try:

@@ -48,6 +48,11 @@ class AxisGroup(AxisExchange):
         self._cycling = False
         self.network.release_cycle()
 
+    def tolerate_silence(self, cycles: int) -> None:
+        """Bridge so many consecutive cycles without an answer; in lockstep none is bridged."""
+        if not self.lockstep:
+            self._ints[codec.SILENCE_LIMIT] = cycles + 1
+
     def request(self, state: State) -> None:
         """Ask all axes for a state; the cycles lead them there step by step.
 

@@ -10,6 +10,7 @@ from drivers.errors import BusError, SdoError
 
 if TYPE_CHECKING:
     from drivers.axis_group import AxisGroup
+    from drivers.network import CanNetwork
 
 _TIMEOUT_S = 1.0
 
@@ -25,15 +26,19 @@ def switch_off(group: AxisGroup) -> str:
     try:
         if _by_cycles(group):
             return ""
-        left = [axis.node_id for axis in group.axes if not _by_sdo(group, axis.node_id)]
+        left = [
+            axis.node_id
+            for axis in group.axes
+            if not switch_off_by_sdo(group.network, axis.node_id)
+        ]
     except BusError as error:
-        nodes = ", ".join(str(axis.node_id) for axis in group.axes)
-        return f"node {nodes}: not known to be without power: {error}"
+        told = ", ".join(str(axis.node_id) for axis in group.axes)
+        return f"node {told}: not known to be without power: {error}"
     if not left:
         return ""
-    nodes = ", ".join(str(node) for node in left)
+    told = ", ".join(str(node) for node in left)
     return (
-        f"node {nodes}: does not confirm that its power stage is off; it was reset (NMT), "
+        f"node {told}: does not confirm that its power stage is off; it was reset (NMT), "
         "but see to it that it has no power"
     )
 
@@ -54,8 +59,11 @@ def _by_cycles(group: AxisGroup) -> bool:
     return False
 
 
-def _by_sdo(group: AxisGroup, node_id: int) -> bool:
-    network = group.network
+def switch_off_by_sdo(network: CanNetwork, node_id: int) -> bool:
+    """Take the power from one drive by SDO and return whether it says that it has none.
+
+    One that does not is reset, as the last resort. Raises BusError.
+    """
     try:
         network.write(node_id, 0x6040, 0, DISABLE_VOLTAGE)
         if state_of(network.read_int(node_id, 0x6041)) in POWER_OFF:

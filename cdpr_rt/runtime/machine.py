@@ -52,6 +52,9 @@ class Machine(Protocol):
     def pause(self) -> None:
         """Leave the drives, which have no power, for a while without cycles."""
 
+    def make_sure(self) -> str:
+        """See to it that no drive has power which does not answer; return what is uncertain."""
+
     def explain(self, reason: str) -> str:
         """Return `reason` with what drives and guards say of it when they are asked."""
 
@@ -82,7 +85,7 @@ class Machine(Protocol):
         """Whether all drives have their power and obey."""
 
     def unpowered(self) -> bool:
-        """Whether no drive that can be heard has power."""
+        """Whether no drive that answers has power."""
 
     def reset_faults(self) -> None:
         """Forget latched alarms and have faults reset in the cycles that follow."""

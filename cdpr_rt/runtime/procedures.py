@@ -170,9 +170,10 @@ def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
         yield  # one command at least, so that it is sent
         if machine.unpowered():
             break
-    if not machine.unpowered():
-        doubt = f"not known to be without power: {', '.join(machine.states())}"
-        life.blame(f"{life.reason}; {doubt}" if life.reason else doubt)
+    doubts: list[str] = []
+    yield from _slowly(loop, lambda: doubts.append(machine.make_sure()))
+    if any(doubts):
+        life.blame("; ".join(filter(None, (life.reason, *doubts))), life.details)
         then = LoopState.FAULT
     life.enter(then)
     loop.reacting = Reaction.NONE

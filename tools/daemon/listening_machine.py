@@ -69,6 +69,10 @@ class ListeningMachine:
     def pause(self) -> None:
         """Do nothing: the drives do not notice."""
 
+    def make_sure(self) -> str:
+        """Return an empty text: the power is the other master's affair."""
+        return ""
+
     def explain(self, reason: str) -> str:
         """Return `reason`; the drives are not asked for more."""
         return reason

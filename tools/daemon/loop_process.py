@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.exchange import AxisFeedback, Setpoint
-from cdpr_rt.realtime import stay_realtime
+from cdpr_rt.realtime import settle_memory, stay_punctual
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.loop import ControlLoop, LoopParts
 from cdpr_rt.runtime.programs.model import model_of
@@ -46,6 +46,7 @@ def main() -> int:
     parts = loop_parts(robot, block)
     block.write_description(description(robot, parts))
     loop = ControlLoop(block, machine, parts)
+    loop.notices += settle_memory()
     _end_on_signals(loop)
     end_with(settings.launcher_pid)
     counters = block.counters
@@ -69,7 +70,7 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
         programs=programs,
         supervisor=Supervisor(limits, n, period_s, names),
         estimator=Estimator(n, period_s, winches_of(axes)),
-        punctual=stay_realtime,
+        punctual=stay_punctual,
     )
     rehearse_programs(programs, n)
     _rehearse_judgement(parts, n)

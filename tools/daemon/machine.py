@@ -15,6 +15,7 @@ from cdpr_rt.runtime.machine import MachineError
 from cdpr_rt.runtime.robot_arrays import limits_of
 from cdpr_rt.tension import TensionFeedback
 from drivers.axis_buses import AxisBuses
+from drivers.axis_shutdown import switch_off_by_sdo
 from drivers.cia402 import POWER_OFF, State
 from drivers.errors import BusError, DriverError
 from drivers.network import CanNetwork
@@ -82,6 +83,8 @@ class RobotMachine:
                 )
             device = device_of(self._robot, networks, booted, torque_Nm)
             stack.callback(device.close)
+            # the supervisor judges silence before the device does
+            device.tolerate_silence(self._robot.limits.missed_cycles + 1)
             for network in networks.values():
                 network.start_heartbeat()
             self._stack = stack.pop_all()
@@ -114,6 +117,23 @@ class RobotMachine:
     def pause(self) -> None:
         """Leave the drives, which have no power, for a while without cycles."""
         self._booted.stop_cycling()
+
+    @_told
+    def make_sure(self) -> str:
+        """See to it that no drive has power which does not answer; return what is uncertain."""
+        device = self._booted
+        doubts = []
+        for axis, state in zip(self._robot.axes, device.states(), strict=True):
+            if state in POWER_OFF:
+                continue
+            try:
+                off = switch_off_by_sdo(self._networks[axis.bus], axis.node_id)
+            except BusError as error:
+                doubts.append(f"{axis.name}: not known to be without power: {error}")
+                continue
+            if not off:
+                doubts.append(f"{axis.name}: does not confirm that its power is off; it was reset")
+        return "; ".join(doubts)
 
     @_told
     def explain(self, reason: str) -> str:
@@ -196,8 +216,12 @@ class RobotMachine:
         return self.device is not None and self.device.reached(State.OPERATION_ENABLED)
 
     def unpowered(self) -> bool:
-        """Whether no drive that can be heard has power."""
-        return self.device is None or all(state in POWER_OFF for state in self.device.states())
+        """Whether no drive that answers has power."""
+        device = self.device
+        return device is None or all(
+            state in POWER_OFF or not valid
+            for state, valid in zip(device.states(), device.feedback.valid, strict=True)
+        )
 
     def reset_faults(self) -> None:
         """Forget latched alarms and have faults reset in the cycles that follow."""
