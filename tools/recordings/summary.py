@@ -13,7 +13,16 @@ from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording_reader import Columns
 from tools.recordings.selection import ELAPSED, Selection
 
-_FIELDS = ("cycle", "state", "lateness_s", "exchange_s", "compute_s", "late_cycles", "missed")
+_FIELDS = (
+    "cycle",
+    "stamp_ns",
+    "state",
+    "lateness_s",
+    "exchange_s",
+    "compute_s",
+    "late_cycles",
+    "missed",
+)
 
 
 @dataclass
@@ -21,6 +30,7 @@ class _Count:
     """Figures of one file, gathered as its rows come."""
 
     rows: int = 0
+    first_stamp_ns: int = 0
     missing_cycles: int = 0
     restarts: int = 0
     first_s: float = 0.0
@@ -35,6 +45,7 @@ class _Count:
         elapsed, cycle = rows[ELAPSED], rows["cycle"]
         if self.rows == 0:
             self.first_s = float(elapsed[0])
+            self.first_stamp_ns = int(rows["stamp_ns"][0])
             self.began = {name: int(rows[name][0]) for name in ("missed", "late_cycles")}
         else:
             elapsed = np.concatenate([[self.last_s], elapsed])
@@ -75,6 +86,9 @@ def summarise(path: Path) -> dict[str, Any]:
     for rows in selection.rows():
         count.add(rows)
     (reader,) = selection.readers
+    began_ns = _wall_ns(reader.metadata, count.first_stamp_ns)
+    for event in reader.events:
+        event["after_s"] = (event["log_time_ns"] - began_ns) * 1e-9 if count.rows else None
     return {
         "file": str(path),
         "bytes": path.stat().st_size,
@@ -85,8 +99,15 @@ def summarise(path: Path) -> dict[str, Any]:
         "axes": [axis.get("name") for axis in reader.description.get("axes", [])],
         "period_s": reader.description.get("period_s"),
         **count.result(),
-        "events": reader.events,
+        "events": sorted(reader.events, key=lambda event: int(event["log_time_ns"])),
     }
+
+
+def _wall_ns(metadata: dict[str, str], stamp_ns: int) -> int:
+    """Return the time of day of a stamp, by the pair of readings in the file."""
+    pair = (metadata.get(f"start_{clock}_ns", "0") for clock in ("realtime", "monotonic"))
+    realtime_ns, monotonic_ns = map(int, pair)
+    return stamp_ns + realtime_ns - monotonic_ns
 
 
 def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
@@ -116,6 +137,6 @@ def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
     if len(events) > most_events:
         lines.append(f"  ({len(events) - most_events} earlier events are in --json)")
     for event in events[-most_events:]:
-        at = f"{event['time_s']:10.3f} s" if "time_s" in event else " " * 12
+        at = f"{event['after_s']:10.3f} s" if event["after_s"] is not None else " " * 12
         lines.append(f"  {at}  {event['text']}")
     return lines
