@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import platform
 import re
@@ -154,21 +155,41 @@ def _memory() -> Finding:
 
 def _kernel() -> Finding:
     release = platform.release()
-    kind = preemption(platform.version(), _text(Path("/sys/kernel/realtime")))
+    kind = preemption(
+        platform.version(), _text(Path("/sys/kernel/realtime")), _text(Path("/proc/cmdline"))
+    )
     if kind == "PREEMPT_RT":
         return Finding("kernel", "ok", f"{release}, {kind}")
     remedy = "for a real robot, install the distribution's PREEMPT_RT kernel"
-    if kind == "PREEMPT_DYNAMIC" and "preempt=full" not in _text(Path("/proc/cmdline")):
+    if kind == "PREEMPT_DYNAMIC":
+        kind += f", {_preemption_built_in(release) or 'its default mode'}"
         remedy += "; until then, boot with preempt=full"
     return Finding("kernel", "note", f"{release}, {kind}, not PREEMPT_RT", remedy)
 
 
-def preemption(version: str, realtime: str) -> str:
-    """Return the kind of preemption by the kernel's version text and /sys/kernel/realtime."""
+def preemption(version: str, realtime: str, command_line: str) -> str:
+    """Return the kind of preemption by the kernel's version, /sys/kernel/realtime, /proc/cmdline.
+
+    A kernel that can change its mode is told with the mode where it was booted with one.
+    """
     named = re.search(r"\bPREEMPT\w*", version)
     if realtime == "1":
         return "PREEMPT_RT"
-    return named[0] if named else "no preemption inside the kernel"
+    mode = re.search(r"\bpreempt=(\w+)", command_line)
+    kind = named[0] if named else "no preemption inside the kernel"
+    return f"{kind}, mode {mode[1]}" if mode else kind
+
+
+def _preemption_built_in(release: str) -> str:
+    """Return the mode that a kernel with a choice has without being told; empty if not known."""
+    try:
+        text = gzip.decompress(Path("/proc/config.gz").read_bytes()).decode()
+    except OSError:
+        text = _text(Path(f"/boot/config-{release}"))
+    mode = re.search(r"^CONFIG_PREEMPT_(NONE|VOLUNTARY|LAZY)=y$", text, re.MULTILINE)
+    if mode:
+        return f"mode {mode[1].lower()}"
+    return "mode full" if "\nCONFIG_PREEMPT=y\n" in text else ""
 
 
 def _timers() -> Finding:

@@ -13,8 +13,8 @@ import pytest
 
 CODE = """
 import os, sys
-from cdpr_rt.realtime import stay_realtime
-notices = stay_realtime()
+from cdpr_rt.realtime import stay_punctual
+notices = stay_punctual()
 print(os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, sorted(os.sched_getaffinity(0)), notices)
 sys.stdout.flush()
 sys.stdin.read()

@@ -80,17 +80,18 @@ def test_what_is_cut_or_mangled_is_read_as_far_as_it_goes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("version", "realtime", "kind"),
+    ("version", "realtime", "command_line", "kind"),
     [
-        ("#1 SMP PREEMPT_DYNAMIC Debian 6.1.1-1", "", "PREEMPT_DYNAMIC"),
-        ("#1 SMP PREEMPT_RT Debian 6.1.1-1", "1", "PREEMPT_RT"),
-        ("#1 SMP PREEMPT RT", "1", "PREEMPT_RT"),
-        ("#1 SMP PREEMPT Tue", "", "PREEMPT"),
-        ("#1 SMP Debian 5.10", "", "no preemption inside the kernel"),
+        ("#1 SMP PREEMPT_DYNAMIC Debian 6.1", "", "ro quiet", "PREEMPT_DYNAMIC"),
+        ("#1 SMP PREEMPT_DYNAMIC", "", "preempt=full ro", "PREEMPT_DYNAMIC, mode full"),
+        ("#1 SMP PREEMPT_RT Debian 6.1.1-1", "1", "", "PREEMPT_RT"),
+        ("#1 SMP PREEMPT RT", "1", "", "PREEMPT_RT"),
+        ("#1 SMP PREEMPT Tue", "", "", "PREEMPT"),
+        ("#1 SMP Debian 5.10", "", "", "no preemption inside the kernel"),
     ],
 )
-def test_the_kinds_of_preemption(version: str, realtime: str, kind: str) -> None:
-    assert preemption(version, realtime) == kind
+def test_the_kinds_of_preemption(version: str, realtime: str, command_line: str, kind: str) -> None:
+    assert preemption(version, realtime, command_line) == kind
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 from typing import cast
 
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from cdpr_rt.cycle import Cycle
 from cdpr_rt.exchange import AxisDevice
-from cdpr_rt.realtime import paced_realtime
+from cdpr_rt.realtime import settle_memory, stay_punctual
 
 Times = NDArray[np.int64]
 _WARM_UP = 100
@@ -62,9 +61,8 @@ def measure(period_s: float, cycles: int) -> Times:
 def main(arguments: Sequence[str]) -> None:
     """Measure and write what was found."""
     period_s, cycles, how = float(arguments[0]), int(arguments[1]), arguments[2]
-    ordinary: AbstractContextManager[list[str]] = nullcontext([])
-    with paced_realtime() if how == "realtime" else ordinary as notices:
-        late = measure(period_s, cycles)
+    notices = [*settle_memory(), *stay_punctual()] if how == "realtime" else []
+    late = measure(period_s, cycles)
     sys.stdout.buffer.write(json.dumps({"not_allowed": notices}).encode() + b"\n")
     sys.stdout.buffer.write(late.astype("<i8").tobytes())
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import socket
 import time
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +12,8 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_rt.runtime.shared_block import MOST_AXES, SharedBlock
+from drivers.bus.master_lock import refuse_second_master
+from drivers.errors import BusError
 from profiles import Robot, load_robot
 from sim_bus.ready import tell_ready
 from tools.bus_fit import require_fit
@@ -108,15 +109,15 @@ def run(
         safety_io=safety_io,
     )
     _require_free(settings.socket)
+    _require_no_master(profile, settings)
     _ask(profile, settings, yes)
     with ExitStack() as stack:
-        keep: tuple[int, ...] = ()
+        simulator = None
         if asks_for_own_simulator(bus or ()):
             out.note(f"starting {len(profile.axes)} simulated drives ...")
             simulator = OwnSimulator(profile.reference, settings.buses[0], plant, paced=True)
             stack.callback(simulator.stop)
-            keep = (simulator.lifeline,)
-        _launch(profile, settings, out, keep)
+        _launch(profile, settings, out, simulator)
 
 
 def settings_for(
@@ -159,7 +160,9 @@ def settings_for(
     )
 
 
-def _launch(robot: Robot, settings: RunSettings, out: Output, keep: Sequence[int]) -> None:
+def _launch(
+    robot: Robot, settings: RunSettings, out: Output, simulator: OwnSimulator | None
+) -> None:
     block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
     block.counters["start_monotonic_ns"] = time.monotonic_ns()
     block.counters["start_realtime_ns"] = time.time_ns()
@@ -169,7 +172,7 @@ def _launch(robot: Robot, settings: RunSettings, out: Output, keep: Sequence[int
         told = {"robot": robot.name, "state": status["state"], "socket": str(settings.socket)}
         tell_ready({**told, "reason": status.get("reason", ""), "pid": os.getpid()})
 
-    launcher = Launcher(settings, block, out.note, ready, keep)
+    launcher = Launcher(settings, block, out.note, ready, simulator)
     status = launcher.run()
     if status != DONE:
         raise _ended(launcher.reason, status)
@@ -190,6 +193,17 @@ def _require_free(control: Path) -> None:
         except OSError as error:
             raise BadInputError(f"--socket {control}: {error}") from None
     raise BadInputError(f"--socket {control}: a daemon runs there already; `cdpr stop` ends it")
+
+
+def _require_no_master(robot: Robot, settings: RunSettings) -> None:
+    """Raise BadInputError where another process runs drives on one of the buses."""
+    if settings.read_only:
+        return
+    for url in robot_urls(robot, settings.buses).values():
+        try:
+            refuse_second_master(url)
+        except BusError as error:
+            raise BadInputError(f"{error}, or give --read-only to listen") from None
 
 
 def _ask(robot: Robot, settings: RunSettings, yes: bool) -> None:

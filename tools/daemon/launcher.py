@@ -9,7 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
@@ -17,6 +18,7 @@ from cdpr_rt.runtime.shared_block import SharedBlock, SharedBlockError
 from tools.daemon.notify import ServiceManager
 from tools.daemon.settings import RunSettings
 from tools.errors import BAD_INPUT, DONE, FAILED
+from tools.simulator import OwnSimulator
 
 LOOP: Final = "tools.daemon.loop_process"
 SERVICE: Final = "tools.daemon.service_process"
@@ -96,19 +98,20 @@ class Launcher:
         block: SharedBlock,
         tell: Callable[[str], None],
         ready: Callable[[dict[str, Any]], None],
-        keep: Sequence[int] = (),
+        simulator: OwnSimulator | None = None,
     ) -> None:
         self._settings = settings
         self._block = block
         self._tell = tell
         self._ready = ready
-        self._keep = keep
+        self._simulator = simulator
         self._manager = ServiceManager()
         self._signals: list[int] = []
         self._restarts = 0
         self._restart_at = 0.0
         self._up = False
         self._stalled = False
+        self._left_core = False
         self._told = ""
         self._fed = 0.0
         self._failure = FAILED
@@ -118,7 +121,9 @@ class Launcher:
     def run(self) -> int:
         """Run both processes; return the exit status for the shell."""
         with _noted_signals(self._signals) as wakeup:
-            self._loop = Child(LOOP, self._settings, self._keep)
+            # it stays as long as the loop does, whatever becomes of this process
+            lifeline = () if self._simulator is None else (self._simulator.lifeline,)
+            self._loop = Child(LOOP, self._settings, lifeline)
             self._service: Child | None = Child(SERVICE, self._settings)
             try:
                 while not self._signals and not self._finished():
@@ -164,6 +169,7 @@ class Launcher:
 
     def _turn(self) -> None:
         now = time.monotonic()
+        self._leave_core()
         self._watch_loop()
         self._watch_service(now)
         status = self._status()
@@ -191,6 +197,19 @@ class Launcher:
                 if stalled
                 else "the loop turns again"
             )
+
+    def _leave_core(self) -> None:
+        """Leave the loop's core to it, once it has taken one; a new service inherits that."""
+        if self._left_core or self._loop.end:
+            return
+        taken = os.sched_getaffinity(self._loop.process.pid)
+        here = os.sched_getaffinity(0)
+        if len(taken) > 1 or not here - taken:
+            return
+        self._left_core = True
+        besides = (self._service, self._simulator)
+        for pid in (os.getpid(), *(one.process.pid for one in besides if one is not None)):
+            _move_to(pid, here - taken)
 
     def _watch_service(self, now: float) -> None:
         if self._service is not None:
@@ -260,6 +279,13 @@ def _settled(status: dict[str, Any]) -> bool:
 def _summary(status: dict[str, Any]) -> str:
     state, reason = status.get("state", "starting"), status.get("reason", "")
     return f"{state}: {reason}" if reason else str(state)
+
+
+def _move_to(pid: int, cores: set[int]) -> None:
+    """Keep all threads of a process on these cores, and those that they will start."""
+    with suppress(OSError):  # it, or one of its threads, has ended meanwhile
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            os.sched_setaffinity(int(task.name), cores)
 
 
 @contextmanager
