@@ -52,6 +52,12 @@ def _note(folder: Path, text: str) -> None:
         log.write(text + "\n")
 
 
+def _tell_pid(folder: Path, who: str) -> None:
+    fresh = folder / f"{who}.new"
+    fresh.write_text(str(os.getpid()))
+    fresh.rename(folder / f"{who}.pid")
+
+
 def _asked_to_end() -> int:
     reader, writer = os.pipe2(os.O_NONBLOCK)
     signal.signal(signal.SIGTERM, lambda *_: os.write(writer, b"."))
@@ -62,7 +68,7 @@ def loop() -> None:
     """Write a status and turn until told to end, or do as the file `plan.json` says."""
     settings = RunSettings.from_argv()
     folder = Path(settings.robot)
-    (folder / "loop.pid").write_text(str(os.getpid()))
+    _tell_pid(folder, "loop")
     end = _asked_to_end()
     end_with(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)
@@ -80,7 +86,7 @@ def service() -> None:
     """Open the socket and wait to be told to end."""
     settings = RunSettings.from_argv()
     folder = Path(settings.robot)
-    (folder / "service.pid").write_text(str(os.getpid()))
+    _tell_pid(folder, "service")
     end = _asked_to_end()
     end_with(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)
