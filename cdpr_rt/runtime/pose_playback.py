@@ -124,7 +124,7 @@ def _fits(
     way = 0.0
     for i in range(3):
         way += (row[i] - last[i]) ** 2
-    return math.sqrt(way) <= most_m_s * max(sent - before, _SHORTEST_INTERVAL_S)
+    return bool(math.sqrt(way) <= most_m_s * max(sent - before, _SHORTEST_INTERVAL_S))
 
 
 @jit

@@ -156,7 +156,9 @@ class PoseStream:
 
     @property
     def delay_s(self) -> float:
-        """Return by how much what is played lies behind the quickest sample's arrival."""
+        """Return by how much what is played lies behind the quickest samples, 0 where stopped."""
+        if self.state is StreamState.STOPPED:
+            return 0.0
         numbers = self._numbers
         earliest = min(numbers[playback.EARLIEST], numbers[playback.EARLIEST_BEFORE])
         return float(numbers[playback.NOW] - earliest - numbers[playback.PLAYED])

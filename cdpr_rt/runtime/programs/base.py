@@ -55,5 +55,9 @@ class Program(Protocol):
     def pose_setpoint(self) -> FloatArray | None:
         """Return where the platform is to be, (7,), None where it does not say."""
 
+    @property
+    def stream_age_s(self) -> float:
+        """Return the age of the newest sample that it follows, nan where it follows none."""
+
     def progress(self) -> dict[str, Any]:
         """Return what a person would want to know of it, such as the part done; asked rarely."""

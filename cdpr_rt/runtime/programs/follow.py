@@ -58,6 +58,11 @@ class FollowProgram(AxisProgram):
         super().start(feedback, setpoint, torque_Nm)
         self.stream.reset()
 
+    @property
+    def stream_age_s(self) -> float:
+        """Return the age of the newest sample that it follows, nan before the first."""
+        return self.stream.age_s
+
     def progress(self) -> dict[str, Any]:
         """Return what the stream is worth and what became of its samples."""
         stream = self.stream

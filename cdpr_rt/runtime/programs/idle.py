@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -92,6 +93,11 @@ class IdleProgram:
     def pose_setpoint(self) -> FloatArray | None:
         """Nothing is known of a platform."""
         return None
+
+    @property
+    def stream_age_s(self) -> float:
+        """Return the age of the newest sample that it follows, nan where it follows none."""
+        return math.nan
 
     def progress(self) -> dict[str, Any]:
         """Return nothing: it has no end."""

@@ -10,13 +10,16 @@ import numpy as np
 from cdpr_rt.compensation import AxisCompensation
 from cdpr_rt.controllers.pid import PidGains
 from cdpr_rt.exchange import FloatArray
+from cdpr_rt.limits import Limits
 from cdpr_rt.tuning import stiffest_pid, sweep_gain
 from profiles import RobotAxis
 
 BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
 """Bandwidths of the position loops that are tried, the stiffest first."""
 CABLE_ACCELERATION_M_S2 = 1.0
-"""Acceleration of the cables, unless a robot says otherwise."""
+"""By which set-points speed cables up and down."""
+SPEED_SHARE = 0.8
+"""Of the speed at which the supervisor intervenes, for set-points: axes swing beyond them."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +52,13 @@ def model_of(
     axes: Sequence[RobotAxis],
     period_s: float,
     latency_s: Sequence[float],
-    torque_Nm: FloatArray,
-    speed_rad_s: FloatArray,
-    cable_acceleration_m_s2: float = CABLE_ACCELERATION_M_S2,
+    limits: Limits,
 ) -> RobotModel:
     """Return the model of axes whose loops are as stiff as the latency of each allows.
 
     `latency_s` (n,) is from the instant an angle was true to the middle of the cycle in which its
-    torque acts; `torque_Nm` and `speed_rad_s` are (n,). The loops are those of the bare rotors.
-    Raises TuningError where a latency is too long for any loop.
+    torque acts. The loops are those of the bare rotors. Raises TuningError where a latency is too
+    long for any loop.
     """
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
     inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
@@ -68,9 +69,9 @@ def model_of(
     }
     return RobotModel(
         period_s=period_s,
-        torque_Nm=np.array(torque_Nm, float),
-        speed_rad_s=np.array(speed_rad_s, float),
-        acceleration_rad_s2=cable_acceleration_m_s2 / np.abs(cable),
+        torque_Nm=np.broadcast_to(limits.torque_Nm, cable.shape).astype(float),
+        speed_rad_s=SPEED_SHARE * np.broadcast_to(limits.speed_rad_s, cable.shape),
+        acceleration_rad_s2=CABLE_ACCELERATION_M_S2 / np.abs(cable),
         cable_m_per_rad=cable,
         gains=tuple(designs[pair] for pair in pairs),
         sweep_gain_Nm_rad=np.array([sweep_gain(J, latency) for J, latency in pairs]),

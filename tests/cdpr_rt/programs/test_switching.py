@@ -1,0 +1,146 @@
+"""Programs change without a bump: laws that hold for any sequence of programs and any stream."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from program_rig import COUNT_RAD, PERIOD_S, COULOMB_Nm, N, ProgramRig
+
+CYCLE_S = st.integers(1, 150).map(lambda cycles: cycles * PERIOD_S)
+
+
+def axes(most: float) -> st.SearchStrategy[list[float]]:
+    return st.lists(st.floats(-most, most), min_size=N, max_size=N)
+
+
+orders = st.one_of(
+    st.tuples(st.sampled_from(["hold", "idle", "follow"]), st.none()),
+    st.tuples(st.just("jog"), st.none() | st.fixed_dictionaries({"velocity_rad_s": axes(30.0)})),
+    st.tuples(
+        st.just("pid"),
+        st.fixed_dictionaries({"position_rad": axes(20.0), "speed_rad_s": st.floats(0.1, 50.0)})
+        | st.fixed_dictionaries({"distance_rad": axes(20.0)}),
+    ),
+    st.tuples(
+        st.just("sweep"),
+        st.fixed_dictionaries({"distance_rad": axes(1.0), "speed_rad_s": st.floats(0.01, 1.0)}),
+    ),
+    st.tuples(st.just("again"), st.none()),
+    st.tuples(st.just("stop"), st.none()),
+)
+samples = st.one_of(
+    st.none(), st.tuples(st.floats(-20, 20), st.floats(-0.1, 0.1), st.floats(0, 1e-3))
+)
+
+
+def check_set_points(rig: ProgramRig) -> None:
+    """No step in velocity beyond the acceleration, and the position is the velocity's integral."""
+    position, velocity = rig.array("position"), rig.array("velocity")
+    # in idle the set-point goes along with the axis, wherever that is turned to
+    moved = rig.array("program")[1:] != "idle"
+    steps = np.abs(np.diff(velocity, axis=0))[moved]
+    assert np.all(steps <= rig.model.acceleration_rad_s2 * PERIOD_S * (1 + 1e-9) + 1e-7)
+    mean = 0.5 * (velocity[1:] + velocity[:-1]) * PERIOD_S
+    np.testing.assert_allclose(np.diff(position, axis=0)[moved], mean[moved], atol=1e-9)
+    assert np.all(np.isfinite(rig.array("torque")))
+    assert np.all(np.abs(rig.array("torque")) <= rig.model.torque_Nm)
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(st.lists(st.tuples(orders, CYCLE_S, samples), min_size=1, max_size=10))
+def test_no_step_in_velocity_whatever_is_ordered(
+    sequence: list[tuple[tuple[str, dict[str, object] | None], float, tuple[float, ...] | None]],
+) -> None:
+    rig = ProgramRig()
+    for (name, wanted), seconds, sample in sequence:
+        if name == "stop":
+            rig.program.stop()
+        elif name == "again":
+            rig.switch(rig.program.name)
+        else:
+            rig.switch(name, wanted)
+        for _ in range(round(seconds / PERIOD_S)):
+            if sample is not None and rig.feedback.cycle % 30 == 0:
+                rig.send(sample[:3], scale=5.0)
+            rig.cycle()
+    check_set_points(rig)
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(
+    st.lists(st.floats(0.0, 0.05), min_size=40, max_size=40),
+    st.sets(st.integers(0, 39), max_size=12),
+    st.lists(st.tuples(st.floats(-0.1, 0.1), st.floats(-1, 1)), min_size=40, max_size=40),
+)
+def test_no_step_in_velocity_whatever_the_stream_does(
+    transits: list[float], dropped: set[int], shakes: list[tuple[float, float]]
+) -> None:
+    """The hand shakes and leaps, a fifth is lost, the rest comes late, twice, in another order."""
+    rig = ProgramRig()
+    rig.switch("hold")
+    rig.run(0.05)
+    rig.switch("follow")
+    start = rig.feedback.cycle
+    arrivals = [
+        (k / 30.0 + transit + again, k)
+        for k, transit in enumerate(transits)
+        if k not in dropped
+        for again in ([0.0, 0.02] if k % 3 == 0 else [0.0])
+    ]
+    sample = rig.sample
+    sample["scale"] = 1.0
+    for arrives_s, k in sorted(arrivals):
+        while (rig.feedback.cycle - start) * PERIOD_S < arrives_s:
+            rig.cycle()
+        sample["sequence"], sample["sent_ns"] = k, round(1e9 * k / 30.0)
+        hand = 0.2 * np.sin(k / 5.0)
+        sample["position_m"] = (hand + shakes[k][0], hand + shakes[k][1], 0.0)
+        rig.block.post_sample(sample)
+    rig.run(1.5)
+    check_set_points(rig)
+    assert rig.program.at_rest
+    held = rig.array("program") == "follow"
+    assert np.ptp(rig.array("position")[held][:, 0]) > 1.0
+
+
+@pytest.mark.parametrize("first", ["idle", "hold", "jog", "sweep", "pid", "follow"])
+@pytest.mark.parametrize("second", ["idle", "hold", "jog", "sweep", "pid", "follow"])
+def test_the_next_program_begins_with_the_torque_of_the_last(first: str, second: str) -> None:
+    wanted = {
+        "jog": {"velocity_rad_s": [5.0] * N},
+        "pid": {"distance_rad": [-3.0] * N},
+        "sweep": {"distance_rad": [1.0] * N},
+    }
+    rig, unchanged = ProgramRig(), ProgramRig()
+    for each in (rig, unchanged):
+        each.switch("hold")
+        each.run(0.1)
+        each.switch(first, wanted.get(first))
+        each.run(0.06)
+    last = rig.torque.copy()
+    rig.switch(second, wanted.get(second))
+    rig.cycle()
+    unchanged.cycle()
+    shared = {"hold", "jog", "pid", "follow"}
+    if first in shared and second in shared:
+        # the same loop goes on: what differs is the first cycle's share of a new motion, and the
+        # friction known of the last axis
+        gains = rig.model.gains[0]
+        share = rig.model.acceleration_rad_s2 * PERIOD_S**2
+        stiffness = gains.proportional_Nm_rad + gains.derivative_Nms_rad / PERIOD_S
+        most = stiffness * share + [0.0, 0.0, COULOMB_Nm]
+        assert np.all(np.abs(rig.torque - unchanged.torque) <= most)
+    else:
+        np.testing.assert_allclose(rig.torque, last, atol=1e-12)
+
+
+def test_a_load_is_held_through_every_change() -> None:
+    rig = ProgramRig(load_Nm=(0.4, -0.3, 0.0))
+    rig.switch("hold")
+    rig.run(2.0)
+    for name in ("jog", "pid", "hold", "follow", "hold", "pid"):
+        rig.switch(name)
+        rig.run(0.2)
+    settled = rig.array("angle")[-1200:]
+    # nothing moved by more than the encoder's reading plays
+    assert np.all(np.ptp(settled, axis=0) <= 20 * COUNT_RAD)
