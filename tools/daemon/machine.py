@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import wraps
@@ -85,6 +86,9 @@ class RobotMachine:
             stack.callback(device.close)
             # the supervisor judges silence before the device does
             device.tolerate_silence(self._robot.limits.missed_cycles + 1)
+            # the collector keeps every thread waiting: it looks at what stays now, and never again
+            gc.collect()
+            gc.freeze()
             for network in networks.values():
                 network.start_heartbeat()
             self._stack = stack.pop_all()
