@@ -12,6 +12,7 @@ from drivers.cia402 import State, mode_bits, state_of
 from drivers.configuration import BootSettings, wanted_configuration
 from drivers.download import configure, store
 from drivers.errors import BootError, DriverError, SdoAbortError, SdoCancelledError, SdoError
+from drivers.foreign_sync import SyncEar
 from drivers.network import CanNetwork
 from profiles import DriveProfile
 
@@ -127,10 +128,13 @@ def _collect(
 def _listen(network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]) -> None:
     waits_s = max(profile.heartbeat_consumer_s for profile, _ in drives.values())
     listen_s = max(_LISTEN_LEAST_S, _LISTEN_SHARE * waits_s)
-    if network.foreign_master.wait(listen_s):
-        raise BootError(
-            "L", min(drives), "another master's heartbeat is on the bus", "stop that master first"
-        )
+    with SyncEar(network.url) as ear:
+        heartbeat = network.foreign_master.wait(listen_s)
+        if heartbeat or ear.heard():
+            what = "heartbeat" if heartbeat else "SYNC"
+            raise BootError(
+                "L", min(drives), f"another master's {what} is on the bus", "stop that master first"
+            )
 
 
 def _prepare(

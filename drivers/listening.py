@@ -27,7 +27,7 @@ _TURN_S = 0.05
 """How long one cycle waits for a SYNC before it ends without."""
 _PAUSE_S = 0.5
 """After so long without a SYNC a new beginning is made with the next."""
-_SHARE = 0.6
+_SHARE = 1.0
 _LOCKSTEP_WAIT_S = 0.2
 _CALM_SHARE = 0.25
 """Of a period after a cycle's answers: by then its SYNC has come on all buses."""

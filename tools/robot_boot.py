@@ -10,6 +10,7 @@ from drivers.axis_buses import AxisBuses, BusAxes
 from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootReports, BootSettings, boot_all
 from drivers.bus import BusUrl
+from drivers.bus.master_lock import MasterLock
 from drivers.cia402 import fault_text
 from drivers.data_sheet import load_dictionary
 from drivers.errors import BootError, BusError, DriverError, SdoError
@@ -22,12 +23,16 @@ from tools.session import lacking_guards
 def open_networks(
     stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl]
 ) -> dict[str, CanNetwork]:
-    """Open the buses of `robot`; `stack` closes them. Raises BadInputError."""
+    """Open the buses of `robot` as their only master here; `stack` closes them.
+
+    Raises BadInputError, also where another process of this machine runs drives on one of them.
+    """
     networks: dict[str, CanNetwork] = {}
     for name, url in urls.items():
         axes = [robot.axes[i] for i in robot.axes_on(name)]
         nodes = [axis.node_id for axis in axes]
         try:
+            stack.enter_context(MasterLock(url))
             network = CanNetwork(url, nodes, robot.master_node_id, robot.master_heartbeat_s)
         except BusError as error:
             raise BadInputError(f"bus {name}: {error}") from error

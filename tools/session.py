@@ -21,6 +21,7 @@ from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootSettings, boot
 from drivers.bus import BusUrl, query_status
 from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
+from drivers.bus.master_lock import MasterLock
 from drivers.cia402 import Mode, State, fault_text
 from drivers.data_sheet import load_dictionary
 from drivers.errors import BusError, DriveFaultError, SdoError
@@ -229,6 +230,13 @@ def open_network(
         yield network
 
 
+def _only_master(url: BusUrl) -> MasterLock:
+    try:
+        return MasterLock(url)
+    except BusError as error:
+        raise BadInputError(str(error)) from error
+
+
 @contextmanager
 def open_winch(
     winch: Winch,
@@ -251,6 +259,7 @@ def open_winch(
         rehearse(1, winch.sync_period_s)  # compiling may keep a polling thread waiting
         safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id]))
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
+        stack.enter_context(_only_master(network.url))
         limit = winch.motor.rated_torque_Nm
         report = boot(network, winch.node_id, winch.drive, boot_settings(winch))
         stack.callback(network.release, winch.node_id)

@@ -39,6 +39,7 @@ def brief_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulated drives are there at once: do not wait as long as for real ones."""
     monkeypatch.setattr("drivers.boot._BOOT_UP_TIMEOUT_S", 0.4)
     monkeypatch.setattr("drivers.boot._LISTEN_SHARE", 0.1)
+    monkeypatch.setattr("drivers.boot._LISTEN_LEAST_S", 0.05)
     monkeypatch.setattr("drivers.network._LOOK_S", 0.02)
     monkeypatch.setattr("drivers.axis_shutdown._TIMEOUT_S", 0.4)
 

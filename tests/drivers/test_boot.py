@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import replace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import can
 import pytest
 from axis_rig import DRIVE, HEARTBEAT_S, MASTER, SETTINGS, Rig, open_network, start_simulator
+from bus_log import logged
 
 from drivers.boot import boot, boot_all
 from drivers.bus import BusUrl, query_status
@@ -77,6 +79,27 @@ def test_another_master_is_step_l(bus: str) -> None:
         with pytest.raises(BootError) as caught:
             boot(network, 1, DRIVE, SETTINGS)
     assert caught.value.letter == "L"
+
+
+def test_another_masters_sync_is_step_l_before_anything_is_sent(bus: str) -> None:
+    """One without heartbeat, or with another node id."""
+    stop = threading.Event()
+    with can.Bus(interface="simbus", channel=bus[7:]) as other, logged(bus) as log:
+
+        def produce() -> None:
+            while not stop.wait(0.005):
+                other.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+
+        producer = threading.Thread(target=produce)
+        producer.start()
+        try:
+            error = _boot_fails(bus)
+        finally:
+            stop.set()
+            producer.join()
+        sent = {frame.identifier for frame in log.frames if frame.identifier in (0x000, 0x601)}
+    assert (error.letter, sent) == ("L", set())
+    assert "another master's SYNC is on the bus" in str(error)
 
 
 def test_an_object_that_cannot_be_mapped_is_step_j(bus: str) -> None:

@@ -20,6 +20,7 @@ from tools.bus_fit import require_fit
 from tools.commands.options import JsonOption, SafetyIoOption, YesOption
 from tools.consent import require_consent
 from tools.daemon.launcher import Launcher
+from tools.daemon.notify import ServiceManager
 from tools.daemon.paths import default_recordings, default_socket
 from tools.daemon.settings import Address, RunSettings
 from tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
@@ -117,7 +118,7 @@ def run(
             out.note(f"starting {len(profile.axes)} simulated drives ...")
             simulator = OwnSimulator(profile.reference, settings.buses[0], plant, paced=True)
             stack.callback(simulator.stop)
-        _launch(profile, settings, out, simulator)
+        _launch(profile, settings, out, manager, simulator)
 
 
 def settings_for(
@@ -161,7 +162,11 @@ def settings_for(
 
 
 def _launch(
-    robot: Robot, settings: RunSettings, out: Output, simulator: OwnSimulator | None
+    robot: Robot,
+    settings: RunSettings,
+    out: Output,
+    manager: ServiceManager,
+    simulator: OwnSimulator | None,
 ) -> None:
     block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
     block.counters["start_monotonic_ns"] = time.monotonic_ns()
@@ -172,7 +177,7 @@ def _launch(
         told = {"robot": robot.name, "state": status["state"], "socket": str(settings.socket)}
         tell_ready({**told, "reason": status.get("reason", ""), "pid": os.getpid()})
 
-    launcher = Launcher(settings, block, out.note, ready, simulator)
+    launcher = Launcher(settings, block, out.note, ready, manager, simulator)
     status = launcher.run()
     if status != DONE:
         raise _ended(launcher.reason, status)
