@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
+from cdpr_rt.limits import Limit
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.states import LoopState, Reaction
 
@@ -78,12 +80,12 @@ class Events:
             words.append(_label(Reaction, now[2]) if now[2] else "no reaction any more")
             if now[3]:
                 axis = f" of {_name(self._axes, now[4])}" if now[4] >= 0 else ""
-                words[-1] += f" by limit {now[3]}{axis}"
+                words[-1] += f" by {_label(Limit, now[3])}{axis}"
         return ", ".join(words)
 
 
-def _label(kind: type[LoopState | Reaction], value: int) -> str:
-    return kind(value).label if value in list(kind) else str(value)
+def _label(kind: type[IntEnum], value: int) -> str:
+    return kind(value).name.lower().replace("_", " ") if value in list(kind) else str(value)
 
 
 def _name(names: list[str], number: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from cdpr_rt.limits import Limit
 from cdpr_rt.runtime.cycle_row import AXES, POSES, SCALARS, cycle_dtype
 from cdpr_rt.runtime.states import LoopState, Reaction
 
@@ -11,6 +12,7 @@ CYCLE, STATUS, DESCRIPTION, EVENTS = "/cycle", "/status", "/description", "/even
 
 _STATES = ", ".join(f"{state.value} {state.label}" for state in LoopState)
 _REACTIONS = ", ".join(f"{reaction.value} {reaction.label}" for reaction in Reaction)
+_LIMITS = ", ".join(f"{limit.value} {limit.key}" for limit in Limit)
 _SEVEN = "x, y, z in m and quaternion w, x, y, z; null where it is not known"
 
 MEANING: Final = {
@@ -26,7 +28,7 @@ MEANING: Final = {
     "state": f"state of the loop: {_STATES}",
     "program": "number of the program in the description's list",
     "reaction": f"reaction of the supervisor in this cycle: {_REACTIONS}",
-    "limit": "code of the limit that caused it, 0 without",
+    "limit": f"the limit that caused it: {_LIMITS}",
     "limit_axis": "the axis concerned, -1 without",
     "answered": "axes that answered this SYNC",
     "setpoint_rad": "where the motor should be",

@@ -227,7 +227,7 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
         "state ready",
         "state active",
         "program jog",
-        "quick stop by limit 7 of right",
+        "quick stop by tension high of right",
         "state fault",
         "right: 31 N below 40 N",
         "stopped by somebody",
