@@ -48,6 +48,8 @@ class RecordingReader:
         self.ended = CUT
         """`CLOSED`; `KILLED` where its writer had no time to write the index; `CUT` where the
         file breaks off."""
+        self.position = 0
+        """Bytes read so far."""
 
     def cycles(self, fields: Collection[str] | None = None) -> Iterator[Columns]:
         """Yield the rows, some hundred at a time; all fields or only `fields`."""
@@ -86,6 +88,7 @@ class RecordingReader:
         stream = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_CHUNK_BYTES)
         try:
             for record in stream.records:
+                self.position = file.tell()
                 if isinstance(record, Chunk):
                     yield breakup_chunk(record, validate_crc=True)
                 elif isinstance(record, Metadata) and record.name == "recording":

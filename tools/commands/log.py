@@ -42,7 +42,7 @@ def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
     out = Output(as_json)
     results = []
     for path in files_of(files):
-        results.append(summarise(path))
+        results.append(summarise(path, out))
         for line in told(results[-1], _EVENTS_SHOWN):
             out.say(line)
     out.result({"ok": True, "recordings": results})
@@ -63,7 +63,9 @@ def export_command(
     """Write the cycles of recordings, one after the other, into one table."""
     out = Output(as_json)
     check_target(target, overwrite)
-    rows = export(Selection(files, fields_of(fields), from_s, until_s), target)
+    selection = Selection(files, fields_of(fields), from_s, until_s)
+    with out.progress(target.name, selection.reading_s) as selection.advance:
+        rows = export(selection, target)
     out.say(f"{target}: {rows} rows")
     out.result({"ok": True, "out": target, "rows": rows})
 
@@ -84,6 +86,8 @@ def plot(
     path = target or files_of(files)[0].with_suffix(".png")
     if path.suffix != ".png":
         raise BadInputError(f"--out {path}: allowed: a name that ends in .png")
-    rows = draw(Selection(files, FIELDS, from_s, until_s), axis, path)
+    selection = Selection(files, FIELDS, from_s, until_s)
+    with out.progress(path.name, selection.reading_s) as selection.advance:
+        rows = draw(selection, axis, path)
     out.say(f"{path}: {rows} cycles")
     out.result({"ok": True, "out": path, "rows": rows})

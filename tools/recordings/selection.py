@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,8 @@ from tools.errors import BadInputError
 
 ELAPSED = "elapsed_s"
 """The column that is added: seconds since the first row, over all files."""
+
+_BYTES_PER_S = 1e7
 
 
 def files_of(paths: Sequence[Path]) -> list[Path]:
@@ -78,8 +80,16 @@ class Selection:
         self.readers = [RecordingReader(path) for path in files_of(paths)]
         self._fields = fields
         self._from_s, self._until_s = from_s, until_s
+        self.advance: Callable[[float], None] = lambda _seconds: None
+        """Called with how far reading has come, out of `reading_s`."""
         if until_s <= from_s:
             raise BadInputError(f"--until {until_s:g}: allowed: more than --from {from_s:g}")
+
+    @property
+    def reading_s(self) -> float:
+        """About how long it takes to read all of it."""
+        paths = (reader.path for reader in self.readers)
+        return sum(path.stat().st_size for path in paths if path.is_file()) / _BYTES_PER_S
 
     def rows(self) -> Iterator[Columns]:
         """Yield the rows with `ELAPSED`, some hundred at a time.
@@ -90,6 +100,8 @@ class Selection:
         time = _Time()
         for reader in self.readers:
             for columns in _readable(reader, needed):
+                done = sum(one.position for one in self.readers)
+                self.advance(done / _BYTES_PER_S)
                 elapsed = time(columns["time_s"], columns["stamp_ns"])
                 wanted = (elapsed >= self._from_s) & (elapsed <= self._until_s)
                 if wanted.any():

@@ -11,6 +11,7 @@ import numpy as np
 
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording_reader import Columns
+from tools.output import Output
 from tools.recordings.selection import ELAPSED, Selection
 
 _FIELDS = (
@@ -79,12 +80,13 @@ class _Count:
         }
 
 
-def summarise(path: Path) -> dict[str, Any]:
+def summarise(path: Path, out: Output) -> dict[str, Any]:
     """Return the figures of one file. Raises BadInputError where it is no recording."""
     selection = Selection([path], _FIELDS)
     count = _Count()
-    for rows in selection.rows():
-        count.add(rows)
+    with out.progress(path.name, selection.reading_s) as selection.advance:
+        for rows in selection.rows():
+            count.add(rows)
     (reader,) = selection.readers
     began_ns = _wall_ns(reader.metadata, count.first_stamp_ns)
     for event in reader.events:
