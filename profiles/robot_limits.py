@@ -1,5 +1,6 @@
 """What a robot may do before its supervisor steps in, and what the supervisor does then."""
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
@@ -57,7 +58,7 @@ class RobotLimits(Profile):
     torque_Nm: PerAxis | None = None
     torque_rate_Nm_s: PerAxis | None = None
     speed_rad_s: PerAxis | None = None
-    following_error_rad: PerAxis = (1.0,)
+    following_error_rad: PerAxis = (math.tau,)
     cable_length_min_m: PerAxis | None = None
     cable_length_max_m: PerAxis | None = None
     tension_min_N: PerAxis | None = None

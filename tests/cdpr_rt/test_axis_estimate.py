@@ -147,6 +147,37 @@ def test_what_accelerates_the_motor_is_not_on_the_cable() -> None:
     assert winch.feedback.torque_Nm[0] == pytest.approx(-winding)
 
 
+def test_friction_that_grows_with_tension_is_told_from_it() -> None:
+    table = winches(np.array([1.0]), friction_Nm=0.1)
+    table.friction_per_N_m[:] = 5e-3
+    feedback = AxisFeedback(1)
+    feedback.valid[:] = True
+    for winding_rad_s, way in ((2.0, 1.0), (-2.0, -1.0), (0.0, 0.0)):
+        estimator = Estimator(1, PERIOD_S, table)
+        # 60 N while the motor turns steadily: a positive angle pays out
+        torque = -(DRUM_m * 60.0 + 0.02 + way * (0.1 + 5e-3 * 60.0))
+        for k in range(300):
+            feedback.position_rad[0] = 1e3 - winding_rad_s * k * PERIOD_S
+            feedback.torque_Nm[0] = torque
+            estimator.update(feedback)
+        assert estimator.estimate.tension_N[0] == pytest.approx(60.0, abs=1e-3)
+
+
+def test_reset_forgets_the_motion_and_begins_where_it_is() -> None:
+    winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))
+    for _ in range(100):
+        winch.step(-1.0, 0.0)
+        estimator.update(winch.feedback)
+    assert estimator.estimate.velocity_rad_s[0] > 10.0
+    estimator.reset()
+    assert estimator.estimate.velocity_rad_s[0] == 0.0
+    winch.feedback.position_rad[0] += 1000.0  # cycles did not run for long
+    winch.feedback.torque_Nm[0] = -(DRUM_m * 30.0 + 0.02)
+    estimator.update(winch.feedback)
+    assert estimator.estimate.velocity_rad_s[0] == 0.0
+    assert estimator.estimate.tension_N[0] == pytest.approx(30.0)
+
+
 def test_a_cable_does_not_push() -> None:
     winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))
     for _ in range(100):

@@ -445,12 +445,30 @@ def test_slack_is_told_once_until_the_cable_was_tight_again():
     assert told == [low, slack, low, slack]
 
 
-def test_a_cable_from_which_tension_was_paid_out_is_not_broken():
-    # the same fall of tension, with 0.5 mm and more of cable
-    supervisor, when, _ = run(tension(0.0, after_cycles=20, paid_out_rad=0.06))
-    assert (supervisor.limit, when) == (Limit.TENSION_LOW, 111)
-    supervisor, *_ = run(tension(0.0, after_cycles=20, paid_out_rad=-0.06))
-    assert supervisor.limit is Limit.BROKEN_CABLE
+@pytest.mark.parametrize(
+    ("paid_out_rad", "limit"),
+    [
+        (0.06, Limit.TENSION_LOW),  # 1.6 mm
+        (0.01, Limit.BROKEN_CABLE),  # 0.3 mm
+        (-0.06, Limit.BROKEN_CABLE),
+    ],
+)
+def test_a_cable_from_which_tension_was_paid_out_is_not_broken(paid_out_rad: float, limit: Limit):
+    def change(cycle: Cycle, k: int) -> None:
+        tension(0.0, after_cycles=20, paid_out_rad=paid_out_rad)(cycle, k)
+        cycle.feedback.position_rad += 7.0
+        cycle.setpoint.position_rad[:] = cycle.feedback.position_rad
+
+    supervisor, *_ = run(change)
+    assert supervisor.limit is limit
+
+
+def test_a_broken_cable_is_told_once():
+    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
+    cycle.check(supervisor)
+    cycle.estimate.tension_N[1] = 0.0
+    told = [supervisor.limit for _ in range(300) if cycle.check(supervisor)]
+    assert told == [Limit.BROKEN_CABLE]
 
 
 # -- memory

@@ -55,7 +55,7 @@ def test_a_robot_that_says_nothing_has_safe_limits(tmp_path: Path) -> None:
     np.testing.assert_allclose(limits.torque_Nm, [motor.rated_torque_Nm] * 2)
     np.testing.assert_allclose(limits.torque_rate_Nm_s, [motor.rated_torque_Nm / 5e-3] * 2)
     np.testing.assert_allclose(limits.speed_rad_s, [0.2 * motor.rated_speed_rad_s] * 2)
-    np.testing.assert_allclose(limits.following_error_rad, [1.0] * 2)
+    np.testing.assert_allclose(limits.following_error_rad, [math.tau] * 2)
     breaking_N = robot.axes[0].winch.cable.breaking_force_N
     np.testing.assert_allclose(limits.tension_max_N, [breaking_N / 5.0] * 2)
     for unknown in (limits.cable_length_max_m, -np.asarray(limits.cable_length_min_m)):
