@@ -154,6 +154,8 @@ async def _whole_body(receive: Receive) -> Receive:
         async with asyncio.timeout(_BODY_S):
             while True:
                 message = await receive()
+                if message["type"] == "http.disconnect":
+                    raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body is not whole")
                 body += message.get("body", b"")
                 if len(body) > MOST_BODY_BYTES:
                     raise _RefusedError(

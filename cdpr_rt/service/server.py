@@ -24,6 +24,7 @@ _MOST_OF_ONE: Final = 24
 _REQUEST_S, _ANSWER_S, _LOOK_S = 10.0, 90.0, 2.0
 _LEAVE_S: Final = 5.0
 _MOST_UNSENT_BYTES: Final = 1 << 20
+_UNREAD_BYTES: Final = 1 << 16
 
 
 class ListenError(ControlError):
@@ -56,6 +57,13 @@ class _Http(H11Protocol):
 
 class _WebSocket(WebSocketsSansIOProtocol):
     """Lets its handler cut the connection, and does so itself where nothing is read."""
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        # what one is behind is held here for some kilobytes only; more would be old when it is read
+        transport.get_extra_info("socket").setsockopt(
+            socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD_BYTES
+        )
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)

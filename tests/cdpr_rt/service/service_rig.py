@@ -1,0 +1,177 @@
+"""A service on real sockets, in a thread, over a loop that does as a test says."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+
+from cdpr_rt.runtime.shared_block import RowWriter, SharedBlock
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.app import create_app
+from cdpr_rt.service.auth import Door, Gate
+from cdpr_rt.service.lease import LeaseError
+from cdpr_rt.service.server import Server, listen_tcp, listen_unix
+from cdpr_rt.service.service import Service
+
+KEY = b"an old key that opens this door"
+AXES = ("left", "right")
+
+
+class MadeUpLoop:
+    """Takes commands as the loop does, notes them, and writes rows while it `turns`."""
+
+    def __init__(self, block: SharedBlock) -> None:
+        self.block = block
+        self.commands: list[dict[str, Any]] = []
+        self.answers = True
+        self.turns = True
+        self.status: dict[str, Any] = {
+            "state": "ready",
+            "program": "idle",
+            "reason": "",
+            "notices": [],
+        }
+        block.counters["loop_pid"] = os.getpid()
+        block.counters["start_monotonic_ns"] = time.monotonic_ns()
+        block.counters["start_realtime_ns"] = time.time_ns()
+        block.write_description(
+            {"axes": [{"name": name} for name in AXES], "programs": ["idle", "hold", "jog"]}
+        )
+        block.write_status(self.status)
+        self._rows = RowWriter(block)
+        self._cycle = 0
+
+    def run(self, ended: threading.Event) -> None:
+        while not ended.wait(0.002):
+            if self.turns:
+                self.turn()
+
+    def turn(self) -> None:
+        self.block.counters["loop_alive_ns"] = time.monotonic_ns()
+        while self.answers and (command := self.block.take_command()) is not None:
+            self.commands.append(command)
+            self.block.post_reply({"to": command["number"], **self._obey(command)})
+        row = self._rows.slot()
+        row["cycle"] = self._cycle = self._cycle + 1
+        row["state"] = LoopState.READY
+        row["compute_s"] = 1e-4
+        row["position_rad"] = np.arange(len(AXES))
+        row["tension_N"] = np.nan
+        self._rows.commit()
+
+    def _obey(self, command: dict[str, Any]) -> dict[str, Any]:
+        if command["do"] == "check":
+            return {"ok": False, "text": "check: node 3 does not answer", "state": "inactive"}
+        if command["do"] == "enable":
+            self.publish(state="active", program=command["program"])
+        return {"ok": True, "text": "", "state": str(self.status["state"])}
+
+    def publish(self, **values: Any) -> None:
+        self.status = {**self.status, **values}
+        self.block.write_status(self.status)
+
+
+class Rig:
+    """The service, its addresses, and clients of it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.block = SharedBlock.create(len(AXES), 1.0, 500.0)
+        self.loop = MadeUpLoop(self.block)
+        self.socket = folder / "control.sock"
+        self.port = self.guarded_port = 0
+        self._ended = threading.Event()
+        self._up = threading.Event()
+        self._threads = [
+            threading.Thread(target=self.loop.run, args=(self._ended,)),
+            threading.Thread(target=lambda: asyncio.run(self._serve())),
+        ]
+
+    def start(self) -> None:
+        for thread in self._threads:
+            thread.start()
+        assert self._up.wait(10.0)
+
+    def stop(self) -> None:
+        self._ended.set()
+        for thread in self._threads:
+            thread.join()
+
+    def reset(self) -> None:
+        """Have everything as at the beginning, but for events and the count of cycles."""
+        loop, lease = self.loop, self.service.lease
+        loop.answers = loop.turns = True
+        time.sleep(0.05)
+        with contextlib.suppress(LeaseError):
+            lease.release(lease._token)
+        loop.publish(state="ready", program="idle", reason="", reason_limit=None)
+        loop.commands.clear()
+
+    async def _serve(self) -> None:
+        self.service = service = Service(self.block, "bench")
+        app = create_app(service)
+        plain, guarded = listen_tcp("127.0.0.1", 0), listen_tcp("127.0.0.1", 0)
+        self.port, self.guarded_port = plain.getsockname()[1], guarded.getsockname()[1]
+        doors = {
+            listen_unix(self.socket): Door(local=True),
+            plain: Door.named(None, "127.0.0.1"),
+            guarded: Door.named(KEY, "127.0.0.1"),
+        }
+        servers = [
+            Server(Gate(app, door, service.count_refusal), listener)
+            for listener, door in doors.items()
+        ]
+        serving = [asyncio.create_task(server.run_until_told()) for server in servers]
+        watching = asyncio.create_task(service.watch())
+        while not all(server.started for server in servers):
+            await asyncio.sleep(0.01)
+        self._up.set()
+        while not self._ended.is_set():
+            await asyncio.sleep(0.02)
+            assert not watching.done()
+        for server in servers:
+            server.should_exit = True
+        await asyncio.gather(*serving)
+        watching.cancel()
+
+    def client(self) -> httpx.Client:
+        transport = httpx.HTTPTransport(uds=str(self.socket))
+        return httpx.Client(transport=transport, base_url="http://robot", timeout=10.0)
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def guarded_url(self) -> str:
+        return f"http://127.0.0.1:{self.guarded_port}"
+
+    @property
+    def lease_left_s(self) -> float:
+        return (int(self.block.counters["lease_ns"][0]) - time.monotonic_ns()) * 1e-9
+
+
+@contextmanager
+def running(folder: Path) -> Iterator[Rig]:
+    rig = Rig(folder)
+    rig.start()
+    try:
+        yield rig
+    finally:
+        rig.stop()
+
+
+def wait_for(seen: Callable[[], bool], seconds: float = 10.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not seen():
+        assert time.monotonic() < deadline, "never came true"
+        time.sleep(0.01)

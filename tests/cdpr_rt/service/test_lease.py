@@ -1,0 +1,142 @@
+"""The right to move: one holder at most, lost by silence."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdpr_rt.service.lease import Lease, LeaseError
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.ns = 1_000_000_000
+
+    def __call__(self) -> int:
+        return self.ns
+
+
+def made() -> tuple[Lease, Clock, list[int]]:
+    clock, published = Clock(), [-1]
+    return Lease(published.append, clock), clock, published
+
+
+def test_nobody_holds_it_at_first_whatever_an_earlier_service_has_published() -> None:
+    lease, _, published = made()
+    assert published[-1] == 0
+    assert lease.holder() is None
+
+
+def test_the_loop_is_told_until_when_and_each_sign_of_life_extends_it() -> None:
+    lease, clock, published = made()
+    token = lease.take("maria", 2.0)
+    assert published[-1] == clock.ns + 2_000_000_000
+    clock.ns += 1_500_000_000
+    assert lease.renew(token) == 2.0
+    assert published[-1] == clock.ns + 2_000_000_000
+
+
+def test_another_is_refused_by_the_holders_name_until_it_has_been_silent() -> None:
+    lease, clock, _ = made()
+    lease.take("maria", 2.0)
+    with pytest.raises(LeaseError, match="maria holds the right to move"):
+        lease.take("jan", 2.0)
+    clock.ns += 2_000_000_001
+    lease.take("jan", 2.0)
+    holder = lease.holder()
+    assert holder is not None
+    assert holder.client == "jan"
+
+
+def test_who_was_silent_has_lost_it_also_where_nobody_else_took_it() -> None:
+    lease, clock, published = made()
+    token = lease.take("maria", 0.5)
+    clock.ns += 600_000_000
+    with pytest.raises(LeaseError, match="run out: maria was silent"):
+        lease.renew(token)
+    assert published[-1] < clock.ns
+
+
+def test_given_back_it_is_gone_at_once() -> None:
+    lease, _, published = made()
+    token = lease.take("maria", 2.0)
+    lease.release(token)
+    assert published[-1] == 0
+    for wrong in (token, "", None):
+        with pytest.raises(LeaseError):
+            lease.renew(wrong)
+
+
+@pytest.mark.parametrize("ttl_s", [0.0, -1.0, 0.19, 10.01, float("nan"), float("inf")])
+def test_no_silence_of_any_length(ttl_s: float) -> None:
+    lease, _, published = made()
+    with pytest.raises(LeaseError, match=r"allowed: 0\.2 to 10 s"):
+        lease.take("maria", ttl_s)
+    assert published[-1] == 0
+
+
+OPERATIONS = st.lists(
+    st.tuples(
+        st.sampled_from(["take", "renew", "release", "wait"]),
+        st.integers(0, 3),
+        st.floats(0.2, 3.0),
+    ),
+    max_size=60,
+)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(OPERATIONS)
+def test_at_most_one_token_counts_and_only_while_it_is_renewed(
+    operations: list[tuple[str, int, float]],
+) -> None:
+    """Against a model that knows the time at which each token was last good."""
+    lease, clock, published = made()
+    tokens: dict[int, str] = {}
+    holder, until_ns, ttl_ns = -1, 0, 0
+    for what, who, seconds in operations:
+        free = holder < 0 or clock.ns >= until_ns
+        if what == "wait":
+            clock.ns += round(seconds * 1e9)
+        elif what == "take":
+            if free:
+                tokens[who] = lease.take(f"client {who}", seconds)
+                ttl_ns = round(seconds * 1e9)
+                holder, until_ns = who, clock.ns + ttl_ns
+            else:
+                with pytest.raises(LeaseError):
+                    lease.take(f"client {who}", seconds)
+        else:
+            do = lease.renew if what == "renew" else lease.release
+            if free or who != holder:
+                with pytest.raises(LeaseError):
+                    do(tokens.get(who))
+            else:
+                do(tokens[who])
+                until_ns = clock.ns + ttl_ns if what == "renew" else 0
+                holder = who if what == "renew" else -1
+        assert published[-1] == until_ns
+
+
+def test_of_many_who_ask_at_once_one_gets_it() -> None:
+    lease = Lease(lambda _: None)
+    got: list[str] = []
+    begin = threading.Barrier(16)
+
+    def ask(name: str) -> None:
+        begin.wait()
+        try:
+            lease.take(name, 5.0)
+        except LeaseError:
+            return
+        got.append(name)
+
+    threads = [threading.Thread(target=ask, args=(f"client {k}",)) for k in range(16)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(got) == 1

@@ -1,0 +1,243 @@
+"""The WebSockets: figures as they come, readers that do not read, the right to move."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from service_rig import AXES, KEY, Rig, running, wait_for
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect, unix_connect
+
+from cdpr_rt.service import live
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with running(tmp_path_factory.mktemp("live")) as rig:
+        yield rig
+
+
+@pytest.fixture
+def rig(shared: Rig) -> Rig:
+    shared.reset()
+    return shared
+
+
+def ask(connection: ClientConnection, **order: Any) -> dict[str, Any]:
+    connection.send(json.dumps(order))
+    answer: dict[str, Any] = json.loads(connection.recv(5.0))
+    return answer
+
+
+def open_unix(rig: Rig, path: str) -> ClientConnection:
+    return unix_connect(str(rig.socket), f"ws://robot{path}")
+
+
+def closed_for(connection: ClientConnection) -> tuple[int, str]:
+    with pytest.raises(ConnectionClosed) as closing:
+        while True:
+            connection.recv(10.0)
+    assert closing.value.rcvd is not None
+    return closing.value.rcvd.code, closing.value.rcvd.reason
+
+
+# -- looking on
+
+
+def test_it_begins_with_what_stays_and_goes_on_with_what_changes(rig: Rig) -> None:
+    with open_unix(rig, "/live?rate_Hz=50&fields=cycle,position_rad,tension_N") as connection:
+        messages = [json.loads(connection.recv(5.0)) for _ in range(30)]
+        rig.loop.publish(state="fault", reason="broken cable of left")
+        deadline = time.monotonic() + 10.0
+        missing = {"fault", "broken cable of left"}
+        while missing:
+            message = json.loads(connection.recv(5.0))
+            missing.discard(message.get("event", {}).get("text"))
+            missing.discard(message.get("status", {}).get("state"))
+            assert time.monotonic() < deadline, missing
+    assert [message["kind"] for message in messages[:3]] == ["description", "status", "cycle"]
+    assert messages[0]["description"]["axes"][0]["name"] == AXES[0]
+    cycles = [message for message in messages if message["kind"] == "cycle"]
+    numbers = [message["cycle"] for message in cycles]
+    assert numbers == sorted(set(numbers))
+    skipped = [message["skipped"] for message in cycles[1:]]
+    assert [b - a - 1 for a, b in pairwise(numbers)] == skipped
+    assert cycles[0]["position_rad"] == [0.0, 1.0]
+    assert cycles[0]["tension_N"] == [None, None]
+    assert "velocity_rad_s" not in cycles[0]
+
+
+def test_never_faster_than_asked_for(rig: Rig) -> None:
+    with open_unix(rig, "/live?rate_Hz=10&fields=cycle") as connection:
+        begin = time.monotonic()
+        cycles = 0
+        while cycles < 8:
+            cycles += json.loads(connection.recv(5.0))["kind"] == "cycle"
+        assert time.monotonic() - begin > 0.65
+
+
+@pytest.mark.parametrize("query", ["rate_Hz=51", "rate_Hz=0", "rate_Hz=nan", "rate_Hz=x"])
+def test_no_rate_beyond_what_a_person_can_see(rig: Rig, query: str) -> None:
+    with pytest.raises(InvalidStatus):
+        open_unix(rig, f"/live?{query}")
+
+
+def test_a_field_that_no_cycle_has_is_named(rig: Rig) -> None:
+    with open_unix(rig, "/live?fields=cycle,colour") as connection:
+        assert closed_for(connection) == (1008, "fields: 'colour' is none of a cycle's")
+
+
+def test_a_client_that_does_not_read_is_dropped_and_others_are_not(rig: Rig) -> None:
+    dropped = rig.service.counts["slow_clients_dropped"]
+    asleep = socket.create_connection(("127.0.0.1", rig.port))
+    asleep.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    asleep.sendall(
+        b"GET /live?rate_Hz=50 HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
+        b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    with open_unix(rig, "/live?rate_Hz=50&fields=cycle") as connection:
+        longest, before = 0.0, time.monotonic()
+        deadline = before + 60.0
+        while rig.service.counts["slow_clients_dropped"] == dropped:
+            connection.recv(5.0)
+            now = time.monotonic()
+            longest, before = max(longest, now - before), now
+            assert now < deadline
+        json.loads(connection.recv(5.0))
+        assert longest < 2.0
+    asleep.close()
+    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+
+
+def test_pings_whose_answers_nobody_reads_do_not_pile_up(rig: Rig) -> None:
+    flood = socket.create_connection(("127.0.0.1", rig.port))
+    flood.sendall(
+        b"GET /live?rate_Hz=1 HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
+        b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    ping = (b"\x89\xfd" + b"\0" * 4 + b"p" * 125) * 500
+    with pytest.raises(OSError):
+        for _ in range(2000):
+            flood.sendall(ping)
+    flood.close()
+
+
+def test_no_more_lookers_on_than_can_be_served(rig: Rig) -> None:
+    with ExitStack() as watching:
+        for _ in range(live._MOST_LIVE):
+            watching.enter_context(open_unix(rig, "/live?rate_Hz=1"))
+        wait_for(lambda: rig.service.counts["live_clients"] == live._MOST_LIVE)
+        with open_unix(rig, "/live") as connection:
+            assert closed_for(connection)[0] == live.BUSY
+    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+
+
+# -- moving
+
+
+def test_the_connection_is_the_right_to_move(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=1") as connection:
+        assert json.loads(connection.recv(5.0))["kind"] == "held"
+        with open_unix(rig, "/control?client=jan") as other:
+            code, reason = closed_for(other)
+            assert code == live.REFUSED
+            assert "maria holds" in reason
+        assert ask(connection, do="program", program="jog", wanted={"v": [1]}, id=7) == {
+            "kind": "reply",
+            "id": 7,
+            "ok": True,
+            "error": None,
+            "state": "ready",
+        }
+        assert ask(connection, do="set", wanted={"v": [2]})["ok"] is True
+        assert rig.lease_left_s > 0.0
+    wait_for(lambda: rig.lease_left_s < 0.0, 1.0)
+    assert [command["do"] for command in rig.loop.commands] == ["program", "set"]
+    assert rig.loop.commands[1]["client"] == "maria"
+
+
+def test_a_connection_cut_off_loses_it_at_once(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
+        connection.recv(5.0)
+        assert rig.lease_left_s > 5.0
+        connection.socket.shutdown(socket.SHUT_RDWR)
+        wait_for(lambda: rig.lease_left_s < 0.0, 2.0)
+
+
+def test_a_client_that_is_there_but_silent_loses_it(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=0.3") as connection:
+        connection.recv(5.0)
+        assert ask(connection, do="renew")["ok"] is True
+        assert closed_for(connection)[0] == live.SILENT
+    assert rig.lease_left_s < 0.0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        '{"do": "enable"}',
+        '{"do": "program"}',
+        '{"do": "program", "program": "jog", "wanted": {"v": [1e999]}}',
+        '{"do": "set", "wanted": {"v": NaN}}',
+        '{"do": "set", "wanted": 1}',
+        '{"do": "renew", "more": 1}',
+        "[" * 9000,
+    ],
+)
+def test_nonsense_is_answered_and_moves_nothing(rig: Rig, text: str) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send(text)
+        answer = json.loads(connection.recv(5.0))
+        assert answer["ok"] is False
+        assert answer["error"]
+        assert ask(connection, do="renew")["ok"] is True
+    assert rig.loop.commands == []
+
+
+def test_bytes_are_no_order(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send(b'{"do": "hold"}')
+        assert json.loads(connection.recv(5.0))["ok"] is False
+    assert rig.loop.commands == []
+
+
+def test_a_message_too_long_or_too_many_end_the_connection(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send("x" * 20_000)
+        assert closed_for(connection)[0] == 1009
+    wait_for(lambda: rig.lease_left_s < 0.0)
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        for _ in range(150):
+            connection.send('{"do": "renew"}')
+        assert closed_for(connection)[0] == live.UNFIT
+    wait_for(lambda: rig.lease_left_s < 0.0)
+
+
+def test_the_door_is_shut_for_websockets_too(rig: Rig) -> None:
+    guarded = f"ws://127.0.0.1:{rig.guarded_port}"
+    key = {"Authorization": f"Bearer {KEY.decode()}"}
+    for path in ("/live", "/control?client=x"):
+        with pytest.raises(InvalidStatus) as refused:
+            connect(guarded + path)
+        assert refused.value.response.status_code == 401
+        with pytest.raises(InvalidStatus) as refused:
+            connect(guarded + path, origin="http://example.com", additional_headers=key)
+        assert refused.value.response.status_code == 403
+        with connect(guarded + path, additional_headers=key) as connection:
+            connection.recv(5.0)
