@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime import procedures
@@ -45,7 +45,7 @@ class Orders:
             return
         try:
             order = self._loop.block.take_command()
-        except ValueError:  # no JSON: nobody can be answered
+        except (ValueError, RecursionError):  # no JSON: nobody can be answered
             counters["commands_taken"][0] += 1
             return
         if isinstance(order, dict):
@@ -54,13 +54,17 @@ class Orders:
     def _obey(self, order: Order) -> None:
         number = order.get("number")
         number = number if isinstance(number, int) else 0
-        doing = self._doing.get(cast(str, order.get("do")))
+        do = order.get("do")
+        doing = self._doing.get(do) if isinstance(do, str) else None
         try:
             if doing is None:
-                raise RefusedError(f"do: {order.get('do')!r}; allowed: {', '.join(self._doing)}")
+                raise RefusedError(f"do: {do!r}; allowed: {', '.join(self._doing)}")
             procedure = doing(order)
         except ControlError as error:
             self._reply(number, str(error))
+            return
+        except Exception as error:  # whatever a command holds: the loop goes on
+            self._reply(number, f"{do}: {type(error).__name__}: {error}")
             return
         if procedure is None:
             self._reply(number, "")

@@ -1,0 +1,110 @@
+"""The daemon's loop in the test's own process, turned by the test, on simulated drives."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from cdpr_rt.runtime import procedures
+from cdpr_rt.runtime.cycle_row import Row
+from cdpr_rt.runtime.loop import ControlLoop
+from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
+from cdpr_rt.runtime.states import LoopState
+from profiles import load_robot
+from tools.daemon.loop_process import loop_parts
+from tools.daemon.machine import RobotMachine
+from tools.daemon.settings import RunSettings
+
+
+class LoopRig:
+    """One loop on the buses of `url`; nothing moves unless the test turns it."""
+
+    def __init__(self, path: Path, url: str) -> None:
+        self.robot = load_robot(path)
+        n, rate_Hz = len(self.robot.axes), 1.0 / self.robot.sync_period_s
+        self.block = SharedBlock.create(n, 20.0, rate_Hz)
+        self.give_lease(1000.0)
+        settings = RunSettings(
+            robot=str(path), name="rig", buses=(url,), socket=path.with_suffix(".sock")
+        )
+        self.machine = RobotMachine(self.robot, settings)
+        self.loop = ControlLoop(self.block, self.machine, loop_parts(self.robot, self.block))
+        self._rows = RowReader(self.block)
+
+    def boot(self) -> None:
+        """Do what the loop does by itself at its start."""
+        self.loop.begin(procedures.start_up(self.loop))
+        self.turn_until(lambda: not self.loop.busy)
+
+    def give_lease(self, seconds: float) -> None:
+        self.block.counters["lease_ns"] = time.monotonic_ns() + round(seconds * 1e9)
+
+    def turn_until(self, done: Callable[[], bool], seconds: float = 30.0) -> None:
+        deadline = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < deadline, self.block.status()
+            self.loop.turn()
+
+    def turn(self, turns: int) -> None:
+        for _ in range(turns):
+            self.loop.turn()
+
+    def run(self, seconds: float) -> Row:
+        """Run cycles for `seconds` of bus time; return their rows."""
+        self.rows()
+        self.turn(round(seconds / self.robot.sync_period_s))
+        return self.rows()
+
+    def rows(self) -> Row:
+        """Return the rows since the last call."""
+        return self._rows.read()
+
+    def order(self, do: Any, **what: Any) -> dict[str, Any]:
+        """Post a command and turn until it is answered."""
+        number = self.block.post_command({"do": do, "client": "test", **what})
+        answers: list[dict[str, Any]] = []
+
+        def answered() -> bool:
+            answer = self.block.take_reply()
+            if answer is not None and answer["to"] == number:
+                answers.append(answer)
+            return bool(answers)
+
+        self.turn_until(answered)
+        return answers[0]
+
+    def obeyed(self, do: str, **what: Any) -> None:
+        """Post a command that is to be done."""
+        answer = self.order(do, **what)
+        assert answer["ok"], answer
+
+    def misbehave(self, axis: int, sub: int, value: int) -> None:
+        """Have a drive do something on purpose (2F00h), told between two cycles."""
+        where = self.robot.axes[axis]
+        self.machine._networks[where.bus].write(where.node_id, 0x2F00, sub, value)
+
+    @property
+    def state(self) -> LoopState:
+        return self.loop.life.state
+
+    @property
+    def status(self) -> dict[str, Any]:
+        self.loop.status.publish()
+        return self.block.status()
+
+    def close(self) -> None:
+        self.loop.request_stop()
+        self.turn_until(lambda: self.loop.ended)
+
+
+@contextmanager
+def opened(path: Path, url: str) -> Iterator[LoopRig]:
+    rig = LoopRig(path, url)
+    rig.boot()
+    try:
+        yield rig
+    finally:
+        rig.close()

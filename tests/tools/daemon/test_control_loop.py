@@ -1,0 +1,327 @@
+"""The loop's states, commands and stops, on simulated drives in lockstep."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cdpr_rt.runtime.cycle_row import Row
+from cdpr_rt.runtime.states import LoopState
+from drivers.cia402 import STATE_TABLE, State
+from tests.drivers.bus_log import BusLog, logged
+from tests.tools.daemon.loop_rig import LoopRig, opened
+from tests.tools.robot_rig import Simulator, robot_file, simulated, unique
+
+PERIOD_S = 2e-3
+FAULT_CODE, SILENT_MS = 1, 6
+QUICK_STOP_WORD = 0x02
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
+    path = robot_file(
+        tmp_path_factory.mktemp("robot"), [("can0", 1), ("can0", 2)], period_s=PERIOD_S
+    )
+    with simulated(path) as url:
+        yield path, url
+
+
+@pytest.fixture(scope="module")
+def rig(lab: tuple[Path, str]) -> Iterator[LoopRig]:
+    with opened(*lab) as made:
+        yield made
+
+
+@pytest.fixture
+def ready(rig: LoopRig) -> Iterator[LoopRig]:
+    assert rig.state is LoopState.READY, rig.status
+    yield rig
+    if rig.state is LoopState.ACTIVE:
+        rig.obeyed("disable")
+    if rig.state is LoopState.FAULT:
+        rig.obeyed("acknowledge")
+
+
+@pytest.fixture
+def jogging(ready: LoopRig) -> LoopRig:
+    """Both axes at 2 rad/s."""
+    ready.obeyed("enable")
+    ready.obeyed("program", program="jog", wanted=JOG)
+    ready.run(0.4)
+    assert ready.loop.setpoint.velocity_rad_s == pytest.approx([2.0, 2.0])
+    return ready
+
+
+JOG = {"velocity_rad_s": [2.0, 2.0], "timeout_s": 2.0}
+
+
+def log_of(rig: LoopRig) -> Any:
+    (url,) = rig.machine._urls.values()
+    return logged(str(url))
+
+
+def drive_states(rows: Row) -> set[State]:
+    return {State(int(s)) for s in np.unique(STATE_TABLE[rows["statusword"] & 0x7F])}
+
+
+def controlwords(log: BusLog, node: int) -> list[tuple[int, int]]:
+    """Cycle and controlword of each command to a drive."""
+    return [(f.cycle, struct.unpack_from("<H", f.data)[0]) for f in log.of(0x200 + node)]
+
+
+def test_it_stands_ready_without_power_and_says_what_it_runs(ready: LoopRig) -> None:
+    rows = ready.run(0.5)
+    assert drive_states(rows) <= {State.SWITCH_ON_DISABLED, State.READY}
+    assert np.all(rows["state"] == LoopState.READY)
+    assert np.all(rows["answered"] == 2)
+    assert np.all(rows["torque_sent_Nm"] == 0.0)
+    assert np.all(np.diff(rows["cycle"].astype(int)) == 1)
+    np.testing.assert_allclose(np.diff(rows["time_s"]), PERIOD_S)
+    status = ready.status
+    assert (status["state"], status["reason"], status["program"]) == ("ready", "", "idle")
+    assert status["check"]["missed"] == 0
+    assert status["lockstep"] is True
+
+
+def test_enabling_holds_and_disabling_takes_the_power(ready: LoopRig) -> None:
+    ready.obeyed("enable")
+    rows = ready.run(0.5)
+    assert drive_states(rows) == {State.OPERATION_ENABLED}
+    assert ready.status["program"] == "hold"
+    assert np.ptp(rows["setpoint_rad"][:, 0]) == 0.0
+    assert np.max(np.abs(rows["position_rad"] - rows["setpoint_rad"])) < 0.02
+    assert np.max(np.abs(rows["torque_sent_Nm"])) > 0.0
+    ready.obeyed("disable")
+    rows = ready.run(0.1)
+    assert ready.state is LoopState.READY
+    assert drive_states(rows) <= {State.SWITCH_ON_DISABLED, State.READY}
+    assert np.all(rows["torque_sent_Nm"] == 0.0)
+
+
+def test_who_does_not_hold_the_right_to_move_moves_nothing(ready: LoopRig) -> None:
+    ready.give_lease(-1.0)
+    try:
+        for order in ({"do": "enable"}, {"do": "enable", "program": "jog"}):
+            answer = ready.order(**order)
+            assert not answer["ok"]
+            assert "right to move" in answer["text"]
+        assert ready.state is LoopState.READY
+    finally:
+        ready.give_lease(1000.0)
+
+
+def test_a_lease_that_runs_out_in_motion_ends_in_a_hold(jogging: LoopRig) -> None:
+    try:
+        jogging.give_lease(-1.0)
+        rows = jogging.run(1.0)
+        assert jogging.state is LoopState.ACTIVE
+        status = jogging.status
+        assert status["program"] == "hold"
+        assert "right to move" in status["reason"]
+        assert rows["setpoint_velocity_rad_s"][-1] == pytest.approx([0.0, 0.0])
+        jogging.obeyed("hold")  # anybody may
+        assert not jogging.order("set", wanted={})["ok"]
+    finally:
+        jogging.give_lease(1000.0)
+
+
+def test_programs_follow_each_other_without_a_bump(ready: LoopRig) -> None:
+    ready.obeyed("enable")
+    ready.run(0.2)
+    ready.rows()
+    for name, wanted in (
+        ("jog", JOG),
+        ("hold", {}),
+        ("jog", {"velocity_rad_s": [-3.0, 1.0], "timeout_s": 2.0}),
+        ("pid", {"distance_rad": [1.0, -1.0]}),
+        ("jog", JOG),
+    ):
+        ready.obeyed("program", program=name, wanted=wanted)
+        ready.turn(100)
+    rows = ready.rows()
+    assert len(np.unique(rows["program"])) == 3
+    velocity = rows["setpoint_velocity_rad_s"]
+    np.testing.assert_allclose(
+        np.diff(rows["setpoint_rad"], axis=0), PERIOD_S * velocity[1:], atol=5e-4
+    )
+    switched = np.flatnonzero(np.diff(rows["program"].astype(int)))
+    step = np.abs(np.diff(rows["torque_sent_Nm"], axis=0))
+    assert len(switched) == 5
+    assert np.max(step[switched]) < 0.5
+
+
+def test_no_cycle_has_two_commands_whatever_happens(ready: LoopRig) -> None:
+    with log_of(ready) as log:
+        ready.obeyed("enable")
+        ready.obeyed("program", program="jog", wanted=JOG)
+        ready.run(0.1)
+        ready.obeyed("disable")
+        ready.obeyed("enable", program="jog", wanted=JOG)
+        ready.run(0.2)
+        ready.misbehave(0, FAULT_CODE, 0x7305)
+        ready.turn_until(lambda: ready.state is LoopState.FAULT)
+        ready.run(0.1)
+    for node in (1, 2):
+        each = Counter(cycle for cycle, _ in controlwords(log, node))
+        assert len(each) > 200
+        assert set(each.values()) == {1}
+
+
+def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -> None:
+    with log_of(jogging) as log:
+        jogging.misbehave(0, FAULT_CODE, 0x7305)
+        jogging.rows()
+        jogging.turn_until(lambda: jogging.state is LoopState.FAULT)
+    words = controlwords(log, 2)
+    fault = next(f.cycle for f in log.of(0x081))
+    stopped = next(cycle for cycle, word in words if word & 0x0F == QUICK_STOP_WORD)
+    assert stopped <= fault + 2
+    rows = jogging.rows()
+    assert State.QUICK_STOP in drive_states(rows)
+    # the healthy one came to a stand by its own ramp, under power, not by coasting
+    velocity = rows["velocity_rad_s"][:, 1]
+    assert abs(velocity[-1]) < 0.3
+    status = jogging.status
+    assert "node 1" in status["reason"]
+    assert "7305h" in status["reason"]
+    assert status["reason_limit"]["limit"] == "drive"
+    assert status["reason_limit"]["reaction"] == "quick stop"
+    assert not jogging.order("enable")["ok"]
+    jogging.run(1.0)
+    assert jogging.state is LoopState.FAULT
+    jogging.obeyed("acknowledge")
+    assert jogging.state is LoopState.READY
+    assert jogging.status["reason"] == ""
+    rows = jogging.run(0.5)
+    assert State.OPERATION_ENABLED not in drive_states(rows)
+    jogging.obeyed("enable")
+
+
+def test_a_drive_that_falls_silent_is_booted_anew(jogging: LoopRig) -> None:
+    jogging.misbehave(1, SILENT_MS, 100)
+    jogging.turn_until(lambda: jogging.state is LoopState.FAULT)
+    assert "node 2" in jogging.status["reason"]
+    jogging.run(0.1)  # until it is heard again
+    jogging.turn_until(lambda: not jogging.loop.busy)
+    cycle = jogging.loop.cycle
+    jogging.obeyed("acknowledge")
+    assert jogging.state is LoopState.READY
+    assert jogging.loop.cycle is not cycle or jogging.machine.intact()
+    jogging.obeyed("enable")
+    assert drive_states(jogging.run(0.1)) == {State.OPERATION_ENABLED}
+
+
+def test_a_drive_that_stays_deaf_keeps_the_fault(lab: tuple[Path, str]) -> None:
+    with simulated(lab[0]) as url, opened(lab[0], url) as rig:
+        rig.misbehave(1, SILENT_MS, 65535)
+        rig.turn_until(lambda: rig.state is LoopState.FAULT)
+        rig.turn_until(lambda: not rig.loop.busy)
+        answer = rig.order("acknowledge")
+        assert not answer["ok"]
+        assert "node 2" in answer["text"]
+        assert rig.state is LoopState.FAULT
+        assert "node 2" in rig.status["reason"]
+
+
+def test_a_bus_that_is_gone_and_comes_back(lab: tuple[Path, str]) -> None:
+    name = unique()
+    simulator = Simulator(str(lab[0]), "--bus", f"simbus:{name}")
+    with opened(lab[0], f"simbus:{name}") as rig:
+        rig.obeyed("enable")
+        rig.run(0.1)
+        simulator.kill()
+        rig.turn_until(lambda: rig.state is LoopState.FAULT)
+        rig.turn_until(lambda: not rig.loop.busy)
+        assert "gone" in rig.status["reason"]
+        answer = rig.order("acknowledge")
+        assert not answer["ok"]
+        assert rig.state is LoopState.FAULT
+        with simulated(lab[0], name=name):
+            rig.obeyed("acknowledge")
+            assert rig.state is LoopState.READY
+            rig.obeyed("enable")
+            assert drive_states(rig.run(0.1)) == {State.OPERATION_ENABLED}
+            rig.obeyed("disable")
+
+
+def test_a_request_to_end_brakes_within_the_acceleration_limit(lab: tuple[Path, str]) -> None:
+    with simulated(lab[0]) as url, opened(lab[0], url) as rig:
+        rig.obeyed("enable", program="jog", wanted=JOG)
+        rig.run(0.5)
+        rig.rows()
+        with log_of(rig) as log:
+            rig.loop.request_stop()
+            rig.turn_until(lambda: rig.loop.ended)
+        velocity = rig.rows()["setpoint_velocity_rad_s"][:, 0]
+        assert velocity[0] == pytest.approx(2.0)
+        braking = np.abs(np.diff(velocity[: np.flatnonzero(velocity == 0.0)[0] + 1]))
+        slope = rig.loop.programs[1]._model.acceleration_rad_s2[0]  # type: ignore[attr-defined]
+        assert np.max(braking) <= 1.001 * slope * PERIOD_S
+        assert rig.status["state"] == "unconfigured"
+        assert [word for _, word in controlwords(log, 1)][-1] & 0x0F == 0
+
+
+def test_nothing_that_is_posted_crashes_the_loop_or_gives_power(ready: LoopRig) -> None:
+    @settings(
+        derandomize=True,
+        deadline=None,
+        max_examples=4,
+        suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    )
+    @given(st.lists(st.dictionaries(KEYS, JUNK, min_size=1), min_size=30, max_size=30))
+    def post(orders: list[dict[str, Any]]) -> None:
+        if ready.state is LoopState.FAULT:  # the drives have missed us while these were made up
+            ready.obeyed("acknowledge")
+        for order in orders:
+            what = {key: value for key, value in order.items() if key != "do"}
+            answer = ready.order(order.get("do"), **what)
+            assert set(answer) == {"to", "ok", "text", "state", "number"}
+            if order.get("do") == "enable" and answer["ok"]:
+                ready.obeyed("disable")
+            assert not ready.loop.driving
+        assert State.OPERATION_ENABLED not in drive_states(ready.run(0.02))
+
+    post()
+
+
+def test_a_command_that_is_no_command_is_left_aside(ready: LoopRig) -> None:
+    block = ready.block
+    for data in (b"{", b"\xff\xfe", b"[" * 4000, b"7", b'"enable"', b"null"):
+        number = int(block.counters["commands"][0])
+        slot = block._commands[number % len(block._commands)]
+        slot[:8].view("<u8")[0] = len(data)
+        slot[8 : 8 + len(data)] = np.frombuffer(data, np.uint8)
+        block.counters["commands"][0] = number + 1
+        ready.turn(2)
+        assert block.counters["commands_taken"][0] == number + 1
+    assert ready.order("set", wanted={})["ok"] is False
+
+
+def test_status_is_plain_json_that_a_service_can_read(ready: LoopRig) -> None:
+    ready.obeyed("enable")
+    ready.run(1.2)
+    status = ready.status
+    assert json.loads(json.dumps(status)) == status
+    assert status["count"]["cycles"] > 0
+    assert set(status["buses"]) == {"can0"}
+
+
+NAMES = st.sampled_from(
+    ["configure", "check", "enable", "acknowledge", "program", "set", "hold", "jog", "x"]
+)
+KEYS = st.sampled_from(["do", "program", "wanted", "client", "number", "velocity_rad_s"])
+LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | NAMES
+JUNK = st.recursive(
+    LEAVES,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
+    max_leaves=5,
+)
