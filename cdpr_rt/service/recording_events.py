@@ -61,8 +61,11 @@ class Events:
         self._label = _label(LoopState, self._last[0])
         events = []
         for k in np.flatnonzero((seen != before).any(axis=1)):
+            words = self._words(before[k].tolist(), seen[k].tolist())
+            if not words:
+                continue  # a reaction that is over is told by the state it has led to
             event = {
-                "text": self._words(before[k].tolist(), seen[k].tolist()),
+                "text": words,
                 "cycle": int(rows["cycle"][k]),
                 "time_s": float(rows["time_s"][k]),
                 **{name: int(rows[name][k]) for name in _WATCHED},
@@ -76,8 +79,8 @@ class Events:
             words.append(f"state {_label(LoopState, now[0])}")
         if now[1] != before[1]:
             words.append(f"program {_name(self._programs, now[1])}")
-        if now[2:] != before[2:]:
-            words.append(_label(Reaction, now[2]) if now[2] else "no reaction any more")
+        if now[2] and now[2:] != before[2:]:
+            words.append(_label(Reaction, now[2]))
             if now[3]:
                 axis = f" of {_name(self._axes, now[4])}" if now[4] >= 0 else ""
                 words[-1] += f" by {_label(Limit, now[3])}{axis}"
