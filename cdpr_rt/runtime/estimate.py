@@ -14,7 +14,6 @@ from cdpr_rt.tension import TensionFeedback
 
 FILTER_S = 0.01
 """Speed and torque are judged over this: one encoder step a cycle is hundreds a second."""
-_NO_SENSOR = -1
 _FRICTION_FULL_rad_s = 0.1
 
 _PAST = np.dtype(
@@ -138,7 +137,7 @@ def _take_sensors(
 ) -> None:
     for i in range(tension.size):
         sensor = sensor_of[i]
-        if sensor < 0:
+        if sensor < 0 or sensor >= read_N.size:
             continue
         sensor_ok[i] = measured[i] = read_valid[sensor]
         if read_valid[sensor]:
@@ -165,13 +164,17 @@ class Estimator:
         self.estimate.cable_m_per_rad[:] = self._winch[0]
         self._past = np.zeros(n, _PAST)
         self._past["length_at_zero"] = np.nan
-        self._sensor_of = None if sensor_of_axis is None else np.array(sensor_of_axis, np.int64)
+        sensors = range(n) if sensor_of_axis is None else sensor_of_axis
+        self._sensor_of = np.array(sensors, np.int64)
 
     def reset(self) -> None:
-        """Forget speeds and torques, after cycles did not run; cable lengths stay known."""
+        """Forget speeds, torques and tensions, after cycles did not run; lengths stay known."""
         for field in ("position", "torque", "elapsed", "started"):
             self._past[field] = 0.0
         self.estimate.velocity_rad_s[:] = 0.0
+        self.estimate.tension_N[:] = np.nan
+        self.estimate.tension_measured[:] = False
+        self.estimate.sensor_ok[:] = True
 
     def set_lengths(self, position_rad: FloatArray, length_m: FloatArray) -> None:
         """Take the cables to have `length_m` (n,) at the motor angles; nan leaves one as it is."""
@@ -209,9 +212,6 @@ class Estimator:
             told.tension_N,
         )
         if tension is not None:
-            if self._sensor_of is None:
-                self._sensor_of = np.arange(told.tension_N.size)
-                self._sensor_of[tension.valid.size :] = _NO_SENSOR
             _take_sensors(
                 self._sensor_of,
                 tension.tension_N,

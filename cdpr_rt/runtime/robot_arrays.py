@@ -12,6 +12,7 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.limits import DEFAULT_REACTIONS, Limits, reactions_of
 from cdpr_rt.runtime.estimate import WinchArrays
 from profiles import Robot, RobotAxis
+from profiles.tension_sensor import load_tension_sensors
 from profiles.winch_calibration import WinchCalibration
 
 SPEED_SHARE: Final = 0.2
@@ -41,6 +42,9 @@ def limits_of(robot: Robot, booted: Sequence[int] | None = None) -> Limits:
     torque_Nm = each(told.torque_Nm, np.array([motor.rated_torque_Nm for motor in motors]))
     speed = SPEED_SHARE * np.array([motor.rated_speed_rad_s for motor in motors])
     strength = np.array([axis.winch.cable.breaking_force_N for axis in axes])
+    measured_N = math.inf
+    if robot.tension_sensors is not None:
+        measured_N = load_tension_sensors(robot.tension_sensors).stop_above_N
     least_N = each(told.tension_min_N, -math.inf)
     return Limits(
         torque_Nm=torque_Nm,
@@ -50,7 +54,7 @@ def limits_of(robot: Robot, booted: Sequence[int] | None = None) -> Limits:
         cable_length_min_m=each(told.cable_length_min_m, -math.inf),
         cable_length_max_m=each(told.cable_length_max_m, math.inf),
         tension_min_N=least_N,
-        tension_max_N=each(told.tension_max_N, strength / CABLE_SAFETY),
+        tension_max_N=np.minimum(each(told.tension_max_N, strength / CABLE_SAFETY), measured_N),
         slack_N=each(told.slack_N, SLACK_SHARE * least_N),
         slack_s=told.slack_s,
         broken_within_s=told.broken_within_s,

@@ -63,6 +63,10 @@ _Stream = Annotated[
     str | None,
     typer.Option(metavar="HOST:PORT", help="Receive a set-point stream (UDP) there."),
 ]
+_TensionPort = Annotated[
+    str | None,
+    typer.Option(metavar="PORT", help="Serial port of the robot's tension sensors."),
+]
 _ReadOnly = Annotated[
     bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
 ]
@@ -86,6 +90,7 @@ def run(
     stream: _Stream = None,
     read_only: _ReadOnly = False,
     safety_io: SafetyIoOption = None,
+    tension_port: _TensionPort = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -108,10 +113,12 @@ def run(
         stream=stream,
         read_only=read_only,
         safety_io=safety_io,
+        tension_port=tension_port,
     )
     _require_free(settings.socket)
     _require_no_master(profile, settings)
     _ask(profile, settings, yes)
+    manager = ServiceManager()  # before any child is started: none of them speaks for the daemon
     with ExitStack() as stack:
         simulator = None
         if asks_for_own_simulator(bus or ()):
@@ -135,6 +142,7 @@ def settings_for(
     stream: str | None,
     read_only: bool,
     safety_io: str | None,
+    tension_port: str | None = None,
 ) -> RunSettings:
     """Return what the options of `cdpr run` ask for; raises BadInputError."""
     if len(robot.axes) > MOST_AXES:
@@ -151,6 +159,7 @@ def settings_for(
         buses=(f"simbus:own-{os.getpid()}",) if own else tuple(bus or ()),
         read_only=read_only,
         safety_io=safety_io,
+        tension_port=tension_port,
         socket=unix or default_socket(robot.profile),
         http=None if http is None else Address.parse("--http", http),
         key_file=key_file,

@@ -20,6 +20,7 @@ from cdpr_rt.runtime.programs.registry import build_programs, rehearse_programs
 from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.supervisor import Supervisor
+from cdpr_rt.tension import TensionFeedback
 from profiles import Robot, load_robot
 from profiles.errors import ProfileError
 from tools.bus_fit import require_fit
@@ -81,7 +82,7 @@ def _rehearse_judgement(parts: LoopParts, n: int) -> None:
     """Have the estimate's and the supervisor's kernels compiled as well."""
     feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
     feedback.valid[:] = True
-    parts.estimator.update(feedback)
+    parts.estimator.update(feedback, TensionFeedback(n))
     parts.supervisor.check(feedback, parts.estimator.estimate, setpoint, torque)
     parts.estimator.reset()
     parts.supervisor.reset()

@@ -23,6 +23,7 @@ from drivers.network import CanNetwork
 from profiles import Robot
 from profiles.errors import ProfileError
 from tools.daemon.settings import RunSettings
+from tools.daemon.tensions import RobotTensions
 from tools.errors import CommandError
 from tools.robot_boot import boot_notes, boot_robot, device_of, faults_text, open_networks
 from tools.robot_buses import robot_urls
@@ -59,6 +60,7 @@ class RobotMachine:
         self._robot = robot
         self._urls = robot_urls(robot, settings.buses)
         real = not all(url.is_simulated for url in self._urls.values())
+        self._tensions = RobotTensions(robot, settings.tension_port)
         self._reference = settings.safety_io or (robot.safety_io if real else None)
         self._device: AxisBuses | None = None
         self.watches: Sequence[Watch] = ()
@@ -74,6 +76,7 @@ class RobotMachine:
         """Open the buses and boot the drives; they are left without power."""
         with ExitStack() as stack:
             self._safety = self._open_safety(stack)
+            self._tensions.open(stack)
             networks = open_networks(stack, self._robot, self._urls)
             torque_Nm = np.asarray(limits_of(self._robot).torque_Nm).tolist()
             booted, absent = boot_robot(stack, self._robot, networks, torque_Nm)
@@ -93,7 +96,8 @@ class RobotMachine:
                 network.start_heartbeat()
             self._stack = stack.pop_all()
         self._networks = networks
-        self.notices = boot_notes(self._robot, booted, absent)
+        notices = [*boot_notes(self._robot, booted, absent), self._tensions.missing(self._robot)]
+        self.notices = [notice for notice in notices if notice]
         self.watches = () if self._safety is None else (self._safety.io,)
         self._device = device
 
@@ -106,6 +110,9 @@ class RobotMachine:
     @_told
     def prepare(self) -> None:
         """Close the contactor and have each drive take torques."""
+        self._tensions.read()
+        if trouble := self._tensions.trouble():
+            raise MachineError(trouble)
         if self._safety is not None and not self._safety.io.state.contactor_closed:
             self._safety.io.energise()
         device = self._booted
@@ -178,7 +185,7 @@ class RobotMachine:
 
     def read_tension(self) -> TensionFeedback | None:
         """Return the tensions as last read, None where none are measured."""
-        return None
+        return self._tensions.read()
 
     def bus_state(self) -> dict[str, Any]:
         """Return what is known of each bus, by its name."""

@@ -77,6 +77,8 @@ class RunSettings(BaseModel):
     """What was given with --bus; never `simbus:` alone, its simulator has a name already."""
     read_only: bool = False
     safety_io: str | None = None
+    tension_port: str | None = None
+    """Serial port at which the robot's tension sensors are."""
     socket: _Path
     http: Address | None = None
     key_file: _Path | None = None
