@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,17 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-ROBOT = "bench-2"
 PATIENCE_S = 60.0
+TOLERANT = """
+master_heartbeat_s = 0.5
+
+[limits]
+late_s = 5.0
+missed_cycles = 500
+missed_in_window = 1000
+stale_cycles = 2000
+"""
+"""What a robot needs to run to the end on a machine that is busy with other tests."""
 
 
 def cdpr(*arguments: str) -> dict[str, Any]:
@@ -56,8 +66,11 @@ class Daemon:
         self.socket = ("--socket", str(folder / "control.sock"))
         transport = httpx.HTTPTransport(uds=self.socket[1])
         self.client = httpx.Client(transport=transport, base_url="http://localhost", timeout=10.0)
+        robot = folder / "bench-2.toml"
+        shipped = resources.files("profiles") / "robots" / "bench-2.toml"
+        robot.write_text(shipped.read_text().replace("[limits]", TOLERANT))
         files = ("--record", str(self.recordings), *self.socket)
-        command = [sys.executable, "-m", "tools.cli", "run", ROBOT, "--bus", "simbus:", *files]
+        command = [sys.executable, "-m", "tools.cli", "run", str(robot), "--bus", "simbus:", *files]
         self.process = subprocess.Popen(
             [*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
