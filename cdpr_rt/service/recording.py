@@ -39,8 +39,9 @@ class Recorder:
 
     A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, the next file begins where one
     has `most_bytes`. A disk that takes no more, or has less than `reserve_bytes` left, ends the
-    recording for good: `told` says why, and nobody else is concerned. A recorder that follows on
-    another one of the same block goes on at the first row that was not safe yet.
+    recording for good: `told` says why, `ended` is called with it, and nobody else is concerned.
+    A recorder that follows on another one of the same block goes on at the first row that was not
+    safe yet.
     """
 
     name = "recording"
@@ -52,12 +53,14 @@ class Recorder:
         robot: str,
         most_bytes: int = MOST_BYTES,
         reserve_bytes: int = RESERVE_BYTES,
+        ended: Callable[[str], None] | None = None,
     ) -> None:
         self._block = block
         self._folder = folder
         self._robot = re.sub(r"[^\w.-]", "_", robot)
         self._most_bytes = most_bytes
         self._reserve_bytes = reserve_bytes
+        self._ended = ended
         self._wall = WallClock(block)
         self._texts = RowTexts(block.n)
         self._reader = RowReader(block)
@@ -81,16 +84,13 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     def start(self) -> None:
-        """Open the first file and record from now on, until `stop`.
-
-        Raises RecordingError where there can be no file.
-        """
+        """Open the first file and record from now on, until `stop`; see `told` for how it goes."""
         try:
             self._open()
-        except ControlError as error:
-            self._error = str(error)
-            raise
-        self._thread.start()
+        except (ControlError, OSError) as error:
+            self._fail(str(error))
+        else:
+            self._thread.start()
 
     def stop(self) -> None:
         """Record what is left and close the file."""
@@ -127,10 +127,15 @@ class Recorder:
             self._take()
             self._close()
         except (ControlError, OSError) as error:
-            self._error = str(error)
+            self._fail(str(error))
         except BaseException as error:
-            self._error = f"the recorder ended: {type(error).__name__}: {error}"
+            self._fail(f"the recorder ended: {type(error).__name__}: {error}")
             raise
+
+    def _fail(self, text: str) -> None:
+        self._error = text
+        if self._ended is not None:
+            self._ended(text)
 
     def _channel(self, topic: str, schema: dict[str, Any]) -> Channel:
         return Channel(topic, schema=schema, context=self._context)

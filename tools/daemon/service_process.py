@@ -48,7 +48,8 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     parts: list[Part] = []
     block, lease = service.block, service.lease
     if settings.record is not None:
-        recorder = Recorder(block, settings.record, settings.name)
+        ended = partial(_recording_ended, service)
+        recorder = Recorder(block, settings.record, settings.name, ended=ended)
         service.events.listeners.append(partial(_note, recorder))
         parts.append(recorder)
     if settings.live is not None:
@@ -64,6 +65,11 @@ def _note(recorder: Recorder, text: str, kind: str, detail: dict[str, Any]) -> N
     """Have an event recorded, beside the states and reasons that the recorder finds by itself."""
     if kind not in ("state", "reason"):
         recorder.remark(text, kind=kind, **detail)
+
+
+def _recording_ended(service: Service, text: str) -> None:
+    service.events.add("recording", text)
+    _LOG.error("%s", text)
 
 
 async def _serve(settings: RunSettings, service: Service) -> None:
