@@ -296,8 +296,9 @@ def test_a_stop_in_mid_sweep(lab: Lab, tmp_path: Path, number: signal.Signals) -
 
 def test_a_second_master_is_kept_out(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path) as command:
-        told = fails("drive", "enable", WINCH, "--bus", lab.bus)
-        assert "step L" in told
+        told = fails("drive", "enable", WINCH, "--bus", lab.bus, status=BAD_INPUT)
+        assert f"process {command.pid} " in told
+        assert "runs the drives on this bus" in told
         assert command.poll() is None
         assert lab.state() == ENABLED
         command.send_signal(signal.SIGINT)
