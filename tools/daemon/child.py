@@ -18,5 +18,19 @@ def end_with(launcher_pid: int) -> None:
     if launcher_pid == 0:
         return
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-    if os.getppid() != launcher_pid:
+    if orphaned(launcher_pid):
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def orphaned(launcher_pid: int) -> bool:
+    """Whether the launcher that this process was started by has ended."""
+    return launcher_pid not in (0, os.getppid())
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is such a process; one that has ended but was not waited for counts as well."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True

@@ -98,6 +98,7 @@ class Launcher:
         block: SharedBlock,
         tell: Callable[[str], None],
         ready: Callable[[dict[str, Any]], None],
+        manager: ServiceManager,
         simulator: OwnSimulator | None = None,
     ) -> None:
         self._settings = settings
@@ -105,7 +106,7 @@ class Launcher:
         self._tell = tell
         self._ready = ready
         self._simulator = simulator
-        self._manager = ServiceManager()
+        self._manager = manager
         self._signals: list[int] = []
         self._restarts = 0
         self._restart_at = 0.0

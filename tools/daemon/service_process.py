@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import sys
+import time
 from functools import partial
 from typing import Any
 
@@ -22,10 +23,11 @@ from cdpr_rt.service.recording import Recorder
 from cdpr_rt.service.server import ListenError, Server, listen_tcp, listen_unix
 from cdpr_rt.service.service import Service
 from cdpr_rt.service.setpoint_stream import SetpointStream
-from tools.daemon.child import end_with
+from tools.daemon.child import end_with, is_running, orphaned
 from tools.daemon.settings import RunSettings, read_key
 from tools.errors import DONE, FAILED, CommandError
 
+_LOOP_STOP_S, _TURN_S = 20.0, 0.05
 _LOG = logging.getLogger("cdpr.service")
 
 
@@ -83,7 +85,7 @@ async def _serve(settings: RunSettings, service: Service) -> None:
     end_with(settings.launcher_pid)
     watching = asyncio.create_task(service.watch())
     serving = [asyncio.create_task(server.run_until_told()) for server in servers]
-    waiting = asyncio.create_task(ended.wait())
+    waiting = asyncio.create_task(_told_to_end(ended, settings, service.block))
     try:
         done, _ = await asyncio.wait(
             {watching, waiting, *serving}, return_when=asyncio.FIRST_COMPLETED
@@ -98,6 +100,17 @@ async def _serve(settings: RunSettings, service: Service) -> None:
         waiting.cancel()
         service.stop_parts()
         settings.socket.unlink(missing_ok=True)
+
+
+async def _told_to_end(ended: asyncio.Event, settings: RunSettings, block: SharedBlock) -> None:
+    """Wait for the signal; where the launcher has died, for the loop's controlled stop as well.
+
+    Otherwise the launcher has seen to it that the loop has ended first.
+    """
+    await ended.wait()
+    pid, end_s = int(block.counters["loop_pid"][0]), time.monotonic() + _LOOP_STOP_S
+    while orphaned(settings.launcher_pid) and is_running(pid) and time.monotonic() < end_s:
+        await asyncio.sleep(_TURN_S)
 
 
 def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Server]:

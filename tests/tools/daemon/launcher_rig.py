@@ -18,6 +18,7 @@ from pathlib import Path
 from cdpr_rt.runtime.shared_block import SharedBlock
 from tools.daemon import launcher
 from tools.daemon.child import end_with
+from tools.daemon.notify import ServiceManager
 from tools.daemon.settings import RunSettings
 
 NAME = "stand-in"
@@ -41,7 +42,7 @@ def main(folder: Path) -> int:
     def ready(status: dict[str, object]) -> None:
         print(json.dumps({"ready": status}), flush=True)
 
-    daemon = launcher.Launcher(settings, block, tell, ready)
+    daemon = launcher.Launcher(settings, block, tell, ready, ServiceManager())
     code = daemon.run()
     print(json.dumps({"reason": daemon.reason, "status": block.status()}), flush=True)
     return code

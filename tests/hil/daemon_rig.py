@@ -1,0 +1,160 @@
+"""A real daemon for tests: `cdpr run` on a simulated robot of its own, and what is seen of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+# slow enough for a machine on which other tests run: its paced simulator must answer in time
+_ROBOT = """
+name = "Two motors, slowly"
+sync_period_s = 0.01
+[limits]
+torque_Nm = 1.5
+following_error_rad = 1.0
+[[buses]]
+name = "can0"
+[[axes]]
+winch = "winch-mpp0923d"
+name = "left"
+bus = "can0"
+node_id = 1
+[[axes]]
+winch = "winch-mpp0923d"
+name = "right"
+bus = "can0"
+node_id = 2
+"""
+NAME = "slow-2"
+PATIENCE_S = 60.0
+
+
+def until(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
+    """Ask until the answer is true; return it."""
+    end = time.monotonic() + patience_s
+    while not (answer := what()):
+        assert time.monotonic() < end, f"not within {patience_s:g} s"
+        time.sleep(0.05)
+    return answer
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that only waits to be reaped does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+class RealDaemon:
+    """`cdpr run` of a slow robot with two axes; `ready` is the line that says that it is up.
+
+    Where an answer came late while the bus was checked, it is checked again until it is ready.
+    """
+
+    def __init__(self, folder: Path, *options: str, env: dict[str, str] | None = None) -> None:
+        self.socket = folder / "control.sock"
+        self.at = ("--socket", str(self.socket))
+        transport = httpx.HTTPTransport(uds=str(self.socket))
+        self.http = httpx.Client(transport=transport, base_url="http://localhost", timeout=20.0)
+        self._errors = (folder / "errors").open("w+")
+        self.robot = folder / f"{NAME}.toml"
+        self.robot.write_text(_ROBOT)
+        asked = ("run", str(self.robot), "--bus", "simbus:", *self.at)
+        command = [sys.executable, "-m", "tools.cli", *asked]
+        self.process = subprocess.Popen(
+            [*command, *options],
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
+            env={**os.environ, **(env or {})},
+        )
+        try:
+            self.ready: dict[str, Any] = json.loads(self._first_line())["ready"]
+            until(self._is_ready)
+        except BaseException:
+            self.end()
+            raise
+
+    def _first_line(self) -> str:
+        assert self.process.stdout is not None
+        told, _, _ = select.select([self.process.stdout], [], [], PATIENCE_S)
+        line = self.process.stdout.readline() if told else ""
+        assert line, self.errors()
+        return line
+
+    def _is_ready(self) -> bool:
+        state = self.status().get("state")
+        if state in ("inactive", "fault"):
+            self.http.post("/check" if state == "inactive" else "/acknowledge", json={})
+        return state == "ready"
+
+    def errors(self) -> str:
+        """Return what it has said on standard error so far."""
+        self._errors.seek(0)
+        return self._errors.read()
+
+    def status(self) -> dict[str, Any]:
+        """Return what the control interface tells, an empty table where nobody answers."""
+        try:
+            told: dict[str, Any] = self.http.get("/status").json()
+        except (httpx.HTTPError, ValueError):
+            return {}
+        return told
+
+    def wait_for(self, state: str) -> dict[str, Any]:
+        """Wait until the loop is in a state; return the status."""
+        told: dict[str, Any] = {}
+
+        def there() -> bool:
+            nonlocal told
+            told = self.status()
+            return told.get("state") == state
+
+        try:
+            until(there)
+        except AssertionError:
+            raise AssertionError(f"not {state}: {told}; {self.errors()}") from None
+        return told
+
+    def children(self) -> dict[str, int]:
+        """Return the processes of loop, service and simulator, those of them that live."""
+        pid = self.process.pid
+        found = {}
+        for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            command = Path(f"/proc/{child}/cmdline").read_bytes()
+            for name in ("loop", "service"):
+                if f"{name}_process".encode() in command:
+                    found[name] = int(child)
+            if b"\0sim\0up\0" in command:
+                found["simulator"] = int(child)
+        return found
+
+    def end(self) -> int:
+        """End it as a user would; return its exit status."""
+        self.http.close()
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.communicate(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
+        self._errors.close()
+        return self.process.returncode
+
+
+def cdpr(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    command = [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)

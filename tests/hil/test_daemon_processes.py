@@ -1,0 +1,124 @@
+"""A real daemon's processes: what systemd hears, who may run where, what is left when one dies."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+import pytest
+from daemon_rig import RealDaemon, alive, cdpr, until
+from mcap.reader import make_reader
+
+POWERED = 0x0004  # statusword: operation enabled
+
+
+class Manager:
+    """The socket at which systemd listens."""
+
+    def __init__(self, path: Path) -> None:
+        self.env = {"NOTIFY_SOCKET": str(path), "WATCHDOG_USEC": "2000000"}
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind(str(path))
+
+    def heard(self, seconds: float) -> list[str]:
+        """Return everything told until nothing comes for so long."""
+        told: list[str] = []
+        self._socket.settimeout(seconds)
+        while True:
+            try:
+                told += self._socket.recv(4096).decode().split("\n")
+            except TimeoutError:
+                return told
+
+    def hears(self, wanted: str) -> None:
+        """Wait for a line."""
+        self._socket.settimeout(30.0)
+        while wanted not in self._socket.recv(4096).decode().split("\n"):
+            pass
+
+
+@pytest.fixture(scope="module")
+def manager(tmp_path_factory: pytest.TempPathFactory) -> Manager:
+    return Manager(tmp_path_factory.mktemp("systemd") / "notify")
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory, manager: Manager) -> Iterator[RealDaemon]:
+    daemon = RealDaemon(tmp_path_factory.mktemp("run"), "--no-record", env=manager.env)
+    yield daemon
+    daemon.end()
+
+
+def test_it_is_up_without_power_and_systemd_hears_so(daemon: RealDaemon, manager: Manager) -> None:
+    assert daemon.ready["socket"] == str(daemon.socket)
+    assert daemon.ready["pid"] == daemon.process.pid
+    manager.hears("READY=1")
+    manager.hears("WATCHDOG=1")
+    assert daemon.status()["state"] == "ready"
+    # whoever comes later does not speak for the daemon
+    for pid in daemon.children().values():
+        assert b"NOTIFY_SOCKET" not in Path(f"/proc/{pid}/environ").read_bytes()
+
+
+def test_the_loops_core_is_left_to_it(daemon: RealDaemon) -> None:
+    children = daemon.children()
+    taken = os.sched_getaffinity(children["loop"])
+    if len(taken) > 1:  # it could not have one, and says so
+        assert any("none to itself" in n or "ordinary" in n for n in daemon.status()["notices"])
+        return
+    for pid in (daemon.process.pid, children["service"], children["simulator"]):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            assert not taken & os.sched_getaffinity(int(task.name))
+
+
+def test_a_second_daemon_for_the_same_robot_is_refused(daemon: RealDaemon) -> None:
+    second = cdpr("run", daemon.robot, "--bus", "simbus:", "--no-record", *daemon.at)
+    assert second.returncode == 2
+    assert "a daemon runs there already" in second.stderr
+    assert "Traceback" not in second.stderr
+    assert daemon.status()["loop"]["alive"]
+
+
+def test_a_loop_that_is_killed_is_reported_and_nobody_feeds_the_watchdog(
+    daemon: RealDaemon, manager: Manager
+) -> None:
+    children = daemon.children()
+    os.kill(children["loop"], signal.SIGKILL)
+    told = daemon.wait_for("dead")
+    assert "the loop has died: killed by signal 9" in told["reason"]
+    assert not told["loop"]["alive"]
+    assert "STATUS=dead: the loop has died: killed by signal 9" in manager.heard(1.0)
+    assert "WATCHDOG=1" not in manager.heard(1.0)
+    assert daemon.http.post("/hold", json={}).status_code == 503
+    assert daemon.children()["service"] == children["service"]
+    assert daemon.end() == 1
+    assert not any(alive(pid) for pid in children.values())
+    assert not daemon.socket.exists()
+
+
+def test_a_launcher_that_is_killed_takes_everything_along_in_order(tmp_path: Path) -> None:
+    daemon = RealDaemon(tmp_path, "--record", str(tmp_path / "log"))
+    children = daemon.children()
+    assert set(children) == {"loop", "service", "simulator"}
+    try:
+        enabled = cdpr("enable", *daemon.at)
+        assert enabled.returncode == 0, enabled.stderr
+        daemon.process.kill()
+        until(lambda: not any(alive(pid) for pid in children.values()))
+    finally:
+        for pid in children.values():
+            if alive(pid):
+                os.kill(pid, signal.SIGKILL)
+        daemon.end()
+    (log,) = (tmp_path / "log").iterdir()
+    with log.open("rb") as file:
+        found = make_reader(file).iter_messages(["/cycle"])
+        words = [json.loads(message.data)["statusword"] for _, _, message in found]
+    # the motors lost their power in cycles that are recorded, the last of all
+    assert any(word & POWERED for word in chain(*words))
+    assert not any(word & POWERED for word in words[-1])
