@@ -1,9 +1,10 @@
-"""A daemon's recording from start to end, through the death of the service that writes it."""
+"""A daemon's recording from start to end, through a full disk and the death of its writer."""
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -96,14 +97,32 @@ class Daemon:
         self.process.communicate(timeout=PATIENCE_S)
 
 
+def fill_the_disk_for(service: int, daemon: Daemon) -> None:
+    """Let the service's files grow no further; wait until it says so, the robot being active."""
+    (path,) = daemon.recordings.iterdir()
+    size = path.stat().st_size
+    resource.prlimit(service, resource.RLIMIT_FSIZE, (size, size))
+    end = time.monotonic() + PATIENCE_S
+    while not (told := daemon.client.get("/status").json())["parts"]["recording"]["error"]:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    assert told["state"] == "active"
+    assert "File too large" in told["parts"]["recording"]["error"]
+    events = daemon.client.get("/events").json()["events"]
+    assert any("File too large" in event["text"] for event in events)
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Path]]:
-    """The files of a run in which the service was killed while the motors had power."""
+    """The files of a run in which, while the motors had power, the disk was full for the service
+    and it was killed then; the next one has room again."""
     daemon = Daemon(tmp_path_factory.mktemp("run"))
     try:
         cdpr("enable", *daemon.socket)
         cdpr("jog", "left=30", "--seconds", "1", *daemon.socket)
-        os.kill(service_of(daemon.process.pid), signal.SIGKILL)
+        service = service_of(daemon.process.pid)
+        fill_the_disk_for(service, daemon)
+        os.kill(service, signal.SIGKILL)
         daemon.wait_for("active")
         cdpr("disable", *daemon.socket)
         cdpr("stop", *daemon.socket)
