@@ -18,7 +18,7 @@ import httpx
 # slow enough for a machine on which other tests run: its paced simulator must answer in time
 _ROBOT = """
 name = "Two motors, slowly"
-sync_period_s = 0.01
+sync_period_s = {period_s}
 [limits]
 torque_Nm = 1.5
 following_error_rad = 1.0
@@ -35,8 +35,15 @@ name = "right"
 bus = "can0"
 node_id = 2
 """
-NAME = "slow-2"
+NAME, PERIOD_S = "slow-2", 0.01
 PATIENCE_S = 60.0
+
+
+def write_robot(folder: Path, period_s: float = PERIOD_S, limits: str = "") -> Path:
+    """Write the robot's file into a folder, `limits` being more lines of that table; return it."""
+    path = folder / f"{NAME}.toml"
+    path.write_text(_ROBOT.format(period_s=period_s).replace("[limits]", f"[limits]\n{limits}"))
+    return path
 
 
 def until(what: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
@@ -62,15 +69,22 @@ class RealDaemon:
     Where an answer came late while the bus was checked, it is checked again until it is ready.
     """
 
-    def __init__(self, folder: Path, *options: str, env: dict[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *options: str,
+        env: dict[str, str] | None = None,
+        bus: str = "simbus:",
+        period_s: float = PERIOD_S,
+        limits: str = "",
+    ) -> None:
         self.socket = folder / "control.sock"
         self.at = ("--socket", str(self.socket))
         transport = httpx.HTTPTransport(uds=str(self.socket))
         self.http = httpx.Client(transport=transport, base_url="http://localhost", timeout=20.0)
         self._errors = (folder / "errors").open("w+")
-        self.robot = folder / f"{NAME}.toml"
-        self.robot.write_text(_ROBOT)
-        asked = ("run", str(self.robot), "--bus", "simbus:", *self.at)
+        self.robot = write_robot(folder, period_s, limits)
+        asked = ("run", str(self.robot), "--bus", bus, *self.at)
         command = [sys.executable, "-m", "tools.cli", *asked]
         self.process = subprocess.Popen(
             [*command, *options],
