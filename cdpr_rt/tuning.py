@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,11 @@ GAIN_MARGIN_dB = 6.0
 MAX_SENSITIVITY = 2.0
 DERIVATIVE_FILTER_RATIO = 10.0
 """The derivative's filter pole lies at this multiple of the crossover frequency."""
+INERTIA_RATIO = 10.0
+"""By how much the inertia may grow beyond the rotor's before a firm loop swings up."""
 SWEEP_PHASE = 0.3
 """Phase in radians that the latency may take at the sweep's natural frequency."""
+_MOST_FACTOR = 8.0
 
 
 class TuningError(ControlError):
@@ -132,6 +135,39 @@ def stiffest_pid(
         with contextlib.suppress(TuningError):
             return design_pid(inertia_kg_m2, latency_s, bandwidth, period_s)
     return design_pid(inertia_kg_m2, latency_s, bandwidths_Hz[-1], period_s)
+
+
+def stand_firm(design: PidDesign, period_s: float) -> PidDesign:
+    """Return a design with as much gain at standstill as `MAX_SENSITIVITY` leaves.
+
+    A rotor stands where the loop is stiffer than its cogging is steep. Phase margin is given away
+    for that: the proportional gain grows by a factor, the integral by its square, as far as the
+    loop still bears `INERTIA_RATIO` times the inertia.
+    """
+    gains, inertia = design.gains, design.inertia_kg_m2
+
+    def firmer(factor: float) -> PidDesign:
+        proportional = factor * gains.proportional_Nm_rad
+        # the slow part of the loop, J·s³ + kd·s² + kp·s + ki, is stable below kd·kp/J; half of it
+        # is left to the latency
+        most = gains.derivative_Nms_rad * proportional / (2.0 * INERTIA_RATIO * inertia)
+        integral = min(factor * factor * gains.integral_Nm_rad_s, most)
+        firm = replace(gains, proportional_Nm_rad=proportional, integral_Nm_rad_s=integral)
+        return analyse(firm, inertia, design.latency_s, period_s)
+
+    found, low, high = firmer(1.0), 1.0, _MOST_FACTOR
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        try:
+            firm = firmer(middle)
+            bearable = firm.sensitivity_peak <= MAX_SENSITIVITY
+        except TuningError:
+            bearable = False
+        if bearable and firm.gain_margin_dB >= GAIN_MARGIN_dB:
+            found, low = firm, middle
+        else:
+            high = middle
+    return found
 
 
 def design_pid(

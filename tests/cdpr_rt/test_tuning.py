@@ -8,12 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_rt.tuning import (
+    INERTIA_RATIO,
     MAX_SENSITIVITY,
     GAIN_MARGIN_dB,
     PHASE_MARGIN_deg,
     TuningError,
     analyse,
     design_pid,
+    stand_firm,
+    stiffest_pid,
     sweep_gain,
 )
 
@@ -92,3 +95,23 @@ def test_what_cannot_be_had_is_refused():
 def test_sweep_gain_leaves_the_latency_its_phase():
     gain = sweep_gain(1.13e-4, 2.3e-3)
     assert math.sqrt(gain / 1.13e-4) * 2.3e-3 == pytest.approx(0.3)
+
+
+@settings(derandomize=True, deadline=None, max_examples=10)
+@given(inertias, st.sampled_from([5e-4, 1e-3, 2e-3, 4e-3]))
+def test_a_firm_loop_keeps_its_bounds_and_bears_more_inertia(inertia, period):
+    latency = 0.8e-3 + 1.5 * period
+    plain = stiffest_pid(inertia, latency, (30.0, 20.0, 10.0, 5.0), period)
+    firm = stand_firm(plain, period)
+    assert firm.sensitivity_peak <= MAX_SENSITIVITY
+    assert firm.gain_margin_dB >= GAIN_MARGIN_dB
+    assert firm.gains.proportional_Nm_rad > 1.5 * plain.gains.proportional_Nm_rad
+    analyse(firm.gains, INERTIA_RATIO * inertia, latency, period)
+
+
+@pytest.mark.parametrize("period", [1e-3, 2e-3])
+def test_a_firm_loop_is_stiffer_than_cogging_is_steep(period):
+    latency = 0.8e-3 + 1.5 * period
+    firm = stand_firm(stiffest_pid(1.13e-4, latency, (30.0, 20.0), period), period)
+    # 0.06 Nm, four times a turn
+    assert firm.gains.proportional_Nm_rad > 4 * 0.06

@@ -11,7 +11,7 @@ from cdpr_rt.compensation import AxisCompensation
 from cdpr_rt.controllers.pid import PidGains
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.limits import Limits
-from cdpr_rt.tuning import stiffest_pid, sweep_gain
+from cdpr_rt.tuning import stand_firm, stiffest_pid, sweep_gain
 from profiles import RobotAxis
 
 BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
@@ -48,6 +48,12 @@ class RobotModel:
         return len(self.gains)
 
 
+def position_gains(inertia_kg_m2: float, latency_s: float, period_s: float) -> PidGains:
+    """Return the gains with which a rotor follows set-points and stands; raises TuningError."""
+    design = stiffest_pid(inertia_kg_m2, latency_s, BANDWIDTHS_Hz, period_s)
+    return stand_firm(design, period_s).gains
+
+
 def model_of(
     axes: Sequence[RobotAxis],
     period_s: float,
@@ -64,8 +70,7 @@ def model_of(
     inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
     pairs = list(zip(inertia, latency_s, strict=True))
     designs = {
-        (J, latency): stiffest_pid(J, latency, BANDWIDTHS_Hz, period_s).gains
-        for J, latency in dict.fromkeys(pairs)
+        (J, latency): position_gains(J, latency, period_s) for J, latency in dict.fromkeys(pairs)
     }
     return RobotModel(
         period_s=period_s,

@@ -10,10 +10,10 @@ import numpy as np
 from cdpr_rt.compensation import AxisCompensation, FrictionFeedforward
 from cdpr_rt.exchange import AxisFeedback, Setpoint
 from cdpr_rt.runtime.programs.base import Program
-from cdpr_rt.runtime.programs.model import BANDWIDTHS_Hz, RobotModel
+from cdpr_rt.runtime.programs.model import RobotModel, position_gains
 from cdpr_rt.runtime.programs.registry import build_programs
 from cdpr_rt.runtime.shared_block import SAMPLE, SharedBlock
-from cdpr_rt.tuning import stiffest_pid, sweep_gain
+from cdpr_rt.tuning import sweep_gain
 
 N = 3
 PERIOD_S = 1e-3
@@ -25,7 +25,7 @@ COUNT_RAD = 2.0 * np.pi / 8192
 
 def rig_model() -> RobotModel:
     """Axes that differ in all their bounds; the last one's friction is known."""
-    gains = stiffest_pid(INERTIA_kg_m2, LATENCY_S, BANDWIDTHS_Hz, PERIOD_S).gains
+    gains = position_gains(INERTIA_kg_m2, LATENCY_S, PERIOD_S)
     friction = FrictionFeedforward(COULOMB_Nm, COULOMB_Nm)
     return RobotModel(
         period_s=PERIOD_S,
