@@ -197,7 +197,9 @@ def _check(
         error, paying_out = wanted[i] - position[i], wanted_velocity[i] * cable_m_per_rad[i]
         _watch_motion(i, lim, reactions, verdict, error, velocity[i], length[i], paying_out)
         if not sensor_ok[i]:
+            # what takes its place is an estimate, whose step would look like a broken cable
             _judge(verdict, _TENSION_SENSOR, reactions[_TENSION_SENSOR], i, np.nan, np.nan)
+            continue
         per_rad = cable_m_per_rad[i]
         _watch_tension(i, lim, own, reactions, verdict, elapsed, tension[i], position[i], per_rad)
     return int(verdict[0]["reaction"])

@@ -137,6 +137,8 @@ def flag(name: str, cycles: int) -> Change:
 def sensor(is_ok: bool) -> Change:
     def change(cycle: Cycle, _k: int) -> None:
         cycle.estimate.sensor_ok[1] = is_ok
+        # without a reading there is the estimate, which may be anything
+        cycle.estimate.tension_N[1] = 50.0 if is_ok else 0.0
 
     return change
 

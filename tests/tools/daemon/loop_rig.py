@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.loop import ControlLoop
+from cdpr_rt.runtime.programs.base import Program
 from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
 from cdpr_rt.runtime.states import LoopState
 from profiles import load_robot
@@ -20,18 +22,25 @@ from tools.daemon.settings import RunSettings
 
 
 class LoopRig:
-    """One loop on the buses of `url`; nothing moves unless the test turns it."""
+    """One loop on the buses of `url`; nothing moves unless the test turns it.
 
-    def __init__(self, path: Path, url: str) -> None:
+    `programs` are run besides the daemon's own; the rest are settings.
+    """
+
+    def __init__(
+        self, path: Path, url: str, programs: Mapping[str, Program] | None = None, **more: Any
+    ) -> None:
         self.robot = load_robot(path)
         n, rate_Hz = len(self.robot.axes), 1.0 / self.robot.sync_period_s
         self.block = SharedBlock.create(n, 20.0, rate_Hz)
         self.give_lease(1000.0)
         settings = RunSettings(
-            robot=str(path), name="rig", buses=(url,), socket=path.with_suffix(".sock")
+            robot=str(path), name="rig", buses=(url,), socket=path.with_suffix(".sock"), **more
         )
         self.machine = RobotMachine(self.robot, settings)
-        self.loop = ControlLoop(self.block, self.machine, loop_parts(self.robot, self.block))
+        parts = loop_parts(self.robot, self.block)
+        parts = replace(parts, programs={**parts.programs, **(programs or {})})
+        self.loop = ControlLoop(self.block, self.machine, parts)
         self._rows = RowReader(self.block)
 
     def boot(self) -> None:
@@ -101,8 +110,10 @@ class LoopRig:
 
 
 @contextmanager
-def opened(path: Path, url: str) -> Iterator[LoopRig]:
-    rig = LoopRig(path, url)
+def opened(
+    path: Path, url: str, programs: Mapping[str, Program] | None = None, **more: Any
+) -> Iterator[LoopRig]:
+    rig = LoopRig(path, url, programs, **more)
     rig.boot()
     try:
         yield rig

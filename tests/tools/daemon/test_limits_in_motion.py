@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,18 +12,13 @@ import pytest
 
 from cdpr_rt.controllers.base import Idle
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
-from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_row import Row
-from cdpr_rt.runtime.loop import ControlLoop
-from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
 from cdpr_rt.runtime.states import LoopState, Reaction
 from cdpr_rt.supervisor import Limit
 from drivers.cia402 import STATE_TABLE, State
-from profiles import load_robot
+from tests.drivers.modbus.load_cell_rig import LoadCellRig
+from tests.tools.daemon.loop_rig import LoopRig
 from tests.tools.robot_rig import robot_file, simulated
-from tools.daemon.loop_process import loop_parts
-from tools.daemon.machine import RobotMachine
-from tools.daemon.settings import RunSettings
 
 PERIOD_S = 2e-3
 LIMITS = """
@@ -80,80 +73,41 @@ class Wild:
         return {}
 
 
-class Rig:
-    """The daemon's loop in the test's own process, on two drives in lockstep."""
+class WildRig(LoopRig):
+    """A loop that may run the wild program."""
 
-    def __init__(self, path: Path, url: str) -> None:
-        robot = load_robot(path)
-        self.block = SharedBlock.create(2, 20.0, 1.0 / PERIOD_S)
-        self.block.counters["lease_ns"] = time.monotonic_ns() + 10**12
-        settings = RunSettings(
-            robot=str(path), name="rig", buses=(url,), socket=path.with_suffix(".sock")
-        )
-        self.machine = RobotMachine(robot, settings)
+    def __init__(self, path: Path, url: str, **more: Any) -> None:
         self.wild = Wild()
-        parts = loop_parts(robot, self.block)
-        parts = dataclasses.replace(parts, programs={**parts.programs, "wild": self.wild})
-        self.loop = ControlLoop(self.block, self.machine, parts)
-        self._rows = RowReader(self.block)
+        super().__init__(path, url, {"wild": self.wild}, **more)
 
-    def turn_until(self, done: Callable[[], bool], turns: int = 4000) -> None:
-        for _ in range(turns):
-            if done():
-                return
-            self.loop.turn()
-        raise AssertionError(f"not within {turns} turns: {self.block.status()}")
-
-    def order(self, **what: Any) -> dict[str, Any]:
-        """Post a command and turn until it is answered."""
-        number = self.block.post_command({"client": "test", **what})
-        answers: list[dict[str, Any]] = []
-
-        def answered() -> bool:
-            answer = self.block.take_reply()
-            if answer is not None and answer["to"] == number:
-                answers.append(answer)
-            return bool(answers)
-
-        self.turn_until(answered)
-        return answers[0]
-
-    def run(self, deed: Deed) -> Row:
+    def go_wild(self, deed: Deed) -> Row:
         """Enable with the wild program doing `deed`; return the rows until it is over."""
         self.wild.deed = deed
-        answer = self.order(do="enable", program="wild")
-        assert answer["ok"], answer
-        self._rows.read()
-        self.turn_until(lambda: self.loop.life.state is LoopState.FAULT)
-        return self._rows.read()
-
-    @property
-    def status(self) -> dict[str, Any]:
-        self.loop.turn()
-        return self.block.status()
+        self.rows()
+        self.obeyed("enable", program="wild")
+        self.turn_until(lambda: self.state is LoopState.FAULT)
+        return self.rows()
 
 
 @pytest.fixture(scope="module")
-def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    folder = tmp_path_factory.mktemp("robot")
-    path = robot_file(folder, [("can0", 1), ("can0", 2)], period_s=PERIOD_S)
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[WildRig]:
+    path = robot_file(
+        tmp_path_factory.mktemp("robot"), [("can0", 1), ("can0", 2)], period_s=PERIOD_S
+    )
     path.write_text(path.read_text() + LIMITS)
     with simulated(path) as url:
-        made = Rig(path, url)
-        loop = made.loop
-        loop.begin(procedures.start_up(loop))
-        made.turn_until(lambda: loop.life.state is LoopState.READY)
+        made = WildRig(path, url)
+        made.boot()
         yield made
-        loop.request_stop()
-        made.turn_until(lambda: loop.ended)
+        made.close()
 
 
 @pytest.fixture
-def ready(rig: Rig) -> Iterator[Rig]:
+def ready(rig: WildRig) -> Iterator[WildRig]:
     yield rig
-    if rig.loop.life.state is LoopState.FAULT:
-        assert rig.order(do="acknowledge")["ok"]
-    assert rig.loop.life.state is LoopState.READY
+    if rig.state is LoopState.FAULT:
+        rig.obeyed("acknowledge")
+    assert rig.state is LoopState.READY
 
 
 def push(torque_Nm: float) -> Deed:
@@ -167,15 +121,15 @@ def states(row: Row) -> list[State]:
     return [State(int(STATE_TABLE[int(word) & 0x7F])) for word in row["statusword"]]
 
 
-def test_drives_are_told_the_robots_torque_and_heartbeat(ready: Rig) -> None:
+def test_drives_are_told_the_robots_torque_and_heartbeat(ready: WildRig) -> None:
     network = ready.machine._networks["can0"]
     for node in (1, 2):
         assert network.read_int(node, 0x6072) == 500  # 1.5 Nm of 3 Nm
         assert network.read_int(node, 0x1016, 1) == 127 << 16 | 175
 
 
-def test_a_motor_that_runs_away_is_stopped_by_its_drive(ready: Rig) -> None:
-    rows = ready.run(push(1.0))
+def test_a_motor_that_runs_away_is_stopped_by_its_drive(ready: WildRig) -> None:
+    rows = ready.go_wild(push(1.0))
     told = ready.status
     assert told["reason"].startswith("axis 1: speed ")
     assert told["reason"].endswith("2292 deg/s allowed")
@@ -193,19 +147,20 @@ def test_a_motor_that_runs_away_is_stopped_by_its_drive(ready: Rig) -> None:
     assert np.abs(speed).max() < 5.0
 
 
-def test_torque_is_clamped_in_value_and_rate(ready: Rig) -> None:
-    rows = ready.run(push(9.0))
+def test_torque_is_clamped_in_value_and_rate(ready: WildRig) -> None:
+    rows = ready.go_wild(push(9.0))
     clamped = rows[rows["reaction"] == Reaction.CLAMP]
     assert set(clamped["limit"]) <= {Limit.TORQUE, Limit.TORQUE_RATE}
-    assert (rows["torque_asked_Nm"][: clamped.size, 1] == 9.0).all()
+    assert clamped.size > 0
+    assert (clamped["torque_asked_Nm"][:, 1] == 9.0).all()
     assert np.abs(rows["torque_sent_Nm"]).max() <= 1.5
     # 0.2 Nm a cycle, and what the drive's unit of 3 mNm makes of it
     assert np.diff(clamped["torque_sent_Nm"][:, 1]).max() <= 0.2 + 3e-3
 
 
 @pytest.mark.parametrize("what", [math.nan, math.inf, -math.inf])
-def test_a_torque_that_is_no_number_reaches_no_drive(ready: Rig, what: float) -> None:
-    rows = ready.run(push(what))
+def test_a_torque_that_is_no_number_reaches_no_drive(ready: WildRig, what: float) -> None:
+    rows = ready.go_wild(push(what))
     tripped = int(np.flatnonzero(rows["limit"] == Limit.NOT_FINITE)[0])
     assert rows["reaction"][tripped] == Reaction.QUICK_STOP
     assert not rows["torque_sent_Nm"].any()
@@ -213,11 +168,11 @@ def test_a_torque_that_is_no_number_reaches_no_drive(ready: Rig, what: float) ->
 
 
 @pytest.mark.parametrize("what", [1.6, -1.6, math.nan])
-def test_the_robots_own_reaction_is_what_happens(ready: Rig, what: float) -> None:
+def test_the_robots_own_reaction_is_what_happens(ready: WildRig, what: float) -> None:
     def jump(_k: int, feedback: AxisFeedback, setpoint: Setpoint, _torque: FloatArray) -> None:
         setpoint.position_rad[1] = feedback.position_rad[1] + what
 
-    rows = ready.run(jump)
+    rows = ready.go_wild(jump)
     tripped = int(np.flatnonzero(rows["limit"] == Limit.FOLLOWING_ERROR)[0])
     assert rows["reaction"][tripped] == Reaction.TORQUE_OFF
     assert ready.status["reason_limit"]["reaction"] == "torque off"
@@ -227,27 +182,130 @@ def test_the_robots_own_reaction_is_what_happens(ready: Rig, what: float) -> Non
     assert after[-1] == [State.SWITCH_ON_DISABLED] * 2
 
 
-def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: Rig) -> None:
+def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> None:
     estimator = ready.loop.parts.estimator
     position = ready.loop.machine.device.feedback.position_rad  # type: ignore[union-attr]
     estimator.set_lengths(position, np.array([1.0, 1.0]))
     try:
         moving = {"velocity_rad_s": [0.0, 4.0], "timeout_s": 2.0}
-        assert ready.order(do="enable", program="jog", wanted=moving)["ok"]
-        assert ready.loop.program.name == "jog"
-        ready.turn_until(lambda: ready.loop.program.name == "hold", 500)
+        ready.obeyed("enable", program="jog", wanted=moving)
+        ready.turn_until(lambda: ready.loop.program.name == "hold")
         told = ready.status
         assert (told["state"], told["program"]) == ("active", "hold")
         assert told["reason"].startswith("axis 1: cable length 1.02")
         assert told["reason"].endswith("1.020 m allowed")
-        for _ in range(200):
-            ready.loop.turn()
+        ready.turn(200)
         length_m = estimator.estimate.cable_length_m[1]
         assert 1.02 < length_m < 1.05  # it brakes at 1 m/s2
-        back = {"velocity_rad_s": [0.0, -4.0]}
-        assert ready.order(do="program", program="jog", wanted=back)["ok"]
-        ready.turn_until(lambda: estimator.estimate.cable_length_m[1] < length_m - 5e-3, 240)
+        back = {"velocity_rad_s": [0.0, -4.0], "timeout_s": 2.0}
+        ready.obeyed("program", program="jog", wanted=back)
+        ready.turn_until(lambda: estimator.estimate.cable_length_m[1] < length_m - 5e-3)
         assert ready.loop.program.name == "jog"
     finally:
         estimator.forget_lengths()
-        assert ready.order(do="disable")["ok"]
+        ready.obeyed("disable")
+
+
+# -- tension
+
+
+SENSORS = """
+name = "Two load cells"
+period_s = 0.02
+stale_after_s = 0.5
+stop_above_N = 80.0
+[amplifier]
+highest_N = 1000.0
+[amplifier.value]
+kind = "input"
+address = 0
+type = "int32"
+scale_N = 0.01
+[[sensors]]
+cable = "left"
+unit = 1
+[[sensors]]
+cable = "right"
+unit = 2
+"""
+TIGHT = """
+tension_sensors = "cells.toml"
+[limits]
+tension_min_N = 20.0
+[limits.reactions]
+slack = "controlled stop"
+tension_low = "controlled stop"
+"""
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[WildRig, LoadCellRig]]:
+    folder = tmp_path_factory.mktemp("tight")
+    (folder / "cells.toml").write_text(SENSORS)
+    path = robot_file(folder, [("can0", 1), ("can0", 2)], period_s=PERIOD_S)
+    top, limits = TIGHT.split("\n[limits]", 1)
+    path.write_text(top + "\n" + path.read_text() + "\n[limits]" + limits)
+    with LoadCellRig(folder / "cells.toml", folder, 2) as cells, simulated(path) as url:
+        cells.pull([30.0, 30.0])
+        made = WildRig(path, url, tension_port=cells.port)
+        made.boot()
+        yield made, cells
+        made.close()
+
+
+def until_read(rig: WildRig, tension_N: float) -> None:
+    """Turn until the right load cell is read as `tension_N`, but for its own error."""
+    told = rig.loop.parts.estimator.estimate
+    rig.turn_until(lambda: abs(told.tension_N[1] - tension_N) < 2.0)
+
+
+# an amplifier settles in its own time, and bus time in lockstep is faster than it
+FALLEN = ("tension_low", "slack", "broken_cable")
+
+
+@pytest.mark.parametrize(
+    ("tension_N", "limits", "least_N", "most_N"),
+    [(90.0, ("tension_high",), 80.0, 95.0), (1.0, FALLEN, -2.0, 20.0)],
+)
+def test_measured_tensions_end_a_motion(
+    loaded: tuple[WildRig, LoadCellRig],
+    tension_N: float,
+    limits: tuple[str, ...],
+    least_N: float,
+    most_N: float,
+) -> None:
+    rig, cells = loaded
+    until_read(rig, 30.0)
+    rig.obeyed("enable", program="hold")
+    rig.turn(20)
+    assert rig.rows()["tension_measured"][-1].all()
+    cells.pull([30.0, tension_N])
+    rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
+    told = rig.status["reason_limit"]
+    cells.pull([30.0, 30.0])
+    until_read(rig, 30.0)
+    rig.turn_until(lambda: bool(rig.order("acknowledge")["ok"]))
+    assert told["limit"] in limits
+    assert told["axis"] == 1
+    assert least_N < told["value"] < most_N
+
+
+def test_a_silent_load_cell_ends_the_motion_and_is_named(
+    loaded: tuple[WildRig, LoadCellRig],
+) -> None:
+    rig, cells = loaded
+    until_read(rig, 30.0)
+    rig.obeyed("enable", program="hold")
+    rig.turn(20)
+    cells.tell("silent 2")
+    try:
+        rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
+        told = rig.status
+        assert told["reason_limit"]["limit"] == "tension_sensor"
+        assert told["reason_limit"]["axis"] == 1
+        answer = rig.order("acknowledge")
+        assert "right: tension sensor: stale" in answer["text"]
+        assert rig.state is LoopState.FAULT
+    finally:
+        cells.tell("mend 2")
+    rig.turn_until(lambda: bool(rig.order("acknowledge")["ok"]))
