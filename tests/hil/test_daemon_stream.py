@@ -1,0 +1,232 @@
+"""A real daemon led by a hand over UDP, with others who want the same bus."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+import random
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from daemon_rig import RealDaemon, cdpr, until
+
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.recording_reader import RecordingReader
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import Standing
+from profiles import load_winch
+
+WINCH = load_winch("winch-mpp0923d")
+PERIOD_S = 0.01
+MOST_ACCELERATION_m_s2 = 1.0
+SCALE = 0.25
+RATE_Hz = 60.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("led")
+
+
+@pytest.fixture(scope="module")
+def daemon(folder: Path) -> Iterator[RealDaemon]:
+    running = RealDaemon(folder, "--stream", "127.0.0.1:0", "--record", str(folder / "rec"))
+    try:
+        yield running
+    finally:
+        assert running.end() == 0, running.errors()
+
+
+def port_of(daemon: RealDaemon) -> int:
+    return int(daemon.status()["parts"]["stream"]["address"].rpartition(":")[2])
+
+
+def ask(daemon: RealDaemon, path: str, token: str, **body: Any) -> dict[str, Any]:
+    reply = daemon.http.post(path, json=body, headers={"X-Control-Token": token})
+    assert reply.status_code == 200, reply.text
+    told: dict[str, Any] = reply.json()
+    return told
+
+
+def follow(daemon: RealDaemon) -> str:
+    """Take the right to move, enable the drives, and have them follow; return the token."""
+    for name in ("disable", "acknowledge"):
+        daemon.http.post(f"/{name}", json={})
+    until(daemon._is_ready)
+    until(lambda: not daemon.http.get("/control").json()["held"])
+    token = daemon.http.post("/control", json={"client": "hand", "ttl_s": 5.0}).json()["token"]
+    ask(daemon, "/enable", token, program="follow")
+    return str(token)
+
+
+def lead(client: StreamClient, path: Callable[[float], float], seconds: float) -> None:
+    """Send x of the hand along `path` at 60 Hz."""
+    begin = time.monotonic()
+    for k in itertools.count():
+        t = k / RATE_Hz
+        if t > seconds:
+            return
+        time.sleep(max(0.0, begin + t - time.monotonic()))
+        client.send((path(t), 0.0, 0.0), scale=SCALE)
+        client.receive()
+
+
+def setpoints(daemon: RealDaemon) -> list[float]:
+    """Return the set-points in m of cable; at this slow cycle motors follow them softly."""
+    axes = daemon.status()["axes"]
+    return [float(axis["setpoint_rad"]) * WINCH.cable_m_per_motor_rad for axis in axes]
+
+
+@contextmanager
+def hostile(port: int, seed: int) -> Iterator[tuple[int, list[int]]]:
+    """Yield the port of a proxy that loses, delays, repeats and reorders, and its counts."""
+    chance = random.Random(seed)
+    front = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    front.bind(("127.0.0.1", 0))
+    back = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    back.connect(("127.0.0.1", port))
+    stop = threading.Event()
+    counts = [0, 0]
+
+    def run() -> None:
+        late: list[tuple[float, int, bytes, bool]] = []
+        numbers = itertools.count()
+        sender = None
+        while not stop.is_set():
+            ready, _, _ = select.select([front, back], [], [], 0.002)
+            for sock in ready:
+                data, address = sock.recvfrom(2048)
+                if sock is front:
+                    sender = address
+                counts[0] += 1
+                for _ in range(chance.choices((0, 1, 2), (0.2, 0.75, 0.05))[0]):
+                    due = time.monotonic() + chance.uniform(0.0, 0.05)
+                    heapq.heappush(late, (due, next(numbers), data, sock is front))
+            while late and late[0][0] <= time.monotonic():
+                _, _, data, onward = heapq.heappop(late)
+                counts[1] += 1
+                if onward:
+                    back.send(data)
+                elif sender is not None:
+                    front.sendto(data, sender)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield front.getsockname()[1], counts
+    finally:
+        stop.set()
+        thread.join()
+        front.close()
+        back.close()
+
+
+def test_a_hand_leads_until_it_is_gone(daemon: RealDaemon) -> None:
+    token = follow(daemon)
+    before = setpoints(daemon)
+    with StreamClient("127.0.0.1", port_of(daemon), token=token) as hand:
+        lead(hand, lambda t: 0.04 * min(t, 1.0), 1.5)
+        assert hand.state is not None
+        assert (hand.state.standing, hand.state.state) == (Standing.ACCEPTED, LoopState.ACTIVE)
+        moved = np.subtract(setpoints(daemon), before)
+        np.testing.assert_allclose(moved, [0.04 * SCALE, 0.0], atol=1e-4)
+        # the hand is gone in mid-motion, without a good-bye
+        lead(hand, lambda t: 0.04 + 0.04 * t, 0.5)
+        told = daemon.status()
+        assert told["parts"]["stream"]["holder"] is not None
+        assert told["parts"]["stream"]["packets"]["accepted"] > 60
+        until(lambda: daemon.status()["program"] == "hold")
+        assert "nobody holds the right to move" in daemon.status()["reason"]
+        assert daemon.status()["state"] == "active"
+        moved = np.subtract(setpoints(daemon), before)
+        # to the last sample, and nothing beyond
+        np.testing.assert_allclose(moved, [0.06 * SCALE, 0.0], atol=4e-4)
+
+
+def test_a_stranger_without_the_right_moves_nothing(daemon: RealDaemon) -> None:
+    token = follow(daemon)
+    before = setpoints(daemon)
+    with StreamClient("127.0.0.1", port_of(daemon)) as stranger:
+        lead(stranger, lambda t: 0.2 * t, 0.5)
+        assert stranger.state is not None
+        assert stranger.state.standing == Standing.NO_RIGHT
+    with StreamClient("127.0.0.1", port_of(daemon), token="guessed") as stranger:
+        lead(stranger, lambda t: 0.2 * t, 0.5)
+        assert stranger.state is not None
+        assert stranger.state.standing == Standing.NO_RIGHT
+    np.testing.assert_allclose(setpoints(daemon), before, atol=1e-4)
+    daemon.http.delete("/control", headers={"X-Control-Token": token})
+
+
+def test_a_hostile_network_makes_no_step(daemon: RealDaemon) -> None:
+    token = follow(daemon)
+    with (
+        hostile(port_of(daemon), 4) as (port, counts),
+        StreamClient("127.0.0.1", port, token=token) as hand,
+    ):
+        lead(hand, lambda t: 0.06 * math.sin(1.4 * math.pi * t), 4.0)
+        assert counts[1] < 0.95 * counts[0]
+        assert 0.0 < hand.round_trip_s < 0.5
+        progress = daemon.status()["program_progress"]
+        assert progress["stream"] in ("fresh", "held")
+        assert progress["repeated"] + progress["late"] + progress["missing"] > 20
+    assert daemon.status()["state"] == "active"
+    daemon.http.post("/disable", json={})
+    daemon.http.delete("/control", headers={"X-Control-Token": token})
+
+
+def test_a_second_daemon_is_refused_and_a_listener_is_not(daemon: RealDaemon, folder: Path) -> None:
+    bus = f"simbus:own-{daemon.process.pid}"
+    until(daemon._is_ready)
+    other = folder / "other.sock"
+    told = cdpr("run", daemon.robot, "--bus", bus, "--socket", other, "--no-record")
+    assert told.returncode == 2
+    assert f"process {daemon.children()['loop']} " in told.stderr
+    assert "or give --read-only to listen" in told.stderr
+    beside = folder / "beside"
+    beside.mkdir()
+    listener = RealDaemon(beside, "--read-only", "--no-record", bus=bus)
+    try:
+        heard = listener.status()["cycle"]["cycle"]
+        follow(daemon)
+        until(lambda: listener.status()["cycle"]["cycle"] > heard + 100)
+        status = listener.status()
+        assert (status["state"], status["read_only"]) == ("ready", True)
+        held = listener.http.post("/control", json={"client": "x"}).json().get("token", "")
+        refused = listener.http.post(
+            "/enable", json={"program": "hold"}, headers={"X-Control-Token": held}
+        )
+        assert refused.status_code >= 400
+        assert "listens" in refused.text
+        daemon.http.post("/disable", json={})
+    finally:
+        assert listener.end() == 0, listener.errors()
+    assert daemon.wait_for("ready")
+
+
+def test_recorded_setpoints_never_step(daemon: RealDaemon, folder: Path) -> None:
+    """Last: it ends the daemon, whose recording holds all that went before."""
+    daemon.end()
+    assert daemon.process.returncode == 0
+    step = MOST_ACCELERATION_m_s2 * PERIOD_S / abs(WINCH.cable_m_per_motor_rad)
+    wanted = ("setpoint_velocity_rad_s", "state", "program")
+    rows: dict[str, list[Any]] = {name: [] for name in wanted}
+    for path in sorted((folder / "rec").glob("*.mcap")):
+        for columns in RecordingReader(path).cycles(wanted):
+            for name in wanted:
+                rows[name].append(columns[name])
+    speed, state, program = (np.concatenate(rows[name]) for name in wanted)
+    led = (state == LoopState.ACTIVE) & (program != 0)  # idle has no set-point of its own
+    both = led[1:] & led[:-1]
+    assert both.sum() > 500
+    assert np.abs(speed[led]).max() > 2.0
+    assert np.abs(np.diff(speed, axis=0)[both]).max() <= 1.001 * step
