@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from daemon_rig import RealDaemon, cdpr, until
 from mcap.reader import make_reader
+from websockets.sync.client import connect
 
 PERIOD_s = 0.01
 TOLERANT = """
@@ -54,15 +55,31 @@ def fill_the_disk_for(service: int, daemon: RealDaemon, folder: Path) -> None:
     assert any("File too large" in event["text"] for event in events)
 
 
+def watch_live(daemon: RealDaemon) -> dict[str, Any]:
+    """Return the first message on the axes that a client of the live view gets."""
+    url = until(lambda: daemon.status()["parts"]["live_view"]["url"])
+    with connect(url, subprotocols=["foxglove.sdk.v1"]) as client:  # type: ignore[list-item]
+        while True:
+            message = client.recv(timeout=20.0)
+            if isinstance(message, bytes):
+                value: dict[str, Any] = json.loads(message[13:])
+                return value
+            for channel in json.loads(message).get("channels", []):
+                if channel["topic"] == "/axes":
+                    wanted = [{"id": 1, "channelId": channel["id"]}]
+                    client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Path]]:
     """The files of a run in which, while the motors had power, the disk was full for the service
     and it was killed then; the next one has room again."""
     folder = tmp_path_factory.mktemp("run")
     recordings = folder / "recordings"
-    daemon = RealDaemon(folder, "--record", str(recordings), limits=TOLERANT)
+    daemon = RealDaemon(folder, "--record", str(recordings), "--live", "0", limits=TOLERANT)
     try:
         told("enable", *daemon.at)
+        assert set(watch_live(daemon)) == {"left", "right"}
         told("jog", "left=30", "--seconds", "1", *daemon.at)
         service = daemon.children()["service"]
         fill_the_disk_for(service, daemon, recordings)
