@@ -11,6 +11,8 @@ import gc
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
 from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.lifecycle import RefusedError
 from cdpr_rt.runtime.states import LoopState, Reaction
@@ -21,11 +23,12 @@ if TYPE_CHECKING:
 CHECK_S: Final = 0.25
 """For how long cycles are looked at before the bus counts as good."""
 _CHECK_CYCLES: Final = 20
-_MISSED_SHARE: Final = 0.02
 _SETTLE_CYCLES: Final = 5
 _MODE_S: Final = 2.0
 _POWER_ON_S: Final = 4.0
 _REST_S: Final = 5.0
+_SETTLE_S: Final = 1.0
+_STILL_RAD_S: Final = 0.3
 _BRAKES_S: Final = 2.0
 _POWER_OFF_S: Final = 3.0
 _POWER_OFF_AT_LAST_S: Final = 0.5
@@ -105,7 +108,9 @@ def _look_at_cycles(loop: ControlLoop) -> Iterator[None]:
         "late": cycle.lateness.late - late,
         "slowest_exchange_s": slowest_s,
     }
-    if missed > _MISSED_SHARE * cycles * device.n:
+    limits = loop.parts.supervisor.limits
+    allowed = cycles * device.n * limits.missed_in_window / limits.window_cycles
+    if missed > max(1.0, allowed):
         raise RefusedError(
             f"check: {missed} of {cycles * device.n} answers did not come in time; see `cdpr bus "
             "monitor`"
@@ -146,30 +151,13 @@ def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
     """See to the end of a motion that has been ended, until the drives have no power."""
     life, machine = loop.life, loop.machine
     if loop.driving:
-        for _ in range(loop.cycles_in(_REST_S)):
-            if loop.program.at_rest:
-                break
-            yield
-        loop.switch("hold")
-        machine.set_brakes(False)
-        for _ in range(loop.cycles_in(_BRAKES_S)):
-            if machine.brakes_are(False):
-                break
-            yield
-        machine.power_off()
-        loop.driving = False
-        loop.switch("idle")
+        yield from _brake(loop)
     else:
         machine.set_brakes(False)
-    for _ in range(loop.cycles_in(_POWER_OFF_S)):
-        if machine.unpowered():
-            break
-        yield
+    yield from _up_to(loop, _POWER_OFF_S, machine.unpowered)
     machine.power_off()
-    for _ in range(loop.cycles_in(_POWER_OFF_AT_LAST_S)):
-        yield  # one command at least, so that it is sent
-        if machine.unpowered():
-            break
+    yield  # one command at least, so that it is sent
+    yield from _up_to(loop, _POWER_OFF_AT_LAST_S, machine.unpowered)
     doubts: list[str] = []
     yield from _slowly(loop, lambda: doubts.append(machine.make_sure()))
     if any(doubts):
@@ -179,6 +167,19 @@ def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
     loop.reacting = Reaction.NONE
     if then is LoopState.FAULT:
         yield from _explain(loop)
+
+
+def _brake(loop: ControlLoop) -> Iterator[None]:
+    """Wait until the axes stand under their program, have the brakes hold them, take the power."""
+    machine, velocity = loop.machine, loop.parts.estimator.estimate.velocity_rad_s
+    yield from _up_to(loop, _REST_S, lambda: loop.program.at_rest)
+    loop.switch("hold")
+    yield from _up_to(loop, _SETTLE_S, lambda: bool(np.max(np.abs(velocity)) < _STILL_RAD_S))
+    machine.set_brakes(False)
+    yield from _up_to(loop, _BRAKES_S, lambda: machine.brakes_are(False))
+    machine.power_off()
+    loop.driving = False
+    loop.switch("idle")
 
 
 def fall(loop: ControlLoop) -> Iterator[None]:
@@ -249,6 +250,13 @@ def shut_down(loop: ControlLoop) -> Iterator[None]:
         loop.life.blame(doubt[0])
     loop.life.enter(LoopState.UNCONFIGURED)
     loop.ended = True
+
+
+def _up_to(loop: ControlLoop, within_s: float, done: Callable[[], bool]) -> Iterator[None]:
+    for _ in range(loop.cycles_in(within_s)):
+        if done():
+            return
+        yield
 
 
 def _until(
