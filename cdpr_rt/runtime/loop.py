@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,7 +22,7 @@ from cdpr_rt.runtime.lifecycle import Lifecycle
 from cdpr_rt.runtime.machine import Machine
 from cdpr_rt.runtime.orders import Orders
 from cdpr_rt.runtime.programs.base import Program
-from cdpr_rt.runtime.shared_block import SAMPLES, SharedBlock
+from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.runtime.states import LoopState, Reaction
 from cdpr_rt.runtime.status import StatusPage
 from cdpr_rt.supervisor import Supervisor
@@ -89,7 +88,6 @@ class ControlLoop:
         self._asked: FloatArray = np.zeros(block.n)
         self._alive = block.counters["loop_alive_ns"]
         self._lease = block.counters["lease_ns"]
-        self._samples, self._arrived = block.counters["samples"], block.samples["arrived_ns"]
         self._last_ns = 0
         self._orders = Orders(self)
         self.status = StatusPage(self)
@@ -133,6 +131,7 @@ class ControlLoop:
             self.notices += self.parts.punctual()
         if self.cycle is None or self.cycle.device is not device:
             self.cycle = Cycle(device, self.machine.watches)
+            self.parts.estimator.forget_lengths()  # drives that have booted count from anywhere
         self.parts.estimator.reset()
         self._rows.follow(self.cycle, self.setpoint, self.parts.estimator.estimate)
         self._last_ns = 0
@@ -198,14 +197,6 @@ class ControlLoop:
         if cycle.device.lockstep or last_ns == 0:
             return 0.0
         return (cycle.began_ns - last_ns) * 1e-9
-
-    def stream_age_s(self) -> float:
-        """Return the age of the newest sample of the set-point stream, nan without one."""
-        samples = int(self._samples[0])
-        if samples == 0:
-            return math.nan
-        arrived_ns = int(self._arrived[(samples - 1) % SAMPLES])
-        return (time.monotonic_ns() - arrived_ns) * 1e-9
 
     # -- judging
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cdpr_rt.errors import ControlError
+from cdpr_rt.exchange import FloatArray
 from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.lifecycle import RefusedError
 from cdpr_rt.runtime.shared_block import SharedBlockError
@@ -16,6 +20,7 @@ if TYPE_CHECKING:
 
 Order = Mapping[str, Any]
 _MOST_TEXT = 1500
+_LONGEST_CABLE_m = 1000.0
 
 
 class Orders:
@@ -35,6 +40,7 @@ class Orders:
             "program": self._program,
             "set": self._set,
             "hold": self._hold,
+            "lengths": self._lengths,
             "shutdown": self._shutdown,
         }
 
@@ -133,6 +139,29 @@ class Orders:
         self._require_lease("set")
         self._loop.program.command(self._wanted(order))
         self._loop.status.touch()
+
+    def _lengths(self, order: Order) -> None:
+        loop, device = self._loop, self._loop.machine.device
+        if device is None or loop.life.state not in (LoopState.READY, LoopState.ACTIVE):
+            raise RefusedError(f"lengths: not in state {loop.life.state.label}")
+        self._require_lease("lengths")
+        if not device.feedback.valid.all():
+            raise RefusedError("lengths: not every axis answers")
+        length_m = self._lengths_in(self._wanted(order), device.n)
+        loop.parts.estimator.set_lengths(device.feedback.position_rad, length_m)
+
+    @staticmethod
+    def _lengths_in(wanted: Mapping[str, Any], n: int) -> FloatArray:
+        told = wanted.get("cable_length_m")
+        if set(wanted) != {"cable_length_m"} or not isinstance(told, list) or len(told) != n:
+            raise RefusedError(f"wanted: allowed: cable_length_m, {n} lengths or null")
+        for i, length in enumerate(told):
+            is_number = isinstance(length, int | float) and not isinstance(length, bool)
+            if length is not None and not (is_number and 0.0 < length <= _LONGEST_CABLE_m):
+                raise RefusedError(
+                    f"cable_length_m[{i}]: {length!r}; allowed: above 0, up to {_LONGEST_CABLE_m:g}"
+                )
+        return np.array([math.nan if length is None else length for length in told])
 
     def _run(self, name: str, wanted: Mapping[str, Any]) -> None:
         self._require_running(name)

@@ -233,6 +233,11 @@ def _add_commands(app: FastAPI, service: Service) -> None:
         """Tell the running program what it is to do."""
         return await ask("set", body, token, request, wanted=body.wanted)
 
+    @app.post("/lengths", responses=_REFUSALS)
+    async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
+        """Tell how long the cables are now: `cable_length_m`, one for each axis or null."""
+        return await ask("lengths", body, token, request, wanted=body.wanted)
+
 
 def _done(reply: Reply) -> models.Done:
     if not reply.ok:

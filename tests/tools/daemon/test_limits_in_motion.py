@@ -182,10 +182,36 @@ def test_the_robots_own_reaction_is_what_happens(ready: WildRig, what: float) ->
     assert after[-1] == [State.SWITCH_ON_DISABLED] * 2
 
 
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        {},
+        {"cable_length_m": [1.0]},
+        {"cable_length_m": 1.0},
+        {"cable_length_m": [1.0, -1.0]},
+        {"cable_length_m": [1.0, math.nan]},
+        {"cable_length_m": [1.0, True]},
+        {"cable_length_m": [1.0, "2"]},
+        {"cable_length_m": [1.0, 1.0], "more": 1},
+    ],
+)
+def test_lengths_that_are_none_are_refused(ready: WildRig, wanted: dict[str, Any]) -> None:
+    answer = ready.order("lengths", wanted=wanted)
+    assert not answer["ok"]
+    assert "allowed: " in answer["text"]
+    assert not ready.loop.parts.estimator.estimate.length_known.any()
+
+
 def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> None:
     estimator = ready.loop.parts.estimator
-    position = ready.loop.machine.device.feedback.position_rad  # type: ignore[union-attr]
-    estimator.set_lengths(position, np.array([1.0, 1.0]))
+    ready.give_lease(-1.0)
+    assert not ready.order("lengths", wanted={"cable_length_m": [None, 1.0]})["ok"]
+    ready.give_lease(1000.0)
+    ready.obeyed("lengths", wanted={"cable_length_m": [None, 1.0]})
+    ready.turn(1)
+    length_m = ready.rows()["cable_length_m"][-1]
+    assert math.isnan(length_m[0])
+    assert length_m[1] == pytest.approx(1.0, abs=1e-3)
     try:
         moving = {"velocity_rad_s": [0.0, 4.0], "timeout_s": 2.0}
         ready.obeyed("enable", program="jog", wanted=moving)
