@@ -122,6 +122,7 @@ class RobotMachine:
     def acknowledge(self) -> None:
         """Forget what the safety I/O has latched, whose cause is gone."""
         if self._safety is not None and self._safety.tripped:
+            self._safety.io.de_energise()  # it acknowledges while it does not watch
             self._safety.io.acknowledge()
 
     @_told
@@ -251,6 +252,7 @@ class RobotMachine:
         faults = (State.FAULT, State.FAULT_REACTION)
         return self.device is not None and not any(s in faults for s in self.device.states())
 
+    @_told
     def set_brakes(self, released: bool) -> None:
         """Have the brakes released or applied; does not wait for them."""
         if self._safety is not None and self._safety.braked:

@@ -28,14 +28,14 @@ class LoopRig:
     """
 
     def __init__(
-        self, path: Path, url: str, programs: Mapping[str, Program] | None = None, **more: Any
+        self, path: Path | str, url: str, programs: Mapping[str, Program] | None = None, **more: Any
     ) -> None:
         self.robot = load_robot(path)
         n, rate_Hz = len(self.robot.axes), 1.0 / self.robot.sync_period_s
         self.block = SharedBlock.create(n, 20.0, rate_Hz)
         self.give_lease(1000.0)
         settings = RunSettings(
-            robot=str(path), name="rig", buses=(url,), socket=path.with_suffix(".sock"), **more
+            robot=str(path), name="rig", buses=(url,), socket=Path("unused"), **more
         )
         self.machine = RobotMachine(self.robot, settings)
         parts = loop_parts(self.robot, self.block)

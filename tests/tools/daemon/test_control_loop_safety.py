@@ -1,0 +1,131 @@
+"""The loop behind a safety I/O: contactor, brakes and emergency stop, seen on the physics."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "drivers" / "modbus"))
+from safety_rig import Twin, board_file, patient_profile, ready, start
+
+from cdpr_rt.runtime.states import LoopState
+from sim_bus.physics_board import BoardAxis, PhysicsBoard
+from sim_bus.safety_twin import Fault
+from tests.tools.daemon.loop_rig import LoopRig, opened
+
+WINCH = "winch-mpp0923d"
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[LoopRig, Twin, BoardAxis]]:
+    bus = f"simbus:loop-safety-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    folder = tmp_path_factory.mktemp("io")
+    before = os.environ.get("XDG_STATE_HOME")
+    os.environ["XDG_STATE_HOME"] = str(folder)
+    try:
+        with board_file() as path:
+            simulator = start("up", WINCH, "--bus", bus, "--lockstep", "--board", path)
+            ready(simulator)
+            twin = Twin(patient_profile(folder), "--board", path)
+            with (
+                PhysicsBoard.attach(path) as board,
+                opened(WINCH, bus, safety_io=twin.reference) as rig,
+            ):
+                yield rig, twin, board.axis(0)
+            twin.close()
+            simulator.communicate(b"", timeout=10)
+    finally:
+        if before is None:
+            del os.environ["XDG_STATE_HOME"]
+        else:
+            os.environ["XDG_STATE_HOME"] = before
+
+
+def wait(rig: LoopRig, done: Callable[[], object]) -> None:
+    """Turn the loop, at a pace at which the I/O is polled meanwhile, until `done`."""
+
+    def at_ease() -> bool:
+        time.sleep(0.002)
+        return bool(done())
+
+    rig.turn_until(at_ease)
+
+
+def jog(rig: LoopRig) -> None:
+    wanted = {"velocity_rad_s": [5.0], "timeout_s": 2.0}
+    rig.obeyed("program", program="jog", wanted=wanted)
+    rig.run(0.3)
+
+
+def test_brakes_open_behind_power_and_close_before_it_goes(
+    lab: tuple[LoopRig, Twin, BoardAxis],
+) -> None:
+    rig, _, winch = lab
+    assert rig.state is LoopState.READY, rig.status
+    assert winch.power_allowed
+    assert not winch.brake_released
+    number = rig.block.post_command({"do": "enable"})
+    wait(rig, lambda: winch.brake_released)
+    assert rig.loop.driving  # it was held before the brake let go
+    wait(rig, lambda: not rig.loop.busy)
+    answer = rig.block.take_reply()
+    assert answer is not None
+    assert (answer["to"], answer["ok"]) == (number, True)
+    jog(rig)
+    rig.block.post_command({"do": "disable"})
+    wait(rig, lambda: not winch.brake_released)
+    wait(rig, lambda: rig.state is LoopState.READY)
+    rig.block.take_reply()
+
+
+def test_an_emergency_stop_takes_the_torque_at_once(
+    lab: tuple[LoopRig, Twin, BoardAxis],
+) -> None:
+    rig, twin, winch = lab
+    rig.block.post_command({"do": "enable"})
+    wait(rig, lambda: rig.loop.driving and not rig.loop.busy)
+    rig.block.take_reply()
+    jog(rig)
+    rig.rows()
+    twin.press()
+    wait(rig, lambda: rig.state is LoopState.FAULT)
+    wait(rig, lambda: not winch.brake_released)
+    wait(rig, lambda: not rig.loop.busy)
+    told = rig.status
+    assert "emergency-stop chain is open" in told["reason"]
+    rows = rig.rows()
+    (changes,) = (rows["state"] == LoopState.FAULT).nonzero()
+    assert not rows["torque_sent_Nm"][changes].any()
+    # it stays while the button is pressed
+    answer = rig.order("acknowledge")
+    assert not answer["ok"]
+    assert "chain" in answer["text"]
+    assert rig.state is LoopState.FAULT
+    twin.press(False)
+    rig.obeyed("acknowledge")
+    assert rig.state is LoopState.READY
+    assert not winch.brake_released
+    assert not winch.state().power_on
+
+
+def test_a_brake_that_does_not_open_ends_in_a_fault(
+    lab: tuple[LoopRig, Twin, BoardAxis],
+) -> None:
+    rig, twin, winch = lab
+    twin.break_(Fault.BRAKES_STUCK)
+    rig.block.post_command({"do": "enable"})
+    wait(rig, lambda: rig.state is LoopState.FAULT)
+    wait(rig, lambda: not rig.loop.busy)
+    assert "brake" in rig.status["reason"]
+    assert not winch.state().power_on
+    twin.mend()
+    answer = rig.block.take_reply()
+    assert answer is not None
+    assert not answer["ok"]
+    rig.obeyed("acknowledge")
