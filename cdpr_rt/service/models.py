@@ -3,39 +3,56 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Any, Final
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
 
 from cdpr_rt.service.lease import LONGEST_S, SHORTEST_S
 
-_DEEPEST, _LONGEST_LIST, _LONGEST_TEXT = 4, 64, 200
-_LARGEST: Final = 1e9
+_MOST_KEYS, _MOST_NUMBERS, _LARGEST = 32, 64, 1e9
+_KEY: Final = "^[A-Za-z][A-Za-z0-9_]{0,39}$"
+_TEXT: Final = "^[ -~]{0,64}$"
+_SCALAR: Final[list[dict[str, Any]]] = [
+    {"type": "number", "minimum": -_LARGEST, "maximum": _LARGEST},
+    {"type": "string", "pattern": _TEXT},
+    {"type": "boolean"},
+    {"type": "null"},
+]
+_LIST: Final = {"type": "array", "items": {"anyOf": _SCALAR}, "maxItems": _MOST_NUMBERS}
+_WANTED: Final[dict[str, Any]] = {
+    "type": "object",
+    "propertyNames": {"pattern": _KEY},
+    "maxProperties": _MOST_KEYS,
+    "additionalProperties": {"anyOf": [*_SCALAR, _LIST]},
+}
 
 
-def _check_value(value: Any, depth: int = 0) -> None:
-    """Raise ValueError for what no program can want."""
-    if depth > _DEEPEST:
-        raise ValueError(f"tables and lists within each other; allowed: {_DEEPEST} deep")
-    if isinstance(value, str):
-        if len(value) > _LONGEST_TEXT or not value.isprintable():
-            raise ValueError(f"text; allowed: {_LONGEST_TEXT} printable characters")
-    elif isinstance(value, int | float):
-        if not math.isfinite(value) or abs(value) > _LARGEST:
-            raise ValueError(f"number; allowed: finite, at most {_LARGEST:g} in size")
-    elif isinstance(value, list | dict):
-        if len(value) > _LONGEST_LIST:
-            raise ValueError(f"{len(value)} items; allowed: {_LONGEST_LIST}")
-        if isinstance(value, dict):
-            for key in value:
-                _check_value(key, depth + 1)
-        for item in value.values() if isinstance(value, dict) else value:
-            _check_value(item, depth + 1)
+def _check_scalar(key: str, value: Any) -> None:
+    if isinstance(value, int | float):
+        good = math.isfinite(value) and abs(value) <= _LARGEST
+    else:
+        good = value is None or (isinstance(value, str) and re.fullmatch(_TEXT, value) is not None)
+    if not good:
+        raise ValueError(
+            f"{key}: allowed: a number up to {_LARGEST:g}, 64 characters of ASCII, true, false, "
+            f"null, or a list of {_MOST_NUMBERS} of these"
+        )
 
 
-def _checked(value: dict[str, Any]) -> dict[str, Any]:
-    _check_value(value)
-    return value
+def _checked(wanted: dict[str, Any]) -> dict[str, Any]:
+    """Raise ValueError for what no program can want; it is said in `_WANTED` as well."""
+    if len(wanted) > _MOST_KEYS:
+        raise ValueError(f"{len(wanted)} keys; allowed: {_MOST_KEYS}")
+    for key, value in wanted.items():
+        if re.fullmatch(_KEY, key) is None:
+            raise ValueError("key; allowed: a letter, then up to 39 letters, digits and _")
+        values = value if isinstance(value, list) else [value]
+        if len(values) > _MOST_NUMBERS:
+            raise ValueError(f"{key}: {len(values)} values; allowed: {_MOST_NUMBERS}")
+        for one in values:
+            _check_scalar(key, one)
+    return wanted
 
 
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$", description="A program's name.")]
@@ -50,6 +67,7 @@ _Client = Annotated[
 _Wanted = Annotated[
     dict[str, Any],
     AfterValidator(_checked),
+    WithJsonSchema(_WANTED),
     Field(description="What the program is to do; its page tells which keys it knows."),
 ]
 
