@@ -24,6 +24,7 @@ from profiles.robot import (
 from profiles.safety_io import load_safety_io
 from profiles.tension_sensor import load_tension_sensors
 from profiles.winch import Winch, WinchFile
+from profiles.winch_calibration import WinchCalibration, load_winch_calibration
 
 Kind = Literal[
     "motors", "drives", "cables", "winches", "robots", "tension_sensors", "safety_io", "rails"
@@ -162,8 +163,20 @@ def _axes(path: Path, file: RobotFile) -> list[RobotAxis]:
             cable_sign=axis.cable_sign or winches[axis.winch].cable_sign,
         )
         name = axis.name or default_name(i)
-        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name))
+        known = _calibration(path, i, axis.calibration, winch)
+        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name, known))
     return axes
+
+
+def _calibration(robot: Path, axis: int, name: str | None, winch: Winch) -> WinchCalibration | None:
+    """Return the calibration that an axis names, a path from the robot's file."""
+    if name is None:
+        return None
+    found = load_winch_calibration(robot.parent / Path(name).expanduser())
+    if found.motor != winch.motor.model:
+        problem = f"is of a {found.motor}; allowed: one of a {winch.motor.model}"
+        raise ProfileError(robot, f"axes[{axis}].calibration", problem)
+    return found
 
 
 def _too_strong(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[str, str]]:

@@ -10,6 +10,7 @@ from pydantic import Field
 from profiles.reader import Profile, one_of
 from profiles.robot_limits import RobotLimits
 from profiles.winch import BITRATES_bit_s, Winch
+from profiles.winch_calibration import WinchCalibration
 
 HEARTBEATS_WAITED = 1.75
 """Periods of the master's heartbeat after which its drives take it for lost: fewer than two."""
@@ -32,6 +33,7 @@ class AxisFile(Profile):
     mandatory: bool = True
     name: str | None = Field(default=None, min_length=1, max_length=32)
     cable_sign: Annotated[int, one_of(-1, 1)] | None = None
+    calibration: str | None = None
 
 
 class RobotFile(Profile):
@@ -102,7 +104,7 @@ def default_name(axis: int) -> str:
 class RobotAxis:
     """One axis: its winch, told the robot's bit rate, cycle, node ids and heartbeat.
 
-    `name` is what messages call it.
+    `name` is what messages call it; `calibration` its measured tension-to-torque gain.
     """
 
     winch: Winch
@@ -110,6 +112,7 @@ class RobotAxis:
     node_id: int
     mandatory: bool
     name: str
+    calibration: WinchCalibration | None = None
 
 
 @dataclass(frozen=True)

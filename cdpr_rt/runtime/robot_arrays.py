@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +13,6 @@ from cdpr_rt.limits import DEFAULT_REACTIONS, Limits, reactions_of
 from cdpr_rt.runtime.estimate import WinchArrays
 from profiles import Robot, RobotAxis
 from profiles.tension_sensor import load_tension_sensors
-from profiles.winch_calibration import WinchCalibration
 
 SPEED_SHARE: Final = 0.2
 """Of the motors' rated speed, where a robot's file says no other."""
@@ -67,21 +66,16 @@ def limits_of(robot: Robot, booted: Sequence[int] | None = None) -> Limits:
     )
 
 
-def winches_of(
-    axes: Sequence[RobotAxis], calibrations: Mapping[int, WinchCalibration] | None = None
-) -> WinchArrays:
-    """Return what the estimate needs of the axes; `calibrations` by their place among these.
+def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:
+    """Return what the estimate needs of the axes.
 
     Without a calibration the tension follows from drum and gear, friction left out.
     """
-    known = calibrations or {}
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
-    measured = {i: known[i] for i in range(len(axes)) if i in known}
 
     def each(key: str, otherwise: FloatArray) -> FloatArray:
-        return np.array(
-            [getattr(measured[i], key) if i in measured else otherwise[i] for i in range(len(axes))]
-        )
+        pairs = zip((axis.calibration for axis in axes), otherwise, strict=True)
+        return np.array([getattr(known, key) if known else value for known, value in pairs])
 
     none = np.zeros(len(axes))
     return WinchArrays(

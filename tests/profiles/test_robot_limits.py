@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from profiles import ProfileError, load_robot
 from profiles.catalogue import SHIPPED
 from profiles.reader import validated
 from profiles.robot_limits import Reactions, RobotLimits
+from profiles.winch_calibration import WinchCalibration
 
 FILE = """
 name = "Two"
@@ -183,6 +185,45 @@ def test_axes_have_names_and_directions(tmp_path: Path) -> None:
     assert (arrays.gain_m > 0.0).all()
 
 
+def calibration(motor: str = "MPP0923D") -> WinchCalibration:
+    return WinchCalibration(
+        winch="winch-mpp0923d",
+        motor=motor,
+        drive_serial=1,
+        date=datetime(2026, 1, 2, tzinfo=UTC),
+        method="masses",
+        gain_m=0.027,
+        gain_half_width_m=1e-4,
+        nominal_gain_m=0.026,
+        bias_Nm=0.01,
+        bias_half_width_Nm=0.001,
+        friction_Nm=0.08,
+        friction_half_width_Nm=0.001,
+        friction_per_N_m=1e-4,
+        friction_per_N_half_width_m=1e-5,
+        residual_rms_Nm=0.001,
+        lowest_tension_N=20.0,
+        highest_tension_N=80.0,
+        raw_data=("a.raw",),
+    )
+
+
+def test_an_axis_knows_its_calibration(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(calibration().to_toml())
+    path = robot_file(tmp_path, second='calibration = "mine.toml"')
+    arrays = winches_of(load_robot(path).axes)
+    np.testing.assert_allclose(arrays.gain_m, [0.026, 0.027])
+    np.testing.assert_allclose(arrays.friction_Nm, [0.0, 0.08])
+    np.testing.assert_allclose(arrays.friction_per_N_m, [0.0, 1e-4])
+    np.testing.assert_allclose(arrays.bias_Nm, [0.0, 0.01])
+    (tmp_path / "mine.toml").write_text(calibration("MPP0922C").to_toml())
+    with pytest.raises(ProfileError, match=r"axes\[1\].calibration: is of a MPP0922C; allowed"):
+        load_robot(path)
+    (tmp_path / "mine.toml").unlink()
+    with pytest.raises(ProfileError, match=r"mine\.toml: cannot be read"):
+        load_robot(path)
+
+
 def test_drives_miss_their_master_in_fewer_than_two_heartbeats(tmp_path: Path) -> None:
     robot = load_robot(robot_file(tmp_path, top="master_heartbeat_s = 0.04"))
     for axis in robot.axes:
@@ -226,8 +267,10 @@ def test_the_documented_robot_is_one(tmp_path: Path) -> None:
     (tmp_path / "my-winch.toml").write_text(winch)
     path = tmp_path / "my-robot.toml"
     path.write_text(robot + limits)
+    (tmp_path / "right.toml").write_text(calibration().to_toml())
     told = load_robot(path)
     assert [axis.name for axis in told.axes] == ["axis 0", "right"]
+    assert told.axes[1].calibration == calibration()
     figures = re.findall(r"^([a-z]\w+) = ", limits.partition("[limits.reactions]")[0], re.M)
     assert figures == [key for key in RobotLimits.model_fields if key != "reactions"]
 
