@@ -68,9 +68,9 @@ class RobotLimits(Profile):
     """For how long a tension may be below `tension_min_N`, and below `slack_N`."""
     broken_within_s: float = Field(default=0.05, gt=0, le=1)
     """A cable that goes from `tension_min_N` to below `slack_N` faster than this has broken."""
-    missed_cycles: int = Field(default=3, ge=0, le=1000)
+    missed_cycles: int = Field(default=10, ge=0, le=1000)
     """Consecutive cycles without an answer that are bridged."""
-    missed_in_window: int = Field(default=20, ge=0, le=10_000)
+    missed_in_window: int = Field(default=50, ge=0, le=10_000)
     window_cycles: int = Field(default=1000, ge=1, le=10_000)
     stale_cycles: int = Field(default=100, ge=1, le=10_000)
     """Cycles for which a drive may be unheard or its answers irregular."""
