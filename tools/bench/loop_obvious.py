@@ -1,0 +1,179 @@
+"""Run as a program: the control loop as one writes it first, on `canopen`'s PDOs and NumPy.
+
+The argument is JSON: {"buses": {NAME: {NODE: EDS}}, "period_s", "seconds", "counts_per_rad",
+"per_mille_per_Nm", "gains", "limits"}. Standard output gets {"running": true} when the motors turn
+under the loop, and at the end {"cycles", "late", "missed", "processor_s", "turned_rad", and for
+each cycle "lateness_s", "exchange_s", "compute_s"}.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import canopen
+import numpy as np
+
+from cdpr_rt.realtime import settle_memory, stay_punctual
+
+_NOTIFIER_CYCLE_S = 0.05
+_LATE_SHARE, _PATIENCE_SHARE = 0.1, 0.6
+_WARM_UP = 200
+_ENABLE = (6, 7, 15)
+_CYCLES_A_STEP = 50
+_STATE = np.dtype([("time_s", "f8"), ("values", "f8", (6, 16)), ("statusword", "u2", (16,))])
+
+
+class ObviousLoop:
+    """Cyclic torque control of all axes: a PID in arrays, limits checked, each cycle kept."""
+
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        nodes = [(bus, int(node)) for bus, of in given["buses"].items() for node in of]
+        self.n = n = len(nodes)
+        self.period_s = float(given["period_s"])
+        self.per_rad = float(given["counts_per_rad"])
+        self.per_Nm = float(given["per_mille_per_Nm"])
+        self.kp, self.ki, self.kd = (float(gain) for gain in given["gains"])
+        self.limits: dict[str, float] = given["limits"]
+        self.status, self.counts, self.actual = np.zeros((3, n))
+        self.waiting, self.complete = 0, threading.Event()
+        self.networks = []
+        self.orders: list[tuple[Any, Any, Any]] = []
+        for bus, of in given["buses"].items():
+            network = canopen.Network()
+            network.NOTIFIER_CYCLE = _NOTIFIER_CYCLE_S
+            network.connect(interface="simbus", channel=bus)
+            self.networks.append(network)
+            for node_id, eds in of.items():
+                self._add(network.add_node(int(node_id), eds), nodes.index((bus, int(node_id))))
+        for network in self.networks:
+            network.nmt.state = "OPERATIONAL"
+        self.integral, self.velocity, self.last, self.torque = np.zeros((4, n))
+        self.controlword = 0
+        self.kept = np.zeros(round((given["seconds"] + 10.0) / self.period_s), _STATE)
+
+    def _add(self, node: Any, i: int) -> None:
+        node.tpdo.read()
+        node.rpdo.read()
+        answer, order = node.tpdo[1], node.rpdo[1]
+        variables = [answer[index] for index in (0x6041, 0x6064, 0x6077)]
+        answer.add_callback(partial(self._take, i, variables))
+        self.orders.append((order, order[0x6040], order[0x6071]))
+
+    def _take(self, i: int, variables: list[Any], _pdo: object) -> None:
+        self.status[i], self.counts[i], self.actual[i] = (one.raw for one in variables)
+        self.waiting -= 1
+        if not self.waiting:
+            self.complete.set()
+
+    def exchange(self) -> bool:
+        """Send SYNC on all buses and wait for all answers; return whether they came in time."""
+        self.waiting = self.n
+        self.complete.clear()
+        for network in self.networks:
+            network.sync.transmit()
+        return self.complete.wait(_PATIENCE_SHARE * self.period_s)
+
+    def control(self, k: int, start: Any, speed_rad_s: float) -> None:
+        """Compute torques for a turn at constant speed, within the limits, and keep the cycle."""
+        position = self.counts / self.per_rad
+        measured = (position - self.last) / self.period_s
+        self.velocity = 0.8 * self.velocity + 0.2 * measured
+        self.last = position
+        setpoint = start + speed_rad_s * k * self.period_s
+        error = setpoint - position
+        self.integral = np.clip(self.integral + error * self.period_s, -1.0, 1.0)
+        wanted = self.kp * error + self.ki * self.integral
+        wanted = wanted + self.kd * (speed_rad_s - self.velocity)
+        step = self.limits["torque_rate_Nm_s"] * self.period_s
+        torque = np.clip(wanted, self.torque - step, self.torque + step)
+        torque = np.clip(torque, -self.limits["torque_Nm"], self.limits["torque_Nm"])
+        if (
+            np.any(np.abs(self.velocity) > self.limits["speed_rad_s"])
+            or np.any(np.abs(error) > self.limits["following_error_rad"])
+            or not np.all(np.isfinite(torque))
+        ):
+            torque = np.zeros(self.n)
+        self.torque = torque
+        row = self.kept[k % self.kept.size]
+        row["time_s"] = k * self.period_s
+        values = (setpoint, position, self.velocity, self.actual, wanted, torque)
+        row["values"][:, : self.n] = values
+        row["statusword"][: self.n] = self.status
+
+    def transmit(self) -> None:
+        """Send controlwords and torques."""
+        for (pdo, controlword, target), torque in zip(self.orders, self.torque, strict=True):
+            controlword.raw = self.controlword
+            target.raw = round(torque * self.per_Nm)
+            pdo.transmit()
+
+    def close(self) -> None:
+        """Take the power and leave the buses."""
+        self.controlword = 0
+        self.torque = np.zeros(self.n)
+        self.transmit()
+        for network in self.networks:
+            network.disconnect()
+
+
+def run(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Enable the drives, turn them for so many seconds, and return how it went."""
+    loop = ObviousLoop(given)
+    settle_memory()
+    stay_punctual()
+    begin_enable = len(_ENABLE) * _CYCLES_A_STEP
+    first = begin_enable + _WARM_UP
+    cycles = first + round(given["seconds"] / loop.period_s)
+    lateness, exchange, compute = np.zeros((3, cycles))
+    late = missed = 0
+    processor_s, start = 0.0, np.zeros(loop.n)
+    deadline = time.monotonic()
+    for k in range(cycles):
+        if k < begin_enable:
+            loop.controlword = _ENABLE[k // _CYCLES_A_STEP]
+        if k == begin_enable:
+            start = loop.last
+        if k == first:
+            print(json.dumps({"running": True}), flush=True)
+            processor_s, late, missed = time.process_time(), 0, 0
+        deadline += loop.period_s
+        ahead = deadline - time.monotonic()
+        if ahead > 0.0:
+            time.sleep(ahead)
+        woke = time.monotonic()
+        lateness[k] = woke - deadline
+        late += lateness[k] > _LATE_SHARE * loop.period_s
+        if not loop.exchange():
+            missed += loop.waiting
+        came = time.monotonic()
+        exchange[k] = came - woke
+        moving = max(0, k - begin_enable)
+        loop.control(moving, start if k >= begin_enable else loop.last, _speed(given, moving))
+        loop.transmit()
+        compute[k] = time.monotonic() - came
+    spent = time.process_time() - processor_s
+    loop.close()
+    return {
+        "cycles": cycles - first,
+        "late": int(late),
+        "missed": int(missed),
+        "lateness_s": lateness[first:].tolist(),
+        "exchange_s": exchange[first:].tolist(),
+        "compute_s": compute[first:].tolist(),
+        "processor_s": spent,
+        "turned_rad": (loop.last - start).tolist(),
+    }
+
+
+def _speed(given: Mapping[str, Any], moving: int) -> float:
+    return float(given["speed_rad_s"]) if moving else 0.0
+
+
+if __name__ == "__main__":
+    print(json.dumps(run(json.loads(sys.argv[1]))))
