@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -15,7 +16,6 @@ from cdpr_rt.runtime.shared_block import MOST_AXES, SharedBlock
 from drivers.bus.master_lock import refuse_second_master
 from drivers.errors import BusError
 from profiles import Robot, load_robot
-from sim_bus.ready import tell_ready
 from tools.bus_fit import require_fit
 from tools.commands.options import JsonOption, SafetyIoOption, YesOption
 from tools.consent import require_consent
@@ -24,7 +24,7 @@ from tools.daemon.notify import ServiceManager
 from tools.daemon.paths import default_recordings, default_socket
 from tools.daemon.settings import Address, RunSettings
 from tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
-from tools.output import Output
+from tools.output import Output, to_json
 from tools.robot_buses import RobotBusOption, asks_for_own_simulator, robot_urls
 from tools.simulator import OwnSimulator
 
@@ -183,14 +183,23 @@ def _launch(
     settings = settings.model_copy(update={"block_fd": block.fd})
 
     def ready(status: dict[str, Any]) -> None:
-        told = {"robot": robot.name, "state": status["state"], "socket": str(settings.socket)}
-        tell_ready({**told, "reason": status.get("reason", ""), "pid": os.getpid()})
+        told = {"robot": robot.name, "state": status["state"], "reason": status.get("reason", "")}
+        _tell_ready({**told, "socket": str(settings.socket), "pid": os.getpid()}, out)
 
     launcher = Launcher(settings, block, out.note, ready, manager, simulator)
     status = launcher.run()
     if status != DONE:
         raise _ended(launcher.reason, status)
     out.result({"ok": True})
+
+
+def _tell_ready(told: dict[str, Any], out: Output) -> None:
+    """Say on standard output that the daemon is up: as JSON unless a person reads it."""
+    if out.as_json or not sys.stdout.isatty():
+        print(to_json({"ready": told}), flush=True)
+        return
+    out.say(f"{told['robot']}: {told['state']}" + (f": {told['reason']}" if told["reason"] else ""))
+    out.say(f"socket {told['socket']}; Ctrl-C ends it")
 
 
 def _ended(reason: str, status: int) -> CommandError:
