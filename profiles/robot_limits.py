@@ -72,7 +72,7 @@ class RobotLimits(Profile):
     """Consecutive cycles without an answer that are bridged."""
     missed_in_window: int = Field(default=50, ge=0, le=10_000)
     window_cycles: int = Field(default=1000, ge=1, le=10_000)
-    stale_cycles: int = Field(default=100, ge=1, le=10_000)
+    stale_cycles: int = Field(default=250, ge=1, le=10_000)
     """Cycles for which a drive may be unheard or its answers irregular."""
     late_s: float = Field(default=0.05, gt=0, le=10)
     """For how long the loop itself may be held up."""
