@@ -55,12 +55,21 @@ class Gate:
 
     A page that a browser has open can send requests to this machine. Those carry the page's
     `Origin`; and where its name was pointed to this machine afterwards, that name as `Host`.
+    `refused` is called for everybody who is not let in; `leads` says whether a token is that of
+    the client that may move, whom a flood from its own address shall not silence.
     """
 
-    def __init__(self, app: ASGIApp, door: Door, refused: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        door: Door,
+        refused: Callable[[], None],
+        leads: Callable[[str], bool],
+    ) -> None:
         self._app = app
         self._door = door
         self._refused = refused
+        self._leads = leads
         self._usual = _Buckets(_REQUESTS_PER_S, _BURST)
         self._urgent = _Buckets(_URGENT_PER_S, _URGENT_BURST)
 
@@ -86,13 +95,16 @@ class Gate:
         await self._app(scope, receive, send_on)
 
     def _check(self, scope: Scope) -> None:
+        headers = {name.lower(): value for name, value in scope["headers"]}
         peer = "" if self._door.local or not scope["client"] else scope["client"][0]
+        if self._leads(headers.get(b"x-control-token", b"").decode("latin-1")):
+            peer = "the one that may move"
         buckets = self._urgent if scope["path"] in _URGENT else self._usual
         if not buckets.take(peer):
             raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; go slower")
-        headers = {name.lower(): value for name, value in scope["headers"]}
         host = headers.get(b"host", b"").decode("latin-1")
-        if not self._door.local and not self._is_ours(host):
+        guarded = self._door.local or self._door.key is not None
+        if not guarded and not self._is_ours(host):
             raise _RefusedError(
                 HTTPStatus.FORBIDDEN, "Host: not a name of this machine; use its address"
             )

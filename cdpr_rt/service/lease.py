@@ -89,6 +89,12 @@ class Lease:
             left_s = self._left_s()
             return Holder(self._client, left_s) if left_s > 0.0 else None
 
+    def is_held_by(self, token: str) -> bool:
+        """Return whether `token` is that of the holder."""
+        with self._lock:
+            same = hmac.compare_digest(token.encode(), self._token.encode())
+            return same and self._left_s() > 0.0
+
     def find(self, digest: bytes, digest_of: Callable[[str], bytes]) -> str | None:
         """Return the holder's token if `digest_of` makes `digest` of it, None otherwise.
 

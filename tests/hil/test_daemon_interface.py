@@ -23,6 +23,8 @@ from hypothesis.errors import Unsatisfiable
 
 from tools.cli import main
 
+KEY = "the key of a robot in a test"
+RIGHT = {"Authorization": f"Bearer {KEY}"}
 MORE_MEMORY_B = 40e6
 # what another test beside this one does to the machine is none of its business
 PATIENT = """
@@ -37,9 +39,11 @@ late_s = 10.0
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
     folder = tmp_path_factory.mktemp("daemon")
-    running = RealDaemon(
-        folder, "--http", "127.0.0.1:0", "--no-record", period_s=0.002, limits=PATIENT
-    )
+    key_file = folder / "key"
+    key_file.write_text(KEY)
+    key_file.chmod(0o600)
+    options = ("--http", "127.0.0.1:0", "--key-file", str(key_file), "--no-record")
+    running = RealDaemon(folder, *options, period_s=0.002, limits=PATIENT)
     try:
         running.wait_for("ready")
         yield running
@@ -47,14 +51,16 @@ def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
         assert running.end() == 0, running.errors()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def url(daemon: RealDaemon) -> str:
+    # a service that was started anew has found itself another port
     return f"http://{daemon.status()['parts']['service']['http']}"
 
 
 @pytest.fixture(scope="module")
-def description(url: str) -> Any:
-    return schemathesis.openapi.from_url(f"{url}/openapi.json")
+def description(daemon: RealDaemon) -> Any:
+    url = f"http://{daemon.status()['parts']['service']['http']}"
+    return schemathesis.openapi.from_url(f"{url}/openapi.json", headers=RIGHT)
 
 
 FUZZED = settings(
@@ -90,7 +96,7 @@ def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int
             def try_it(case: schemathesis.Case) -> None:
                 nonlocal sent
                 sent += 1
-                case.call_and_validate(base_url=url, headers=headers)
+                case.call_and_validate(base_url=url, headers={**RIGHT, **headers})
 
             if mode is schemathesis.GenerationMode.NEGATIVE:
                 with suppress(Unsatisfiable):  # where there is nothing that could be wrong
@@ -344,6 +350,29 @@ def test_status_goes_on_until_ctrl_c(active: RealDaemon) -> None:
     out, err = watching.communicate(timeout=20.0)
     assert watching.returncode == 0, err
     assert json.loads(out.splitlines()[-1])["state"] == "active"
+
+
+def test_over_tcp_with_the_key_only(
+    active: RealDaemon, url: str, terminal: Terminal, tmp_path: Path
+) -> None:
+    key_file = tmp_path / "key"
+    key_file.write_text(KEY)
+    key_file.chmod(0o600)
+    assert terminal.told("hold", "--url", url, "--key-file", str(key_file))["state"] == "active"
+    for option in ((), ("--key-file", str(wrong_key(tmp_path)))):
+        status, _, err = terminal.run("hold", "--url", url, *option)
+        assert (status, "Bearer KEY" in err) == (2, True)
+    assert terminal.told("status", "--url", url)["state"] == "active"
+    key_file.chmod(0o644)
+    status, _, err = terminal.run("hold", "--url", url, "--key-file", str(key_file))
+    assert (status, "others may read it" in err) == (2, True)
+
+
+def wrong_key(folder: Path) -> Path:
+    path = folder / "wrong"
+    path.write_text("the key of another robot")
+    path.chmod(0o600)
+    return path
 
 
 def test_where_no_daemon_runs_it_says_how_to_start_one(tmp_path: Path, terminal: Terminal) -> None:

@@ -118,8 +118,8 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
 
     A robot in motion is not let go because somebody else has taken its port.
     """
-    refused = service.count_refusal
-    servers = [Server(Gate(app, Door(local=True), refused), listen_unix(settings.socket))]
+    watched = (service.count_refusal, service.lease.is_held_by)
+    servers = [Server(Gate(app, Door(local=True), *watched), listen_unix(settings.socket))]
     address = settings.http
     if address is None:
         return servers
@@ -131,7 +131,7 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
         _LOG.error("--http %s", error)
     else:
         service.http = listener.getsockname()[:2]
-        servers.append(Server(Gate(app, door, refused), listener))
+        servers.append(Server(Gate(app, door, *watched), listener))
     return servers
 
 

@@ -127,7 +127,7 @@ class Rig:
             guarded: Door.named(KEY, "127.0.0.1"),
         }
         servers = [
-            Server(Gate(app, door, service.count_refusal), listener)
+            Server(Gate(app, door, service.count_refusal, service.lease.is_held_by), listener)
             for listener, door in doors.items()
         ]
         serving = [asyncio.create_task(server.run_until_told()) for server in servers]

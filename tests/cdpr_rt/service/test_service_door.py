@@ -133,6 +133,7 @@ def test_a_body_that_never_comes_is_given_up(rig: Rig, monkeypatch: pytest.Monke
 
 
 def test_requests_without_end_are_slowed_down_and_a_stop_still_comes_through(rig: Rig) -> None:
+    held = httpx.post(f"{rig.url}/control", json={"client": "maria", "ttl_s": 10.0}).json()
     connection = http.client.HTTPConnection("127.0.0.1", rig.port, timeout=10.0)
     answers = set()
     begin = time.monotonic()
@@ -145,6 +146,8 @@ def test_requests_without_end_are_slowed_down_and_a_stop_still_comes_through(rig
         if answer.getheader("connection") == "close":
             connection.close()
     assert httpx.post(f"{rig.url}/hold").status_code == 200
+    token = {"X-Control-Token": held["token"]}
+    assert httpx.put(f"{rig.url}/control", headers=token).status_code == 200
     with rig.client() as client:  # others have their own measure
         assert client.get("/control").status_code == 200
 

@@ -1,0 +1,87 @@
+"""Which daemon a command speaks to, and how it reads what is typed."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tools.daemon.client import NoDaemonError, axis_values, key_values, open_daemon
+from tools.errors import BadInputError
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    path = tmp_path / "cdpr-rt"
+    path.mkdir(mode=0o700)
+    return path
+
+
+@pytest.fixture
+def listening(folder: Path) -> Iterator[list[Path]]:
+    with ExitStack() as stack:
+        paths = [folder / f"{name}.sock" for name in ("left", "right")]
+        for path in paths:
+            sock = stack.enter_context(socket.socket(socket.AF_UNIX))
+            sock.bind(str(path))
+            sock.listen()
+        yield paths
+
+
+def where(robot: str | None) -> str:
+    with open_daemon(robot, None, None, None) as daemon:
+        return daemon.where
+
+
+def test_several_daemons_must_be_told_apart(listening: list[Path]) -> None:
+    with pytest.raises(BadInputError, match=r"choose one by --robot \(left, right\)"):
+        where(None)
+    assert where("right") == str(listening[1])
+
+
+def test_what_a_killed_daemon_left_behind_is_none(listening: list[Path], folder: Path) -> None:
+    listening[0].unlink()
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(folder / "dead.sock"))
+    assert where(None) == str(listening[1])
+    with pytest.raises(NoDaemonError, match="no daemon runs for dead"):
+        where("dead")
+
+
+def test_none_at_all(folder: Path) -> None:
+    with pytest.raises(NoDaemonError, match="cdpr run ROBOT"):
+        where(None)
+
+
+def test_options_that_exclude_each_other() -> None:
+    with pytest.raises(BadInputError, match="--url"), open_daemon("a", None, "http://x", None):
+        pass
+
+
+AXES: list[dict[str, Any]] = [{"name": "left"}, {"name": "x=y"}]
+
+
+def test_numbers_go_to_their_axes_by_name() -> None:
+    assert axis_values(["left=-2.5", "x=y=3"], AXES, "deg") == {0: -2.5, 1: 3.0}
+    assert axis_values(["7"], AXES[:1], "deg") == {0: 7.0}
+
+
+@pytest.mark.parametrize("text", ["7", "left", "left=", "up=1", "left=1,5", "=1", ""])
+def test_others_are_refused_with_what_is_allowed(text: str) -> None:
+    with pytest.raises(BadInputError, match="deg"):
+        axis_values([text], AXES, "deg")
+
+
+def test_values_are_json() -> None:
+    assert key_values(["a=1.5", "b=[1, null]", 'c="x=y"']) == {"a": 1.5, "b": [1, None], "c": "x=y"}
+
+
+@pytest.mark.parametrize("text", ["a", "=1", "a=", "a=x", "a=[1", "a=NaN", "a=[1, -Infinity]"])
+def test_what_is_no_json_is_refused(text: str) -> None:
+    with pytest.raises(BadInputError, match=r"^a|^=1"):
+        key_values([text])
