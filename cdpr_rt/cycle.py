@@ -10,7 +10,7 @@ from typing import Protocol
 from cdpr_rt.exchange import AxisDevice
 
 _LATE_SHARE = 0.1
-_MOST_CYCLES_BEHIND = 10
+_TOO_LATE_SHARE = 0.25
 
 
 class Watch(Protocol):
@@ -52,8 +52,13 @@ class Cycle:
         self.began_ns = 0
         """CLOCK_MONOTONIC when this cycle's SYNC went out."""
         self._deadline_s = 0.0
+        self._fresh = True
         self._open = False
         self._released = True
+
+    def begin(self) -> None:
+        """Tell that no cycles have run for a while: the next one is not late by it."""
+        self._fresh = True
 
     def exchange(self) -> int:
         """Wait for the deadline, send SYNC, take in the answers; return how many axes answered."""
@@ -100,15 +105,18 @@ class Cycle:
         return ""
 
     def _await_deadline(self) -> None:
-        now = time.monotonic()
         period = self.device.period_s
         self._deadline_s += period
-        ahead_s = self._deadline_s - now
-        if ahead_s > period or ahead_s < -_MOST_CYCLES_BEHIND * period:
-            self._deadline_s = now  # the loop starts, or stood still: a new time base
-        elif ahead_s > 0.0:
-            time.sleep(ahead_s)
-        self.late_s = time.monotonic() - self._deadline_s
+        now = time.monotonic()
+        if now < self._deadline_s:
+            time.sleep(self._deadline_s - now)
+            now = time.monotonic()
+        elif self._fresh:
+            self._deadline_s = now
+        self._fresh = False
+        self.late_s = now - self._deadline_s
+        if self.late_s > _TOO_LATE_SHARE * period:
+            self._deadline_s = now  # a new time base: the next cycles are not run in a hurry
         lateness = self.lateness
         lateness.cycles += 1
         lateness.late += self.late_s > _LATE_SHARE * period

@@ -78,6 +78,7 @@ class Executive:
         self.estimator.reset()
         self._recorder.clear()
         self._log = log
+        self._cycle.begin()
         try:
             self._follow(controller, motion)
         finally:
@@ -95,6 +96,7 @@ class Executive:
         and InterruptedMotionError on request.
         """
         self._refuse_when_stopped(what)
+        self._cycle.begin()
         period = self.device.period_s
         for _ in range(max(1, round(timeout_s / period))):
             self._cycle.exchange()

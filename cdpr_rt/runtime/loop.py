@@ -132,6 +132,7 @@ class ControlLoop:
         if self.cycle is None or self.cycle.device is not device:
             self.cycle = Cycle(device, self.machine.watches)
             self.parts.estimator.forget_lengths()  # drives that have booted count from anywhere
+        self.cycle.begin()
         self.parts.estimator.reset()
         self._rows.follow(self.cycle, self.setpoint, self.parts.estimator.estimate)
         self._last_ns = 0

@@ -1,5 +1,6 @@
 """The executive with a device of two free inertias (a stand-in: no bus is wanted here)."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -216,3 +217,31 @@ def test_ring_never_overwrites() -> None:
     assert (recorder.pending(), recorder.lost) == (8, 2)
     recorder.clear()
     assert recorder.pending() == 0
+
+
+def test_a_cycle_that_is_held_up_is_counted_and_makes_none_run_in_a_hurry() -> None:
+    class HeldUp(Inertias):
+        def __init__(self) -> None:
+            super().__init__(lockstep=False)
+            self.syncs: list[float] = []
+
+        def sync(self) -> None:
+            super().sync()
+            self.syncs.append(time.monotonic())
+
+        def receive(self) -> int:
+            if self.feedback.cycle == 50:
+                time.sleep(0.05)
+            return super().receive()
+
+    device = HeldUp()
+    run = executive(device)
+    run.step(lambda: device.feedback.cycle >= 100, 1.0, "some cycles")
+    assert run.lateness.worst_s > 0.04
+    # the cycle after it begins late, those that follow a period after each other
+    apart = np.diff(device.syncs)[50:]
+    assert np.sum(apart < 0.5 * device.period_s) == 0
+    late = run.lateness.late
+    time.sleep(0.05)
+    run.step(lambda: device.feedback.cycle >= 101, 1.0, "one cycle")
+    assert run.lateness.late <= late  # a pause between motions is nobody's fault

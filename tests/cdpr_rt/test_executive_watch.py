@@ -47,7 +47,8 @@ def test_a_reason_to_stop_brakes_the_motion_first() -> None:
     run = executive(device, At(device, 200, stop="no good poll"))
     with pytest.raises(TripError, match="no good poll"):
         run.run(controller(), leg())
-    assert device.feedback.cycle == 200 + 100  # the ramp takes 0.1 s
+    # the ramp takes 0.1 s, and one cycle more takes the torque back
+    assert device.feedback.cycle == 200 + 100 + 1
     assert abs(run.setpoint.velocity_rad_s[0]) < 0.05
     assert not device.pending.any()
 

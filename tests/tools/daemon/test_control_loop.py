@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import struct
+import tracemalloc
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -325,3 +327,20 @@ JUNK = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
     max_leaves=5,
 )
+
+
+def test_nothing_that_is_allocated_in_a_cycle_stays(ready: LoopRig) -> None:
+    ready.obeyed("enable", program="jog", wanted=JOG)
+    ready.turn(500)
+    gc.collect()
+    tracemalloc.start()
+    try:
+        ready.turn(500)
+        before, _ = tracemalloc.get_traced_memory()
+        ready.turn(3000)
+        after, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert after - before < 16_384  # the status as it was written last
+    assert peak - before < 65_536
+    assert gc.collect() == 0  # so that the collector may stay off
