@@ -269,6 +269,27 @@ def test_more_than_the_ring_keeps_is_counted_and_begins_anew() -> None:
     assert counts["accepted"] + counts["late"] == 63
 
 
+def test_samples_overwritten_while_they_were_read_do_not_count() -> None:
+    sender = Sender()
+    sender.send(0, 0.0, (0.1, 0.0, 0.0))
+    sender.run(0.1)
+    posted = sender.block.counters["samples"]
+
+    class Racing:
+        """The writer's counter, as seen by a reader that is held up after its first look."""
+
+        looks = 0
+
+        def __getitem__(self, index: int) -> int:
+            self.looks += 1
+            return int(posted[index]) + (70 if self.looks > 1 else 1)
+
+    sender.stream._posted = Racing()  # type: ignore[assignment]
+    assert sender.stream.update() == StreamState.STOPPED
+    assert sender.stream.session == -1
+    assert sender.stream.counts()["overrun"] == 1
+
+
 def test_update_keeps_no_memory() -> None:
     sender = Sender()
     row = np.zeros((), SAMPLE)
