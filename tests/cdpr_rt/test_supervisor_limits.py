@@ -6,52 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
 import pytest
 
-from cdpr_rt.exchange import AxisFeedback, Setpoint
 from cdpr_rt.limits import DEFAULT_REACTIONS
-from cdpr_rt.runtime.estimate import AxisEstimate
 from cdpr_rt.runtime.states import Reaction
 from cdpr_rt.supervisor import Limit, Limits, Supervisor
-
-PERIOD_S = 1e-3
-SAFE = Limits(
-    torque_Nm=np.array([1.0, 2.0]),
-    speed_rad_s=np.array([10.0, 20.0]),
-    following_error_rad=np.array([0.1, 0.2]),
-    torque_rate_Nm_s=1e4,
-    cable_length_min_m=0.5,
-    cable_length_max_m=np.array([3.0, 4.0]),
-    tension_min_N=20.0,
-    tension_max_N=100.0,
-    slack_N=5.0,
-    slack_s=0.0995,
-    broken_within_s=0.02,
-    missed_cycles=3,
-    missed_in_window=5,
-    window_cycles=50,
-    stale_cycles=10,
-    late_s=0.02,
-)
-
-
-class Cycle:
-    """What one cycle sees of two axes, both well; tests change it."""
-
-    def __init__(self) -> None:
-        self.feedback, self.estimate = AxisFeedback(2), AxisEstimate(2)
-        self.setpoint, self.torque = Setpoint(2), np.zeros(2)
-        for flags in (self.feedback.valid, self.feedback.alive, self.feedback.rate_ok):
-            flags[:] = True
-        self.estimate.elapsed_s = PERIOD_S
-        self.estimate.cable_m_per_rad[:] = 0.026
-        self.estimate.cable_length_m[:] = 2.0
-        self.estimate.tension_N[:] = 50.0
-
-    def check(self, supervisor: Supervisor) -> int:
-        return supervisor.check(self.feedback, self.estimate, self.setpoint, self.torque)
-
+from tests.cdpr_rt.supervisor_rig import PERIOD_S, SAFE, Cycle, with_rate
 
 Change = Callable[[Cycle, int], None]
 
@@ -329,101 +289,6 @@ def test_no_limit_of_the_kernel_is_left_untried():
     others = {Limit.NONE, Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.DRIVE}
     assert {case.limit for case in CASES} == set(Limit) - others
     assert set(DEFAULT_REACTIONS) == set(Limit) - {Limit.NONE}
-
-
-def with_rate(rate_Nm_s: float) -> Limits:
-    values = {name: getattr(SAFE, name) for name in SAFE.__dataclass_fields__}
-    return Limits(**values | {"torque_rate_Nm_s": rate_Nm_s})
-
-
-# -- clamping
-
-
-def test_torque_is_clamped_to_each_axis_own_limit():
-    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
-    cycle.torque[:] = -5.0, 5.0
-    assert cycle.check(supervisor) == Reaction.CLAMP
-    np.testing.assert_array_equal(cycle.torque, [-1.0, 2.0])
-
-
-def test_torque_rises_and_falls_no_faster_than_its_rate():
-    supervisor, cycle = Supervisor(with_rate(100.0), 2, PERIOD_S), Cycle()
-    supervisor.reset(np.array([0.5, -0.5]))
-    sent = [[0.5, -0.5]]
-    for k in range(40):
-        cycle.torque[:] = (0.9, 1.9) if k < 25 else (-0.9, -1.9)
-        cycle.check(supervisor)
-        sent.append(cycle.torque.tolist())
-    steps = np.diff(np.array(sent), axis=0)
-    assert np.abs(steps).max() == pytest.approx(0.1)
-    assert sent[4][0] == pytest.approx(0.9)
-    assert sent[24][1] == pytest.approx(1.9)
-    assert sent[-1] == pytest.approx([-0.6, 0.4])
-
-
-def test_a_torque_that_is_no_number_is_not_passed_on():
-    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
-    cycle.torque[:] = math.nan, math.inf
-    assert cycle.check(supervisor) == Reaction.QUICK_STOP
-    np.testing.assert_array_equal(cycle.torque, [0.0, 0.0])
-
-
-def test_one_figure_serves_all_axes():
-    supervisor, cycle = Supervisor(Limits(1.5, 1.0, 1.0), 2, PERIOD_S), Cycle()
-    cycle.torque[:] = -5.0, 5.0
-    cycle.check(supervisor)
-    np.testing.assert_array_equal(cycle.torque, [-1.5, 1.5])
-
-
-# -- what is reported
-
-
-def test_the_worst_of_a_cycle_is_what_counts():
-    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
-    cycle.torque[:] = 5.0  # to be clamped
-    cycle.estimate.tension_N[0] = 110.0
-    cycle.setpoint.position_rad[1] = 1.0
-    assert cycle.check(supervisor) == Reaction.QUICK_STOP
-    assert (supervisor.limit, supervisor.axis) == (Limit.FOLLOWING_ERROR, 1)
-    assert supervisor.details() == {
-        "limit": "following_error",
-        "axis": 1,
-        "value": 1.0,
-        "allowed": 0.2,
-        "unit": "rad",
-        "reaction": "quick stop",
-    }
-    cycle.setpoint.position_rad[1] = 0.0
-    assert cycle.check(supervisor) == Reaction.CONTROLLED_STOP
-    assert (supervisor.limit, supervisor.axis) == (Limit.TENSION_HIGH, 0)
-
-
-def test_axes_are_called_by_their_names():
-    supervisor = Supervisor(SAFE, 2, PERIOD_S, ["left", "right"])
-    cycle = Cycle()
-    cycle.setpoint.position_rad[1] = 1.0
-    cycle.check(supervisor)
-    assert supervisor.reason().startswith("right: following error")
-
-
-def test_what_others_find_counts_where_it_is_worse():
-    supervisor, cycle = Supervisor(SAFE, 2, PERIOD_S), Cycle()
-    cycle.check(supervisor)
-    assert supervisor.report(Limit.SAFETY_STOP, "a door is open") == Reaction.CONTROLLED_STOP
-    assert supervisor.report(Limit.DRIVE, "node 2: overcurrent") == Reaction.QUICK_STOP
-    assert supervisor.report(Limit.SAFETY_STOP, "a door is open") == Reaction.QUICK_STOP
-    assert supervisor.reason() == "node 2: overcurrent"
-    assert supervisor.details() == {
-        "limit": "drive",
-        "axis": -1,
-        "value": None,
-        "allowed": None,
-        "unit": "",
-        "reaction": "quick stop",
-    }
-    assert supervisor.report(Limit.SAFETY_ALARM, "emergency stop") == Reaction.TORQUE_OFF
-    assert cycle.check(supervisor) == Reaction.NONE
-    assert (supervisor.reason(), supervisor.limit, supervisor.axis) == ("", Limit.NONE, -1)
 
 
 # -- cables
