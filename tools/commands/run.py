@@ -219,14 +219,14 @@ def _require_free(control: Path) -> None:
 
 
 def _require_no_master(robot: Robot, settings: RunSettings) -> None:
-    """Raise BadInputError where another process runs drives on one of the buses."""
+    """Raise WorkFailedError where another process runs drives on one of the buses, for now."""
     if settings.read_only:
         return
     for url in robot_urls(robot, settings.buses).values():
         try:
             refuse_second_master(url)
         except BusError as error:
-            raise BadInputError(f"{error}, or give --read-only to listen") from None
+            raise WorkFailedError(f"{error}, or give --read-only to listen") from None
 
 
 def _ask(robot: Robot, settings: RunSettings, yes: bool) -> None:
