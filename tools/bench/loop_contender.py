@@ -26,6 +26,7 @@ PROGRAM = "tools.bench.loop_obvious"
 _BANDWIDTHS_HZ = (20.0, 15.0, 12.0, 8.0, 5.0)
 _PATIENCE_S = 120.0
 _CYCLIC_TORQUE = 10
+_LIMITS = ("torque_Nm", "torque_rate_Nm_s", "speed_rad_s", "following_error_rad", "tension_max_N")
 
 
 def measure(robot: Robot, seconds: float, speed_rad_s: float) -> dict[str, Any]:
@@ -83,13 +84,11 @@ def _axes(robot: Robot, channels: dict[str, str]) -> dict[str, Any]:
         "period_s": period_s,
         "counts_per_rad": winch.encoder_counts_per_turn / math.tau,
         "per_mille_per_Nm": 1e3 / motor.rated_torque_Nm,
+        "cable_m_per_rad": winch.cable_m_per_motor_rad,
         "gains": [
             gains.proportional_Nm_rad,
             gains.integral_Nm_rad_s,
             gains.derivative_Nms_rad,
         ],
-        "limits": {
-            name: float(np.min(getattr(limits, name)))
-            for name in ("torque_Nm", "torque_rate_Nm_s", "speed_rad_s", "following_error_rad")
-        },
+        "limits": {name: float(np.min(getattr(limits, name))) for name in _LIMITS},
     }

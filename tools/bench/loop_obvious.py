@@ -1,9 +1,9 @@
 """Run as a program: the control loop as one writes it first, on `canopen`'s PDOs and NumPy.
 
 The argument is JSON: {"buses": {NAME: {NODE: EDS}}, "period_s", "seconds", "counts_per_rad",
-"per_mille_per_Nm", "gains", "limits"}. Standard output gets {"running": true} when the motors turn
-under the loop, and at the end {"cycles", "late", "missed", "processor_s", "turned_rad", and for
-each cycle "lateness_s", "exchange_s", "compute_s"}.
+"per_mille_per_Nm", "cable_m_per_rad", "gains", "limits", "speed_rad_s"}. Standard output gets
+{"running": true} when the motors turn under the loop, and at the end {"cycles", "late", "missed",
+"processor_s", "turned_rad", and for each cycle "lateness_s", "exchange_s", "compute_s"}.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ _LATE_SHARE, _PATIENCE_SHARE = 0.1, 0.6
 _WARM_UP = 200
 _ENABLE = (6, 7, 15)
 _CYCLES_A_STEP = 50
-_STATE = np.dtype([("time_s", "f8"), ("values", "f8", (6, 16)), ("statusword", "u2", (16,))])
+_STATES = ((0x4F, 0x40), (0x6F, 0x21), (0x6F, 0x23), (0x6F, 0x27), (0x6F, 0x07), (0x4F, 0x08))
+_NUMBERS = list(range(len(_STATES)))
+_FAULT = _NUMBERS[-1]
+_FLOATS = (
+    *("setpoint_rad", "position_rad", "velocity_rad_s", "torque_actual_Nm", "torque_asked_Nm"),
+    *("torque_sent_Nm", "tension_N", "cable_length_m"),
+)
 
 
 class ObviousLoop:
@@ -54,8 +60,11 @@ class ObviousLoop:
         for network in self.networks:
             network.nmt.state = "OPERATIONAL"
         self.integral, self.velocity, self.last, self.torque = np.zeros((4, n))
+        self.cable_m_per_rad = float(given["cable_m_per_rad"])
         self.controlword = 0
-        self.kept = np.zeros(round((given["seconds"] + 10.0) / self.period_s), _STATE)
+        fields = [("time_s", "f8"), *((name, "f8", (n,)) for name in _FLOATS)]
+        fields += [("statusword", "u2", (n,)), ("state", "i1", (n,))]
+        self.kept = np.zeros(round((given["seconds"] + 10.0) / self.period_s), fields)
 
     def _add(self, node: Any, i: int) -> None:
         node.tpdo.read()
@@ -79,32 +88,58 @@ class ObviousLoop:
             network.sync.transmit()
         return self.complete.wait(_PATIENCE_SHARE * self.period_s)
 
-    def control(self, k: int, start: Any, speed_rad_s: float) -> None:
-        """Compute torques for a turn at constant speed, within the limits, and keep the cycle."""
-        position = self.counts / self.per_rad
-        measured = (position - self.last) / self.period_s
+    def estimate(self) -> None:
+        """Turn what the drives have told into states, angles, speeds, torques and tensions."""
+        self.position = self.counts / self.per_rad
+        measured = (self.position - self.last) / self.period_s
         self.velocity = 0.8 * self.velocity + 0.2 * measured
-        self.last = position
+        self.last = self.position
+        self.measured_Nm = self.actual / self.per_Nm
+        self.length_m = self.position * self.cable_m_per_rad
+        self.tension_N = np.abs(self.measured_Nm / self.cable_m_per_rad)
+        words = self.status.astype(int)
+        self.state = np.select([(words & mask) == word for mask, word in _STATES], _NUMBERS, -1)
+
+    def control(self, k: int, start: Any, speed_rad_s: float) -> None:
+        """Compute torques for a turn at constant speed, and stop where a limit is exceeded."""
+        limits = self.limits
         setpoint = start + speed_rad_s * k * self.period_s
-        error = setpoint - position
+        error = setpoint - self.position
         self.integral = np.clip(self.integral + error * self.period_s, -1.0, 1.0)
         wanted = self.kp * error + self.ki * self.integral
         wanted = wanted + self.kd * (speed_rad_s - self.velocity)
-        step = self.limits["torque_rate_Nm_s"] * self.period_s
+        step = limits["torque_rate_Nm_s"] * self.period_s
         torque = np.clip(wanted, self.torque - step, self.torque + step)
-        torque = np.clip(torque, -self.limits["torque_Nm"], self.limits["torque_Nm"])
+        torque = np.clip(torque, -limits["torque_Nm"], limits["torque_Nm"])
         if (
-            np.any(np.abs(self.velocity) > self.limits["speed_rad_s"])
-            or np.any(np.abs(error) > self.limits["following_error_rad"])
+            np.any(np.abs(self.velocity) > limits["speed_rad_s"])
+            or np.any(np.abs(error) > limits["following_error_rad"])
+            or np.any(self.tension_N > limits["tension_max_N"])
+            or np.any(self.state == _FAULT)
             or not np.all(np.isfinite(torque))
         ):
             torque = np.zeros(self.n)
         self.torque = torque
+        self.keep(k, setpoint, wanted)
+
+    def keep(self, k: int, setpoint: Any, wanted: Any) -> None:
+        """Record the cycle."""
         row = self.kept[k % self.kept.size]
         row["time_s"] = k * self.period_s
-        values = (setpoint, position, self.velocity, self.actual, wanted, torque)
-        row["values"][:, : self.n] = values
-        row["statusword"][: self.n] = self.status
+        values = {
+            "setpoint_rad": setpoint,
+            "position_rad": self.position,
+            "velocity_rad_s": self.velocity,
+            "torque_actual_Nm": self.measured_Nm,
+            "torque_asked_Nm": wanted,
+            "torque_sent_Nm": self.torque,
+            "tension_N": self.tension_N,
+            "cable_length_m": self.length_m,
+            "statusword": self.status,
+            "state": self.state,
+        }
+        for name, value in values.items():
+            row[name] = value
 
     def transmit(self) -> None:
         """Send controlwords and torques."""
@@ -153,6 +188,7 @@ def run(given: Mapping[str, Any]) -> dict[str, Any]:
             missed += loop.waiting
         came = time.monotonic()
         exchange[k] = came - woke
+        loop.estimate()
         moving = max(0, k - begin_enable)
         loop.control(moving, start if k >= begin_enable else loop.last, _speed(given, moving))
         loop.transmit()
