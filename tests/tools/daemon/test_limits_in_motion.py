@@ -16,8 +16,9 @@ from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.states import LoopState, Reaction
 from cdpr_rt.supervisor import Limit
 from drivers.cia402 import STATE_TABLE, State
+from profiles.catalogue import SHIPPED
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
-from tests.tools.daemon.loop_rig import LoopRig
+from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 
 PERIOD_S = 2e-3
@@ -335,3 +336,18 @@ def test_a_silent_load_cell_ends_the_motion_and_is_named(
     finally:
         cells.tell("mend 2")
     rig.turn_until(lambda: bool(rig.order("acknowledge")["ok"]))
+
+
+# -- a winch alone
+
+
+def test_a_winch_is_run_as_a_robot_of_one_axis() -> None:
+    path = SHIPPED / "winches" / "winch-mpp0923d.toml"
+    with simulated(path) as url, opened(path, url) as rig:
+        assert rig.state is LoopState.READY, rig.status
+        rig.obeyed("enable", program="pid", wanted={"distance_rad": [1.0]})
+        rows = rig.run(2.0)
+        assert rows["position_rad"][-1, 0] == pytest.approx(1.0, abs=0.1)
+        assert not (rows["reaction"] > Reaction.CLAMP).any()
+        rig.obeyed("disable")
+        assert rig.state is LoopState.READY
