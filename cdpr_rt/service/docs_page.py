@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from typing import Any, Final
 
@@ -21,7 +22,7 @@ def docs_page(openapi: dict[str, Any]) -> HTMLResponse:
     about = openapi["info"]
     parts = [
         f"<h1>{escape(about['title'])}</h1>",
-        f'<p class="about">{escape(about["description"])}</p>',
+        f'<p class="about">{_marked(about["description"])}</p>',
         '<p>For programs: <a href="/openapi.json">openapi.json</a>. WebSockets: <code>/live</code> '
         "and <code>/control</code>.</p>",
     ]
@@ -41,7 +42,7 @@ def _operation(
 ) -> list[str]:
     parts = [
         f'<h2><span class="method">{method.upper()}</span> {escape(path)}</h2>',
-        f"<p>{escape(operation.get('description', ''))}</p>",
+        f"<p>{_marked(operation.get('description', ''))}</p>",
     ]
     rows = [
         (f"{one['name']} ({one['in']})", one.get("description", ""), one["schema"])
@@ -58,6 +59,10 @@ def _operation(
         ]
         parts.append(f"<table>{''.join(lines)}</table>")
     return parts
+
+
+def _marked(text: str) -> str:
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def _references(schema: dict[str, Any]) -> list[str]:

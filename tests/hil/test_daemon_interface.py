@@ -6,14 +6,17 @@ import json
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 import schemathesis
 from daemon_rig import NAME, RealDaemon, alive, until
@@ -77,9 +80,13 @@ def resident_B(pid: int) -> int:
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-def state_texts(daemon: RealDaemon) -> list[str]:
-    events = daemon.http.get("/events", params={"most": 512}).json()["events"]
-    return [event["text"] for event in events if event["kind"] == "state"]
+def happened(daemon: RealDaemon) -> str:
+    return "\n".join(" ".join(event) for event in events(daemon)[-20:])
+
+
+def events(daemon: RealDaemon) -> list[tuple[str, str]]:
+    told = daemon.http.get("/events", params={"most": 512}).json()["events"]
+    return [(event["kind"], event["text"]) for event in told]
 
 
 def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int:
@@ -113,7 +120,7 @@ def test_each_answer_is_as_described_and_nothing_gets_power(
     sent = fuzz(description, url, {"/shutdown"})
     assert sent > 150
     assert angles(daemon) == pytest.approx(before, abs=3.0)  # within the encoder's noise
-    assert "active" not in state_texts(daemon)
+    assert ("state", "active") not in events(daemon)
 
 
 @pytest.fixture
@@ -125,7 +132,7 @@ def active(daemon: RealDaemon) -> Iterator[RealDaemon]:
             answer = daemon.http.post("/enable", json={}, headers=headers)
             assert answer.status_code == 200, answer.text
     yield daemon
-    assert daemon.status()["state"] == "active", daemon.status()["reason"]
+    assert daemon.status()["state"] == "active", happened(daemon)
     daemon.http.post("/hold")
     until(lambda: all(at_rest(axis) for axis in daemon.status()["axes"]))
 
@@ -159,7 +166,7 @@ def test_with_power_too_nobody_moves_it_who_does_not_hold_the_right(
             assert answer.status_code in (409, 422)
         fuzz(description, url, {"/shutdown", "/disable", "/events", "/metrics"}, **wrong)
         assert active.http.put("/control", headers=headers).status_code in (200, 409)
-    assert active.status()["program"] == "hold"
+    assert active.status()["program"] == "hold", happened(active)
     assert angles(active) == pytest.approx(before, abs=3.0)
     assert resident_B(service) - memory_B < MORE_MEMORY_B
 
@@ -234,6 +241,58 @@ def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
     status = active.wait_for("active")
     assert status["program"] == "hold"
     assert status["control"]["held"] is False
+
+
+def flood(url: str, ended: threading.Event, what: bytes) -> None:
+    host, _, port = url.removeprefix("http://").partition(":")
+    while not ended.is_set():
+        with suppress(OSError), socket.create_connection((host, int(port)), 1.0) as sock:
+            sock.settimeout(0.2)
+            for _ in range(200):
+                if ended.is_set():
+                    break
+                sock.sendall(what)
+                sock.recv(1)
+
+
+def test_a_flood_from_the_holders_own_address_neither_moves_nor_silences_it(
+    active: RealDaemon, url: str
+) -> None:
+    service = active.children()["service"]
+    memory_B = resident_B(service)
+    before = setpoints(active)
+    key = RIGHT["Authorization"].encode()
+    floods = [
+        b"\x00\xff" * 5000,
+        b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n" * 20,
+        b"POST /program HTTP/1.1\r\nHost: a\r\nAuthorization: "
+        + key
+        + b"\r\nContent-Length: 2\r\n\r\n{}",
+        b"POST /hold HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999\r\n\r\n{",
+        b"GET /live HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+        b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+        b"Authorization: " + key + b"\r\n\r\n",
+    ]
+    ended = threading.Event()
+    threads = [
+        threading.Thread(target=flood, args=(url, ended, what)) for what in floods for _ in range(2)
+    ]
+    with holding(active) as headers, httpx.Client(base_url=url, timeout=5.0) as client:
+        shown = {**RIGHT, **headers}
+        assert client.put("/control", headers=shown).status_code == 200
+        for thread in threads:
+            thread.start()
+        try:
+            for _ in range(20):
+                assert client.put("/control", headers=shown).status_code == 200
+                time.sleep(0.2)
+        finally:
+            ended.set()
+            for thread in threads:
+                thread.join()
+    assert active.status()["program"] == "hold", happened(active)
+    assert setpoints(active) == pytest.approx(before, abs=0.01)
+    assert resident_B(service) - memory_B < MORE_MEMORY_B
 
 
 # -- from the terminal

@@ -136,14 +136,18 @@ def test_what_the_loop_refuses_is_passed_on_with_its_state(rig: Rig) -> None:
 def test_many_who_ask_for_hold_at_once_are_one_command(rig: Rig) -> None:
     rig.loop.answers = False
     answers: list[int] = []
+    begin = threading.Barrier(20)
 
     def ask() -> None:
         with rig.client() as client:
-            answers.append(client.post("/hold").status_code)
+            client.get("/control")
+            begin.wait()
+            answers.append(client.post("/hold", timeout=30.0).status_code)
 
     threads = [threading.Thread(target=ask) for _ in range(20)]
     for thread in threads:
         thread.start()
+    wait_for(lambda: int(rig.block.counters["commands"][0]) > 0)
     time.sleep(0.5)
     rig.loop.answers = True
     for thread in threads:
