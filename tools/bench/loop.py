@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
 from math import floor
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,16 +21,21 @@ from drivers.bus.budget import machine_budget
 from profiles import Robot, load_robot
 from tools.bench import loop_contender
 from tools.bench.loop_daemon import BenchDaemon, tolerant
+from tools.errors import WorkFailedError
 from tools.output import Output
 
 ROBOT, ONE_BUS = "spatial-8", "one-bus-8"
 ROUNDS = 3
+SLOW_PERIOD_S = 4e-3
+"""At 1 kHz the obvious loop has no pause; here it has, so that its own cost can be told."""
 TARGETS = {"compute_share": 0.30, "obvious_over_ours": 4.0, "recording_share": 0.02}
 """The first and last at most, the second at least this."""
 PERCENTILES = (50.0, 99.9, 100.0)
 _NAMES = ("p50", "p99.9", "worst")
 _SPEED_RAD_S = 1.0
 _SETTLE_S = 1.0
+_TRIES = 4
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -75,22 +82,24 @@ def measure(seconds: float, out: Output) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="cdpr-bench-") as folder:
         robot = tolerant(load_robot(ROBOT), Path(folder))
         one_bus = tolerant(load_robot(ONE_BUS), Path(folder))
-        bare, served, obvious = [], [], []
+        slow = replace(robot, sync_period_s=SLOW_PERIOD_S)
+        bare, served, obvious, relaxed = [], [], [], []
         for k in range(ROUNDS):
             out.note(f"round {k + 1} of {ROUNDS}: the daemon, then the obvious loop ...")
             part = seconds / ROUNDS
-            alone, recorded = _daemon(robot, part, Path(folder))
+            alone, recorded = _tried(partial(_daemon, robot, part, Path(folder)))
             bare.append(alone)
             served.append(recorded)
             obvious.append(_obvious(robot, part))
+            relaxed.append(_obvious(slow, part))
         out.note("eight axes on one bus ...")
-        full = _full_bus(one_bus, seconds, Path(folder))
-    ours, unserved, theirs = _told(served), _told(bare), _told(obvious)
+        full = _tried(partial(_full_bus, one_bus, seconds, Path(folder)))
+    ours, unserved, theirs, unhurried = (_told(runs) for runs in (served, bare, obvious, relaxed))
     cost = ours["host_us"] / unserved["host_us"] - 1.0
     period_us = 1e6 * robot.sync_period_s
     shares = {
         "compute_share": ours["compute_us"]["p99.9"] / period_us,
-        "obvious_over_ours": theirs["host_us"] / ours["host_us"],
+        "obvious_over_ours": unhurried["host_us"] / ours["host_us"],
         "recording_share": cost,
     }
     return {
@@ -102,6 +111,7 @@ def measure(seconds: float, out: Output) -> dict[str, Any]:
         "ours": ours,
         "without_service": unserved,
         "obvious": theirs,
+        "obvious_slow": unhurried,
         "one_bus": full,
         "shares": {name: round(value, 3) for name, value in shares.items()},
         "targets": TARGETS,
@@ -114,6 +124,14 @@ def measure(seconds: float, out: Output) -> dict[str, Any]:
     }
 
 
+def _tried(work: Callable[[], _T]) -> _T:
+    """Do `work`, anew a few times where a machine that is busy has ended it."""
+    for _ in range(_TRIES - 1):
+        with suppress(WorkFailedError):
+            return work()
+    return work()
+
+
 def _daemon(robot: Robot, seconds: float, folder: Path) -> tuple[Run, Run]:
     """Run the loop alone, then with recording and clients of both live views."""
     with BenchDaemon(robot, folder) as daemon:
@@ -123,7 +141,10 @@ def _daemon(robot: Robot, seconds: float, folder: Path) -> tuple[Run, Run]:
         with daemon.served():
             daemon.turn(_SPEED_RAD_S)
             time.sleep(_SETTLE_S)
-            return alone, Run.of(*daemon.measure(seconds))
+            recorded = Run.of(*daemon.measure(seconds))
+        if not any(path.stat().st_size for path in daemon.recorded()):
+            raise WorkFailedError(f"{robot.name}: nothing was recorded")
+        return alone, recorded
 
 
 def _obvious(robot: Robot, seconds: float) -> Run:

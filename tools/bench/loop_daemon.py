@@ -30,7 +30,12 @@ _LEASE_NS = 10**9
 _TO_AND_FRO_RAD = 10.0
 _CHECKS = 4
 _TURN_S = 0.05
-_TOLERATED = {"missed_cycles": 1000, "missed_in_window": 10_000, "stale_cycles": 10_000}
+_TOLERATED = {
+    "missed_cycles": 1000,
+    "missed_in_window": 10_000,
+    "stale_cycles": 10_000,
+    "late_s": 5.0,
+}
 
 
 def tolerant(robot: Robot, folder: Path) -> Robot:

@@ -36,7 +36,10 @@ _FLOATS = (
 
 
 class ObviousLoop:
-    """Cyclic torque control of all axes: a PID in arrays, limits checked, each cycle kept."""
+    """Cyclic torque control of all axes: a PID in arrays, limits checked, each cycle kept.
+
+    PDOs are read and written as the package's documentation shows it.
+    """
 
     def __init__(self, given: Mapping[str, Any]) -> None:
         nodes = [(bus, int(node)) for bus, of in given["buses"].items() for node in of]
@@ -49,7 +52,7 @@ class ObviousLoop:
         self.status, self.counts, self.actual = np.zeros((3, n))
         self.waiting, self.complete = 0, threading.Event()
         self.networks = []
-        self.orders: list[tuple[Any, Any, Any]] = []
+        self.nodes: list[Any] = []
         for bus, of in given["buses"].items():
             network = canopen.Network()
             network.NOTIFIER_CYCLE = _NOTIFIER_CYCLE_S
@@ -69,13 +72,13 @@ class ObviousLoop:
     def _add(self, node: Any, i: int) -> None:
         node.tpdo.read()
         node.rpdo.read()
-        answer, order = node.tpdo[1], node.rpdo[1]
-        variables = [answer[index] for index in (0x6041, 0x6064, 0x6077)]
-        answer.add_callback(partial(self._take, i, variables))
-        self.orders.append((order, order[0x6040], order[0x6071]))
+        node.tpdo[1].add_callback(partial(self._take, i))
+        self.nodes.append(node)
 
-    def _take(self, i: int, variables: list[Any], _pdo: object) -> None:
-        self.status[i], self.counts[i], self.actual[i] = (one.raw for one in variables)
+    def _take(self, i: int, answer: Any) -> None:
+        self.status[i] = answer[0x6041].raw
+        self.counts[i] = answer[0x6064].raw
+        self.actual[i] = answer[0x6077].raw
         self.waiting -= 1
         if not self.waiting:
             self.complete.set()
@@ -143,10 +146,11 @@ class ObviousLoop:
 
     def transmit(self) -> None:
         """Send controlwords and torques."""
-        for (pdo, controlword, target), torque in zip(self.orders, self.torque, strict=True):
-            controlword.raw = self.controlword
-            target.raw = round(torque * self.per_Nm)
-            pdo.transmit()
+        for node, torque in zip(self.nodes, self.torque, strict=True):
+            order = node.rpdo[1]
+            order[0x6040].raw = self.controlword
+            order[0x6071].raw = round(torque * self.per_Nm)
+            order.transmit()
 
     def close(self) -> None:
         """Take the power and leave the buses."""

@@ -12,6 +12,7 @@ _WAYS = {
     "ours": "ours, recorded and watched",
     "without_service": "ours, the loop's process alone",
     "obvious": "the obvious loop on canopen",
+    "obvious_slow": "the same at 250 Hz",
 }
 
 
