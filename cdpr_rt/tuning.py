@@ -21,8 +21,8 @@ GAIN_MARGIN_dB = 6.0
 MAX_SENSITIVITY = 2.0
 DERIVATIVE_FILTER_RATIO = 10.0
 """The derivative's filter pole lies at this multiple of the crossover frequency."""
-INERTIA_RATIO = 10.0
-"""By how much the inertia may grow beyond the rotor's before a firm loop swings up."""
+INERTIA_RATIO = 50.0
+"""How many times the rotor's inertia a firm loop bears; a mass on the cable is such a multiple."""
 SWEEP_PHASE = 0.3
 """Phase in radians that the latency may take at the sweep's natural frequency."""
 _MOST_FACTOR = 8.0

@@ -37,7 +37,7 @@ def test_hold_catches_what_turns_and_keeps_it_there() -> None:
     rig.run(0.02)
     assert rig.speed[1] > 5.0
     rig.switch("hold")
-    rig.run(2.0)
+    rig.run(4.0)
     assert rig.program.at_rest
     place = rig.setpoint.position_rad.copy()
     rig.run(0.5)
