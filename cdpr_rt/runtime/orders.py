@@ -62,6 +62,9 @@ class Orders:
         number = number if isinstance(number, int) else 0
         do = order.get("do")
         doing = self._doing.get(do) if isinstance(do, str) else None
+        if do == "disable" and self._loop.reacting and self._loop.busy:
+            self._pending.append(number)  # it is being done: answered when the power is off
+            return
         try:
             if doing is None:
                 raise RefusedError(f"do: {do!r}; allowed: {', '.join(self._doing)}")
@@ -117,8 +120,6 @@ class Orders:
         self._refuse_read_only("disable")
         loop = self._loop
         loop.life.require(Transition.DISABLE)
-        if loop.reacting:
-            raise RefusedError("disable: the motion is being ended already")
         if loop.life.state is LoopState.READY:
             return None
         return procedures.disable(loop)
