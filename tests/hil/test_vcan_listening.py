@@ -1,0 +1,40 @@
+"""Axes of another master on a real vcan0, whose kernel counts every frame that is sent."""
+
+from __future__ import annotations
+
+import math
+import struct
+from pathlib import Path
+
+import pytest
+
+from drivers.bus import BusUrl, open_port
+from drivers.bus.packed import FRAME
+from drivers.listening import HeardBus, ListeningDevice, heard_axis
+from profiles import load_winch
+
+pytestmark = pytest.mark.vcan
+
+SENT = Path("/sys/class/net/vcan0/statistics/tx_packets")
+
+
+def test_what_is_said_is_heard_and_nothing_added() -> None:
+    winch, url = load_winch("winch-mpp0923d"), BusUrl.parse("socketcan:vcan0")
+    talker = open_port(url, [])
+    axis = heard_axis(winch, 1)
+    with ListeningDevice([HeardBus("can0", url, [axis], [0])], 0.001) as device:
+        before = int(SENT.read_text())
+        for k in range(100):
+            talker.send(FRAME.pack(0x080, 0, bytes(8)))
+            answer = struct.pack("<Hih", 0x0237, 100 * k, 0)
+            talker.send(FRAME.pack(0x181, len(answer), answer))
+            device.sync()
+            assert device.receive() == 1
+            device.command.torque_Nm[:] = 1.0
+            device.transmit()
+            turned = 100 * k / winch.encoder_counts_per_turn * math.tau
+            assert device.feedback.position_rad[0] == pytest.approx(turned)
+        assert device.alarm() == ""
+        device.forget_alarms()
+    talker.close()
+    assert int(SENT.read_text()) - before == 200
