@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -21,12 +21,13 @@ from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.service import recording_schema as topics
 from cdpr_rt.service.recording_events import Events
-from cdpr_rt.service.recording_file import RecordingError, RecordingFile
+from cdpr_rt.service.recording_file import NameTakenError, RecordingError, RecordingFile
 from cdpr_rt.service.recording_json import RowTexts
 from cdpr_rt.service.rows import plain
 
 MOST_BYTES: Final = 1 << 30
-RESERVE_BYTES: Final = 64 << 20
+_RESERVE_BYTES: Final = 64 << 20
+_RESERVE_PART: Final = 20
 _INTERVAL_S: Final = 0.1
 _SYNC_S: Final = 0.4
 """With the interval and a disk at its usual pace, nothing older than a second is ever lost."""
@@ -38,8 +39,9 @@ class Recorder:
     """Writes rows, status, description and events of a block into MCAP files in `folder`.
 
     A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, the next file begins where one
-    has `most_bytes`. A disk that takes no more, or has less than `reserve_bytes` left, ends the
-    recording for good: `told` says why, `ended` is called with it, and nobody else is concerned.
+    has `most_bytes`. A disk that takes no more, or has less than `reserve_bytes` left (without:
+    64 MB, or a twentieth of a small disk), ends the recording for good: `told` says why, `ended` is
+    called with it, and nobody else is concerned.
     A recorder that follows on another one of the same block goes on at the first row that was not
     safe yet.
     """
@@ -52,7 +54,7 @@ class Recorder:
         folder: Path,
         robot: str,
         most_bytes: int = MOST_BYTES,
-        reserve_bytes: int = RESERVE_BYTES,
+        reserve_bytes: int | None = None,
         ended: Callable[[str], None] | None = None,
     ) -> None:
         self._block = block
@@ -134,6 +136,11 @@ class Recorder:
 
     def _fail(self, text: str) -> None:
         self._error = text
+        file, self._file = self._file, None
+        if file is not None:
+            with suppress(ControlError, OSError):
+                file.close()
+            self._bytes += file.size
         if self._ended is not None:
             self._ended(text)
 
@@ -143,49 +150,57 @@ class Recorder:
     def _open(self) -> None:
         date = datetime.fromtimestamp(self._wall.start_ns / 1e9, UTC)
         session = f"{self._robot}-{date:%Y%m%dT%H%M%SZ}"
-        there = [path.stem[-3:] for path in self._folder.glob(f"{session}-*.mcap")]
-        part = 1 + max((int(number) for number in there if number.isdigit()), default=0)
-        metadata = {
-            "robot": self._robot,
-            "axes": str(self._block.n),
-            "session": session,
-            "part": str(part),
-            "start_realtime_ns": str(self._wall.start_ns),
-            "start_monotonic_ns": str(self._wall.start_monotonic_ns),
-            "version": version("cdpr-rt"),
-        }
-        self._path = self._folder / f"{session}-{part:03d}.mcap"
-        self._file = RecordingFile(self._path, self._context, metadata)
+        numbers = [path.stem.rpartition("-")[2] for path in self._folder.glob(f"{session}-*.mcap")]
+        part = max((int(number) for number in numbers if number.isdecimal()), default=0)
+        while self._file is None:
+            part += 1
+            metadata = {
+                "robot": self._robot,
+                "axes": str(self._block.n),
+                "session": session,
+                "part": str(part),
+                "start_realtime_ns": str(self._wall.start_ns),
+                "start_monotonic_ns": str(self._wall.start_monotonic_ns),
+                "version": version("cdpr-rt"),
+            }
+            self._path = self._folder / f"{session}-{part:03d}.mcap"
+            with suppress(NameTakenError):  # a daemon that began in the same second was faster
+                self._file = RecordingFile(self._path, self._context, metadata)
         self._seen.clear()
 
     def _sync(self) -> None:
-        if self._file is None:
+        file = self._file
+        if file is None:
             return
-        self._file.sync()
+        file.sync()
         self._block.counters["recorded"][0] = self._reader.next
-        room = os.statvfs(self._folder)
-        if room.f_bavail * room.f_frsize < self._reserve_bytes:
-            self._close()
-            least = self._reserve_bytes >> 20
-            raise RecordingError(f"{self._folder}: recording ended: less than {least} MB free")
-        if self._file.size >= self._most_bytes:
+        if not file.is_there:
+            raise RecordingError(f"{file.path}: recording ended: the file has been removed")
+        room, size = file.room()
+        least = reserve_of(size) if self._reserve_bytes is None else self._reserve_bytes
+        if room < least:
+            raise RecordingError(
+                f"{self._folder}: recording ended: less than {least / 1e6:.0f} MB free"
+            )
+        if file.size >= self._most_bytes:
             self._close()
             self._open()
 
     def _close(self) -> None:
-        file, self._file = self._file, None
-        if file is not None:
-            file.close()
+        if self._file is not None:
+            self._file.close()
             self._block.counters["recorded"][0] = self._reader.next
-            self._bytes += file.size
+            self._bytes += self._file.size
+            self._file = None
 
     def _take(self) -> None:
         """Log what has come since the last time."""
         self._take_text("description", self._description, self._block.description)
         self._take_text("status", self._status, self._block.status)
         before = self._rows
-        while (rows := self._reader.read(_MOST_ROWS)).size:
-            self._take_rows(rows)
+        newest = int(self._block.counters["rows"][0])  # later ones wait, or there were no end of it
+        while self._reader.next < newest:
+            self._take_rows(self._reader.read(_MOST_ROWS))
         if self._rows == before and (event := self._events.of_state(self._told_status)):
             self._log_event(event, time.monotonic_ns())
         while self._remarks:
@@ -225,6 +240,11 @@ class Recorder:
 
     def _log_event(self, event: dict[str, Any], stamp_ns: int) -> None:
         self._event.log(_text(event), log_time=self._wall(stamp_ns))
+
+
+def reserve_of(disk_bytes: int) -> int:
+    """Return what is left free of a disk of this size, for the others on it."""
+    return min(_RESERVE_BYTES, disk_bytes // _RESERVE_PART)
 
 
 def _text(value: dict[str, Any]) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +13,11 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from cdpr_rt.errors import ControlError
 
+PROFILE: Final = "cdpr-rt"
+"""The MCAP profile: what says that a file is a recording."""
 _MAGIC: Final = b"\x89MCAP0\r\n"
+_CHUNK_BYTES: Final = 1 << 22
+"""At most, where much has come at once; readers hold a whole chunk in memory."""
 _DATA_END: Final = struct.pack("<BQI", 0x0F, 4, 0)
 _FOOTER_WITHOUT_SUMMARY: Final = struct.pack("<BQQQI", 0x02, 20, 0, 0, 0)
 _END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
@@ -21,6 +26,10 @@ _END: Final = _DATA_END + _FOOTER_WITHOUT_SUMMARY + _MAGIC
 
 class RecordingError(ControlError):
     """The recording cannot go on; the message names the file and says why."""
+
+
+class NameTakenError(RecordingError):
+    """There is a file of this name already."""
 
 
 class _Held:
@@ -52,10 +61,10 @@ class _Held:
 class RecordingFile:
     """A new MCAP file at `path`; what is logged in `context` goes into it.
 
-    `sync` appends what came since, ends the file as MCAP asks and has the disk confirm it. The
-    next one writes over that end, so a reader finds a whole file whenever the writer was killed.
-    Raises RecordingError where the disk does not take it; the file is then what it was at the
-    last `sync`, and closed.
+    `sync` appends what came since, ends the file as MCAP asks and has the disk confirm it. What
+    belongs where the end was before is written last, so a reader finds an end, and everything that
+    belongs to it, whenever the writer was killed or the power was cut. Raises RecordingError where
+    the disk does not take it; the file is then what it was at the last `sync`, and closed.
     """
 
     def __init__(self, path: Path, context: Context, metadata: dict[str, str]) -> None:
@@ -63,7 +72,12 @@ class RecordingFile:
         self._held = _Held()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RecordingError(f"{path}: cannot record: {error.strerror}") from error
+        try:
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        except FileExistsError as error:
+            raise NameTakenError(f"{path}: cannot record: {error.strerror}") from error
         except OSError as error:
             raise RecordingError(f"{path}: cannot record: {error.strerror}") from error
         self.size = 0
@@ -72,10 +86,10 @@ class RecordingFile:
             compression=MCAPCompression.Zstd,
             compression_level=1,
             compression_threads=0,
-            chunk_size=None,
+            chunk_size=_CHUNK_BYTES,
             disable_seeking=True,
             calculate_data_section_crc=False,
-            profile="cdpr-rt",
+            profile=PROFILE,
         )
         self._writer = open_mcap(self._held, context=context, writer_options=options)
         self._writer.write_metadata("recording", metadata)
@@ -87,50 +101,78 @@ class RecordingFile:
         """The file's name without its folder."""
         return self.path.name
 
+    @property
+    def is_there(self) -> bool:
+        """Whether the file can still be found by somebody."""
+        return os.fstat(self._fd).st_nlink > 0
+
+    def room(self) -> tuple[int, int]:
+        """Return the bytes that are free on its disk, and how many the disk has."""
+        told = os.fstatvfs(self._fd)
+        return told.f_bavail * told.f_frsize, told.f_blocks * told.f_frsize
+
     def sync(self) -> None:
         """Make everything logged so far safe."""
         self._writer.flush()
-        self._put(_END)
+        if self._held.data:
+            self._put(_END)
 
     def close(self) -> None:
-        """Write the index and close; nothing is logged into it afterwards."""
+        """Write the index and close, once; nothing is logged into it afterwards."""
+        if self._fd < 0:
+            return
+        self.sync()
         self._writer.close()
         self._put(b"")
-        os.ftruncate(self._fd, self.size)
-        os.fsync(self._fd)
-        os.close(self._fd)
+        self._close()
+
+    def _close(self) -> None:
+        fd, self._fd = self._fd, -1
+        os.close(fd)
 
     def _put(self, end: bytes) -> None:
         data = bytes(self._held.data)
         self._held.data.clear()
+        held = len(_END) if self.size else 0
+        text = data + end
         try:
-            _write_all(self._fd, data + end, self.size)
-            os.fsync(self._fd)
+            _write_safely(self._fd, text[held:], self.size + held)
+            if held:
+                _write_safely(self._fd, text[:held], self.size)
         except OSError as error:
             self._give_up()
             raise RecordingError(f"{self.path}: recording ended: {error.strerror}") from error
         self.size += len(data)
 
     def _give_up(self) -> None:
-        """Leave what was safe before; its end fits where it was."""
+        """Leave what was safe before, and its end."""
         try:
-            os.ftruncate(self._fd, self.size)
-            _write_all(self._fd, _END if self.size else b"", self.size)
+            if self.size:
+                _write_all(self._fd, _END, self.size)
+                os.ftruncate(self._fd, self.size + len(_END))
+            else:
+                self.path.unlink(missing_ok=True)
         except OSError:
             pass  # a reader that allows for a file cut short still reads it
         finally:
-            os.close(self._fd)
-            if self.size == 0:
-                self.path.unlink(missing_ok=True)
+            self._close()
             self._writer.close()
             self._held.data.clear()
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the names of the files in it safe."""
-    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    os.fsync(fd)
-    os.close(fd)
+    """Make the names of the files in it safe; some file systems know no such thing."""
+    with suppress(OSError):
+        fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(fd)
+        finally:
+            os.close(fd)
+
+
+def _write_safely(fd: int, data: bytes, at: int) -> None:
+    _write_all(fd, data, at)
+    os.fdatasync(fd)
 
 
 def _write_all(fd: int, data: bytes, at: int) -> None:

@@ -11,21 +11,33 @@ from typing import IO, Any, Final
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, Footer, Message, Metadata, Schema
+from mcap.records import Channel, Chunk, Footer, Header, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from numpy.typing import NDArray
 from pyarrow import json as arrow_json
 from zstandard import ZstdError
 
-from cdpr_rt.service.recording_file import RecordingError
+from cdpr_rt.service.recording_file import PROFILE, RecordingError
 from cdpr_rt.service.recording_schema import CYCLE, DESCRIPTION, EVENTS, STATUS
 
 Columns = dict[str, NDArray[Any]]
 """Fields of rows: (rows,) each, or (rows, axes); null is nan."""
 
-_BROKEN: Final = (McapError, ZstdError, struct.error, ValueError, EOFError, pa.ArrowInvalid)
+_BROKEN: Final = (
+    McapError,
+    ZstdError,
+    struct.error,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    MemoryError,  # by a length that is damaged
+    OverflowError,
+)
 _MOST_CHUNK_BYTES: Final = 1 << 28
 _TYPES: Final = {"number": pa.float64(), "integer": pa.int64(), "boolean": pa.bool_()}
+_ALWAYS: Final = ("time_s", "stamp_ns")
 
 CLOSED, KILLED, CUT = "closed", "not closed", "cut short"
 
@@ -40,8 +52,14 @@ class RecordingReader:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.metadata: dict[str, str] = {}
+        self.part = 0
+        """Its number in its session, from 1."""
+        self.offset_ns = 0
+        """From a stamp to the time of day."""
         self.description: dict[str, Any] = {}
         """What was published last."""
+        self.axes: list[str] = []
+        """Their names, as far as the description has some."""
         self.status: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
         """In the order of the file, each with `log_time_ns`, the time of day."""
@@ -53,66 +71,102 @@ class RecordingReader:
 
     def cycles(self, fields: Collection[str] | None = None) -> Iterator[Columns]:
         """Yield the rows, some hundred at a time; all fields or only `fields`."""
-        topics: dict[int, str] = {}
-        names: dict[int, dict[str, Any]] = {}
+        channels: dict[int, Channel] = {}
         schemas: dict[int, Schema] = {}
         with self._open() as file:
-            for records in self._records(file):
-                rows: list[bytes] = []
-                schema: dict[str, Any] = {}
-                for record in records:
-                    if isinstance(record, Message):
-                        topic = topics.get(record.channel_id, "")
-                        if topic == CYCLE:
-                            rows.append(record.data)
-                            schema = names[record.channel_id]
-                        else:
-                            self._take(topic, record)
-                    elif isinstance(record, Schema):
-                        schemas[record.id] = record
-                    elif isinstance(record, Channel):
-                        topics[record.id] = record.topic
-                        names[record.id] = json.loads(schemas[record.schema_id].data)
-                if rows:
-                    yield _columns(rows, schema["properties"], fields)
+            for chunk in self._chunks(file):
+                try:
+                    columns = self._rows(chunk, channels, schemas, fields)
+                except _BROKEN:
+                    self.ended = CUT
+                    return
+                if columns:
+                    yield columns
 
     def _open(self) -> IO[bytes]:
         try:
+            if self.path.exists() and not self.path.is_file():
+                raise RecordingError(f"{self.path}: cannot be read: no file")
             return self.path.open("rb")
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
 
-    def _records(self, file: IO[bytes]) -> Iterator[list[Any]]:
-        """Yield the records of each chunk; note what stands between the chunks."""
-        found = False
+    def _chunks(self, file: IO[bytes]) -> Iterator[Chunk]:
+        """Yield the chunks; note what stands between them."""
         stream = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_CHUNK_BYTES)
         try:
             for record in stream.records:
                 self.position = file.tell()
-                if isinstance(record, Chunk):
-                    yield breakup_chunk(record, validate_crc=True)
-                elif isinstance(record, Metadata) and record.name == "recording":
-                    self.metadata = dict(record.metadata)
-                    found = True
+                if isinstance(record, Header) and record.profile != PROFILE:
+                    raise RecordingError(
+                        f"{self.path}: an MCAP file, but not a recording of {PROFILE}"
+                    )
+                if isinstance(record, Metadata) and record.name == "recording":
+                    self._take_metadata(record.metadata)
                 elif isinstance(record, Footer):
                     self.ended = CLOSED if record.summary_start else KILLED
+                elif isinstance(record, Chunk) and self.metadata:
+                    yield record
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
         except _BROKEN as error:
             self.ended = CUT
-            if not found:
+            if not self.metadata:
                 reason = str(error) or "nothing in it"
                 raise RecordingError(f"{self.path}: not a recording: {reason}") from None
-        if not found:
-            raise RecordingError(f"{self.path}: an MCAP file, but not a recording of cdpr-rt")
+        if not self.metadata:
+            raise RecordingError(f"{self.path}: not a recording: does not say of what")
+
+    def _take_metadata(self, metadata: dict[str, str]) -> None:
+        self.part = int(metadata["part"])
+        self.offset_ns = int(metadata["start_realtime_ns"]) - int(metadata["start_monotonic_ns"])
+        self.metadata = dict(metadata)
+
+    def _rows(
+        self,
+        chunk: Chunk,
+        channels: dict[int, Channel],
+        schemas: dict[int, Schema],
+        fields: Collection[str] | None,
+    ) -> Columns:
+        """Take in one chunk; return the rows in it, nothing where there are none."""
+        rows: list[bytes] = []
+        schema_id = 0
+        for record in breakup_chunk(chunk, validate_crc=True):
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
+                channels[record.id] = record
+            elif isinstance(record, Message):
+                channel = channels[record.channel_id]
+                if channel.topic == CYCLE:
+                    rows.append(record.data)
+                    schema_id = channel.schema_id
+                else:
+                    self._take(channel.topic, record)
+        if not rows:
+            return {}
+        properties = json.loads(schemas[schema_id].data)["properties"]
+        for name in (*(fields or ()), *_ALWAYS):
+            if name not in properties:
+                version = self.metadata.get("version")
+                raise RecordingError(f"{self.path}: has no {name}; recorded by version {version}")
+        return _columns(rows, properties, fields)
 
     def _take(self, topic: str, message: Message) -> None:
         if topic not in (DESCRIPTION, STATUS, EVENTS):
             return
-        value = json.loads(message.data)
+        value: dict[str, Any] = json.loads(message.data)
         if topic == DESCRIPTION:
+            axes = enumerate(value.get("axes", []))
+            self.axes = [str(axis.get("name") or k) for k, axis in axes]
             self.description = value
+        elif topic == STATUS:
+            self.status.append({"log_time_ns": message.log_time, **value})
         else:
-            into = self.status if topic == STATUS else self.events
-            into.append({"log_time_ns": message.log_time, **value})
+            self.events.append(
+                {"log_time_ns": message.log_time, **value, "text": str(value["text"])}
+            )
 
 
 def _columns(

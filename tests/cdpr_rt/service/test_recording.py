@@ -1,10 +1,15 @@
 """Recording: nothing is missing, whatever ends it, and the stock `mcap` package reads it."""
 
+import io
 import os
+import shutil
+import threading
 import time
 from pathlib import Path
 
 import pytest
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.writer import Writer
 from recording_rig import (
     DESCRIPTION,
     RecorderProcess,
@@ -18,7 +23,7 @@ from recording_rig import (
 
 from cdpr_rt.runtime.shared_block import RowWriter
 from cdpr_rt.runtime.states import Reaction
-from cdpr_rt.service.recording import Recorder
+from cdpr_rt.service.recording import Recorder, reserve_of
 from cdpr_rt.service.recording_file import RecordingError
 from cdpr_rt.service.recording_reader import CLOSED, CUT, KILLED, RecordingReader, read_columns
 
@@ -124,8 +129,63 @@ def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
         other.write_bytes(data)
         with pytest.raises(RecordingError, match=r"other\.mcap: not a recording"):
             list(RecordingReader(other).cycles())
+    os.mkfifo(tmp_path / "pipe.mcap")
+    with pytest.raises(RecordingError, match=r"pipe\.mcap: cannot be read"):
+        list(RecordingReader(tmp_path / "pipe.mcap").cycles())
     with pytest.raises(RecordingError, match="No such file"):
         list(RecordingReader(tmp_path / "missing.mcap").cycles())
+
+
+def _foreign(path: Path, profile: str, schema: bytes, data: bytes, **metadata: str) -> Path:
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile=profile)
+        if metadata:
+            writer.add_metadata("recording", metadata)
+        schema_id = writer.register_schema("other", "protobuf", schema) if schema else 0
+        channel = writer.register_channel("/cycle", "protobuf", schema_id)
+        writer.add_message(channel, 0, data, 0)
+        writer.finish()
+    return path
+
+
+def test_mcap_files_of_others_are_said_to_be_that(tmp_path: Path) -> None:
+    for schema in (b"", b"{}", b"\xff\xfe\x00"):
+        for profile in ("", "ros2"):
+            path = _foreign(tmp_path / "other.mcap", profile, schema, b"\xff", part="1")
+            with pytest.raises(RecordingError, match="but not a recording of cdpr-rt"):
+                list(RecordingReader(path).cycles())
+    path = _foreign(tmp_path / "other.mcap", "cdpr-rt", b"{}", b"{}", part="one")
+    with pytest.raises(RecordingError, match=r"other\.mcap: not a recording"):
+        list(RecordingReader(path).cycles())
+    path = _foreign(tmp_path / "other.mcap", "cdpr-rt", b"{}", b"{}")
+    with pytest.raises(RecordingError, match=r"other\.mcap: not a recording"):
+        list(RecordingReader(path).cycles())
+
+
+def test_what_claims_to_be_a_recording_ends_where_it_makes_no_sense(tmp_path: Path) -> None:
+    known = {"part": "1", "start_realtime_ns": "1", "start_monotonic_ns": "1", "version": "9"}
+    numbers = b'{"properties": {"time_s": {"type": "number"}, "stamp_ns": {"type": "integer"}}}'
+    for schema, data in ((b"", b"{}"), (b"[]", b"{}"), (b"\xff", b"{}"), (numbers, b"no row")):
+        reader = RecordingReader(_foreign(tmp_path / "x.mcap", "cdpr-rt", schema, data, **known))
+        assert list(reader.cycles()) == [] and reader.ended == CUT
+    path = _foreign(tmp_path / "x.mcap", "cdpr-rt", numbers, b"{}", **known)
+    with pytest.raises(RecordingError, match="has no position_rad; recorded by version 9"):
+        list(RecordingReader(path).cycles(["position_rad"]))
+
+
+def test_lengths_that_are_damaged_are_no_end_of_memory(recorded: Path, tmp_path: Path) -> None:
+    data = bytearray(recorded.read_bytes())
+    chunk = data.index(b"\x06", 8 + 9 + 20)
+    path = tmp_path / "damaged.mcap"
+    for at in range(chunk, chunk + 60):
+        damaged = data.copy()
+        damaged[at] ^= 0xFF
+        path.write_bytes(damaged)
+        try:
+            list(RecordingReader(path).cycles(["cycle"]))
+        except RecordingError:
+            continue
 
 
 def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None:
@@ -147,6 +207,100 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None
     assert kept == list(range(len(kept))) and len(kept) > 100
     # what was not safe is not counted as such
     assert int(block.counters["recorded"][0]) == len(kept)
+
+
+def test_at_no_moment_of_writing_is_the_end_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The power is cut between any two writes, and in the middle of each."""
+    writes: list[tuple[bytes, int]] = []
+    pwrite = os.pwrite
+
+    def noted(fd: int, data: bytes, at: int) -> int:
+        writes.append((bytes(data), at))
+        return pwrite(fd, data, at)
+
+    monkeypatch.setattr(os, "pwrite", noted)
+    block = block_with_clock()
+    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
+    recorder.start()
+    run_for(RowWriter(block), 2.0, 0)
+    recorder.stop()
+    disk, least = bytearray(), 0
+    for data, at in writes:
+        if not disk:
+            disk[:] = data
+            continue
+        torn = disk.copy()
+        half = data[: len(data) // 2]
+        torn[at : at + len(half)] = half
+        kept = NonSeekingReader(io.BytesIO(torn)).iter_messages(["/cycle"])
+        if len(data) > 100:  # the few bytes of the old end stand in one sector
+            assert sum(1 for _ in kept) >= least
+        disk[at : at + len(data)] = data
+        count = sum(1 for _ in make_reader(io.BytesIO(disk)).iter_messages(["/cycle"]))
+        assert count >= least
+        least = count
+    assert least == recorder.told()["rows"] > 0 and len(writes) > 4
+
+
+def test_rows_that_never_stop_coming_are_made_safe_all_the_same(tmp_path: Path) -> None:
+    block = block_with_clock(seconds=60.0)
+    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
+    newest = block.counters["rows"]
+    end = threading.Event()
+
+    def feed() -> None:
+        while not end.is_set():
+            if newest[0] - recorder._reader.next < 20_000:
+                newest[0] += 2_000
+            time.sleep(0)
+
+    thread = threading.Thread(target=feed)
+    recorder.start()
+    thread.start()
+    try:
+        _wait_until(lambda: int(block.counters["recorded"][0]) > 0)
+    finally:
+        end.set()
+        thread.join()
+        recorder.stop()
+
+
+def test_a_file_that_is_removed_ends_the_recording(tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    recorder = Recorder(block_with_clock(), folder, "bench")
+    recorder.start()
+    shutil.rmtree(folder)
+    _wait_until(lambda: recorder.told()["error"])
+    recorder.stop()
+    assert "001.mcap: recording ended: the file has been removed" in recorder.told()["error"]
+
+
+def test_daemons_of_one_second_and_folder_do_not_take_each_others_files(tmp_path: Path) -> None:
+    recorders = [Recorder(block_with_clock(), tmp_path, "bench") for _ in range(4)]
+    threads = [threading.Thread(target=recorder.start) for recorder in recorders]
+    for thread in threads:
+        thread.start()
+    for thread, recorder in zip(threads, recorders, strict=True):
+        thread.join()
+        recorder.stop()
+    assert [recorder.told()["error"] for recorder in recorders] == [""] * 4
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_the_thousandth_file_of_a_session_is_not_the_last(tmp_path: Path) -> None:
+    for number in (999, 1000):
+        (tmp_path / f"bench-20270115T080000Z-{number}.mcap").write_bytes(b"")
+    recorder = Recorder(block_with_clock(), tmp_path, "bench")
+    recorder.start()
+    recorder.stop()
+    assert recorder.told()["error"] == "" and recorder.told()["file"].endswith("-1001.mcap")
+
+
+def test_a_small_disk_keeps_a_small_reserve(tmp_path: Path) -> None:
+    assert reserve_of(20 << 20) == 1 << 20
+    assert reserve_of(1 << 40) == 64 << 20
 
 
 def test_no_room_at_all_is_said_at_the_start(tmp_path: Path) -> None:
