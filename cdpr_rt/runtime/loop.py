@@ -72,6 +72,8 @@ class ControlLoop:
         self.reacting = Reaction.NONE
         """What ends the present motion, NONE while nothing does."""
         self.ended = False
+        self.doubt = ""
+        """Which drive is not known to be without power at the end."""
         self.missed = 0
         self.cycle: Cycle | None = None
         self.notices: list[str] = []

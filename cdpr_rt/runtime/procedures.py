@@ -213,7 +213,6 @@ def disable(loop: ControlLoop) -> Iterator[None]:
         else:
             loop.machine.power_off()
         yield from come_to_rest(loop, LoopState.READY)
-    loop.life.forget()
 
 
 def acknowledge(loop: ControlLoop) -> Iterator[None]:
@@ -247,7 +246,8 @@ def shut_down(loop: ControlLoop) -> Iterator[None]:
     doubt: list[str] = []
     yield from _slowly(loop, lambda: doubt.append(loop.machine.close()))
     if any(doubt):
-        loop.life.blame(doubt[0])
+        loop.doubt = doubt[0]
+        loop.life.blame(loop.doubt)
     loop.life.enter(LoopState.UNCONFIGURED)
     loop.ended = True
 

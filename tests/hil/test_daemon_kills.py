@@ -23,8 +23,8 @@ from drivers.data_sheet import load_dictionary
 from drivers.network import CanNetwork
 from profiles import load_drive
 
-PERIOD_S, HEARTBEAT_S = 0.004, 0.1
-PATIENT = "missed_cycles = 25\nmissed_in_window = 500\nlate_s = 0.5"
+PERIOD_S, HEARTBEAT_S = 0.002, 0.1
+PATIENT = "missed_cycles = 50\nmissed_in_window = 500\nlate_s = 0.5"
 NODES = (1, 2)
 SPEED_rad_s = 2.0
 # beside the other tests neither this process nor the simulator is always on time

@@ -28,7 +28,7 @@ from tools.daemon.child import end_with
 from tools.daemon.listening_machine import ListeningMachine
 from tools.daemon.machine import RobotMachine
 from tools.daemon.settings import RunSettings
-from tools.errors import BAD_INPUT, DONE, CommandError
+from tools.errors import BAD_INPUT, DONE, FAILED, CommandError
 from tools.session import latency_s
 
 
@@ -56,6 +56,9 @@ def main() -> int:
         counters["start_realtime_ns"] = time.time_ns()
     counters["loop_pid"] = os.getpid()
     loop.run()
+    if loop.doubt:
+        print(f"cdpr: {loop.doubt}", file=sys.stderr)
+        return FAILED
     return DONE
 
 
