@@ -208,6 +208,8 @@ def _ended(reason: str, status: int) -> CommandError:
 
 def _require_free(control: Path) -> None:
     """Raise BadInputError where a daemon listens at `control` already, or none ever could."""
+    if not os.access(control.parent, os.W_OK | os.X_OK):
+        raise BadInputError(f"--socket {control}: {control.parent} is no folder to write into")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
         try:
             caller.connect(str(control))

@@ -156,17 +156,13 @@ class Launcher:
         if code == DONE:
             return True
         if code is not None and not self._up:
-            return self._could_not_begin("loop", self._loop)
-        refused = self._service is not None and self._service.process.poll() == BAD_INPUT
-        if refused and self._service is not None and not self._up:
-            return self._could_not_begin("service", self._service)
-        return False
+            self._could_not_begin("loop", self._loop)
+        return not self._up and bool(self.reason)
 
-    def _could_not_begin(self, name: str, child: Child) -> bool:
+    def _could_not_begin(self, name: str, child: Child) -> None:
         self.reason = f"the {name} could not begin: {child.end}"
         if child.process.returncode == BAD_INPUT:
             self._failure = BAD_INPUT
-        return True
 
     def _turn(self) -> None:
         now = time.monotonic()
@@ -216,6 +212,11 @@ class Launcher:
         if self._service is not None:
             if not self._service.end:
                 self._watch_service_turns()
+                return
+            # an address that is taken may be free again in a moment, bad input stays bad
+            hopeless = self._service.process.returncode == BAD_INPUT
+            if not self._up and (hopeless or self._restarts >= len(_RESTART_S)):
+                self._could_not_begin("service", self._service)
                 return
             lived = now - self._service.started
             self._restarts = 1 if lived > _STEADY_S else self._restarts + 1

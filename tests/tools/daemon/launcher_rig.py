@@ -26,6 +26,7 @@ NAME = "stand-in"
 
 def main(folder: Path) -> int:
     launcher.LOOP, launcher.SERVICE = "stand_in_loop", "stand_in_service"  # type: ignore[misc]
+    launcher._RESTART_S = (0.1, 0.1, 0.1)  # type: ignore[misc]
     launcher._LOOP_STALLED_S = launcher._SERVICE_STALLED_S = 1.0  # type: ignore[misc]
     block = SharedBlock.create(1, 0.1, 100.0)
     settings = RunSettings(
@@ -84,9 +85,13 @@ def loop() -> None:
 
 
 def service() -> None:
-    """Open the socket and wait to be told to end."""
+    """Open the socket and wait to be told to end, or do as the file `plan.json` says."""
     settings = RunSettings.from_argv()
     folder = Path(settings.robot)
+    plan = json.loads((folder / "plan.json").read_text())
+    if "refuse_service" in plan:
+        _note(folder, "service refused")
+        sys.exit(plan["refuse_service"])
     _tell_pid(folder, "service")
     end = _asked_to_end()
     end_with(settings.launcher_pid)

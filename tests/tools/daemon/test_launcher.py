@@ -200,6 +200,16 @@ def test_a_loop_that_cannot_begin_ends_the_daemon_with_its_status(
     assert daemon.ends() == status
 
 
+@pytest.mark.parametrize(("status", "times"), [(1, 4), (2, 1)])
+def test_a_service_that_cannot_begin_ends_the_daemon_in_the_end(
+    start: Start, status: int, times: int
+) -> None:
+    daemon = start({"refuse_service": status})
+    assert "the service could not begin" in daemon.line("reason")["reason"]
+    assert daemon.ends() == status
+    assert daemon.log().count("service refused") == times
+
+
 def test_a_loop_that_was_told_to_shut_down_ends_the_daemon_well(start: Start) -> None:
     daemon = start()
     daemon.line("ready")
