@@ -24,6 +24,7 @@ from cdpr_rt.runtime.shared_block import RowWriter
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording import Recorder
 from tools.cli import main
+from tools.report.style import thinned
 
 
 def _log(*arguments: str | Path) -> tuple[int, str, str]:
@@ -152,12 +153,71 @@ def test_plot_draws_a_picture(folder: Path, tmp_path: Path) -> None:
     assert Path(copied).with_suffix(".png").exists()
 
 
+def _recorded(folder: Path, rows: Row, n: int = 2, **described: Any) -> Path:
+    block = block_with_clock(n=n)
+    block.write_description({"robot": "bench", **described})
+    recorder = Recorder(block, folder, "bench")
+    put(RowWriter(block), rows)
+    recorder.start()
+    recorder.stop()
+    return Path(recorder.told()["file"])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_single_cycle_and_odd_names_are_drawn(tmp_path: Path) -> None:
+    axes = [{"name": "_left"}, {"name": r"$\frac{$"}]
+    path = _recorded(tmp_path, made_rows(0, 1), axes=axes)
+    assert _done("plot", path)["rows"] == 1
+    one = imread(path.with_suffix(".png"))
+    assert _done("plot", path, "--axis", "_left")["rows"] == 1
+    assert one.shape != (other := imread(path.with_suffix(".png"))).shape or (one != other).any()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_recording_of_nothing_known_is_drawn(tmp_path: Path) -> None:
+    rows = made_rows(0, 100)
+    for name in ("position_rad", "setpoint_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N"):
+        rows[name] = np.nan
+    assert _done("plot", _recorded(tmp_path, rows))["rows"] == 100
+
+
+def test_curves_with_single_unknown_values_keep_their_extremes() -> None:
+    x = np.arange(30_000.0)
+    y = np.sin(x / 500.0)
+    y[::7] = np.nan
+    y[10_000:12_000] = np.nan
+    y[20_001] = 9.0
+    at, kept = thinned(x, y)
+    assert kept.size < 9000 and np.nanmax(kept) == 9.0
+    assert np.isnan(kept[(at > 10_100) & (at < 11_900)]).all()
+    assert np.isfinite(kept).mean() > 0.9
+
+
+def test_recordings_of_several_robots_make_no_table(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    _recorded(tmp_path, made_rows(0, 100))
+    second = _recorded(tmp_path, made_rows(0, 100, 3), 3)
+    for command, name in (("export", "x.csv"), ("export", "x.parquet"), ("plot", "x.png")):
+        status, _, errors = _log(command, tmp_path, "--out", tmp_path / name)
+        assert status == 2 and errors.count("\n") == 1
+        assert f"{second}: of bench with 3 axes, and those before it of bench with 2" in errors
+        assert not (tmp_path / name).exists()
+    assert capfd.readouterr().err == ""  # no complaint of a table that was not finished
+    assert len(_done("info", tmp_path)["recordings"]) == 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
         (("info", "missing.mcap"), "missing.mcap: cannot be read: No such file"),
         (("info", "text.mcap"), "text.mcap: not a recording"),
         (("info", "empty"), "empty: no recordings"),
+        (("info", "x" * 300), "x: cannot be read: File name too long"),
+        (
+            ("export", "FOLDER", "--out", f"{'x' * 300}.csv"),
+            "cannot be written: File name too long",
+        ),
         (("export", "FOLDER", "--out", "x.txt"), "allowed: a name that ends in .csv or .parquet"),
         (("export", "FOLDER", "--out", "there.csv"), "there.csv: exists already"),
         (("export", "FOLDER", "--out", "x.csv", "--fields", "speed"), "--fields speed: allowed:"),

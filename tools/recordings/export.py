@@ -21,7 +21,11 @@ def check_target(path: Path, overwrite: bool) -> None:
     """Raise BadInputError where `path` cannot be written to."""
     if path.suffix not in FORMATS:
         raise BadInputError(f"--out {path}: allowed: a name that ends in {' or '.join(FORMATS)}")
-    if path.exists() and not overwrite:
+    try:
+        exists = path.exists()
+    except OSError as error:
+        raise BadInputError(f"--out {path}: cannot be written: {error.strerror}") from None
+    if exists and not overwrite:
         raise BadInputError(f"--out {path}: exists already; give --overwrite to write over it")
 
 
@@ -46,21 +50,27 @@ def export(selection: Selection, path: Path) -> int:
 
 def _write(selection: Selection, file: IO[bytes], suffix: str) -> int:
     count, writer = 0, None
-    for columns in selection.rows():
-        table = _table(columns)
-        if writer is None and suffix == ".csv":
-            writer = csv.CSVWriter(file, table.schema)
-        elif writer is None:
-            writer = parquet.ParquetWriter(file, table.schema, compression="zstd")
-        writer.write_table(table)
-        count += table.num_rows
-    if writer is None:
-        names = ", ".join(str(reader.path) for reader in selection.readers)
-        raise BadInputError(f"{names}: no cycles in what was asked for")
-    if suffix == ".parquet":
-        described = json.dumps(selection.readers[-1].description)
-        writer.add_key_value_metadata({"description": described})
-    writer.close()
+    try:
+        for columns in selection.rows():
+            table = _table(columns)
+            if writer is None and suffix == ".csv":
+                writer = csv.CSVWriter(file, table.schema)
+            elif writer is None:
+                writer = parquet.ParquetWriter(file, table.schema, compression="zstd")
+            writer.write_table(table)
+            count += table.num_rows
+        if writer is None:
+            names = ", ".join(str(reader.path) for reader in selection.readers)
+            raise BadInputError(f"{names}: no cycles in what was asked for")
+        if suffix == ".parquet":
+            described = json.dumps(selection.readers[-1].description)
+            writer.add_key_value_metadata({"description": described})
+        writer.close()
+    except BaseException:
+        if writer is not None:
+            with contextlib.suppress(Exception):  # or it complains later, of the file being closed
+                writer.close()
+        raise
     return count
 
 

@@ -42,8 +42,7 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
     """
     columns = selection.columns()
     count = columns["position_rad"].shape[1]
-    description = selection.readers[-1].description
-    names = [str(axis.get("name") or k) for k, axis in enumerate(description.get("axes", []))]
+    names = selection.readers[-1].axes[:count]
     names += [str(k) for k in range(len(names), count)]
     chosen = axes_of(names, axes)
     degrees = {name: np.degrees(columns[name]) for name in FIELDS[:3]}
@@ -55,19 +54,22 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
         ("tension (N)", columns["tension_N"]),
     ]
     panels = [one for one in panels if np.isfinite(one[1][:, chosen]).any()]
+    dot = "." if columns[ELAPSED].size == 1 else None
     figure, all_axes = canvas(rows=len(panels) + 1, height=1.75, sharex=True)
     for ax, (label, values) in zip(all_axes, panels, strict=False):
         for k in chosen:
             colour, line = _COLOURS[k % len(_COLOURS)], "-" if k < len(_COLOURS) else "--"
             x, y = thinned(columns[ELAPSED], values[:, k])
-            ax.plot(x, y, color=colour, ls=line, label=names[k])
+            ax.plot(x, y, color=colour, ls=line, marker=dot, label=_as_it_is(names[k]))
         ax.set_ylabel(label)
     _draw_times(all_axes[-1], columns)
     for ax in all_axes:
         _shade(ax, columns)
     all_axes[-1].set_xlabel("bus time since the first cycle (s)")
-    all_axes[-1].set_xlim(columns[ELAPSED][0], columns[ELAPSED][-1])
-    legend_above(figure, all_axes[0])
+    if dot is None:
+        all_axes[-1].set_xlim(columns[ELAPSED][0], columns[ELAPSED][-1])
+    if panels:
+        legend_above(figure, all_axes[0])
     figure.align_ylabels()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -75,6 +77,11 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
     except OSError as error:
         raise WorkFailedError(f"{path}: cannot be written: {error.strerror or error}") from error
     return int(columns["state"].size)
+
+
+def _as_it_is(name: str) -> str:
+    """Return a label that shows `name`, whatever it begins with or has in it."""
+    return f" {name}".replace("$", r"\$")
 
 
 def _draw_times(ax: Axes, columns: Columns) -> None:

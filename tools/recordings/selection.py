@@ -25,7 +25,10 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
     """Return the recordings that `paths` name: files, or all in a folder. Raises BadInputError."""
     found: list[Path] = []
     for path in paths:
-        inside = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        try:
+            inside = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        except OSError as error:
+            raise BadInputError(f"{path}: cannot be read: {error.strerror}") from None
         if not inside:
             raise BadInputError(f"{path}: no recordings (*.mcap) in this folder")
         found += inside
@@ -80,6 +83,7 @@ class Selection:
         self.readers = [RecordingReader(path) for path in files_of(paths)]
         self._fields = fields
         self._from_s, self._until_s = from_s, until_s
+        self._robot: tuple[str | None, str | None] | None = None
         self.advance: Callable[[float], None] = lambda _seconds: None
         """Called with how far reading has come, out of `reading_s`."""
         if until_s <= from_s:
@@ -100,6 +104,7 @@ class Selection:
         time = _Time()
         for reader in self.readers:
             for columns in _readable(reader, needed):
+                self._check_robot(reader)
                 done = sum(one.position for one in self.readers)
                 self.advance(done / _BYTES_PER_S)
                 elapsed = time(columns["time_s"], columns["stamp_ns"])
@@ -107,6 +112,16 @@ class Selection:
                 if wanted.any():
                     chosen = {name: columns[name][wanted] for name in self._fields or columns}
                     yield {ELAPSED: elapsed[wanted], **chosen}
+
+    def _check_robot(self, reader: RecordingReader) -> None:
+        """Raise BadInputError where a file is not of the robot of those before it."""
+        robot = (reader.metadata.get("robot"), reader.metadata.get("axes"))
+        first = self._robot = self._robot or robot
+        if robot != first:
+            said = "{}: of {} with {} axes, and those before it of {} with {}"
+            raise BadInputError(
+                said.format(reader.path, *robot, *first) + "; allowed: recordings of one robot"
+            )
 
     def columns(self) -> Columns:
         """Return all of them as whole columns; raises BadInputError where there are none."""

@@ -88,7 +88,7 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         for rows in selection.rows():
             count.add(rows)
     (reader,) = selection.readers
-    began_ns = _wall_ns(reader.metadata, count.first_stamp_ns)
+    began_ns = count.first_stamp_ns + reader.offset_ns
     for event in reader.events:
         event["after_s"] = (event["log_time_ns"] - began_ns) * 1e-9 if count.rows else None
     return {
@@ -97,19 +97,12 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         "ended": reader.ended,
         "robot": reader.metadata.get("robot"),
         "session": reader.metadata.get("session"),
-        "part": int(reader.metadata.get("part", 1)),
-        "axes": [axis.get("name") for axis in reader.description.get("axes", [])],
+        "part": reader.part,
+        "axes": reader.axes,
         "period_s": reader.description.get("period_s"),
         **count.result(),
         "events": sorted(reader.events, key=lambda event: int(event["log_time_ns"])),
     }
-
-
-def _wall_ns(metadata: dict[str, str], stamp_ns: int) -> int:
-    """Return the time of day of a stamp, by the pair of readings in the file."""
-    pair = (metadata.get(f"start_{clock}_ns", "0") for clock in ("realtime", "monotonic"))
-    realtime_ns, monotonic_ns = map(int, pair)
-    return stamp_ns + realtime_ns - monotonic_ns
 
 
 def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:

@@ -69,11 +69,17 @@ def embedded(figure: Figure) -> str:
 
 
 def thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a curve (k,) with few enough points to draw, both extremes of each stretch kept."""
+    """Return a curve (k,) with few enough points to draw, both extremes of each stretch kept.
+
+    A gap (nan) is kept where it fills a stretch.
+    """
     step = -(-2 * y.size // _POINTS)
     if step <= 2:
         return x, y
     blocks = np.pad(y, (0, -y.size % step), mode="edge").reshape(-1, step)
-    extremes = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)], axis=1), axis=1)
+    unknown = np.isnan(blocks)
+    lowest = np.where(unknown, np.inf, blocks).argmin(axis=1)
+    highest = np.where(unknown, -np.inf, blocks).argmax(axis=1)
+    extremes = np.sort(np.stack([lowest, highest], axis=1), axis=1)
     keep = (extremes + step * np.arange(len(blocks))[:, None]).ravel().clip(max=y.size - 1)
     return x[keep], y[keep]

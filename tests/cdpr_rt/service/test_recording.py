@@ -145,7 +145,7 @@ def _foreign(path: Path, profile: str, schema: bytes, data: bytes, **metadata: s
         schema_id = writer.register_schema("other", "protobuf", schema) if schema else 0
         channel = writer.register_channel("/cycle", "protobuf", schema_id)
         writer.add_message(channel, 0, data, 0)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return path
 
 
