@@ -53,7 +53,7 @@ class Hub:
         self._clients: dict[int, Client] = {}
         self._routes: dict[int, Route] = {}
         self._accepts = [node.accepts for node in self.nodes]
-        self._now_s = self._quiet_until_s = 0.0
+        self._now_s = 0.0
         self._just_synced = False
         self._leftover = False
         self._batch: list[tuple[int, int, int, Route, bytes, LocalNode]] = []
@@ -90,7 +90,8 @@ class Hub:
         assert self._listener is not None
         try:
             sock, _ = self._listener.accept()
-        except OSError:  # the peer has gone already
+        except OSError:
+            # the peer has gone already
             return
         self.attach(sock)
 
@@ -175,14 +176,13 @@ class Hub:
 
     def _tick(self, now_s: float) -> bool:
         """Let the nodes' timers run when one is due; return whether one was."""
-        self._quiet_until_s = min((node.next_event() for node in self.nodes), default=math.inf)
-        if self._quiet_until_s > now_s:
-            return False
-        self._advance(now_s)
-        return True
+        due = any(node.next_event() <= now_s for node in self.nodes)
+        if due:
+            self._advance(now_s)
+        return due
 
     def _advance(self, now_s: float) -> None:
-        self._now_s, self._quiet_until_s = now_s, 0.0
+        self._now_s = now_s
         for node in self.nodes:
             node.advance(now_s)
         self._check_accepts()
@@ -190,11 +190,10 @@ class Hub:
 
     def _reach(self, now_s: float, route: Route) -> None:
         """Bring those nodes up to the time of a frame which it concerns, or all if one is due."""
-        if now_s >= self._quiet_until_s and self._tick(now_s):
-            return
-        self._now_s = now_s
-        for node in route.nodes:
-            node.advance(now_s)
+        if not self._tick(now_s):
+            self._now_s = now_s
+            for node in route.nodes:
+                node.advance(now_s)
 
     def _check_accepts(self) -> None:
         for i, node in enumerate(self.nodes):
@@ -294,13 +293,13 @@ class Hub:
             if peer is not source:
                 self._deliver(frame, peer)
         if route.nodes:
+            answered = False
             for node in route.nodes:
                 node.receive(frame, now_s)
-                if self._quiet_until_s:
-                    self._quiet_until_s = min(self._quiet_until_s, node.next_event())
+                answered = answered or bool(node.outbox)
             if route.configures:
                 self._check_accepts()
-            if any(node.outbox for node in route.nodes):
+            if answered:
                 self._flush()
         return False
 
@@ -312,7 +311,6 @@ class Hub:
             period_s = max(period_s, node.sync_period_s)
         wall_s = source.sent_s if self._paced else time.monotonic()
         self._now_s = now_s = self.clock.sync(wall_s, period_s)
-        self._quiet_until_s = 0.0
         self._just_synced = self.clock.held
         for node in nodes:
             node.advance(now_s)
@@ -397,5 +395,4 @@ class Hub:
         for node in route.nodes:
             if node is not source:
                 node.receive(frame, self._now_s)
-                self._quiet_until_s = 0.0
                 self._leftover = self._leftover or bool(node.outbox)
