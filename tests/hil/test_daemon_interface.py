@@ -39,19 +39,32 @@ late_s = 10.0
 """
 
 
+@contextmanager
+def running(folder: Path, *options: str, period_s: float) -> Iterator[RealDaemon]:
+    one = RealDaemon(folder, "--no-record", *options, period_s=period_s, limits=PATIENT)
+    try:
+        yield one
+    finally:
+        assert one.end() == 0, one.errors()
+
+
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
+    """One that is only asked, and stands still: its cycle is slow."""
     folder = tmp_path_factory.mktemp("daemon")
     key_file = folder / "key"
     key_file.write_text(KEY)
     key_file.chmod(0o600)
-    options = ("--http", "127.0.0.1:0", "--key-file", str(key_file), "--no-record")
-    running = RealDaemon(folder, *options, period_s=0.002, limits=PATIENT)
-    try:
-        running.wait_for("ready")
-        yield running
-    finally:
-        assert running.end() == 0, running.errors()
+    options = ("--http", "127.0.0.1:0", "--key-file", str(key_file))
+    with running(folder, *options, period_s=0.01) as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def quick_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
+    """One that moves: its cycle is fast enough for a stiff position loop."""
+    with running(tmp_path_factory.mktemp("quick"), period_s=0.002) as one:
+        yield one
 
 
 @pytest.fixture
@@ -123,9 +136,9 @@ def test_each_answer_is_as_described_and_nothing_gets_power(
     assert ("state", "active") not in events(daemon)
 
 
-@pytest.fixture
-def active(daemon: RealDaemon) -> Iterator[RealDaemon]:
-    """With power, holding; nobody holds the right to move.
+@contextmanager
+def with_power(daemon: RealDaemon) -> Iterator[RealDaemon]:
+    """Have it hold; nobody holds the right to move.
 
     What ended an earlier test, as a machine too busy for the simulated bus, is acknowledged.
     """
@@ -139,6 +152,18 @@ def active(daemon: RealDaemon) -> Iterator[RealDaemon]:
     assert daemon.status()["state"] == "active", happened(daemon)
     daemon.http.post("/hold")
     until(lambda: all(at_rest(axis) for axis in daemon.status()["axes"]))
+
+
+@pytest.fixture
+def active(daemon: RealDaemon) -> Iterator[RealDaemon]:
+    with with_power(daemon) as one:
+        yield one
+
+
+@pytest.fixture
+def quick(quick_daemon: RealDaemon) -> Iterator[RealDaemon]:
+    with with_power(quick_daemon) as one:
+        yield one
 
 
 def at_rest(axis: dict[str, Any]) -> bool:
@@ -168,7 +193,12 @@ def test_with_power_too_nobody_moves_it_who_does_not_hold_the_right(
         for path in ("/program", "/set", "/enable"):
             answer = active.http.post(path, json={"program": "jog", "wanted": {}}, headers=wrong)
             assert answer.status_code in (409, 422)
-        fuzz(description, url, {"/shutdown", "/disable", "/events", "/metrics"}, **wrong)
+        fuzz(
+            description,
+            url,
+            {"/shutdown", "/disable", "/acknowledge", "/events", "/metrics"},
+            **wrong,
+        )
         assert active.http.put("/control", headers=headers).status_code in (200, 409)
     assert active.status()["program"] == "hold", happened(active)
     assert angles(active) == pytest.approx(before, abs=10.0)
@@ -192,12 +222,12 @@ WISHES = st.dictionaries(
 )
 
 
-def test_no_wish_of_the_holder_ends_the_loop(active: RealDaemon) -> None:
-    loop = active.children()["loop"]
-    programs = active.http.get("/description").json()["programs"]
+def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
+    loop = quick.children()["loop"]
+    programs = quick.http.get("/description").json()["programs"]
     seen: set[int] = set()
 
-    with holding(active) as headers:
+    with holding(quick) as headers:
 
         @settings(max_examples=80, deadline=None, derandomize=True)
         @given(program=st.sampled_from([*programs, "none"]), first=WISHES, then=WISHES)
@@ -205,44 +235,44 @@ def test_no_wish_of_the_holder_ends_the_loop(active: RealDaemon) -> None:
             if program == "idle":  # its torque is zero: what hangs on the cable falls
                 return
             body = {"program": program, "wanted": first}
-            seen.add(active.http.post("/program", json=body, headers=headers).status_code)
-            seen.add(active.http.post("/set", json={"wanted": then}, headers=headers).status_code)
+            seen.add(quick.http.post("/program", json=body, headers=headers).status_code)
+            seen.add(quick.http.post("/set", json={"wanted": then}, headers=headers).status_code)
 
         wish()
     assert seen == {200, 409}
     assert alive(loop)
 
 
-def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(active: RealDaemon) -> None:
-    command = [sys.executable, "-m", "tools.cli", "jog", "left=60", "--seconds", "60", *active.at]
+def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(quick: RealDaemon) -> None:
+    command = [sys.executable, "-m", "tools.cli", "jog", "left=60", "--seconds", "60", *quick.at]
     client = subprocess.Popen(command)
-    until(lambda: active.status()["program"] == "jog")
-    until(lambda: active.status()["axes"][0]["velocity_rad_s"] > 0.5)
-    assert active.status()["control"]["client"]
+    until(lambda: quick.status()["program"] == "jog")
+    until(lambda: quick.status()["axes"][0]["velocity_rad_s"] > 0.5)
+    assert quick.status()["control"]["client"]
     client.kill()
     client.wait()
     killed = time.monotonic()
-    until(lambda: active.status()["program"] == "hold")
+    until(lambda: quick.status()["program"] == "hold")
     assert time.monotonic() - killed < 6.0
-    until(lambda: abs(active.status()["axes"][0]["velocity_rad_s"]) < 0.1)
-    assert "nobody holds the right to move" in active.status()["reason"]
+    until(lambda: abs(quick.status()["axes"][0]["velocity_rad_s"]) < 0.1)
+    assert "nobody holds the right to move" in quick.status()["reason"]
 
 
 def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
-    active: RealDaemon,
+    quick: RealDaemon,
 ) -> None:
-    with holding(active, 1.0) as headers:
+    with holding(quick, 1.0) as headers:
         wanted = {"velocity_rad_s": [0.5, 0.0], "timeout_s": 2.0}
         body = {"program": "jog", "wanted": wanted}
-        assert active.http.post("/program", json=body, headers=headers).status_code == 200
-        service = active.children()["service"]
+        assert quick.http.post("/program", json=body, headers=headers).status_code == 200
+        service = quick.children()["service"]
         os.kill(service, signal.SIGSTOP)
         time.sleep(2.0)
         os.kill(service, signal.SIGCONT)
-        until(lambda: active.status().get("program") == "hold")
+        until(lambda: quick.status().get("program") == "hold")
     os.kill(service, signal.SIGKILL)
-    until(lambda: active.children().get("service") not in (None, service))
-    status = active.wait_for("active")
+    until(lambda: quick.children().get("service") not in (None, service))
+    status = quick.wait_for("active")
     assert status["program"] == "hold"
     assert status["control"]["held"] is False
 
@@ -332,31 +362,31 @@ def setpoints(daemon: RealDaemon) -> list[float]:
     return [math.degrees(axis["setpoint_rad"]) for axis in daemon.status()["axes"]]
 
 
-def test_a_move_ends_where_it_should(active: RealDaemon, terminal: Terminal) -> None:
-    result = terminal.told("move", "left=20", "right=-15", "--speed", "200", *active.at)
+def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> None:
+    result = terminal.told("move", "left=20", "right=-15", "--speed", "200", *quick.at)
     assert result["arrived"] is True
-    assert setpoints(active) == pytest.approx([20.0, -15.0], abs=0.1)
+    assert setpoints(quick) == pytest.approx([20.0, -15.0], abs=0.1)
     found = [math.degrees(result["position_rad"][name]) for name in ("left", "right")]
     assert found == pytest.approx([20.0, -15.0], abs=10.0)
-    terminal.told("move", "right=5", "--relative", *active.at)
-    assert setpoints(active) == pytest.approx([20.0, -10.0], abs=0.1)
+    terminal.told("move", "right=5", "--relative", *quick.at)
+    assert setpoints(quick) == pytest.approx([20.0, -10.0], abs=0.1)
 
 
-def test_a_jog_turns_as_long_and_as_fast_as_asked(active: RealDaemon, terminal: Terminal) -> None:
-    start = setpoints(active)
-    result = terminal.told("jog", "left=40", "--seconds", "1", *active.at)
+def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: Terminal) -> None:
+    start = setpoints(quick)
+    result = terminal.told("jog", "left=40", "--seconds", "1", *quick.at)
     assert result["program"] == "hold"
-    turned = [now - then for now, then in zip(setpoints(active), start, strict=True)]
+    turned = [now - then for now, then in zip(setpoints(quick), start, strict=True)]
     assert 25.0 < turned[0] < 120.0  # the machine may be busy, the jog then lasts longer
     assert turned[1] == pytest.approx(0.0, abs=0.1)
-    assert abs(angles(active)[0] - setpoints(active)[0]) < 15.0
+    assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0
 
 
 def test_a_controller_runs_to_its_end_and_hold_follows(
-    active: RealDaemon, terminal: Terminal
+    quick: RealDaemon, terminal: Terminal
 ) -> None:
     sweep = ("sweep", "distance_rad=[0.2, 0.2]", "speed_rad_s=0.4", "legs=2")
-    result = terminal.told("controller", *sweep, *active.at)
+    result = terminal.told("controller", *sweep, *quick.at)
     assert (result["state"], result["program"]) == ("active", "hold")
 
 
