@@ -153,7 +153,7 @@ class _Topics:
     def __init__(self, context: Context, given: Sequence[str], n: int) -> None:
         self.given = list(given)
         names = [*given, *(f"axis_{k + 1}" for k in range(len(given), n))][:n]
-        self._names = [re.sub(r"\W", "_", name) for name in names]
+        self._names = _spelled(names)
         axis = _schema("Axis", dict.fromkeys((*_AXIS_FIELDS, "error_deg"), "number"))
         axes = {"type": "object", "title": "cdpr_rt.Axes"}
         axes["properties"] = dict.fromkeys(self._names, axis)  # type: ignore[assignment]
@@ -233,6 +233,17 @@ class _Topics:
                 rotation=turned,
             )
             self._frame.log(transform, log_time=time_ns)
+
+
+def _spelled(names: Sequence[str]) -> list[str]:
+    """Return the names as message paths can spell them, each of its own."""
+    spelled: list[str] = []
+    for name in names:
+        word = re.sub(r"\W", "_", name)
+        while word in spelled:
+            word += "_"
+        spelled.append(word)
+    return spelled
 
 
 def _schema(title: str, fields: dict[str, str]) -> dict[str, Any]:

@@ -153,6 +153,14 @@ def test_a_client_that_does_not_read_holds_nobody_up() -> None:
         assert view.told()["error"] == ""
 
 
+def test_axes_whose_names_are_spelled_alike_are_all_shown() -> None:
+    block = block_with_clock()
+    block.write_description({"axes": [{"name": "top left"}, {"name": "top_left"}]})
+    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+        _, messages = asyncio.run(_watch(view.told()["url"], 0.7))
+    assert set(json.loads(messages["/axes"][-1][1])) == {"top_left", "top_left_"}
+
+
 def test_it_stays_where_no_cycles_run() -> None:
     block = block_with_clock()
     with _running(block) as view:
