@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import re
 import threading
@@ -76,6 +77,8 @@ class LiveView:
 
     def start(self) -> None:
         """Listen on loopback; raises LiveViewError where the port is not free."""
+        # it has a line for each client that talks nonsense: they could fill a disk with them
+        logging.getLogger("foxglove.websocket").setLevel(logging.CRITICAL)
         try:
             self._server = start_server(
                 name=f"cdpr-rt {self._robot}",

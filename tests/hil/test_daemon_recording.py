@@ -7,6 +7,7 @@ import os
 import resource
 import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -70,18 +71,31 @@ def watch_live(daemon: RealDaemon) -> dict[str, Any]:
                     client.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 
 
+@contextmanager
+def few_files(most: int) -> Iterator[None]:
+    """Let processes that are started here open no more than this, unless they ask for it."""
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Path]]:
     """The files of a run in which, while the motors had power, the disk was full for the service
     and it was killed then; the next one has room again."""
     folder = tmp_path_factory.mktemp("run")
     recordings = folder / "recordings"
-    daemon = RealDaemon(folder, "--record", str(recordings), "--live", "0", limits=TOLERANT)
+    with few_files(512):
+        daemon = RealDaemon(folder, "--record", str(recordings), "--live", "0", limits=TOLERANT)
     try:
         told("enable", *daemon.at)
         assert set(watch_live(daemon)) == {"left", "right"}
         told("jog", "left=30", "--seconds", "1", *daemon.at)
         service = daemon.children()["service"]
+        assert resource.prlimit(service, resource.RLIMIT_NOFILE)[0] > 512  # for files, not clients
         fill_the_disk_for(service, daemon, recordings)
         os.kill(service, signal.SIGKILL)
         until(lambda: daemon.children().get("service", service) != service)

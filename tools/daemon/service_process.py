@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import resource
 import signal
 import sys
 import time
@@ -35,6 +36,7 @@ def main() -> int:
     """Serve until SIGTERM; return the exit status."""
     logging.basicConfig(level=logging.ERROR, format="service: %(message)s", stream=sys.stderr)
     settings = RunSettings.from_argv()
+    _allow_many_files()
     block = SharedBlock.attach(settings.block_fd)
     block.counters["service_pid"] = os.getpid()
     try:
@@ -43,6 +45,12 @@ def main() -> int:
         print(f"service: {error}", file=sys.stderr)
         return FAILED
     return DONE
+
+
+def _allow_many_files() -> None:
+    """So that clients who open connections without end do not keep the recorder from its files."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def build_parts(settings: RunSettings, service: Service) -> list[Part]:

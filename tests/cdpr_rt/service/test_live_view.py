@@ -3,6 +3,7 @@
 import asyncio
 import json
 import math
+import socket
 import struct
 import threading
 import time
@@ -159,6 +160,19 @@ def test_axes_whose_names_are_spelled_alike_are_all_shown() -> None:
     with _running(block) as view, _repeating(block, made_rows(100, 1)):
         _, messages = asyncio.run(_watch(view.told()["url"], 0.7))
     assert set(json.loads(messages["/axes"][-1][1])) == {"top_left", "top_left_"}
+
+
+def test_clients_that_talk_nonsense_leave_no_lines_in_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with _running(block_with_clock()) as view:
+        port = int(view.told()["url"].rsplit(":", 1)[1])
+        for _ in range(10):
+            with socket.create_connection(("127.0.0.1", port)) as client:
+                client.sendall(b"nonsense\r\n\r\n")
+                client.settimeout(5.0)
+                assert b"101" not in client.recv(1000)
+    assert not caplog.records
 
 
 def test_it_stays_where_no_cycles_run() -> None:
