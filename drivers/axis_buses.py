@@ -16,7 +16,7 @@ from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
 from drivers.axis_state import StateArrays
 from drivers.cia402 import POWER_OFF, State
-from drivers.errors import BusError, DriveFaultError, ModeRefusedError
+from drivers.errors import BusError, DriveFaultError, DriverError, ModeRefusedError
 from drivers.network import CanNetwork
 
 _STOP_TIMEOUT_S = 1.0
@@ -77,6 +77,9 @@ class AxisBuses:
             self.feedback, self.command = self._moves.feedback, self._moves.command
         self.transmits = 0
         """How often commands went out on all buses."""
+        self._lost = [False] * len(self.groups)
+        """Which buses have failed in this cycle."""
+        self._failure: BusError | None = None
         self._closed = False
 
     def _common_clock(self) -> bool:
@@ -93,33 +96,44 @@ class AxisBuses:
     # -- one cycle
 
     def sync(self) -> None:
-        """Send the SYNC that opens the cycle, on one bus right after the other."""
+        """Send the SYNC that opens the cycle, on one bus right after the other.
+
+        A bus that fails is told by `receive`, after the others' answers have been taken in.
+        """
         self.feedback.cycle += 1
         self.feedback.time_s = self.feedback.cycle * self.period_s
-        failure: BusError | None = None
-        for group in self.groups:
+        self._failure = None
+        for i, group in enumerate(self.groups):
+            self._lost[i] = False
             try:
                 group.sync()
             except BusError as error:
-                failure = failure or error
-        if failure is not None:
-            raise failure
+                self._lose(i, error)
 
     def receive(self) -> int:
         """Wait for the answers on all buses and decode them; return how many axes answered."""
         deadline_s = 0.0 if self.lockstep else time.monotonic() + self.groups[0].paced_wait_s
         answered = 0
-        failure: BusError | None = None
-        for group in self.groups:
+        for i, group in enumerate(self.groups):
+            if self._lost[i]:
+                continue
             try:
                 answered += group.receive(deadline_s)
             except BusError as error:
-                failure = failure or error
+                self._lose(i, error)
         if self._moves.needed:
             self._moves.gather()
-        if failure is not None:
-            raise failure
+        if self._failure is not None:
+            raise self._failure
         return answered
+
+    def _lose(self, i: int, error: BusError) -> None:
+        """Note that a bus has failed: what its axes said last is old."""
+        self._lost[i] = True
+        self._failure = self._failure or error
+        feedback = self.groups[i].feedback
+        for flags in (feedback.valid, feedback.alive, feedback.rate_ok):
+            flags.fill(False)
 
     def transmit(self) -> None:
         """Send controlwords and torques on all buses, to act from the next SYNC on."""
@@ -167,7 +181,7 @@ class AxisBuses:
         try:
             for group in self.groups:
                 group.request(state)
-        except (DriveFaultError, ModeRefusedError):
+        except DriverError:
             for group in self.groups:
                 group.request(State.SWITCH_ON_DISABLED)
             raise

@@ -85,7 +85,7 @@ class Machine(Protocol):
         """Whether all drives have their power and obey."""
 
     def unpowered(self) -> bool:
-        """Whether no drive that answers has power."""
+        """Whether no drive that can be heard has power, by what it said last."""
 
     def reset_faults(self) -> None:
         """Forget latched alarms and have faults reset in the cycles that follow."""

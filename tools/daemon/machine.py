@@ -17,7 +17,7 @@ from cdpr_rt.runtime.robot_arrays import limits_of
 from cdpr_rt.tension import TensionFeedback
 from drivers.axis_buses import AxisBuses
 from drivers.axis_shutdown import switch_off_by_sdo
-from drivers.cia402 import POWER_OFF, State
+from drivers.cia402 import POWER_OFF, State, state_of
 from drivers.errors import BusError, DriverError
 from drivers.network import CanNetwork
 from profiles import Robot
@@ -228,12 +228,16 @@ class RobotMachine:
         return self.device is not None and self.device.reached(State.OPERATION_ENABLED)
 
     def unpowered(self) -> bool:
-        """Whether no drive that answers has power."""
+        """Whether no drive that can be heard has power, by what it said last.
+
+        An answer that is missing says nothing: a quick stop would be cut short by it.
+        """
         device = self.device
-        return device is None or all(
-            state in POWER_OFF or not valid
-            for state, valid in zip(device.states(), device.feedback.valid, strict=True)
-        )
+        if device is None:
+            return True
+        told = zip(device.feedback.statusword, device.feedback.alive, strict=True)
+        # one that has never answered reads as not ready
+        return all(state_of(int(word)) in POWER_OFF or not alive for word, alive in told)
 
     def reset_faults(self) -> None:
         """Forget latched alarms and have faults reset in the cycles that follow."""

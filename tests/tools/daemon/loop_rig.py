@@ -22,7 +22,7 @@ from tools.daemon.settings import RunSettings
 
 
 class LoopRig:
-    """One loop on the buses of `url`; nothing moves unless the test turns it.
+    """One loop on the buses of `url`, or of several; nothing moves unless the test turns it.
 
     `programs` are run besides the daemon's own; the rest are settings.
     """
@@ -35,7 +35,7 @@ class LoopRig:
         self.block = SharedBlock.create(n, 20.0, rate_Hz)
         self.give_lease(1000.0)
         settings = RunSettings(
-            robot=str(path), name="rig", buses=(url,), socket=Path("unused"), **more
+            robot=str(path), name="rig", buses=tuple(url.split()), socket=Path("unused"), **more
         )
         self.machine = RobotMachine(self.robot, settings)
         parts = loop_parts(self.robot, self.block)
