@@ -216,6 +216,7 @@ def test_a_loop_that_dies_is_said_to_be_dead_also_to_those_who_wait(own_rig: Rig
         ("/program", '{"program": "jog", "unknown": 1}', "body.unknown"),
         ("/program", '{"program": "jog", "wanted": {"v": [NaN]}}', "body.wanted"),
         ("/program", '{"program": "jog", "wanted": {"v": 1e10}}', "body.wanted"),
+        ("/program", '{"program": "jog", "wanted": {"v": [-' + "9" * 400 + "]}}", "body.wanted"),
         ("/program", '{"program": "jog", "wanted": {"\\ud800": 1}}', "body.wanted"),
         ("/set", '{"wanted": {"v": [[[[[1]]]]]}}', "body.wanted"),
         ("/set", '{"wanted": {"v": [' + "1," * 64 + "1]}}", "body.wanted"),

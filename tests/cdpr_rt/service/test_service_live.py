@@ -194,6 +194,7 @@ def test_a_client_that_is_there_but_silent_loses_it(rig: Rig) -> None:
         '{"do": "program"}',
         '{"do": "program", "program": "jog", "wanted": {"v": [1e999]}}',
         '{"do": "set", "wanted": {"v": NaN}}',
+        '{"do": "set", "wanted": {"v": ' + "9" * 400 + "}}",
         '{"do": "set", "wanted": 1}',
         '{"do": "renew", "more": 1}',
         "[" * 9000,
