@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Generic, TypeVar, cast
 
 _T = TypeVar("_T")
@@ -22,7 +23,8 @@ class Job(Generic[_T]):
         self._thread.start()
 
     def _run(self) -> None:
-        os.sched_setaffinity(0, self._cores)
+        with suppress(OSError):  # cores that have been taken away since
+            os.sched_setaffinity(0, self._cores)
         try:
             self._result = self._work()
         except BaseException as error:

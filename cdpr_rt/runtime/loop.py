@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -136,7 +137,6 @@ class ControlLoop:
             self.parts.estimator.forget_lengths()  # drives that have booted count from anywhere
         self.cycle.begin()
         self.parts.estimator.reset()
-        self._rows.follow(self.cycle, self.setpoint, self.parts.estimator.estimate)
         self._last_ns = 0
         self.lost_bus = ""
         self.cycling = True
@@ -212,7 +212,9 @@ class ControlLoop:
             reaction = supervisor.check(cycle.device.feedback, estimate, self.setpoint, torque)
         else:
             torque[:] = 0.0
-        failure = self.lost_bus or cycle.device_alarm()
+        # in a fault the drives' complaints are known, and putting them in words takes its time
+        known = self.life.state is LoopState.FAULT
+        failure = self.lost_bus or ("" if known else cycle.device_alarm())
         alarm, stop = cycle.watch_alarm(), cycle.stop_reason()
         if failure or alarm or stop:
             if not self.driving:
@@ -248,10 +250,11 @@ class ControlLoop:
 
     def stop(self, reaction: Reaction, then: LoopState, torque: FloatArray | None = None) -> None:
         """End the motion as `reaction` says and go to state `then`."""
+        brakes = reaction is Reaction.CONTROLLED_STOP and self.driving
+        if brakes and not self._program_brakes():
+            brakes, reaction = False, Reaction.QUICK_STOP
         self.reacting = reaction
-        if reaction is Reaction.CONTROLLED_STOP and self.driving:
-            self.program.stop()
-        else:
+        if not brakes:
             if reaction is Reaction.QUICK_STOP:
                 self.machine.quick_stop()
             else:
@@ -261,6 +264,14 @@ class ControlLoop:
                 torque[:] = 0.0
             self.switch(IDLE)
         self.begin(procedures.come_to_rest(self, then))
+
+    def _program_brakes(self) -> bool:
+        try:
+            self.program.stop()
+        except Exception:  # whatever a program does wrong: the drives can brake by themselves
+            traceback.print_exc()
+            return False
+        return True
 
     # -- programs
 
@@ -285,7 +296,8 @@ class ControlLoop:
             program.command(wanted)
         self.program = program
         self.program_number = self.programs.index(program)
-        self._rows.control(program, self._asked)
+        estimate = self.parts.estimator.estimate
+        self._rows.follow(cycle, self.setpoint, estimate, program, self._asked)
         self.status.touch()
 
     @property
@@ -324,6 +336,12 @@ class ControlLoop:
             told = ""
         except ControlError as error:
             told = str(error)
+        except Exception as error:  # a mistake, of a program for instance: no power, the loop stays
+            traceback.print_exc()
+            told = f"{type(error).__name__}: {error}"
+            self.life.blame(told)
+            if self.life.state is LoopState.ACTIVE:
+                self.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
         if self._procedure is procedure:
             self._procedure = None
             self._orders.done(told)
@@ -342,9 +360,7 @@ class ControlLoop:
         elif self._stop_requests > 1:
             self._stop_requests = 1
             if self.driving and now_s - self._stopping_since_s > _AT_ONCE_AFTER_S:
-                self.machine.power_off()
-                self.driving = False
-                self.switch(IDLE)
+                self.stop(Reaction.TORQUE_OFF, LoopState.READY)  # brakes at once as well
 
     def job(self, work: Callable[[], Any]) -> Job[Any]:
         """Start slow work beside the cycle."""

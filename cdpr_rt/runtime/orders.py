@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cdpr_rt.runtime.loop import ControlLoop
 
 Order = Mapping[str, Any]
-_MOST_TEXT = 1500
+_MOST_TEXT, _SHORT_TEXT = 1500, 200
 _LONGEST_CABLE_m = 1000.0
 
 
@@ -89,11 +89,13 @@ class Orders:
 
     def _reply(self, number: int, told: str) -> None:
         state = self._loop.life.state.label
-        reply = {"to": number, "ok": not told, "text": told[:_MOST_TEXT], "state": state}
-        try:
-            self._loop.block.post_reply(reply)
-        except SharedBlockError:
-            return  # nobody takes them
+        for most in (_MOST_TEXT, _SHORT_TEXT):  # letters may take a dozen bytes each
+            reply = {"to": number, "ok": not told, "text": told[:most], "state": state}
+            try:
+                self._loop.block.post_reply(reply)
+                return
+            except SharedBlockError:
+                continue  # too long, or nobody takes them
 
     # -- what each does: at once, or by a procedure
 

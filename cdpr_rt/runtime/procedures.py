@@ -244,7 +244,10 @@ def shut_down(loop: ControlLoop) -> Iterator[None]:
             yield from come_to_rest(loop, LoopState.READY)
     loop.stop_cycles()
     doubt: list[str] = []
-    yield from _slowly(loop, lambda: doubt.append(loop.machine.close()))
+    try:
+        yield from _slowly(loop, lambda: doubt.append(loop.machine.close()))
+    except ControlError as error:  # such as a contactor that stays closed
+        doubt.append(str(error))
     if any(doubt):
         loop.doubt = doubt[0]
         loop.life.blame(loop.doubt)

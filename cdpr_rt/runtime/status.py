@@ -49,9 +49,16 @@ class StatusPage:
             return
         try:
             self._loop.block.write_status(status)
-        except SharedBlockError:  # a program that tells too much of itself
-            self._loop.block.write_status({**status, "program_progress": {}, "buses": {}})
+        except (SharedBlockError, TypeError, ValueError):  # a program that tells too much of itself
+            less = {"program_progress": {}, "buses": {}, "notices": []}
+            self._loop.block.write_status({**status, **less})
         self._written = status
+
+    def _progress(self) -> dict[str, Any]:
+        try:
+            return dict(self._loop.program.progress())
+        except Exception as error:  # no motion ends because it cannot be told of
+            return {"error": f"{type(error).__name__}: {error}"}
 
     def _status(self) -> dict[str, Any]:
         loop, life = self._loop, self._loop.life
@@ -63,7 +70,7 @@ class StatusPage:
             "reason_limit": life.details,
             "program": loop.program.name,
             "program_number": loop.program_number,
-            "program_progress": dict(loop.program.progress()),
+            "program_progress": self._progress(),
             "driving": loop.driving,
             "reacting": loop.reacting.label,
             "busy": loop.busy,

@@ -129,3 +129,31 @@ def test_a_brake_that_does_not_open_ends_in_a_fault(
     assert answer is not None
     assert not answer["ok"]
     rig.obeyed("acknowledge")
+
+
+def test_who_asks_twice_to_end_gets_the_brakes_at_once(
+    lab: tuple[LoopRig, Twin, BoardAxis],
+) -> None:
+    rig, _, winch = lab
+    rig.block.post_command({"do": "enable"})
+    wait(rig, lambda: rig.loop.driving and not rig.loop.busy)
+    jog(rig)
+    rig.loop.request_stop()
+    rig.turn(10)
+    assert rig.loop.driving  # it brakes under its controller
+    rig.loop._stopping_since_s -= 2.0
+    rig.loop.request_stop()
+    rig.turn(2)
+    assert not rig.loop.driving
+    assert rig.machine._safety is not None
+    assert not any(rig.machine._safety.io._wanted[brake] for brake in brake_coils(rig))
+    wait(rig, lambda: not winch.brake_released)
+    wait(rig, lambda: rig.loop.ended)
+    assert not winch.state().power_on
+    assert rig.loop.doubt == ""
+
+
+def brake_coils(rig: LoopRig) -> list[int]:
+    assert rig.machine._safety is not None
+    axes = rig.machine._safety.io.profile.axes
+    return [axis.brake.output.coil for axis in axes if axis.brake is not None]

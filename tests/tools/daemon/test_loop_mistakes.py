@@ -1,0 +1,97 @@
+"""Mistakes of programs, and what cannot be told: the drives stop, the loop goes on and says so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdpr_rt.runtime.programs.hold import HoldProgram
+from cdpr_rt.runtime.programs.idle import IdleProgram
+from cdpr_rt.runtime.programs.model import model_of
+from cdpr_rt.runtime.programs.registry import build_programs
+from cdpr_rt.runtime.robot_arrays import limits_of
+from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.runtime.states import LoopState, Reaction
+from drivers.cia402 import POWER_OFF
+from profiles import load_robot
+from tests.tools.daemon.loop_rig import LoopRig, opened
+from tests.tools.robot_rig import robot_file, simulated
+from tools.daemon.machine import RobotMachine
+
+PERIOD_S = 2e-3
+
+
+class Careless(HoldProgram):
+    """Holds, but cannot stop and cannot tell of itself."""
+
+    name = "careless"
+
+    def stop(self) -> None:
+        raise ZeroDivisionError("by nought")
+
+    def progress(self) -> dict[str, Any]:
+        raise KeyError("done")
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[LoopRig]:
+    path = robot_file(tmp_path, [("can0", 1)], period_s=PERIOD_S)
+    robot = load_robot(path)
+    model = model_of(robot.axes, PERIOD_S, [3e-3], limits_of(robot))
+    hold = build_programs(model, SharedBlock.create(1, 1.0, 500.0))["hold"]
+    assert isinstance(hold, HoldProgram)
+    programs = {"careless": Careless(model, hold._loop), "bare": IdleProgram(model)}
+    with simulated(path) as url, opened(path, url, programs) as made:
+        made.obeyed("enable", program="careless")
+        yield made
+
+
+def test_a_program_that_cannot_stop_loses_the_power(rig: LoopRig) -> None:
+    answer = rig.order("disable")
+    assert not answer["ok"]
+    rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
+    assert "ZeroDivisionError: by nought" in rig.status["reason"]
+    assert all(state in POWER_OFF for state in rig.machine._booted.states())
+    rig.obeyed("acknowledge")
+
+
+def test_where_a_limit_ends_it_the_drives_brake_by_themselves(rig: LoopRig) -> None:
+    rig.loop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
+    assert rig.loop.reacting is Reaction.QUICK_STOP
+    assert not rig.loop.driving
+    rig.turn_until(lambda: rig.state is LoopState.FAULT)
+    assert all(state in POWER_OFF for state in rig.machine._booted.states())
+
+
+def test_a_program_that_cannot_tell_of_itself_goes_on(rig: LoopRig) -> None:
+    rig.turn(10)
+    assert rig.status["program"] == "careless"
+    assert "KeyError" in rig.status["program_progress"]["error"]
+    rig.obeyed("hold")
+
+
+def test_long_words_are_answered(rig: LoopRig) -> None:
+    answer = rig.order("\u00e9" * 665)
+    assert not answer["ok"]
+    rig.obeyed("hold")
+
+
+def test_a_machine_that_cannot_be_left_in_order_is_told_of(
+    rig: LoopRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave = rig.machine._stack.close
+
+    def stays_closed() -> None:
+        leave()
+        raise OSError("the contactor stays closed")
+
+    rig.obeyed("hold")
+    monkeypatch.setattr(rig.machine._stack, "close", stays_closed)
+    assert isinstance(rig.machine, RobotMachine)
+    rig.loop.request_stop()
+    rig.turn_until(lambda: rig.loop.ended)
+    assert "contactor" in rig.loop.doubt
+    assert "contactor" in rig.status["reason"]
