@@ -50,7 +50,7 @@ class StatusPage:
         try:
             self._loop.block.write_status(status)
         except (SharedBlockError, TypeError, ValueError):  # a program that tells too much of itself
-            less = {"program_progress": {}, "buses": {}, "notices": []}
+            less: dict[str, Any] = {"program_progress": {}, "buses": {}, "notices": []}
             self._loop.block.write_status({**status, **less})
         self._written = status
 
