@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_rt.exchange import AxisCommand, AxisFeedback, BoolArray
+from drivers.answer_wait import AnswerWait
 from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
 from drivers.axis_state import StateArrays
@@ -77,6 +78,8 @@ class AxisBuses:
             self.feedback, self.command = self._moves.feedback, self._moves.command
         self.transmits = 0
         """How often commands went out on all buses."""
+        self._answers = AnswerWait(self.groups[0].paced_wait_s)
+        self._sync_s = 0.0
         self._lost = [False] * len(self.groups)
         """Which buses have failed in this cycle."""
         self._failure: BusError | None = None
@@ -103,6 +106,7 @@ class AxisBuses:
         self.feedback.cycle += 1
         self.feedback.time_s = self.feedback.cycle * self.period_s
         self._failure = None
+        self._sync_s = time.monotonic()
         for i, group in enumerate(self.groups):
             self._lost[i] = False
             try:
@@ -112,7 +116,16 @@ class AxisBuses:
 
     def receive(self) -> int:
         """Wait for the answers on all buses and decode them; return how many axes answered."""
-        deadline_s = 0.0 if self.lockstep else time.monotonic() + self.groups[0].paced_wait_s
+        if self.lockstep:
+            return self._receive(0.0)
+        self._answers.sleep(self._sync_s)
+        waits = sum(group.waits for group in self.groups)
+        answered = self._receive(self._sync_s + self.groups[0].paced_wait_s)
+        too_early = sum(group.waits for group in self.groups) > waits
+        self._answers.learn(time.monotonic() - self._sync_s, too_early)
+        return answered
+
+    def _receive(self, deadline_s: float) -> int:
         answered = 0
         for i, group in enumerate(self.groups):
             if self._lost[i]:

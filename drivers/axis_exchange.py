@@ -23,7 +23,7 @@ _OPERATIONAL_STATE = 5
 # lockstep: for all axes, as their simulator may be held up; for one that is alone in not answering,
 # less than bus time stands still; and for one that has not answered last time
 _PATIENCE_S, _PATIENCE_WITH_ONE_S, _SHORT_PATIENCE_S = 2.0, 0.4, 0.02
-_PACED_SHARE = 0.6
+_PACED_SHARE = 0.75
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
 _LATE_PASSES = 8
 
@@ -70,6 +70,8 @@ class AxisExchange:
         self._be_patient(True)
         self._cycling = self._closed = False
         self._late = False
+        self.waits = 0
+        """How often a frame was waited for, in paced cycles."""
         self._alarms = 0
         state = GroupState(self.axes, period_s, self.lockstep, room)
         self._ints, self._floats = state.ints, state.floats
@@ -179,6 +181,7 @@ class AxisExchange:
 
     def _wait(self, seconds: float) -> None:
         """Wait for a frame; the kernel's own receive time-out is too coarse for a cycle."""
+        self.waits += 1
         select.select([self._port], [], [], seconds)
 
     def _take_late(self) -> None:
