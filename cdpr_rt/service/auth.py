@@ -102,6 +102,11 @@ class Gate:
         buckets = self._urgent if scope["path"] in _URGENT else self._usual
         if not buckets.take(peer):
             raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; go slower")
+        if b"content-length" in headers and b"transfer-encoding" in headers:
+            # a proxy may see its end elsewhere, and what follows as somebody else's request
+            raise _RefusedError(
+                HTTPStatus.BAD_REQUEST, "Content-Length and Transfer-Encoding; allowed: one of them"
+            )
         host = headers.get(b"host", b"").decode("latin-1")
         guarded = self._door.local or self._door.key is not None
         if not guarded and not self._is_ours(host):

@@ -231,5 +231,7 @@ class _Life:
                 self._ended = True
                 return True
             self._pid = pid
-        self._ended = bool(select.select([self._fd], [], [], 0)[0])
+        poll = select.poll()  # `select` fails at descriptors from 1024
+        poll.register(self._fd, select.POLLIN)
+        self._ended = bool(poll.poll(0))
         return self._ended

@@ -15,6 +15,7 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import Frame
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.service.auth import MOST_BODY_BYTES
@@ -25,6 +26,8 @@ _REQUEST_S, _ANSWER_S, _LOOK_S = 10.0, 90.0, 2.0
 _LEAVE_S: Final = 5.0
 _MOST_UNSENT_BYTES: Final = 1 << 20
 _UNREAD_BYTES: Final = 1 << 16
+_MOST_FRAGMENTS: Final = 64
+_NO_UTF8: Final = 1007  # RFC 6455, 7.4.1
 
 
 class ListenError(ControlError):
@@ -70,6 +73,21 @@ class _WebSocket(WebSocketsSansIOProtocol):
         # answers to pings are queued without limit otherwise
         if self.transport.get_write_buffer_size() > _MOST_UNSENT_BYTES:
             self.transport.abort()
+
+    def handle_cont(self, event: Frame) -> None:
+        if len(self.frames) >= _MOST_FRAGMENTS:  # empty ones count as nothing in `ws_max_size`
+            self.transport.abort()
+            return
+        super().handle_cont(event)
+
+    def send_receive_event_to_app(self) -> None:
+        if self.curr_msg_data_type == "text" and not _is_text(self.frames):
+            # as the base class does, but not with a traceback in the journal for each
+            self.frames = []
+            self.conn.send_close(_NO_UTF8)
+            self.handle_parser_exception()
+            return
+        super().send_receive_event_to_app()
 
     async def run_asgi(self) -> None:
         self.scope["state"]["abort"] = self.transport.abort
@@ -154,6 +172,14 @@ def listen_tcp(host: str, port: int) -> socket.socket:
         listener.close()
         raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
     return listener
+
+
+def _is_text(fragments: list[bytes]) -> bool:
+    try:
+        b"".join(fragments).decode()
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _answers(path: Path) -> bool:

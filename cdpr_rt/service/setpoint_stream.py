@@ -89,10 +89,10 @@ class SetpointStream:
         assert first is not None
         while not self._stop.is_set():
             socks = [first] if self._holders is None else [self._holders.sock, first]
-            readable, _, _ = select.select(socks, [], [], _LOOK_S)
+            readable = _readable(socks)
             begin = time.monotonic()
             # the holder's own socket first: a flood of others' packets does not push it aside
-            taken = sum(self._take(sock, buffer) for sock in socks if sock in readable)
+            taken = sum(self._take(sock, buffer) for sock in socks if sock.fileno() in readable)
             self.desk.expire(time.monotonic_ns())
             self._follow_holder(first)
             if taken >= _MOST_A_TURN:
@@ -135,6 +135,17 @@ class _HoldersSocket:
         self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         self.sock.bind(first.getsockname())
         self.sock.connect(holder)
+
+
+def _readable(socks: list[socket.socket]) -> set[int]:
+    """Wait for packets for a moment; return the descriptors of sockets that have some.
+
+    By poll, as `select` fails at descriptors from 1024, which many connections make.
+    """
+    poll = select.poll()
+    for sock in socks:
+        poll.register(sock, select.POLLIN)
+    return {fd for fd, _ in poll.poll(1000.0 * _LOOK_S)}
 
 
 def is_loopback(host: str) -> bool:

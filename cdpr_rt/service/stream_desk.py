@@ -183,13 +183,14 @@ class StreamDesk:
         elif not self._owns(packet.session, address):
             return Standing.BUSY
         session = self._session
+        # before all else: what others send once more costs the holder nothing and keeps nothing up
+        if not session.window.take(packet.sequence):
+            return Standing.REPEATED
         credit = session.credit + (now_ns - session.last_ns) * 1e-9 * MOST_RATE_Hz
         session.credit, session.last_ns = min(credit, BURST), now_ns
         if session.credit < 1.0:
             return Standing.TOO_FAST
         session.credit -= 1.0
-        if not session.window.take(packet.sequence):
-            return Standing.REPEATED
         try:
             self._lease.renew(session.token)
         except LeaseError:

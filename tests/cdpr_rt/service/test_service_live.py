@@ -219,6 +219,35 @@ def test_bytes_are_no_order(rig: Rig) -> None:
     assert rig.loop.commands == []
 
 
+def test_what_is_no_text_ends_the_connection_without_a_traceback(
+    rig: Rig, caplog: pytest.LogCaptureFixture
+) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send(b'{"do": "\xff"}', text=True)
+        assert closed_for(connection)[0] == 1007
+    wait_for(lambda: rig.lease_left_s < 0.0)
+    assert caplog.text == ""
+    assert rig.loop.commands == []
+
+
+def test_a_message_in_pieces_without_end_is_not_kept(rig: Rig) -> None:
+    pieces = 0
+
+    def nothing_for_ever() -> Iterator[str]:
+        nonlocal pieces
+        while pieces < 100_000:
+            pieces += 1
+            yield ""
+
+    with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
+        connection.recv(5.0)
+        with pytest.raises(ConnectionClosed):
+            connection.send(nothing_for_ever())
+    assert pieces < 100_000
+    wait_for(lambda: rig.lease_left_s < 0.0)
+
+
 def test_a_message_too_long_or_too_many_end_the_connection(rig: Rig) -> None:
     with open_unix(rig, "/control?client=maria") as connection:
         connection.recv(5.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import resource
 import socket
 import struct
@@ -218,6 +219,22 @@ def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
             assert share < 0.6
             assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < size_kB + 20_000
             assert there.count("busy") > 0
+
+
+def test_descriptors_beyond_what_select_takes_do_not_end_it() -> None:
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(2048, limits[1]), limits[1]))
+    held: list[int] = []
+    try:
+        while not held or held[-1] < 1024:
+            held.append(os.dup(0))
+        with robot() as there, StreamClient("127.0.0.1", there.port) as client:
+            converse(client, lambda: client.answered >= 5)
+            assert there.stream.told()["holder"] is not None
+    finally:
+        for one in held:
+            os.close(one)
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
 
 
 # -- fuzz

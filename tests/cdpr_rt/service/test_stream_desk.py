@@ -271,6 +271,19 @@ def test_a_flood_from_the_holder_is_cut_to_what_the_loop_takes() -> None:
     assert desk.posted == accepted
 
 
+def test_repeating_what_the_holder_has_sent_neither_silences_nor_outlives_it() -> None:
+    desk = Desk()
+    desk.answer(BASE)
+    for k in range(2, 62):
+        standings = {desk.answer(BASE, ms=0.1).standing for _ in range(160)}
+        assert standings == {Standing.REPEATED}
+        assert desk.answer(replace(BASE, sequence=k)).standing == Standing.ACCEPTED
+    for _ in range(SILENCE_NS // (20 * MS)):  # the holder is gone, its packets still come
+        desk.answer(BASE)
+    other = replace(BASE, session=8)
+    assert desk.answer(other, address=THERE).standing == Standing.ACCEPTED
+
+
 # -- with a shared key
 
 
