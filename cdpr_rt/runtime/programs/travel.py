@@ -9,6 +9,8 @@ from cdpr_rt.exchange import FloatArray, Setpoint
 from cdpr_rt.runtime.programs.model import RobotModel
 
 _LEAST_SHARE = 1e-6
+_LEAST_WAY_RAD = 1e-9
+"""Below that nobody sees who arrives first, and shares of it may exceed what a float holds."""
 
 
 class Travel:
@@ -36,7 +38,7 @@ class Travel:
         self._way[:] = np.abs(target_rad - setpoint.position_rad)
         self._speed[:] = speed_rad_s
         self._acceleration[:] = self._model.acceleration_rad_s2
-        if self._way.any() and not setpoint.velocity_rad_s.any():
+        if self._way.max() > _LEAST_WAY_RAD and not setpoint.velocity_rad_s.any():
             way = np.maximum(self._way, _LEAST_SHARE * self._way.max())
             self._speed[:] = way * np.min(speed_rad_s / way)
             self._acceleration[:] = way * np.min(self._model.acceleration_rad_s2 / way)

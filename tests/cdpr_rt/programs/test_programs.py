@@ -119,6 +119,16 @@ def test_pid_takes_positions_cable_lengths_and_a_lower_speed() -> None:
     assert np.max(rig.array("position")[:, 0]) <= there + 0.01
 
 
+@pytest.mark.parametrize("name", ["pid", "sweep"])
+def test_a_way_too_short_to_divide_by_is_arrived_at(name: str) -> None:
+    rig = ProgramRig((0.0, 0.0, 0.0))
+    with np.errstate(over="raise", divide="raise", invalid="raise"):
+        rig.switch(name, {"distance_rad": [5e-324, 0.0, -1e-310]})
+        rig.run(0.05)
+    assert rig.program.progress()["done"] == 1.0
+    assert np.isfinite(rig.setpoint.position_rad).all()
+
+
 def test_sweep_goes_back_and_forth_at_constant_speed() -> None:
     rig = ProgramRig(load_Nm=(0.0, 0.0, 0.0))
     rig.switch("hold")
