@@ -34,6 +34,8 @@ _SERVICE_STOP_S = 10.0
 _LOOP_STALLED_S = 2.0
 # the service turns some ten times a second; a disk may hold it up
 _SERVICE_STALLED_S = 10.0
+# reading its libraries from a slow disk, on a busy machine, takes less
+_SERVICE_START_S = 30.0
 # a service that dies at once is not started in a tight circle
 _RESTART_S = (0.1, 0.5, 2.0, 5.0)
 _STEADY_S = 30.0
@@ -229,11 +231,16 @@ class Launcher:
             self._service = Child(SERVICE, self._settings)
 
     def _watch_service_turns(self) -> None:
+        service, allowed_s = self._service, _SERVICE_STALLED_S
+        if service is None:
+            return
         silent_s = self._silence_s("service_alive_ns")
-        if self._service is not None and silent_s > _SERVICE_STALLED_S:
-            self._tell(f"the service has not turned for {_SERVICE_STALLED_S:g} s and is killed")
-            self._service.process.kill()
-            self._service.process.wait()
+        if not self._block.counters["service_alive_ns"][0]:  # it has not turned even once
+            silent_s, allowed_s = time.monotonic() - service.started, _SERVICE_START_S
+        if silent_s > allowed_s:
+            self._tell(f"the service has not turned for {allowed_s:g} s and is killed")
+            service.process.kill()
+            service.process.wait()
 
     def _report(self, status: dict[str, Any], now: float) -> None:
         """Keep the service manager informed; its watchdog is fed while the loop lives and turns."""

@@ -28,6 +28,7 @@ def main(folder: Path) -> int:
     launcher.LOOP, launcher.SERVICE = "stand_in_loop", "stand_in_service"  # type: ignore[misc]
     launcher._RESTART_S = (0.1, 0.1, 0.1)  # type: ignore[misc]
     launcher._LOOP_STALLED_S = launcher._SERVICE_STALLED_S = 1.0  # type: ignore[misc]
+    launcher._SERVICE_START_S = 3.0  # type: ignore[misc]
     block = SharedBlock.create(1, 0.1, 100.0)
     settings = RunSettings(
         robot=str(folder),
@@ -92,6 +93,9 @@ def service() -> None:
     if "refuse_service" in plan:
         _note(folder, "service refused")
         sys.exit(plan["refuse_service"])
+    if "freeze_service" in plan and not (folder / "service.pid").exists():
+        _tell_pid(folder, "service")
+        os.kill(os.getpid(), signal.SIGSTOP)
     _tell_pid(folder, "service")
     end = _asked_to_end()
     end_with(settings.launcher_pid)

@@ -144,6 +144,14 @@ def test_a_service_that_dies_or_hangs_is_started_again_and_the_loop_goes_on(
     assert _is_child(loop)
 
 
+def test_a_service_that_hangs_before_its_first_turn_is_started_again(start: Start) -> None:
+    daemon = start({"freeze_service": True})
+    assert "has not turned for 3 s" in daemon.line("told")["told"]
+    assert daemon.line("ready")["ready"]["state"] == "ready"
+    daemon.process.terminate()
+    assert daemon.ends() == 0
+
+
 def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) -> None:
     daemon = start(watchdog_s=0.4)
     daemon.line("ready")
