@@ -70,6 +70,8 @@ class ControlLoop:
         """Whether cycles run."""
         self.driving = False
         """Whether the drives have power and obey the program."""
+        self.first_program = HOLD
+        """What runs once the drives have got their power."""
         self.reacting = Reaction.NONE
         """What ends the present motion, NONE while nothing does."""
         self.ended = False

@@ -105,7 +105,7 @@ class Orders:
 
     def _check(self, _order: Order) -> Iterator[None]:
         self._require(Transition.CHECK)
-        return procedures.check(self._loop)
+        return procedures.check(self._loop, reset=True)
 
     def _acknowledge(self, _order: Order) -> Iterator[None]:
         self._require(Transition.ACKNOWLEDGE)
@@ -130,6 +130,12 @@ class Orders:
         self._loop.request_stop()
 
     def _hold(self, _order: Order) -> None:
+        loop = self._loop
+        if loop.life.state is LoopState.ACTIVE and loop.busy and not loop.reacting:
+            loop.first_program = (
+                "hold"  # the drives are getting their power: they hold, and stay so
+            )
+            return
         self._run("hold", {})
 
     def _program(self, order: Order) -> None:
@@ -182,7 +188,7 @@ class Orders:
         shadow = loop.machine.read_only and loop.life.state is LoopState.READY
         if (loop.driving and not loop.busy) or shadow:
             return
-        if loop.driving:
+        if loop.life.state is LoopState.ACTIVE:
             raise RefusedError(f"{what}: another command is being carried out")
         raise RefusedError(
             f"{what}: not in state {loop.life.state.label}; allowed in {LoopState.ACTIVE.label}"

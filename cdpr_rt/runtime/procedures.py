@@ -34,6 +34,7 @@ _BRAKES_S: Final = 2.0
 _POWER_OFF_S: Final = 3.0
 _POWER_OFF_AT_LAST_S: Final = 0.5
 _FAULT_RESET_S: Final = 2.0
+_BEFORE: Final = " (before: "
 
 
 def start_up(loop: ControlLoop) -> Iterator[None]:
@@ -61,8 +62,11 @@ def configure(loop: ControlLoop) -> Iterator[None]:
     life.enter(LoopState.INACTIVE)
 
 
-def check(loop: ControlLoop) -> Iterator[None]:
-    """Run cycles without power and look at every answer; ready then, inactive where it fails."""
+def check(loop: ControlLoop, reset: bool = False) -> Iterator[None]:
+    """Run cycles without power and look at every answer; ready then, inactive where it fails.
+
+    Drives in fault fail it, unless somebody has asked for their `reset`.
+    """
     life, machine = loop.life, loop.machine
     if loop.cycling:
         loop.stop_cycles()
@@ -73,6 +77,8 @@ def check(loop: ControlLoop) -> Iterator[None]:
         yield from _slowly(loop, machine.prepare)
         gc.collect()  # while nothing is late by it; in paced cycles the collector is off
         loop.start_cycles()
+        if reset:
+            yield from _reset_faults(loop)
         yield from _look_at_cycles(loop)
     except ControlError as error:
         life.blame(str(error))
@@ -82,6 +88,20 @@ def check(loop: ControlLoop) -> Iterator[None]:
     life.enter(LoopState.READY)
     if machine.read_only:
         loop.switch("hold")
+
+
+def _reset_faults(loop: ControlLoop) -> Iterator[None]:
+    machine = loop.machine
+    for _ in range(_SETTLE_CYCLES):  # in which each drive tells its state
+        yield
+    if not machine.intact():
+        return  # what needs a new boot is not to be forgotten
+    machine.reset_faults()
+    yield
+    try:
+        yield from _until(loop, machine.faultless, _FAULT_RESET_S, "the reset of all faults")
+    except RefusedError as error:
+        raise RefusedError(f"{error}: {', '.join(machine.states())}") from error
 
 
 def _look_at_cycles(loop: ControlLoop) -> Iterator[None]:
@@ -141,6 +161,7 @@ def enable(loop: ControlLoop, program: str, wanted: Mapping[str, Any] | None) ->
     """Give the drives power, hold, release the brakes, then run `program`."""
     life, machine = loop.life, loop.machine
     loop.parts.programs[program].check(wanted or {})
+    loop.first_program = program
     life.forget()
     machine.power_on()
     life.enter(LoopState.ACTIVE)
@@ -155,7 +176,7 @@ def enable(loop: ControlLoop, program: str, wanted: Mapping[str, Any] | None) ->
     machine.set_brakes(True)
     while not machine.brakes_are(True):
         yield
-    if program != "hold":
+    if loop.first_program != "hold":
         loop.switch(program, wanted or {})
 
 
@@ -230,20 +251,20 @@ def disable(loop: ControlLoop) -> Iterator[None]:
 def acknowledge(loop: ControlLoop) -> Iterator[None]:
     """Clear what was latched, boot anew where that is needed, and check."""
     life, machine = loop.life, loop.machine
-    before = life.reason
+    now, _, before = life.reason.partition(_BEFORE)
+    before = before.removesuffix(")") or now
     try:
         if machine.device is not None:
             yield from _slowly(loop, machine.acknowledge)
-        if loop.cycling and machine.intact():
-            machine.reset_faults()
-            yield
-            yield from _until(loop, machine.faultless, _FAULT_RESET_S, "the reset of all faults")
+        intact = loop.cycling and machine.intact()
+        if intact:
+            yield from _reset_faults(loop)
         else:
             yield from configure(loop)
-        yield from check(loop)
+        yield from check(loop, reset=not intact)
     except ControlError as error:
         life.enter(LoopState.FAULT)
-        life.blame(f"{error} (before: {before})" if before not in str(error) else str(error))
+        life.blame(f"{error}{_BEFORE}{before})" if before not in str(error) else str(error))
         raise
 
 
