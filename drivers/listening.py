@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import select
 import time
 from collections.abc import Sequence
@@ -94,7 +95,7 @@ class ListeningDevice:
         self._calm_s = _CALM_SHARE * period_s
         self._apart = 0
         self._heard = False
-        self._heard_s = time.monotonic() - _PAUSE_S
+        self._heard_s = -math.inf  # no master yet
 
     @property
     def silent_s(self) -> float:
