@@ -231,7 +231,7 @@ def _own_simulator(
     stack: ExitStack, robot: Robot, out: Output, plant: Path | None
 ) -> tuple[int, str]:
     name = f"simbus:own-{os.getpid()}"
-    out.note(f"starting {len(robot.axes)} simulated drives ...")
+    out.note(f"starting simulated drives: {len(robot.axes)} ...")
     simulator = OwnSimulator(robot.reference, name, plant)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))

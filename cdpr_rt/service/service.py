@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from typing import Any, Final
@@ -15,6 +16,7 @@ from cdpr_rt.service.part import Part
 from cdpr_rt.service.rows import newest_row, plain, row_table
 
 _TURN_S = 0.2
+_LOG = logging.getLogger("cdpr.service")
 _AXIS_FIELDS: Final = (
     "setpoint_rad",
     "position_rad",
@@ -74,6 +76,7 @@ class Service:
                 part.start()
             except Exception as error:
                 self.events.add(part.name, f"{part.name}: cannot start: {error}")
+                _LOG.error("%s: cannot start: %s", part.name, error)
             else:
                 self.parts.append(part)
 

@@ -122,7 +122,7 @@ def run(
     with ExitStack() as stack:
         simulator = None
         if asks_for_own_simulator(bus or ()):
-            out.note(f"starting {len(profile.axes)} simulated drives ...")
+            out.note(f"starting simulated drives: {len(profile.axes)} ...")
             simulator = OwnSimulator(profile.reference, settings.buses[0], plant, paced=True)
             stack.callback(simulator.stop)
         _launch(profile, settings, out, manager, simulator)
@@ -153,6 +153,11 @@ def settings_for(
     own = asks_for_own_simulator(bus or ())
     if plant is not None and not own:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+    if read_only and own:
+        raise BadInputError(
+            "--read-only: no other master is on a simulator that the command starts; "
+            "give --bus simbus:NAME of one that runs"
+        )
     return RunSettings(
         robot=robot.reference,
         name=robot.profile,

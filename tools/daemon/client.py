@@ -32,6 +32,13 @@ KeyFileOption = Annotated[
 _TIMEOUT = httpx.Timeout(5.0, read=70.0)
 _BAD_INPUT: Final = frozenset({400, 401, 403, 404, 405, 413, 422})
 _LEASE_S = 2.0
+# what leads on from a state in which something was refused
+_WAY_ON: Final = {
+    "unconfigured": "`cdpr status` says why, `cdpr check` tries again",
+    "inactive": "`cdpr status` says why, `cdpr check` tries again",
+    "ready": "`cdpr enable` gives power",
+    "fault": "`cdpr status` says why, `cdpr ack` acknowledges it",
+}
 
 
 class NoDaemonError(WorkFailedError):
@@ -103,7 +110,16 @@ class Daemon:
         message = str(answer.get("error", response.reason_phrase))
         if response.status_code in _BAD_INPUT:
             raise BadInputError(message)
-        raise WorkFailedError(message)
+        raise WorkFailedError(message + _way_on(message, str(answer.get("state"))))
+
+
+def _way_on(message: str, state: str) -> str:
+    """Return what leads on, to be put behind a refusal for the present state."""
+    if "not in state" not in message or state not in _WAY_ON:
+        return ""
+    if state == "ready" and not message.endswith("allowed in active"):
+        return ""
+    return f"; {_WAY_ON[state]}"
 
 
 class Control:
@@ -191,6 +207,8 @@ def axis_values(texts: list[str], axes: list[dict[str, Any]], unit: str) -> dict
             name = names[0]
         if name not in names:
             raise BadInputError(f"{text}: allowed: AXIS={unit} with axis {', '.join(names)}")
+        if names.index(name) in values:
+            raise BadInputError(f"{text}: {name} is there twice")
         try:
             values[names.index(name)] = float(number)
         except ValueError:

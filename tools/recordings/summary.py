@@ -107,7 +107,11 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
 
 def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
     """Return the figures of one file as lines for people."""
-    end = {"closed": "", "not closed": ", not closed by its writer", "cut short": ", cut short"}
+    end = {
+        "closed": "",
+        "not closed": ", not closed by its writer, or not yet",
+        "cut short": ", cut short",
+    }
     lines = [
         f"{figures['file']}: {figures['robot']}, {len(figures['axes'])} axes, "
         f"{figures['bytes'] / 1e6:.1f} MB{end[figures['ended']]}"

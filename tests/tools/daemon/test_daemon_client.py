@@ -69,6 +69,8 @@ AXES: list[dict[str, Any]] = [{"name": "left"}, {"name": "x=y"}]
 def test_numbers_go_to_their_axes_by_name() -> None:
     assert axis_values(["left=-2.5", "x=y=3"], AXES, "deg") == {0: -2.5, 1: 3.0}
     assert axis_values(["7"], AXES[:1], "deg") == {0: 7.0}
+    with pytest.raises(BadInputError, match="left=3: left is there twice"):
+        axis_values(["left=2", "left=3"], AXES, "deg")
 
 
 @pytest.mark.parametrize("text", ["7", "left", "left=", "up=1", "left=1,5", "=1", ""])
