@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import errno
 import os
 import socket
 import stat
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +29,8 @@ _LEAVE_S: Final = 5.0
 _MOST_UNSENT_BYTES: Final = 1 << 20
 _UNREAD_BYTES: Final = 1 << 16
 _MOST_FRAGMENTS: Final = 64
+_FULL: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
+_FULL_AGAIN_S: Final = 10.0
 _NO_UTF8: Final = 1007  # RFC 6455, 7.4.1
 
 
@@ -117,6 +121,7 @@ class Server(uvicorn.Server):
                 ws_ping_timeout=5.0,
                 timeout_keep_alive=10,
                 timeout_graceful_shutdown=2,
+                backlog=2 * _MOST_CONNECTIONS,
                 h11_max_incomplete_event_size=MOST_BODY_BYTES,
             )
         )
@@ -130,6 +135,25 @@ class Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave signals to the process."""
         yield
+
+
+def watch_tables(loop: asyncio.AbstractEventLoop, tell: Callable[[str], None]) -> None:
+    """Have `tell` told, now and then, that the system gives no descriptor for a connection more.
+
+    asyncio waits for a second and tries again, but logs hundreds of tracebacks each time.
+    """
+    told_s = -_FULL_AGAIN_S
+
+    def handle(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        nonlocal told_s
+        error = context.get("exception")
+        if not isinstance(error, OSError) or error.errno not in _FULL:
+            loop.default_exception_handler(context)
+        elif time.monotonic() - told_s >= _FULL_AGAIN_S:
+            told_s = time.monotonic()
+            tell(f"no connection more can be taken: {error.strerror}")
+
+    loop.set_exception_handler(handle)
 
 
 def listen_unix(path: Path) -> socket.socket:

@@ -21,7 +21,7 @@ from cdpr_rt.service.auth import Door, Gate
 from cdpr_rt.service.foxglove_view import LiveView
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recording import Recorder
-from cdpr_rt.service.server import ListenError, Server, listen_tcp, listen_unix
+from cdpr_rt.service.server import ListenError, Server, listen_tcp, listen_unix, watch_tables
 from cdpr_rt.service.service import Service
 from cdpr_rt.service.setpoint_stream import SetpointStream
 from tools.daemon.child import end_with, is_running, orphaned
@@ -88,6 +88,7 @@ async def _serve(settings: RunSettings, service: Service) -> None:
     service.start_parts(build_parts(settings, service))
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
+    watch_tables(loop, partial(service.events.add, "http"))
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, ended.set)
     end_with(settings.launcher_pid)

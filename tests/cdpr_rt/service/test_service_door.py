@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import http.client
 import os
+import resource
 import select
 import socket
 import stat
 import struct
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -275,6 +277,53 @@ def test_a_client_that_resets_its_connection_is_forgotten(rig: Rig) -> None:
         sock.sendall(b"POST /control HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\n{")
         sock.close()
     assert _reachable(rig)
+
+
+def test_no_descriptors_left_is_said_once_and_serving_goes_on(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def app(_scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 204, "headers": []})
+        await send({"type": "http.response.body"})
+
+    async def serve() -> None:
+        server.watch_tables(asyncio.get_running_loop(), told.append)
+        one = server.Server(app, listen_unix(tmp_path / "one.sock"))
+        serving = asyncio.create_task(one.run_until_told())
+        while not one.started:
+            await asyncio.sleep(0.01)
+        sock.setblocking(False)
+        with _no_descriptors():
+            sock.connect(str(tmp_path / "one.sock"))
+            await asyncio.sleep(1.2)  # asyncio tries once a second
+        loop = asyncio.get_running_loop()
+        await loop.sock_sendall(sock, b"GET / HTTP/1.1\r\nHost: x\r\n\r\n")
+        assert b" 204 " in await asyncio.wait_for(loop.sock_recv(sock, 100), 5.0)
+        one.should_exit = True
+        await serving
+
+    told: list[str] = []
+    with socket.socket(socket.AF_UNIX) as sock:
+        asyncio.run(serve())
+    assert told == ["no connection more can be taken: Too many open files"]
+    assert caplog.text == ""
+
+
+@contextmanager
+def _no_descriptors() -> Iterator[None]:
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    free = os.dup(0)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (free + 1, limits[1]))
+    held = [free]
+    with suppress(OSError):
+        while True:
+            held.append(os.dup(0))
+    try:
+        yield
+    finally:
+        for one in held:
+            os.close(one)
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
 
 
 # -- sockets
