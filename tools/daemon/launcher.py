@@ -267,7 +267,10 @@ class Launcher:
         patience_s = _LOOP_STALLED_S if self._stalled else _LOOP_STOP_S
         if not self._loop.stop(patience_s):
             return f"the loop did not stop within {patience_s:g} s and was killed"
-        return "" if self._loop.process.returncode == DONE else f"the loop {self._loop.end}"
+        code = self._loop.process.returncode
+        # one that is asked while it loads has opened nothing yet
+        loading = code == -signal.SIGTERM and not self._block.counters["loop_alive_ns"][0]
+        return "" if code == DONE or loading else f"the loop {self._loop.end}"
 
     def _silence_s(self, counter: str) -> float:
         alive = int(self._block.counters[counter][0])

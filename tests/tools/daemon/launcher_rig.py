@@ -71,11 +71,12 @@ def loop() -> None:
     """Write a status and turn until told to end, or do as the file `plan.json` says."""
     settings = RunSettings.from_argv()
     folder = Path(settings.robot)
+    plan = json.loads((folder / "plan.json").read_text())
     _tell_pid(folder, "loop")
+    time.sleep(plan.get("loading_s", 0.0))
     end = _asked_to_end()
     end_with(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)
-    plan = json.loads((folder / "plan.json").read_text())
     if "refuse" in plan:
         sys.exit(plan["refuse"])
     block.write_status({"state": "ready", "reason": ""})

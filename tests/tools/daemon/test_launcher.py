@@ -199,6 +199,17 @@ def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) ->
     assert daemon.log() == ["service stopped"]
 
 
+def test_who_ends_it_while_the_loop_loads_is_told_of_no_failure(start: Start) -> None:
+    daemon = start({"loading_s": 30.0})
+    end = time.monotonic() + TIMEOUT_S
+    while not (daemon.folder / "loop.pid").exists():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    daemon.process.terminate()
+    assert daemon.line("reason")["reason"] == ""
+    assert daemon.ends() == 0
+
+
 @pytest.mark.parametrize("status", [1, 2])
 def test_a_loop_that_cannot_begin_ends_the_daemon_with_its_status(
     start: Start, status: int
