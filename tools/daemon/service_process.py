@@ -29,6 +29,7 @@ from tools.daemon.settings import RunSettings, read_key
 from tools.errors import DONE, FAILED, CommandError
 
 _LOOP_STOP_S, _TURN_S = 20.0, 0.05
+_MOST_FILES = 4096
 _LOG = logging.getLogger("cdpr.service")
 
 
@@ -50,7 +51,8 @@ def main() -> int:
 def _allow_many_files() -> None:
     """So that clients who open connections without end do not keep the recorder from its files."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    # each connection to the live view takes 160 kB: without a bound they would take all memory
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, _MOST_FILES), most))
 
 
 def build_parts(settings: RunSettings, service: Service) -> list[Part]:
