@@ -116,6 +116,7 @@ class Launcher:
         self._stalled = False
         self._left_core = False
         self._told = ""
+        self._fault: tuple[Any, str] | None = None
         self._fed = 0.0
         self._failure = FAILED
         self.reason = ""
@@ -176,6 +177,7 @@ class Launcher:
             self._up = True
             self._manager.tell(READY=1)
             self._ready(status)
+        self._tell_of_faults(status)
         if self._manager.asks:
             self._report(status, now)
 
@@ -241,6 +243,16 @@ class Launcher:
             self._tell(f"the service has not turned for {allowed_s:g} s and is killed")
             service.process.kill()
             service.process.wait()
+
+    def _tell_of_faults(self, status: dict[str, Any]) -> None:
+        """Say why the motion ended, at the terminal or in the journal; once each time."""
+        if not self._up or not status or status.get("state") == DEAD:
+            return
+        is_fault = status.get("state") == "fault"
+        fault = (status.get("since_ns"), _summary(status)) if is_fault else None
+        if fault is not None and fault != self._fault:
+            self._tell(fault[1])
+        self._fault = fault
 
     def _report(self, status: dict[str, Any], now: float) -> None:
         """Keep the service manager informed; its watchdog is fed while the loop lives and turns."""

@@ -79,9 +79,13 @@ def loop() -> None:
     block = SharedBlock.attach(settings.block_fd)
     if "refuse" in plan:
         sys.exit(plan["refuse"])
+    block.counters["loop_alive_ns"] = time.monotonic_ns()  # a test may stop it from here on
     block.write_status({"state": "ready", "reason": ""})
     while not select.select([end], [], [], 0.02)[0] and not (folder / "shutdown").exists():
         block.counters["loop_alive_ns"] = time.monotonic_ns()
+        if (folder / "fault").exists():
+            (folder / "fault").unlink()
+            block.write_status({"state": "fault", "reason": "left: too fast", "since_ns": 1})
     time.sleep(plan.get("stopping_s", 0.0))
     _note(folder, "loop stopped")
 

@@ -172,6 +172,15 @@ def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) 
     assert daemon.ends() == 1
 
 
+def test_a_fault_is_told_with_its_reason_once(start: Start) -> None:
+    daemon = start()
+    daemon.line("ready")
+    (daemon.folder / "fault").touch()
+    assert daemon.line("told")["told"] == "fault: left: too fast"
+    os.kill(daemon.pid("service"), signal.SIGKILL)
+    assert "killed by signal 9" in daemon.line("told")["told"]  # and not the fault again
+
+
 def test_the_watchdog_is_fed_while_the_loop_turns_and_no_longer(start: Start) -> None:
     daemon = start(watchdog_s=0.4)
     daemon.line("ready")
