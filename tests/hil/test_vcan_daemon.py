@@ -15,11 +15,17 @@ pytestmark = pytest.mark.vcan
 
 BUS = "can0=socketcan:vcan0"
 PERIOD_S = 0.02  # the guest's kernel is slow, and has one processor for all of it
+LIMITS = """
+late_s = 5.0
+missed_cycles = 200
+missed_in_window = 500
+stale_cycles = 1000
+"""
 
 
 @pytest.fixture
 def drives(tmp_path: Path) -> Iterator[None]:
-    robot = write_robot(tmp_path, PERIOD_S)
+    robot = write_robot(tmp_path, PERIOD_S, LIMITS)
     command = [sys.executable, "-m", "tools.cli", "sim", "up", str(robot), "--bus", BUS]
     process = subprocess.Popen(
         [*command, "--paced", "--exit-with-stdin"],
@@ -40,7 +46,7 @@ def drives(tmp_path: Path) -> Iterator[None]:
 
 @pytest.mark.usefixtures("drives")
 def test_enabled_held_and_stopped_under_control_over_socketcan(tmp_path: Path) -> None:
-    daemon = RealDaemon(tmp_path, "--no-record", "--yes", bus=BUS, period_s=PERIOD_S)
+    daemon = RealDaemon(tmp_path, "--no-record", "--yes", bus=BUS, period_s=PERIOD_S, limits=LIMITS)
     try:
         assert not daemon.status()["lockstep"]
         token = daemon.http.post("/control", json={"client": "test", "ttl_s": 10}).json()["token"]

@@ -41,8 +41,13 @@ _TOLERATED = {
 def tolerant(robot: Robot, folder: Path) -> Robot:
     """Return `robot` with a copy of its file in `folder` that counts missing answers only."""
     path = folder / f"{robot.profile}.toml"
+    lines = robot.path.read_text().splitlines()
+    kept = [line for line in lines if line.split(" =")[0] not in _TOLERATED]
+    if "[limits]" not in kept:
+        kept.append("[limits]")
+    place = kept.index("[limits]") + 1
     limits = [f"{key} = {most}" for key, most in _TOLERATED.items()]
-    path.write_text("\n".join([robot.path.read_text(), "[limits]", *limits, ""]))
+    path.write_text("\n".join([*kept[:place], *limits, *kept[place:], ""]))
     return load_robot(str(path))
 
 
