@@ -67,7 +67,7 @@ def jog(
                 _require_program(daemon, "jog")
                 control.post("/set", {"wanted": wanted})
             control.hold()
-        _finish(daemon, out)
+        _finish(daemon, out, stop_requested())
 
 
 def move(
@@ -103,7 +103,7 @@ def move(
             control.post("/program", {"program": "pid", "wanted": wanted})
             arrived = _await_end(control, "pid", stop_requested, math.inf)
             control.hold()
-        _finish(daemon, out, arrived=arrived)
+        _finish(daemon, out, stop_requested(), arrived=arrived)
 
 
 def controller(
@@ -133,7 +133,7 @@ def controller(
             if name not in _STANDING:
                 _await_end(control, name, stop_requested, seconds or math.inf)
                 control.hold()
-        _finish(daemon, out)
+        _finish(daemon, out, stop_requested())
 
 
 def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, float]]:
@@ -177,8 +177,11 @@ def _at_rest(axis: dict[str, Any]) -> bool:
     return bool(abs(speed) < _REST_RAD_S and abs(angle - wanted) < _REST_RAD)
 
 
-def _finish(daemon: Daemon, out: Output, **figures: Any) -> None:
-    """Say where the axes are once they have settled, or after a while where they have not."""
+def _finish(daemon: Daemon, out: Output, stopped: bool, **figures: Any) -> None:
+    """Say where the axes are once they have settled, or after a while where they have not.
+
+    Raises WorkFailedError where the user has stopped it, or the loop has gone to fault.
+    """
     deadline = time.monotonic() + _SETTLE_S
     status = daemon.get("/status")
     while not all(map(_at_rest, status["axes"])) and time.monotonic() < deadline:
@@ -189,6 +192,10 @@ def _finish(daemon: Daemon, out: Output, **figures: Any) -> None:
         shown = "-" if angle is None else f"{math.degrees(angle):.3f} deg"
         out.say(f"{axis['name']}: {shown}")
     out.say(f"{status['state']}, {status['program']}")
+    if status["state"] != "active":
+        raise WorkFailedError(f"{status['reason'] or 'the power was taken'} ({status['state']})")
+    if stopped:
+        raise WorkFailedError("stopped on request; the axes hold where they are")
     angles = {axis["name"]: axis.get("position_rad") for axis in status["axes"]}
     told = {"state": status["state"], "program": status["program"], "position_rad": angles}
     out.result({"ok": True, **told, **figures})
