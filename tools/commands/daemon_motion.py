@@ -89,7 +89,7 @@ def move(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Take axes to positions and wait until they are there; Ctrl-C holds them where they are."""
+    """Take axes to positions and wait until they are there; Ctrl-C holds them and fails."""
     out = Output(as_json)
     with open_daemon(robot, socket, url, key_file) as daemon:
         n, goals = _given(daemon, axes, "mm" if cable else "deg")
