@@ -13,11 +13,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 class _ByFile(LoadScopeScheduling):
-    """One process for each file, and one for all that run in the guest kernel's single boot."""
+    """One process for each file, for all in the guest kernel's single boot, and for all daemons.
+
+    Several daemons at a time, each with two real-time processes, would keep each other waiting.
+    """
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.split("::", 1)[0]
-        return "vcan" if "/test_vcan_" in file else file
+        if "/test_vcan_" in file:
+            return "vcan"
+        return "daemon" if "/hil/test_daemon_" in file or "/test_bench_loop" in file else file
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:

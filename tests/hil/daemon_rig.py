@@ -96,7 +96,8 @@ class RealDaemon:
         try:
             self.ready: dict[str, Any] = json.loads(self._first_line())["ready"]
             until(self._is_ready)
-        except BaseException:
+        except BaseException as error:
+            error.add_note(f"{self.status()} {self.errors()}")
             self.end()
             raise
 
@@ -109,8 +110,9 @@ class RealDaemon:
 
     def _is_ready(self) -> bool:
         state = self.status().get("state")
-        if state in ("inactive", "fault"):
-            self.http.post("/check" if state == "inactive" else "/acknowledge", json={})
+        asked = {"unconfigured": "/configure", "inactive": "/check", "fault": "/acknowledge"}
+        if state in asked:
+            self.http.post(asked[state], json={})
         return state == "ready"
 
     def errors(self) -> str:
