@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -11,7 +10,7 @@ import numpy as np
 from cdpr_rt.approach import change_pace
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
-from cdpr_rt.runtime.programs.base import ProgramError
+from cdpr_rt.runtime.programs.base import ProgramError, WithoutPlatform
 from cdpr_rt.runtime.programs.model import RobotModel
 from cdpr_rt.runtime.programs.wanted import Wanted
 
@@ -30,7 +29,7 @@ class Loop(Protocol):
         """Write the torques of this cycle, (n,)."""
 
 
-class AxisProgram:
+class AxisProgram(WithoutPlatform):
     """Moves the axes' set-point within the model's bounds; by itself it brakes and stays.
 
     Those that do more have their own `_move`, and `_parsed` and `_take` for their commands.
@@ -83,25 +82,6 @@ class AxisProgram:
     def at_rest(self) -> bool:
         """Whether the set-point stands still and nothing is left to do."""
         return self._at_rest
-
-    @property
-    def pose(self) -> FloatArray | None:
-        """Nothing is known of a platform."""
-        return None
-
-    @property
-    def pose_setpoint(self) -> FloatArray | None:
-        """Nothing is known of a platform."""
-        return None
-
-    @property
-    def stream_age_s(self) -> float:
-        """Return the age of the newest sample that it follows, nan where it follows none."""
-        return math.nan
-
-    def progress(self) -> dict[str, Any]:
-        """Return nothing: standing still makes no progress."""
-        return {}
 
     def _parsed(self, wanted: Mapping[str, Any]) -> Any:
         """Return what `_take` takes; raises ProgramError."""

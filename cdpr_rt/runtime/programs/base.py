@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -61,3 +62,26 @@ class Program(Protocol):
 
     def progress(self) -> dict[str, Any]:
         """Return what a person would want to know of it, such as the part done; asked rarely."""
+
+
+class WithoutPlatform:
+    """What a program tells that knows of no platform and follows no hand."""
+
+    @property
+    def pose(self) -> FloatArray | None:
+        """Nothing is known of a platform."""
+        return None
+
+    @property
+    def pose_setpoint(self) -> FloatArray | None:
+        """Nothing is known of a platform."""
+        return None
+
+    @property
+    def stream_age_s(self) -> float:
+        """Return the age of the newest sample that it follows, nan where it follows none."""
+        return math.nan
+
+    def progress(self) -> dict[str, Any]:
+        """Return nothing, where a program has no end."""
+        return {}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from cdpr_rt.controllers.base import Idle
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
+from cdpr_rt.runtime.programs.base import WithoutPlatform
 from cdpr_rt.runtime.programs.handover import Handover
 from cdpr_rt.runtime.programs.model import RobotModel
 from cdpr_rt.runtime.programs.wanted import Wanted
@@ -33,7 +33,7 @@ def _go_along(
         slope[i] = 0.0
 
 
-class IdleProgram:
+class IdleProgram(WithoutPlatform):
     """Lets the torque fade away; the set-point goes along with the axes, at their mean speed.
 
     What follows on it catches an axis that turns at the speed it has.
@@ -83,22 +83,3 @@ class IdleProgram:
     def at_rest(self) -> bool:
         """Whether no torque is left."""
         return self._loop.done
-
-    @property
-    def pose(self) -> FloatArray | None:
-        """Nothing is known of a platform."""
-        return None
-
-    @property
-    def pose_setpoint(self) -> FloatArray | None:
-        """Nothing is known of a platform."""
-        return None
-
-    @property
-    def stream_age_s(self) -> float:
-        """Return the age of the newest sample that it follows, nan where it follows none."""
-        return math.nan
-
-    def progress(self) -> dict[str, Any]:
-        """Return nothing: it has no end."""
-        return {}
