@@ -1,10 +1,7 @@
-"""A real daemon's control interface: fuzzed by its own description, and used from the terminal."""
+"""A real daemon's control interface: fuzzed by its own description, flooded, and left alone."""
 
 from __future__ import annotations
 
-import functools
-import json
-import math
 import os
 import signal
 import socket
@@ -12,53 +9,39 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 import schemathesis
-from daemon_rig import NAME, RealDaemon, alive, until
+from daemon_lab import (
+    RIGHT,
+    again_where_the_machine_was_too_busy,
+    angles,
+    events,
+    happened,
+    holding,
+    running,
+    setpoints,
+    with_key,
+    with_power,
+)
+from daemon_rig import RealDaemon, alive, until
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
 
-from tools.cli import main
-
-KEY = "the key of a robot in a test"
-RIGHT = {"Authorization": f"Bearer {KEY}"}
-TOO_BUSY = "answers to SYNC are unsteady"
 MORE_MEMORY_B = 40e6
-# what another test beside this one does to the machine is none of its business
-PATIENT = """
-missed_cycles = 500
-missed_in_window = 5000
-window_cycles = 10000
-stale_cycles = 5000
-late_s = 10.0
-"""
-
-
-@contextmanager
-def running(folder: Path, *options: str, period_s: float) -> Iterator[RealDaemon]:
-    one = RealDaemon(folder, "--no-record", *options, period_s=period_s, limits=PATIENT)
-    try:
-        yield one
-    finally:
-        assert one.end() == 0, one.errors()
 
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
     """One that is only asked, and stands still: its cycle is slow."""
     folder = tmp_path_factory.mktemp("daemon")
-    key_file = folder / "key"
-    key_file.write_text(KEY)
-    key_file.chmod(0o600)
-    options = ("--http", "127.0.0.1:0", "--key-file", str(key_file))
-    with running(folder, *options, period_s=0.01) as one:
+    with running(folder, *with_key(folder), period_s=0.01) as one:
         yield one
 
 
@@ -86,22 +69,9 @@ FUZZED = settings(
 )
 
 
-def angles(daemon: RealDaemon) -> list[float]:
-    return [math.degrees(axis["position_rad"]) for axis in daemon.status()["axes"]]
-
-
 def resident_B(pid: int) -> int:
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")
-
-
-def happened(daemon: RealDaemon) -> str:
-    return "\n".join(" ".join(event) for event in events(daemon)[-20:])
-
-
-def events(daemon: RealDaemon) -> list[tuple[str, str]]:
-    told = daemon.http.get("/events", params={"most": 512}).json()["events"]
-    return [(event["kind"], event["text"]) for event in told]
 
 
 def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int:
@@ -138,49 +108,6 @@ def test_each_answer_is_as_described_and_nothing_gets_power(
     assert ("state", "active") not in events(daemon)
 
 
-@contextmanager
-def with_power(daemon: RealDaemon) -> Iterator[RealDaemon]:
-    """Have it hold; nobody holds the right to move.
-
-    What ended an earlier test, as a machine too busy for the simulated bus, is acknowledged.
-    """
-    until(lambda: not daemon.status()["control"]["held"])
-    if daemon.status()["state"] != "active":
-        until(daemon._is_ready)
-        with holding(daemon) as headers:
-            answer = daemon.http.post("/enable", json={}, headers=headers)
-            assert answer.status_code == 200, answer.text
-    yield daemon
-    status = daemon.status()
-    if TOO_BUSY in status["reason"]:
-        return
-    assert status["state"] == "active", happened(daemon)
-    daemon.http.post("/hold")
-    until(lambda: settled(daemon.status()))
-
-
-def settled(status: dict[str, Any]) -> bool:
-    return TOO_BUSY in status["reason"] or all(at_rest(axis) for axis in status["axes"])
-
-
-def again_where_the_machine_was_too_busy(test: Callable[..., None]) -> Callable[..., None]:
-    """Try up to three times where the simulated bus did not keep pace, which ends the motion."""
-
-    @functools.wraps(test)
-    def tried(**given: Any) -> None:
-        for left in (2, 1, 0):
-            try:
-                test(**given)
-                return
-            except AssertionError:
-                if not left or TOO_BUSY not in given["quick"].status()["reason"]:
-                    raise
-                with with_power(given["quick"]):
-                    pass
-
-    return tried
-
-
 @pytest.fixture
 def active(daemon: RealDaemon) -> Iterator[RealDaemon]:
     with with_power(daemon) as one:
@@ -191,22 +118,6 @@ def active(daemon: RealDaemon) -> Iterator[RealDaemon]:
 def quick(quick_daemon: RealDaemon) -> Iterator[RealDaemon]:
     with with_power(quick_daemon) as one:
         yield one
-
-
-def at_rest(axis: dict[str, Any]) -> bool:
-    error = axis["position_rad"] - axis["setpoint_rad"]
-    return abs(error) < math.radians(8.0) and abs(axis["velocity_rad_s"]) < 0.2
-
-
-@contextmanager
-def holding(daemon: RealDaemon, ttl_s: float = 5.0) -> Iterator[dict[str, str]]:
-    answer = daemon.http.post("/control", json={"client": "test", "ttl_s": ttl_s})
-    assert answer.status_code == 200, answer.text
-    headers = {"X-Control-Token": answer.json()["token"]}
-    try:
-        yield headers
-    finally:
-        daemon.http.request("DELETE", "/control", headers=headers)
 
 
 def test_with_power_too_nobody_moves_it_who_does_not_hold_the_right(
@@ -357,153 +268,3 @@ def test_a_flood_from_the_holders_own_address_neither_moves_nor_silences_it(
     assert active.status()["program"] == "hold", happened(active)
     assert setpoints(active) == pytest.approx(before, abs=0.01)
     assert resident_B(service) - memory_B < MORE_MEMORY_B
-
-
-# -- from the terminal
-
-
-class Terminal:
-    """Commands of `cdpr` in this process: what they say, and their exit status."""
-
-    def __init__(self, capsys: pytest.CaptureFixture[str], monkeypatch: Any) -> None:
-        self._capsys = capsys
-        self._monkeypatch = monkeypatch
-
-    def run(self, *arguments: str) -> tuple[int, str, str]:
-        self._monkeypatch.setattr(sys, "argv", ["cdpr", *arguments])
-        self._capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return int(ended.value.code or 0), *self._capsys.readouterr()
-
-    def told(self, *arguments: str) -> dict[str, Any]:
-        status, out, err = self.run(*arguments, "--json")
-        assert status == 0, err
-        answer: dict[str, Any] = json.loads(out.splitlines()[-1])
-        return answer
-
-
-@pytest.fixture
-def terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    return Terminal(capsys, monkeypatch)
-
-
-def setpoints(daemon: RealDaemon) -> list[float]:
-    return [math.degrees(axis["setpoint_rad"]) for axis in daemon.status()["axes"]]
-
-
-@again_where_the_machine_was_too_busy
-def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> None:
-    result = terminal.told("move", "left=20", "right=-15", "--speed", "200", *quick.at)
-    assert result["arrived"] is True
-    assert setpoints(quick) == pytest.approx([20.0, -15.0], abs=0.1)
-    found = [math.degrees(result["position_rad"][name]) for name in ("left", "right")]
-    assert found == pytest.approx([20.0, -15.0], abs=10.0)
-    terminal.told("move", "right=5", "--relative", *quick.at)
-    assert setpoints(quick) == pytest.approx([20.0, -10.0], abs=0.1)
-
-
-@again_where_the_machine_was_too_busy
-def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: Terminal) -> None:
-    start = setpoints(quick)
-    result = terminal.told("jog", "left=40", "--seconds", "1", *quick.at)
-    assert result["program"] == "hold"
-    turned = [now - then for now, then in zip(setpoints(quick), start, strict=True)]
-    assert 25.0 < turned[0] < 120.0  # the machine may be busy, the jog then lasts longer
-    assert turned[1] == pytest.approx(0.0, abs=0.1)
-    assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0
-
-
-@again_where_the_machine_was_too_busy
-def test_a_controller_runs_to_its_end_and_hold_follows(
-    quick: RealDaemon, terminal: Terminal
-) -> None:
-    sweep = ("sweep", "distance_rad=[0.2, 0.2]", "speed_rad_s=0.4", "legs=2")
-    result = terminal.told("controller", *sweep, *quick.at)
-    assert (result["state"], result["program"]) == ("active", "hold")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "status", "said"),
-    [
-        (("jog", "middle=3"), 2, "middle=3: allowed: AXIS=deg/s with axis left, right"),
-        (("jog", "left=fast"), 2, "'fast' is no number of deg/s"),
-        (("jog", "left=nan"), 2, "left=nan: allowed: a finite number"),
-        (("jog", "left=1e6"), 1, "velocity_rad_s[0]"),
-        (("controller", "waltz"), 1, "program: 'waltz'; allowed: idle, hold"),
-        (("controller", "sweep", "legs"), 2, "legs: allowed: KEY=VALUE"),
-        (("controller", "sweep", "legs=NaN"), 2, "NaN is no number"),
-        (("controller", "sweep", "legs=[1"), 2, "is not JSON"),
-        (("enable",), 1, "enable: not in state active"),
-        (("ack",), 1, "acknowledge: not in state active; allowed in fault"),
-    ],
-)
-def test_what_cannot_be_done_is_said_in_one_line(
-    active: RealDaemon, terminal: Terminal, arguments: tuple[str, ...], status: int, said: str
-) -> None:
-    ended, _, err = terminal.run(*arguments, *active.at)
-    assert ended == status
-    assert said in err
-    assert err.count("\n") == 1
-
-
-def test_status_is_for_people_and_for_programs(active: RealDaemon, terminal: Terminal) -> None:
-    _, shown, _ = terminal.run("status", *active.at)
-    assert shown.startswith(f"{NAME}: active, program hold")
-    for axis in ("left", "right"):
-        assert f"\n{axis} " in shown
-    assert terminal.told("status", *active.at)["axes"][1]["name"] == "right"
-
-
-def test_disable_and_enable(active: RealDaemon, terminal: Terminal) -> None:
-    assert terminal.told("disable", *active.at)["state"] == "ready"
-    assert terminal.told("enable", *active.at)["state"] == "active"
-
-
-def handles_sigterm(pid: int) -> bool:
-    status = Path(f"/proc/{pid}/status").read_text()
-    caught = int(status.partition("SigCgt:")[2].split()[0], 16)
-    return bool(caught >> (signal.SIGTERM - 1) & 1)
-
-
-def test_status_goes_on_until_ctrl_c(active: RealDaemon) -> None:
-    command = [sys.executable, "-m", "tools.cli", "status", "--watch", "--json", *active.at]
-    watching = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    until(lambda: handles_sigterm(watching.pid))
-    time.sleep(0.5)
-    assert watching.poll() is None
-    watching.send_signal(signal.SIGINT)
-    out, err = watching.communicate(timeout=20.0)
-    assert watching.returncode == 0, err
-    assert json.loads(out.splitlines()[-1])["state"] == "active"
-
-
-def test_over_tcp_with_the_key_only(
-    active: RealDaemon, url: str, terminal: Terminal, tmp_path: Path
-) -> None:
-    key_file = tmp_path / "key"
-    key_file.write_text(KEY)
-    key_file.chmod(0o600)
-    assert terminal.told("hold", "--url", url, "--key-file", str(key_file))["state"] == "active"
-    for option in ((), ("--key-file", str(wrong_key(tmp_path)))):
-        status, _, err = terminal.run("hold", "--url", url, *option)
-        assert (status, "Bearer KEY" in err) == (2, True)
-    assert terminal.told("status", "--url", url)["state"] == "active"
-    key_file.chmod(0o644)
-    status, _, err = terminal.run("hold", "--url", url, "--key-file", str(key_file))
-    assert (status, "others may read it" in err) == (2, True)
-
-
-def wrong_key(folder: Path) -> Path:
-    path = folder / "wrong"
-    path.write_text("the key of another robot")
-    path.chmod(0o600)
-    return path
-
-
-def test_where_no_daemon_runs_it_says_how_to_start_one(tmp_path: Path, terminal: Terminal) -> None:
-    status, _, err = terminal.run("hold", "--socket", str(tmp_path / "none.sock"))
-    assert status == 1
-    assert "cdpr run ROBOT" in err
-    assert terminal.run("hold", "--url", "http://127.0.0.1:9")[0] == 1
-    assert terminal.run("hold", "--url", "ftp://127.0.0.1:9")[0] == 2
