@@ -15,8 +15,9 @@ CONTROL_STEP_S = 5e-5
 """Period of the inner loops, and the longest step of the physics."""
 DELAY_SLOTS = 256
 
-LOAD_KINDS = ("none", "hung_mass", "fixed_anchor")
-"""Names of `load_kind`: their places here are its values."""
+LOAD_KINDS = ("none", "hung_mass", "fixed_anchor", "platform")
+"""Names of `load_kind`: their places here are its values. A platform is no plant file's: the robot's
+physics connects its motors to it."""
 _F8 = np.float64
 _PHYSICS = [
     # parameters
@@ -64,6 +65,13 @@ _CABLE = [
     ("winch_friction", _F8),  # Nm
     ("friction_share", _F8),  # Nm per N
     ("brake", _F8),  # Nm; 0 released
+    ("rigidity", _F8),  # N, EA of a cable that leads to a platform
+    ("weight", _F8),  # N/m, of that cable
+    ("damping_time", _F8),  # s, its damping over its stiffness
+    # where its far end is, written by the platform's physics before every step
+    ("far_distance", _F8),  # m, from exit to anchor point
+    ("far_rate", _F8),  # m/s
+    ("far_level", _F8),  # horizontal share of the way
     # state
     ("mass", _F8),  # kg
     ("mass_position", _F8),  # m, downward from power-up

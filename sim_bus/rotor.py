@@ -12,6 +12,10 @@ from sim_bus.motor_state import DELAY_SLOTS
 
 INDEX_ROSE = 1
 INDEX_FELL = 2
+PLATFORM = 3
+"""`load_kind` of a motor whose cable leads to a platform."""
+_SHORTEST_m = 0.02
+_SLACK_N = 1e-3
 
 
 @jit
@@ -86,6 +90,8 @@ def turn_loaded(m: Any, h: float, A: float, B: float) -> float:
     """
     if m.load_kind == 0:
         return braked(m, A, B)
+    if m.load_kind == PLATFORM:
+        return wind(m, A, B)
     c = m.cable_gain
     stretch = m.cable_start + m.mass_position - c * (m.angle - m.angle_start)
     pull = m.cable_stiffness * stretch
@@ -110,6 +116,54 @@ def turn_loaded(m: Any, h: float, A: float, B: float) -> float:
         v = min(m.mass_velocity + h * m.gravity, landing)
     m.mass_velocity = v
     m.mass_position += h * v
+    m.tension = tension
+    m.load_friction = m.winch_friction + m.friction_share * tension
+    return w
+
+
+@jit
+def cable_force(stretch: float, stiffness: float, sag: float, last: float) -> tuple[float, float]:
+    """Return tension and its slope over `stretch` of an elastic cable that sags.
+
+    stretch = t / stiffness - sag / t², the second part being what a flat parabola is longer than
+    its chord (Irvine, Cable Structures, 1981); without weight a slack cable has no tension at all.
+    Newton's method from the last tension; once below the root it climbs without overshoot, as the
+    curve is concave.
+    """
+    if sag <= 0.0:
+        if stretch <= 0.0:
+            return 0.0, 0.0
+        return stretch * stiffness, stiffness
+    t = max(last, _SLACK_N)
+    slope = 0.0
+    for _ in range(40):
+        slope = 1.0 / stiffness + 2.0 * sag / (t * t * t)
+        step = (stretch - t / stiffness + sag / (t * t)) / slope
+        t = max(t + step, 0.25 * t)
+        if abs(step) <= 1e-9 * t:
+            break
+    return t, 1.0 / slope
+
+
+@jit
+def wind(m: Any, A: float, B: float) -> float:
+    """Return the rotor's new velocity, A·w = B without load, where its cable holds a platform.
+
+    The platform stands still during the step: it is heavy, and moved afterwards by the tension
+    found here. The spring acts from where it is (symplectic Euler), damping is implicit.
+    """
+    c = m.cable_gain
+    length = max(_SHORTEST_m, m.cable_start + c * (m.angle - m.angle_start))
+    hanging = m.weight * length * m.far_level
+    sag = hanging * hanging * length / 24.0
+    stiffness = m.rigidity / length
+    pull, slope = cable_force(m.far_distance - length, stiffness, sag, m.tension)
+    d = m.damping_time * slope
+    w = braked(m, A + c * d * c, B + c * (pull + d * m.far_rate))
+    tension = pull + d * (m.far_rate - c * w)
+    if tension <= 0.0:
+        tension = 0.0
+        w = braked(m, A, B)
     m.tension = tension
     m.load_friction = m.winch_friction + m.friction_share * tension
     return w

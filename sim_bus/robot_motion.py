@@ -1,0 +1,82 @@
+"""Motors, cables and platform of one robot, advanced together (compiled)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from sim_bus import rotor, servo
+from sim_bus.jit import jit
+from sim_bus.motor_state import CONTROL_STEP_S
+from sim_bus.platform import look_along_cables, step_platform
+
+_TIME, _RINGING = 1e-12, 0.15
+
+
+@jit
+def steps_within(motors: Any, h: float) -> int:
+    """Return into how many steps to divide `h` so that the stiffest cable's rotor does not ring.
+
+    A rotor on a cable swings at sqrt(EA c² / (l J)), c the cable it pays out per radian.
+    """
+    most = 1
+    for m in motors:
+        length = max(0.02, m.cable_start + m.cable_gain * (m.angle - m.angle_start))
+        swing = math.sqrt(m.rigidity / length * m.cable_gain * m.cable_gain / m.inertia)
+        most = max(most, m.steps_per_control, math.ceil(swing * h / _RINGING))
+    return min(40, most)
+
+
+@jit
+def run_together(
+    motors: Any, platform: Any, until: float, kinds: Any, targets: Any, flags: Any
+) -> None:
+    """Advance all motors and the platform to bus time `until`; or flags of each to `flags`."""
+    p = platform[0]
+    dt = until - motors[0].time
+    if dt <= _TIME:
+        return
+    n = max(1, math.ceil(dt / CONTROL_STEP_S - 1e-6))
+    h = dt / n
+    start = motors[0].time
+    for i in range(p.cables):
+        rotor.warm_up(motors[i], dt, kinds[i] != servo.OFF)
+    for k in range(n):
+        for i in range(p.cables):
+            flags[i] |= servo.control(motors[i], kinds[i], targets[i], h)
+        parts = steps_within(motors, h)
+        for _ in range(parts):
+            look_along_cables(p, motors)
+            for i in range(p.cables):
+                m = motors[i]
+                rotor.step_rotor(m, h / parts, m.torque_demand, kinds[i] != servo.OFF)
+                flags[i] |= rotor.step_disc(m)
+            step_platform(p, motors, h / parts)
+        for i in range(p.cables):
+            m = motors[i]
+            m.time = start + (k + 1) * h
+            rotor.remember_angle(m)
+            servo.observe(m, rotor.read_counter(m, m.angle), h)
+    for i in range(p.cables):
+        motors[i].time = until
+        flags[i] |= servo.watch(motors[i], kinds[i], targets[i], dt)
+
+
+@jit
+def sample_of(
+    motor: Any, flags: int
+) -> tuple[int, int, int, int, float, float, float, float, float, float]:
+    """Return the `motor.Sample` of a motor as it is now, with the flags of its last steps."""
+    m = motor[0]
+    return (
+        flags | servo.switches(m),
+        rotor.read_counter(m, rotor.delayed_angle(m)),
+        math.floor(m.sensed / m.torque_unit + 0.5),
+        math.floor(m.displayed_velocity + 0.5),
+        m.angle,
+        m.velocity,
+        m.torque_gain * m.sensed,
+        m.cogging_Nm,
+        m.friction_Nm,
+        m.rise,
+    )
