@@ -1,0 +1,190 @@
+"""One simulated cable robot: the physics that its drives share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim_bus import servo
+from sim_bus.motor import Sample
+from sim_bus.motor_state import LOAD_KINDS, MOTOR_DTYPE, MotorArray, Transmission
+from sim_bus.platform import MOST_CABLES, MOST_FEET, PLATFORM_DTYPE, PlatformArray
+from sim_bus.robot_motion import run_together, sample_of
+from sim_bus.robot_plant import RobotPlant
+
+_LONGEST_STEP_S = 1e-3
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RobotShape:
+    """What the robot's profile says of it; points are (n, 2) in a plane or (n, 3), m."""
+
+    exit_points_m: ArrayLike
+    anchor_points_m: ArrayLike
+    """In the platform's frame."""
+    mass_kg: float
+    home_m: Sequence[float]
+    """Where the platform's origin is at power-up, unless the plant says otherwise."""
+    weights_N_m: Sequence[float]
+    """Of each cable."""
+    feet_m: ArrayLike | None = None
+    """What the platform stands on, in its frame; its anchor points where left out."""
+
+
+class CableRobot:
+    """Motors, cables and platform; each drive asks it to advance and reads its own motor.
+
+    Whoever asks first for an instant advances all, under what each power stage is set to then.
+    """
+
+    def __init__(
+        self, shape: RobotShape, plant: RobotPlant, transmissions: Sequence[Transmission]
+    ) -> None:
+        self.n = n = len(transmissions)
+        self.motors: MotorArray = np.zeros(n, MOTOR_DTYPE)
+        """Taken over by `adopt`, one record each."""
+        self.kinds: NDArray[np.int64] = np.full(n, servo.OFF, np.int64)
+        self.targets: FloatArray = np.zeros(n)
+        self._flags: NDArray[np.int64] = np.zeros(n, np.int64)
+        self._plant = plant
+        self._chance = np.random.default_rng([plant.seed, 1])
+        self._transmissions = list(transmissions)
+        self._weights = list(shape.weights_N_m)
+        self.platform = self._build_platform(shape)
+        self._adopted = 0
+
+    def adopt(self, i: int, motor: MotorArray) -> MotorArray:
+        """Connect motor `i`, a record of shape (1,), to its cable; return the record to use."""
+        self.motors[i] = motor[0]
+        here = self.motors[i : i + 1]
+        plant, transmission = self._plant.cables, self._transmissions[i]
+        error = float(self._chance.normal(0.0, plant.drum_radius_sigma))
+        if plant.drum_radius_errors:
+            error += plant.drum_radius_errors[i]
+        gain = transmission.cable_m_per_rad * (1.0 + error)
+        here["load_kind"] = LOAD_KINDS.index("platform")
+        here["cable_gain"] = gain
+        here["rigidity"] = transmission.cable_stiffness_N * (1.0 + plant.stiffness_error)
+        here["weight"] = self._weights[i] if plant.sag else 0.0
+        here["damping_time"] = plant.damping_s
+        here["winch_friction"] = plant.winch_friction_Nm
+        here["friction_share"] = plant.friction_share * abs(gain)
+        here["angle_start"] = here["angle"]
+        here["cable_start"] = self.distance_m(i) + self._plant.start.slack_m
+        self._adopted += 1
+        return here
+
+    def step(self, i: int, until: float, kind: int, target: float) -> Sample:
+        """Set motor `i` to a kind of control, advance all to bus time `until`, return its sample."""
+        self.kinds[i], self.targets[i] = kind, target
+        now = float(self.motors["time"][i])
+        while until - now > 1e-12:
+            now = min(until, now + _LONGEST_STEP_S) if until - now > 1.5e-3 else until
+            run_together(
+                self.motors, self.platform, now, self.kinds, self.targets, self._flags
+            )
+        flags, self._flags[i] = int(self._flags[i]), 0
+        return Sample(*sample_of(self.motors[i : i + 1], flags))
+
+    @property
+    def position_m(self) -> FloatArray:
+        """True position of the platform's origin, (3,)."""
+        p = self.platform[0]
+        return np.asarray(p["position"] - p["rotation"] @ self._com)
+
+    @property
+    def rotation(self) -> FloatArray:
+        """True rotation from the platform's frame to the room, (3, 3)."""
+        return np.array(self.platform[0]["rotation"])
+
+    @property
+    def tension_N(self) -> FloatArray:
+        """True tension of each cable at its winch, (n,)."""
+        return np.array(self.motors["tension"])
+
+    def cut(self, i: int) -> None:
+        """Cut cable `i` for good."""
+        self.motors["rigidity"][i] = 1e-9
+        self.motors["weight"][i] = 0.0
+
+    def distance_m(self, i: int) -> float:
+        """Return the distance from exit to anchor point of cable `i`, m."""
+        p = self.platform[0]
+        anchor = p["position"] + p["rotation"] @ p["anchor"][i]
+        return float(np.linalg.norm(p["exit"][i] - anchor))
+
+    def _build_platform(self, shape: RobotShape) -> PlatformArray:
+        plant, n = self._plant, self.n
+        exits = _points(shape.exit_points_m, n, "exit points")
+        anchors = _points(shape.anchor_points_m, n, "anchor points")
+        planar = np.shape(shape.exit_points_m)[1] == 2
+        exits = self._moved(exits, plant.geometry.exit_errors_m, plant.geometry.exit_sigma_m, planar)
+        anchors = self._moved(
+            anchors, plant.geometry.anchor_errors_m, plant.geometry.anchor_sigma_m, planar
+        )
+        self._com = _vector(plant.platform.centre_of_mass_m)
+        platform: PlatformArray = np.zeros(1, PLATFORM_DTYPE)
+        p: Any = platform[0]
+        p["cables"], p["planar"] = n, planar
+        p["mass"] = shape.mass_kg * (1.0 + plant.platform.mass_error)
+        reach = plant.platform.radius_of_gyration_m or _plate_radius(anchors)
+        p["reach"], p["air"] = reach, plant.platform.air_Ns_m
+        p["inertia"] = p["mass"] * reach**2 * np.eye(3)
+        p["inverse_inertia"] = np.linalg.inv(p["inertia"])
+        p["gravity"] = (0.0, -9.80665, 0.0) if planar else (0.0, 0.0, -9.80665)
+        p["exit"][:n] = exits
+        p["anchor"][:n] = anchors - self._com
+        angle = math.radians(plant.start.angle_deg)
+        cosine, sine = math.cos(angle), math.sin(angle)
+        p["rotation"] = ((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0))
+        start = plant.start.position_m or shape.home_m
+        p["position"] = _vector(start) + p["rotation"] @ self._com
+        self._put_floor(p, anchors if shape.feet_m is None else _points(shape.feet_m, None, "feet"))
+        return platform
+
+    def _put_floor(self, p: Any, feet: FloatArray) -> None:
+        floor = self._plant.floor
+        p["feet"] = len(feet)
+        p["foot"][: len(feet)] = feet - self._com
+        up = -p["gravity"] / np.linalg.norm(p["gravity"])
+        lowest = min(float(up @ (p["position"] + p["rotation"] @ f)) for f in p["foot"][: len(feet)])
+        p["floor"] = lowest if floor.height_m is None else floor.height_m
+        if not floor.present:
+            p["floor"] = -math.inf
+        p["floor_stiffness"], p["floor_damping"] = floor.stiffness_N_m, floor.damping_Ns_m
+        p["floor_friction"] = floor.friction
+
+    def _moved(
+        self, points: FloatArray, errors: Sequence[Sequence[float]], sigma: float, planar: bool
+    ) -> FloatArray:
+        chance = self._chance.normal(0.0, sigma, points.shape)
+        if planar:
+            chance[:, 2] = 0.0
+        known = _points(errors, len(points), "errors") if errors else np.zeros_like(points)
+        return points + known + chance
+
+
+def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:
+    points = np.asarray(values, float)
+    most = MOST_CABLES if n is not None else MOST_FEET
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or not 0 < len(points) <= most:
+        raise ValueError(f"{what}: {points.shape}; allowed: (n, 2) or (n, 3), n up to {most}")
+    if n is not None and len(points) != n:
+        raise ValueError(f"{what}: {len(points)}; allowed: one for each of {n} axes")
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+
+
+def _vector(values: Sequence[float]) -> FloatArray:
+    return np.pad(np.asarray(values, float), (0, 3 - len(values)))
+
+
+def _plate_radius(anchors: FloatArray) -> float:
+    """Return the radius of gyration of a plate about its centre, from its corners' distance."""
+    spread = float(np.sqrt(np.mean(np.sum((anchors - anchors.mean(axis=0)) ** 2, axis=1))))
+    return max(0.01, spread / 2.0)

@@ -1,0 +1,151 @@
+"""The plant file of a cable robot: the truth about platform, cables and motors behind its profile."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from profiles.reader import Profile, read_toml_model
+from sim_bus.plant import CoggingTerm, Plant
+
+Vector = tuple[float, ...]
+_Relative = Annotated[float, Field(ge=-0.5, le=0.5)]
+
+
+class PlatformPlant(Profile):
+    """The rigid body; errors are relative to the robot's profile."""
+
+    mass_error: _Relative = 0.0
+    """Relative: true mass = that of the profile × (1 + this)."""
+    centre_of_mass_m: Annotated[Vector, Field(min_length=2, max_length=3)] = (0.0, 0.0)
+    """In the platform's frame."""
+    radius_of_gyration_m: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
+    """Where left out, that of a plate whose corners are the anchor points."""
+    air_Ns_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
+
+
+class GeometryPlant(Profile):
+    """Where points truly are: first a vector for each cable, then chance on top."""
+
+    exit_errors_m: tuple[Vector, ...] = ()
+    anchor_errors_m: tuple[Vector, ...] = ()
+    exit_sigma_m: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
+    anchor_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
+
+
+class CablesPlant(Profile):
+    """The cables and what winds them."""
+
+    stiffness_error: _Relative = 0.0
+    """Relative: true EA = that of the cable's profile × (1 + this)."""
+    damping_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.002
+    """Damping over stiffness."""
+    sag: bool = True
+    """Whether cables have weight."""
+    drum_radius_errors: tuple[_Relative, ...] = ()
+    """Relative, one for each axis or none."""
+    drum_radius_sigma: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
+    winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Dry friction of gear and drum without tension, on the motor side."""
+    friction_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.02
+    """Further dry friction, as a share of the torque that the tension exerts."""
+
+
+class StartPlant(Profile):
+    """How the robot stands at power-up."""
+
+    position_m: Vector | None = None
+    """Of the platform's origin; the profile's home where left out."""
+    angle_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
+    slack_m: Annotated[float, Field(ge=0.0, le=10.0)] = 0.02
+    """Of every cable."""
+
+
+class FloorPlant(Profile):
+    """What the platform stands on."""
+
+    height_m: float | None = None
+    """Where left out, under the platform as it stands at power-up."""
+    present: bool = True
+    stiffness_N_m: Annotated[float, Field(gt=0.0, le=1e7)] = 5e4
+    damping_Ns_m: Annotated[float, Field(ge=0.0, le=1e5)] = 200.0
+    friction: Annotated[float, Field(ge=0.0, le=2.0)] = 0.3
+
+
+class VariationPlant(Profile):
+    """How much the motors differ from the one in [motor]: uniform within plus and minus these."""
+
+    cogging: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
+    """Of each amplitude, relative; phases are anything at all."""
+    friction: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
+    torque_constant: Annotated[float, Field(ge=0.0, le=0.3)] = 0.03
+
+
+class RobotPlant(Profile):
+    """All sections of a robot's plant file; every key has a default.
+
+    `motor` is the plant of one motor as for a single winch, `motors`, where given, one each.
+    """
+
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
+    platform: PlatformPlant = PlatformPlant()
+    geometry: GeometryPlant = GeometryPlant()
+    cables: CablesPlant = CablesPlant()
+    start: StartPlant = StartPlant()
+    floor: FloorPlant = FloorPlant()
+    variation: VariationPlant = VariationPlant()
+    motor: Plant = Plant()
+    motors: tuple[Plant, ...] = ()
+
+    @classmethod
+    def load_file(cls, path: str | Path) -> RobotPlant:
+        """Read a robot's plant file.
+
+        Raises profiles.errors.ProfileError naming file, key, value and what is allowed.
+        """
+        return read_toml_model(Path(path), cls)
+
+    def motor_plants(self, n: int) -> list[Plant]:
+        """Return the plant of each of n motors."""
+        if self.motors:
+            return list(self.motors)
+        chance = np.random.default_rng(self.seed)
+        return [self._one_of_them(i, chance) for i in range(n)]
+
+    def _one_of_them(self, i: int, chance: np.random.Generator) -> Plant:
+        base, by = self.motor, self.variation
+
+        def about(share: float) -> float:
+            return 1.0 + share * chance.uniform(-1.0, 1.0)
+
+        cogging = tuple(
+            CoggingTerm(
+                order=term.order,
+                amplitude_Nm=term.amplitude_Nm * about(by.cogging),
+                phase_deg=math.degrees(chance.uniform(-math.pi, math.pi)),
+                kind=term.kind,
+            )
+            for term in base.cogging
+        )
+        rubbing = about(by.friction)
+        friction = base.friction.model_copy(
+            update={
+                "coulomb_Nm": base.friction.coulomb_Nm * rubbing,
+                "breakaway_Nm": base.friction.breakaway_Nm * rubbing,
+            }
+        )
+        error = base.motor.torque_constant_error + by.torque_constant * chance.uniform(-1.0, 1.0)
+        index = base.encoder.index_deg + chance.uniform(0.0, 360.0)
+        return base.model_copy(
+            update={
+                "seed": (self.seed + i) % 2**32,
+                "cogging": cogging,
+                "friction": friction,
+                "motor": base.motor.model_copy(update={"torque_constant_error": error}),
+                "encoder": base.encoder.model_copy(update={"index_deg": index % 360.0}),
+            }
+        )
