@@ -11,6 +11,7 @@ from profiles.cable import Cable, CableSeries
 from profiles.drive import DriveProfile
 from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings, MotorSeries
+from profiles.platform import Platform
 from profiles.rail import load_rail
 from profiles.reader import closest, read_toml, read_toml_model
 from profiles.robot import (
@@ -132,8 +133,19 @@ def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
         **{
             key: getattr(file, key)
             for key in RobotFile.model_fields
-            if key not in ("axes", "safety_io", "tension_sensors", "rails")
+            if key not in ("axes", "safety_io", "tension_sensors", "rails", "platform")
         },
+        platform=_platform(file),
+    )
+
+
+def _platform(file: RobotFile) -> Platform | None:
+    if file.platform is None:
+        return None
+    return Platform(
+        **file.platform.model_dump(),
+        exit_points_m=tuple(axis.exit_point_m or () for axis in file.axes),
+        anchor_points_m=tuple(axis.anchor_point_m or () for axis in file.axes),
     )
 
 

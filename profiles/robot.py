@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from profiles.platform import Platform, PlatformFile, Point, platform_faults
 from profiles.reader import Profile, one_of
 from profiles.robot_limits import RobotLimits
 from profiles.winch import BITRATES_bit_s, Winch
@@ -34,6 +35,10 @@ class AxisFile(Profile):
     name: str | None = Field(default=None, min_length=1, max_length=32)
     cable_sign: Annotated[int, one_of(-1, 1)] | None = None
     calibration: str | None = None
+    exit_point_m: Point | None = None
+    """Where its cable leaves for the platform."""
+    anchor_point_m: Point | None = None
+    """Where its cable is made fast, in the platform's frame."""
 
 
 class RobotFile(Profile):
@@ -50,11 +55,17 @@ class RobotFile(Profile):
     tension_sensors: str | None = None
     rails: tuple[str, ...] = ()
     limits: RobotLimits = RobotLimits()
+    platform: PlatformFile | None = None
 
     def faults(self) -> Iterator[tuple[str, str]]:
         """Yield (key, problem) for what contradicts itself."""
         yield from self.limits.faults(len(self.axes))
         yield from self._repeated_names()
+        yield from platform_faults(
+            self.platform,
+            [axis.exit_point_m for axis in self.axes],
+            [axis.anchor_point_m for axis in self.axes],
+        )
         if self.master_heartbeat_s < 2 * self.sync_period_s:
             allowed = f"allowed: at least two cycles ({2 * self.sync_period_s:g})"
             yield "master_heartbeat_s", f"value {self.master_heartbeat_s:g}; {allowed}"
@@ -137,6 +148,8 @@ class Robot:
     notes: tuple[str, ...] = ()
     master_heartbeat_s: float = 0.1
     limits: RobotLimits = field(default_factory=RobotLimits)
+    platform: Platform | None = None
+    """What the axes hold together; None for winches that have nothing in common."""
     is_winch: bool = False
     """Whether it is a single winch, run as a robot of one axis; its file is that of the winch."""
 

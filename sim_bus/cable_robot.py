@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim_bus import servo
-from sim_bus.motor import Sample
 from sim_bus.motor_state import LOAD_KINDS, MOTOR_DTYPE, MotorArray, Transmission
 from sim_bus.platform import MOST_CABLES, MOST_FEET, PLATFORM_DTYPE, PlatformArray
 from sim_bus.robot_motion import run_together, sample_of
@@ -19,6 +18,8 @@ from sim_bus.robot_plant import RobotPlant
 
 _LONGEST_STEP_S = 1e-3
 FloatArray = NDArray[np.float64]
+MotorSample = tuple[int, int, int, int, float, float, float, float, float, float]
+"""A `motor.Sample` as the kernels return it."""
 
 
 @dataclass(frozen=True)
@@ -80,17 +81,19 @@ class CableRobot:
         self._adopted += 1
         return here
 
-    def step(self, i: int, until: float, kind: int, target: float) -> Sample:
-        """Set motor `i` to a kind of control, advance all to bus time `until`, return its sample."""
+    def step(self, i: int, until: float, kind: int, target: float) -> MotorSample:
+        """Set motor `i` to a kind of control, advance all to `until`, return its `motor.Sample`."""
         self.kinds[i], self.targets[i] = kind, target
         now = float(self.motors["time"][i])
         while until - now > 1e-12:
             now = min(until, now + _LONGEST_STEP_S) if until - now > 1.5e-3 else until
-            run_together(
-                self.motors, self.platform, now, self.kinds, self.targets, self._flags
-            )
+            run_together(self.motors, self.platform, now, self.kinds, self.targets, self._flags)
         flags, self._flags[i] = int(self._flags[i]), 0
-        return Sample(*sample_of(self.motors[i : i + 1], flags))
+        return sample_of(self.motors[i : i + 1], flags)
+
+    def members(self) -> list[RobotMember]:
+        """Return each motor's part in the robot."""
+        return [RobotMember(self, i) for i in range(self.n)]
 
     @property
     def position_m(self) -> FloatArray:
@@ -124,7 +127,9 @@ class CableRobot:
         exits = _points(shape.exit_points_m, n, "exit points")
         anchors = _points(shape.anchor_points_m, n, "anchor points")
         planar = np.shape(shape.exit_points_m)[1] == 2
-        exits = self._moved(exits, plant.geometry.exit_errors_m, plant.geometry.exit_sigma_m, planar)
+        exits = self._moved(
+            exits, plant.geometry.exit_errors_m, plant.geometry.exit_sigma_m, planar
+        )
         anchors = self._moved(
             anchors, plant.geometry.anchor_errors_m, plant.geometry.anchor_sigma_m, planar
         )
@@ -153,7 +158,9 @@ class CableRobot:
         p["feet"] = len(feet)
         p["foot"][: len(feet)] = feet - self._com
         up = -p["gravity"] / np.linalg.norm(p["gravity"])
-        lowest = min(float(up @ (p["position"] + p["rotation"] @ f)) for f in p["foot"][: len(feet)])
+        lowest = min(
+            float(up @ (p["position"] + p["rotation"] @ f)) for f in p["foot"][: len(feet)]
+        )
         p["floor"] = lowest if floor.height_m is None else floor.height_m
         if not floor.present:
             p["floor"] = -math.inf
@@ -168,6 +175,22 @@ class CableRobot:
             chance[:, 2] = 0.0
         known = _points(errors, len(points), "errors") if errors else np.zeros_like(points)
         return points + known + chance
+
+
+@dataclass(frozen=True)
+class RobotMember:
+    """One motor's part in the robot, for the drive that it belongs to."""
+
+    robot: CableRobot
+    number: int
+
+    def adopt(self, motor: MotorArray) -> MotorArray:
+        """See `CableRobot.adopt`."""
+        return self.robot.adopt(self.number, motor)
+
+    def step(self, until: float, kind: int, target: float) -> MotorSample:
+        """See `CableRobot.step`."""
+        return self.robot.step(self.number, until, kind, target)
 
 
 def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from typing_extensions import override
 
 from profiles.winch import Winch
 from sim_bus import servo
 from sim_bus.board_link import BoardLink
+from sim_bus.cable_robot import RobotMember
 from sim_bus.canopen import (
     Abort,
     CanopenSlave,
@@ -60,6 +61,19 @@ _FIXED = (0x607E, 0x608F, 0x6091, 0x6092)
 _POSITIONS = ((0x6065, 0), (0x6067, 0), (0x6092, 1))
 
 
+class SyncLog(Protocol):
+    """What is told of every SYNC."""
+
+    def append(self, sync_index: int, time_s: float, truth: tuple[float, ...]) -> None:
+        """Take the true figures that a `motor.Sample` ends with."""
+
+    def flush(self) -> None:
+        """Write what is buffered."""
+
+    def close(self) -> None:
+        """Write the rest; nothing follows."""
+
+
 class SimDrive(SlaveApplication):
     """One drive on the bus (a `LocalNode`), fed with frames and bus time by whoever runs it."""
 
@@ -75,12 +89,14 @@ class SimDrive(SlaveApplication):
         bitrate: int = 1_000_000,
         serial: int | None = None,
         transmission: Transmission | None = None,
+        robot: RobotMember | None = None,
     ) -> None:
         """Build the drive, switched on at bus time 0.
 
         `truth_log` and `store` (what 1010h and LSS keep) are files to write; `serial` is 1018h:4
-        where it is not the EDS's. Raises DictionaryError for an EDS that lacks objects, StoreError
-        for a damaged store, OSError when the truth log cannot be created.
+        where it is not the EDS's; `robot` is what its motor moves together with others. Raises
+        DictionaryError for an EDS that lacks objects, StoreError for a damaged store, OSError when
+        the truth log cannot be created.
         """
         ratings = ratings or MotorRatings()
         self.od = od = ObjectDictionary.from_eds(eds, node_id)
@@ -93,13 +109,13 @@ class SimDrive(SlaveApplication):
             od, node_id, self, store=ParameterStore(store, PROCESS_DATA), bitrate=bitrate
         )
         self.outbox = self._slave.outbox
-        self.axis = Axis(od, plant, ratings, transmission, twin)
+        self.axis = Axis(od, plant, ratings, transmission, twin, robot)
         self.probes = TouchProbes(self.axis)
         self.machine = Machine(self.axis, self._slave)
         self.misbehaviour = Misbehaviour(od, self.machine, self.outbox)
         self._bind_configuration()
         motor = self.axis.motor
-        self._log = None
+        self._log: SyncLog | None = None
         if truth_log is not None:
             index = float(motor["index"][0]) / float(motor["counts_per_rad"][0])
             self._log = TruthLog(truth_log, node_id, index, float(motor["angle"][0]))
@@ -117,6 +133,7 @@ class SimDrive(SlaveApplication):
         truth_log: Path | None = None,
         store: Path | None = None,
         serial: int | None = None,
+        robot: RobotMember | None = None,
     ) -> Self:
         """Build the drive that a winch's profile describes."""
         motor = winch.motor
@@ -137,8 +154,13 @@ class SimDrive(SlaveApplication):
             store=store,
             bitrate=winch.bitrate_bit_s,
             serial=serial,
-            transmission=Transmission(winch.cable_m_per_motor_rad, winch.cable.stiffness_N),
+            transmission=transmission_of(winch),
+            robot=robot,
         )
+
+    def record_with(self, log: SyncLog) -> None:
+        """Have `log` told of every SYNC, instead of a truth log; it is closed with the drive."""
+        self._log = log
 
     def connect(self, board: BoardAxis) -> None:
         """Share the physics: write the truth to the board, take power and brake from there."""
@@ -254,6 +276,11 @@ class SimDrive(SlaveApplication):
                 self.machine.configuration_changed = True
 
         return note
+
+
+def transmission_of(winch: Winch) -> Transmission:
+    """Return what leads from a winch's motor to its cable, by its profile."""
+    return Transmission(winch.cable_m_per_motor_rad, winch.cable.stiffness_N)
 
 
 def _only(allowed: Callable[[Any], bool]) -> Callable[[Value], None]:

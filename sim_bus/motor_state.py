@@ -16,8 +16,7 @@ CONTROL_STEP_S = 5e-5
 DELAY_SLOTS = 256
 
 LOAD_KINDS = ("none", "hung_mass", "fixed_anchor", "platform")
-"""Names of `load_kind`: their places here are its values. A platform is no plant file's: the robot's
-physics connects its motors to it."""
+"""Names of `load_kind`: their places here are its values. The last is that of a `CableRobot`."""
 _F8 = np.float64
 _PHYSICS = [
     # parameters

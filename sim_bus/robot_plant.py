@@ -1,4 +1,4 @@
-"""The plant file of a cable robot: the truth about platform, cables and motors behind its profile."""
+"""The plant file of a cable robot: the truth about platform, cables and motors."""
 
 from __future__ import annotations
 

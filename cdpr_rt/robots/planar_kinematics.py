@@ -171,4 +171,4 @@ class PlanarGeometry:
         )
 
     def _vectors(self, position_m: FloatArray) -> FloatArray:
-        return np.asarray(position_m, float)[..., None, :] + self.b - self.a
+        return np.asarray(np.asarray(position_m, float)[..., None, :] + self.b - self.a)

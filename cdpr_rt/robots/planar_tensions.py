@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from enum import IntEnum
 
-import numpy as np
-
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.jit import jit
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from sim_bus import servo
+from sim_bus.cable_robot import MotorSample, RobotMember
 from sim_bus.canopen.od import ObjectDictionary
 from sim_bus.motor import run
 from sim_bus.motor_state import MotorRatings, Transmission, build_motor
@@ -36,6 +37,7 @@ class Axis:
         ratings: MotorRatings,
         transmission: Transmission | None = None,
         twin: Twin | None = None,
+        robot: RobotMember | None = None,
     ) -> None:
         self.od = od
         self.plant = plant
@@ -44,6 +46,9 @@ class Axis:
         self.velocity_unit = plant.encoder.counts_per_turn / 60.0 if self.twin.speaks_rpm else 1.0
         """Counts/s of one velocity unit, counts/s² of one acceleration unit."""
         self.motor = build_motor(plant, ratings, transmission)
+        self._robot = robot
+        if robot is not None:
+            self.motor = robot.adopt(self.motor)
         self.kind = servo.OFF
         self.target = 0.0
         self.setpoint: Callable[[], float] | None = None
@@ -56,14 +61,14 @@ class Axis:
         """Whether a software limit (607Dh) holds the target back."""
         self._position = od.entry(0x6064)
         self._torque = od.entry(0x6077)
-        self.sample = run(self.motor, 0.0, servo.OFF, 0.0)
+        self.sample = self._run(0.0)
         self._bind_feedback()
 
     def step(self, until: float) -> int:
         """Advance physics and inner loops to bus time `until`; return the flags of `motor.run`."""
         if self.setpoint is not None:
             self.target = self.setpoint()
-        self.sample = sample = run(self.motor, until, self.kind, self.target)
+        self.sample = sample = self._run(until)
         self.time = until
         counts = sample[1] + self.position_offset
         if not -0x80000000 <= counts <= 0x7FFFFFFF:
@@ -72,6 +77,11 @@ class Axis:
         self._torque.value = sample[2]
         self.flags = sample[0]
         return self.flags
+
+    def _run(self, until: float) -> MotorSample:
+        if self._robot is not None:
+            return self._robot.step(until, self.kind, self.target)
+        return run(self.motor, until, self.kind, self.target)
 
     def drive(self, kind: int, target: float) -> None:
         """Switch the power stage on under a kind of control (named in `servo`)."""

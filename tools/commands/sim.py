@@ -68,7 +68,8 @@ def up(
         int, typer.Option(min=1, max=16, help="So many drives, node ids counted up.")
     ] = 1,
     truth_log: Annotated[
-        Path | None, typer.Option(help="Write the true motion to this file (one drive only).")
+        Path | None,
+        typer.Option(help="Write the true motion, or pose, to this file (one drive, or a robot)."),
     ] = None,
     unconfigured: Annotated[
         bool, typer.Option("--unconfigured", help="New drives: without node ids, waiting for LSS.")
@@ -96,16 +97,14 @@ def up(
 ) -> None:
     """Run simulated drives until Ctrl-C; tells on standard output when they are up."""
     profile = load_machine(machine)
-    truth = Plant() if plant is None else Plant.load_file(plant)
     mode = ClockMode.LOCKSTEP if lockstep else ClockMode.PACED
     if isinstance(profile, Robot):
-        if nodes > 1 or truth_log or unconfigured or slcan or socketcand is not None:
-            raise BadInputError(
-                "--nodes, --truth-log, --unconfigured, --slcan and --socketcand: for a winch only"
-            )
+        if nodes > 1 or unconfigured or slcan or socketcand is not None:
+            raise BadInputError("--nodes, --unconfigured, --slcan, --socketcand: for a winch only")
         stores = partial(_store_file, store)
-        sim_robot.up(profile, bus, truth, mode, stores, board, exit_with_stdin)
+        sim_robot.up(profile, bus, plant, mode, stores, board, exit_with_stdin, truth_log)
         return
+    truth = Plant() if plant is None else Plant.load_file(plant)
     require_fit(profile)
     url = _bus(bus)
     if truth_log is not None and nodes > 1:
