@@ -35,7 +35,7 @@ class RobotShape:
     weights_N_m: Sequence[float]
     """Of each cable."""
     feet_m: ArrayLike | None = None
-    """What the platform stands on, in its frame; its anchor points where left out."""
+    """What the platform stands on, in its frame; the corners of the box around its anchor points where left out."""
 
 
 class CableRobot:
@@ -150,7 +150,9 @@ class CableRobot:
         p["rotation"] = ((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0))
         start = plant.start.position_m or shape.home_m
         p["position"] = _vector(start) + p["rotation"] @ self._com
-        self._put_floor(p, anchors if shape.feet_m is None else _points(shape.feet_m, None, "feet"))
+        self._put_floor(
+            p, _corners(anchors) if shape.feet_m is None else _points(shape.feet_m, None, "feet")
+        )
         return platform
 
     def _put_floor(self, p: Any, feet: FloatArray) -> None:
@@ -201,6 +203,11 @@ def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:
     if n is not None and len(points) != n:
         raise ValueError(f"{what}: {len(points)}; allowed: one for each of {n} axes")
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+
+
+def _corners(points: FloatArray) -> FloatArray:
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([np.where(pick, high, low) for pick in np.ndindex(2, 2, 2)])
 
 
 def _vector(values: Sequence[float]) -> FloatArray:

@@ -1,0 +1,155 @@
+"""The platform's physics against its laws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from body_lab import ANCHORS_m, EXITS_m, body, energy_J, free_length_m, run
+from scipy.optimize import brentq
+
+from sim_bus.rotor import cable_force
+
+ROOM_EXITS_m = [(x, y, z) for z in (0.0, 3.0) for x in (-2.5, 2.5) for y in (-2.0, 2.0)]
+ROOM_ANCHORS_m = [(x, y, z) for z in (-0.3, 0.3) for x in (-0.1, 0.1) for y in (-0.1, 0.1)]
+
+
+@pytest.mark.parametrize("locked", [True, False])
+def test_energy_stays(locked: bool) -> None:
+    robot = body(locked=locked)
+    robot.platform["velocity"][0, :2] = 0.3, 0.1
+    begin, lowest, highest = energy_J(robot), math.inf, -math.inf
+    for k in range(300):
+        run(robot, 1e-3, begin_s=k * 1e-3)
+        lowest, highest = min(lowest, energy_J(robot)), max(highest, energy_J(robot))
+    moved = 0.5 * 4.0 * (0.3**2 + 0.1**2)
+    assert highest - begin < 0.05 * moved
+    assert begin - lowest < 0.05 * moved
+
+
+def test_damping_and_friction_only_take_energy() -> None:
+    robot = body(smooth=False, cables={"damping_s": 0.002, "friction_share": 0.05})
+    robot.platform["velocity"][0, 0] = 0.5
+    last = energy_J(robot)
+    begin = last
+    for k in range(100):
+        run(robot, 5e-3, begin_s=k * 5e-3)
+        now = energy_J(robot)
+        assert now < last + 1e-3
+        last = now
+    assert last < begin - 0.2
+
+
+def test_a_free_body_keeps_momentum_spin_and_energy() -> None:
+    robot = body(exits=ROOM_EXITS_m, anchors=ROOM_ANCHORS_m, home=(0.0, 0.0, 1.5))
+    for i in range(8):
+        robot.cut(i)
+    p = robot.platform[0]
+    p["gravity"] = (0.0, 0.0, -1e-12)
+    p["inertia"] = np.diag((0.02, 0.05, 0.11))
+    p["inverse_inertia"] = np.linalg.inv(p["inertia"])
+    p["velocity"] = (0.3, -0.2, 0.1)
+    p["spin"] = (0.4, 3.0, -0.5)
+
+    def momentum() -> np.ndarray:
+        return np.asarray(p["rotation"] @ p["inertia"] @ p["rotation"].T @ p["spin"])
+
+    before, kinetic = momentum(), energy_J(robot)
+    run(robot, 2.0)
+    assert np.allclose(p["velocity"], (0.3, -0.2, 0.1), atol=1e-6)
+    assert np.allclose(momentum(), before, atol=2e-3 * np.linalg.norm(before))
+    assert energy_J(robot) == pytest.approx(kinetic, rel=2e-3)
+    assert np.allclose(p["rotation"] @ p["rotation"].T, np.eye(3), atol=1e-9)
+    assert abs(float(np.dot(p["rotation"][:, 2], (0.0, 0.0, 1.0)))) < 0.999, "it has tumbled"
+
+
+@pytest.mark.parametrize("room", [False, True])
+def test_at_rest_tensions_carry_the_platform(room: bool) -> None:
+    points = (
+        (ROOM_EXITS_m, ROOM_ANCHORS_m, (0.1, 0.2, 1.4))
+        if room
+        else (EXITS_m, ANCHORS_m, (0.2, 1.5))
+    )
+    robot = body(
+        exits=points[0], anchors=points[1], home=points[2], locked=True,
+        cables={"damping_s": 0.02}, platform={"air_Ns_m": 60.0},
+    )  # fmt: skip
+    run(robot, 3.0)
+    p, t = robot.platform[0], robot.tension_N
+    assert np.linalg.norm(p["velocity"]) < 1e-6
+    forces = t[:, None] * p["way"][: robot.n]
+    arms = p["arm"][: robot.n]
+    weight = p["mass"] * p["gravity"]
+    assert np.allclose(forces.sum(axis=0) + weight, 0.0, atol=1e-3)
+    assert np.allclose(np.cross(arms, forces).sum(axis=0), 0.0, atol=1e-3)
+    assert np.linalg.norm(weight) > 30.0
+
+
+def test_a_cut_cable_lets_go_and_the_others_hold() -> None:
+    robot = body(locked=True, cables={"damping_s": 0.002})
+    run(robot, 0.05)
+    robot.cut(0)
+    run(robot, 0.4, begin_s=0.05)
+    assert robot.tension_N[0] < 1e-3
+    x, y, _ = robot.position_m
+    assert y < 1.5 - 0.1, "it falls"
+    reach = np.hypot(x - 2.0, y - 3.0)
+    assert reach < free_length_m(robot)[1] + 0.2, "on its remaining cable"
+
+
+@pytest.mark.parametrize("length_m", [0.05, 0.2, 1.0])
+def test_stiff_short_cables_stay_stable(length_m: float) -> None:
+    exits = ((-length_m - 0.075, 1.5433), (length_m + 0.075, 1.5433), (0.0, 1.4134 - length_m))
+    robot = body(exits=exits, home=(0.0, 1.5), smooth=False, cables={"damping_s": 0.0005})
+    robot.platform["velocity"][0, 0] = 0.5
+    begin = energy_J(robot)
+    run(robot, 0.5, torque_units=-300.0)
+    # what the motors put in: 0.9 Nm over the little they turn
+    turned = float(np.abs(robot.motors["angle"] - robot.motors["angle_start"]).sum())
+    assert energy_J(robot) - begin < 1.0 * turned + 0.5
+    assert np.isfinite(robot.position_m).all()
+
+
+def test_the_floor_carries_a_slack_platform() -> None:
+    robot = body(
+        pretension_N=0.0, start={"slack_m": 0.05}, floor={"present": True}, weight_N_m=0.122
+    )
+    run(robot, 1.0)
+    assert np.linalg.norm(robot.platform["velocity"][0]) < 1e-3
+    assert robot.position_m[:2] == pytest.approx((0.2, 1.5), abs=2e-3)
+    # what a slack cable of some 2 m weighs
+    assert 0.0 < robot.tension_N.max() < 3.0
+
+
+@pytest.mark.parametrize("tension_N", [5.0, 20.0, 60.0])
+@pytest.mark.parametrize("span_m", [1.0, 3.0])
+def test_a_sagging_cable_is_a_catenary(tension_N: float, span_m: float) -> None:
+    weight, rigidity = 0.122, 40_000.0
+
+    def unstretched(t: float) -> float:
+        # elastic catenary of level ends with horizontal tension t: length less its mean stretch
+        a = t / weight
+        length = 2.0 * a * math.sinh(span_m / (2.0 * a))
+        mean = t * a / length * (span_m / (2.0 * a) + math.sinh(span_m / a) / 2.0) * 2.0 / 2.0
+        return length - length * mean / (rigidity + mean)
+
+    free = unstretched(tension_N)
+    found, slope = cable_force(
+        span_m - free, rigidity / free, (weight * free) ** 2 * free / 24.0, 1.0
+    )
+    assert found == pytest.approx(tension_N, rel=0.02)
+    stretch = 1e-6
+    more = brentq(lambda t: span_m - unstretched(t) - (span_m - free + stretch), 1.0, 200.0)
+    assert slope == pytest.approx((more - tension_N) / stretch, rel=0.05)
+
+
+@pytest.mark.parametrize("stretch_m", [-0.5, -0.01, 0.0, 1e-4, 1e-2])
+@pytest.mark.parametrize("last_N", [0.0, 1.0, 5000.0])
+def test_the_cable_force_is_found_from_any_last_tension(stretch_m: float, last_N: float) -> None:
+    k, sag = 2e4, 0.122**2 * 8.0 / 24.0
+    t, slope = cable_force(stretch_m, k, sag, last_N)
+    assert t / k - sag / t**2 == pytest.approx(stretch_m, abs=1e-9)
+    assert slope > 0.0
+    assert cable_force(-abs(stretch_m), k, 0.0, last_N)[0] == 0.0
