@@ -35,7 +35,8 @@ class RobotShape:
     weights_N_m: Sequence[float]
     """Of each cable."""
     feet_m: ArrayLike | None = None
-    """What the platform stands on, in its frame; the corners of the box around its anchor points where left out."""
+    """What the platform stands on, in its frame; the corners of a box around its anchor points
+    where left out."""
 
 
 class CableRobot:

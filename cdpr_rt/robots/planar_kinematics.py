@@ -15,7 +15,7 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.jit import jit
 
 MOST_ITERATIONS = 30
-_STEP_TOLERANCE_m = 1e-12
+_STEP_TOLERANCE_m = 1e-10
 # a platform this far from all exit points is no robot any more: the iteration has run away
 _FAR_m = 1e4
 
@@ -91,7 +91,8 @@ def solve_position(
         if abs(dx) + abs(dy) < _STEP_TOLERANCE_m * (1.0 + abs(p[0]) + abs(p[1])):
             return k, np.sqrt(cost / m), True
         if share < 1e-5:
-            return k, np.sqrt(cost / m), abs(gx) + abs(gy) < 1e-9
+            # what is left to win is less than rounding takes
+            return k, np.sqrt(cost / m), abs(dx) + abs(dy) < 1e3 * _STEP_TOLERANCE_m
     return MOST_ITERATIONS, np.sqrt(cost / m), False
 
 

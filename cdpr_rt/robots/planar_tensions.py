@@ -9,8 +9,11 @@ from __future__ import annotations
 import math
 from enum import IntEnum
 
+import numpy as np
+
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.jit import jit
+from cdpr_rt.robots.planar_kinematics import GeometryError
 
 
 class TensionOutcome(IntEnum):
@@ -60,3 +63,133 @@ def line_of_tensions(J: FloatArray, wrench: FloatArray, t0: FloatArray, u: Float
         for i in range(3):
             u[i] = -u[i]
     return True
+
+
+@jit
+def bounds_of_k(
+    t0: FloatArray, u: FloatArray, low: FloatArray, high: FloatArray
+) -> tuple[float, float]:
+    """Return between which k all of t0 + k·u lie within their bounds; the first larger: none."""
+    least, most = -math.inf, math.inf
+    for i in range(t0.size):
+        a, b = low[i] - t0[i], high[i] - t0[i]
+        if abs(u[i]) < 1e-9:  # this cable's tension is what it is
+            if a > 0.0 or b < 0.0:
+                return math.inf, -math.inf
+            continue
+        first, last = (a / u[i], b / u[i]) if u[i] > 0.0 else (b / u[i], a / u[i])
+        least, most = max(least, first), min(most, last)
+    return least, most
+
+
+@jit
+def least_violation(
+    t0: FloatArray, u: FloatArray, low: FloatArray, high: FloatArray
+) -> tuple[float, float]:
+    """Return the k at which the tension furthest outside its bounds is least so, and by how much.
+
+    How far outside is a convex function of k: the golden section finds its minimum.
+    """
+    span = 1.0
+    for i in range(t0.size):
+        span = max(span, abs(t0[i]), abs(low[i]), abs(high[i]))
+    left, right = -1e3 * span, 1e3 * span
+    ratio = 0.6180339887498949
+    x, y = right - ratio * (right - left), left + ratio * (right - left)
+    fx, fy = _outside(t0, u, low, high, x), _outside(t0, u, low, high, y)
+    for _ in range(80):
+        if fx <= fy:
+            right, y, fy = y, x, fx
+            x = right - ratio * (right - left)
+            fx = _outside(t0, u, low, high, x)
+        else:
+            left, x, fx = x, y, fy
+            y = left + ratio * (right - left)
+            fy = _outside(t0, u, low, high, y)
+    k = 0.5 * (left + right)
+    return k, _outside(t0, u, low, high, k)
+
+
+@jit
+def _outside(t0: FloatArray, u: FloatArray, low: FloatArray, high: FloatArray, k: float) -> float:
+    worst = -math.inf
+    for i in range(t0.size):
+        t = t0[i] + k * u[i]
+        worst = max(worst, low[i] - t, t - high[i])
+    return worst
+
+
+@jit
+def distribute(
+    J: FloatArray,
+    wrench: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    share: float,
+    t: FloatArray,
+    room: FloatArray,
+) -> tuple[int, float]:
+    """Write tensions that carry `wrench` (2,), the force of all else on the platform: eq. (2.16).
+
+    `J` (3, 2) is the Jacobian, `low` and `high` (3,) are the bounds, `room` (2, 3) is overwritten.
+    Of the stretch of k within the bounds, `share` (0 to 1) of the way from the least tensions to
+    the greatest is taken: least is least friction, and k is continuous over the workspace.
+    Returns a `TensionOutcome` and by how much a tension is outside, N; where no tensions within
+    the bounds carry the wrench those that still carry it and miss the bounds least are written.
+    """
+    t0, u = room[0], room[1]
+    if not line_of_tensions(J, wrench, t0, u):
+        for i in range(3):
+            t[i] = low[i]
+        return 2, math.inf
+    least, most = bounds_of_k(t0, u, low, high)
+    outcome, outside = 0, 0.0
+    k = least + share * (most - least)
+    if least > most or not math.isfinite(least) or not math.isfinite(most):
+        outcome = 1
+        k, outside = least_violation(t0, u, low, high)
+    for i in range(3):
+        t[i] = t0[i] + k * u[i]
+    return outcome, outside
+
+
+class PlanarTensions:
+    """Tensions for a planar robot with three cables, and where in the plane there are any."""
+
+    def __init__(self, low_N: FloatArray, high_N: FloatArray, share: float = 0.0) -> None:
+        """Take bounds (3,), each lower one below its upper one; raises GeometryError."""
+        self.low = np.array(low_N, float)
+        self.high = np.array(high_N, float)
+        if self.low.shape != (3,) or self.high.shape != (3,):
+            raise GeometryError(
+                f"tension bounds {self.low.shape}, {self.high.shape}; allowed: (3,): eq. (2.18) is "
+                "for three cables"
+            )
+        if not ((self.low >= 0.0).all() and (self.low < self.high).all()):
+            raise GeometryError(
+                f"tension bounds {self.low} to {self.high} N; allowed: 0 and more, each below"
+            )
+        self.share = share
+        self._room = np.zeros((2, 3))
+
+    def distribute(self, J: FloatArray, wrench_N: FloatArray) -> tuple[FloatArray, str]:
+        """Return tensions (3,) for one Jacobian (3, 2), and what is missing, or an empty text."""
+        t = np.zeros(3)
+        outcome, outside = distribute(
+            np.ascontiguousarray(J), np.asarray(wrench_N, float), self.low, self.high,
+            self.share, t, self._room,
+        )  # fmt: skip
+        return t, self.missing(outcome, outside, t)
+
+    def missing(self, outcome: int, outside_N: float, t: FloatArray) -> str:
+        """Return in words why tensions are not feasible, an empty text where they are."""
+        if outcome == TensionOutcome.FEASIBLE:
+            return ""
+        if outcome == TensionOutcome.SINGULAR:
+            return "the cables cannot hold one direction, whatever their tensions"
+        below, above = self.low - t, t - self.high
+        i = int(np.argmax(np.maximum(below, above)))
+        return (
+            f"cable {i} would need {t[i]:.1f} N, {self.low[i]:g} to {self.high[i]:g} N allowed: "
+            f"{outside_N:.1f} N outside"
+        )
