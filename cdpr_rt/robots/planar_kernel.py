@@ -1,0 +1,201 @@
+"""One cycle of a planar robot's control, compiled: pose from lengths, wrench, tensions, torques."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.jit import jit
+
+G_m_s2 = 9.80665
+_MOST_TURN_rad = 0.02
+_SOLVED_m = 1e-9
+
+ROBOT = np.dtype(
+    [
+        ("mass", "<f8"),
+        ("period", "<f8"),
+        ("stiffness", "<f8"),  # N/m, of the position loop
+        ("damping", "<f8"),  # N s/m
+        ("integral", "<f8"),  # N/(m s)
+        ("most_N", "<f8"),  # of the integral part
+        ("dead_m", "<f8"),  # error around which the integral part fades out and in
+        ("inertia", "<f8"),  # kg m2 of each motor
+        ("velocity_gain", "<f8"),  # Nm s/rad, of each motor's loop
+        ("observer", "<f8"),  # rad/s, double pole of the motors' observers
+    ]
+)
+"""What a cycle has to know besides the geometry; one row."""
+STATE = np.dtype(
+    [
+        ("position", "<f8", (2,)),  # m, estimated
+        ("velocity", "<f8", (2,)),
+        ("angle", "<f8"),  # rad, of the platform
+        ("integral", "<f8", (2,)),  # N
+        ("residual", "<f8"),  # m
+        ("awake", "<f8"),  # share of the integral part, 0 to 1
+    ]
+)
+"""What a cycle leaves to the next; one row."""
+CABLE = np.dtype(
+    [
+        # parameters
+        ("exit", "<f8", (2,)),
+        ("anchor", "<f8", (2,)),
+        ("rigidity", "<f8"),  # N, EA
+        ("m_per_rad", "<f8"),  # paid out, signed
+        ("length_at_zero", "<f8"),  # m, without tension
+        ("low", "<f8"),  # N
+        ("high", "<f8"),
+        ("torque", "<f8"),  # Nm, the motor's limit
+        # state
+        ("arm", "<f8", (2,)),  # anchor point from the platform's origin, turned with it
+        ("way", "<f8", (2,)),  # unit vector from anchor to exit
+        ("length", "<f8"),  # m, under tension, as the motor's angle has it
+        ("tension", "<f8"),  # N, asked for
+        ("theta", "<f8"),  # observer: angle and velocity of the motor
+        ("omega", "<f8"),
+    ]
+)
+"""What belongs to one cable; one row each."""
+
+
+@jit
+def observe(cables: Any, position: FloatArray, rate: float, period: float) -> None:
+    """Track each motor's angle and velocity: an observer with a double pole at `rate`."""
+    for i in range(cables.size):
+        c = cables[i]
+        decay = math.exp(-rate * period)
+        predicted = c.theta + period * c.omega
+        error = position[i] - predicted
+        c.theta = predicted + (1.0 - decay * decay) * error
+        c.omega += (1.0 - decay) ** 2 / period * error
+
+
+@jit
+def turn_to_equilibrium(state: Any, cables: Any) -> None:
+    """Turn the platform by one Newton step to where its tensions have no moment about its origin.
+
+    The model has no rotation of its own: tensions decide it, and it moves with the pose.
+    """
+    s = state[0]
+    cosine, sine = math.cos(s.angle), math.sin(s.angle)
+    moment, slope = 0.0, 0.0
+    for i in range(cables.size):
+        c = cables[i]
+        x = cosine * c.anchor[0] - sine * c.anchor[1]
+        y = sine * c.anchor[0] + cosine * c.anchor[1]
+        wx, wy = c.exit[0] - s.position[0] - x, c.exit[1] - s.position[1] - y
+        rho = math.sqrt(wx * wx + wy * wy)
+        wx, wy = wx / rho, wy / rho
+        across = x * wy - y * wx
+        along = -y * wx + x * wy
+        moment += c.tension * across
+        slope -= c.tension * (x * wx + y * wy + (x * x + y * y - along * across) / rho)
+    if slope < 0.0:
+        s.angle += min(max(-moment / slope, -_MOST_TURN_rad), _MOST_TURN_rad)
+
+
+@jit
+def locate(state: Any, cables: Any, iterations: int) -> bool:
+    """Bring the position up to the cable lengths by Gauss-Newton, eqs. (2.6) to (2.9).
+
+    From the last position on, one or two iterations do. Writes arms, ways, residual; returns
+    whether it has converged.
+    """
+    s = state[0]
+    cosine, sine = math.cos(s.angle), math.sin(s.angle)
+    n = cables.size
+    for i in range(n):
+        c = cables[i]
+        c.arm[0] = cosine * c.anchor[0] - sine * c.anchor[1]
+        c.arm[1] = sine * c.anchor[0] + cosine * c.anchor[1]
+    moved = math.inf
+    for _ in range(iterations + 1):
+        xx, xy, yy, gx, gy, rest = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            c = cables[i]
+            x = c.exit[0] - s.position[0] - c.arm[0]
+            y = c.exit[1] - s.position[1] - c.arm[1]
+            rho = math.sqrt(x * x + y * y)
+            c.way[0], c.way[1] = x / rho, y / rho
+            f = rho - c.length
+            rest += f * f
+            xx += c.way[0] * c.way[0]
+            xy += c.way[0] * c.way[1]
+            yy += c.way[1] * c.way[1]
+            gx += c.way[0] * f
+            gy += c.way[1] * f
+        s.residual = math.sqrt(rest / n)
+        det = xx * yy - xy * xy
+        if moved < _SOLVED_m:
+            return True
+        if not det > 1e-9:
+            return False
+        dx, dy = (yy * gx - xy * gy) / det, (xx * gy - xy * gx) / det
+        s.position[0] += dx
+        s.position[1] += dy
+        moved = abs(dx) + abs(dy)
+    return moved < 1e-6
+
+
+@jit
+def velocity_of(state: Any, cables: Any) -> None:
+    """Write the platform's velocity from those of the cables, in the sense of least squares."""
+    s = state[0]
+    xx, xy, yy, gx, gy = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(cables.size):
+        c = cables[i]
+        rate = c.m_per_rad * c.omega
+        xx += c.way[0] * c.way[0]
+        xy += c.way[0] * c.way[1]
+        yy += c.way[1] * c.way[1]
+        gx -= c.way[0] * rate
+        gy -= c.way[1] * rate
+    det = xx * yy - xy * xy
+    if det > 1e-9:
+        s.velocity[0] = (yy * gx - xy * gy) / det
+        s.velocity[1] = (xx * gy - xy * gx) / det
+
+
+@jit
+def estimate(robot: Any, state: Any, cables: Any, position: FloatArray, iterations: int) -> bool:
+    """Estimate pose and velocity of the platform from the motors' angles (m,)."""
+    observe(cables, position, robot[0].observer, robot[0].period)
+    for i in range(cables.size):
+        c = cables[i]
+        free = c.length_at_zero + c.m_per_rad * c.theta
+        c.length = free * (1.0 + c.tension / c.rigidity)
+    turn_to_equilibrium(state, cables)
+    found = locate(state, cables, iterations)
+    velocity_of(state, cables)
+    return found
+
+
+@jit
+def push(
+    robot: Any, state: Any, wanted: FloatArray, speed: FloatArray, slope: FloatArray, w: FloatArray
+) -> None:
+    """Write into `w` (2,) what acts on the platform besides its cables, the wanted force reversed.
+
+    Position loop with velocity and acceleration known beforehand. The integral part goes to sleep
+    by a sigmoid where the error is within what cannot be told from friction, so that the platform
+    stands still at its target instead of hunting around it.
+    """
+    r, s = robot[0], state[0]
+    ex, ey = wanted[0] - s.position[0], wanted[1] - s.position[1]
+    size = math.sqrt(ex * ex + ey * ey)
+    # two thresholds, as fig. 2.3 has them: once asleep it takes twice the error to wake it
+    threshold = r.dead_m * (2.0 - s.awake)
+    moving = abs(speed[0]) + abs(speed[1]) > 0.0
+    s.awake = 1.0 if moving else 1.0 / (1.0 + math.exp(-8.0 * (size / threshold - 1.0)))
+    error, rate = (ex, ey), (speed[0] - s.velocity[0], speed[1] - s.velocity[1])
+    for k in range(2):
+        s.integral[k] += s.awake * r.integral * r.period * error[k]
+        s.integral[k] = min(max(s.integral[k], -r.most_N), r.most_N)
+        force = r.mass * slope[k] + r.stiffness * error[k] + r.damping * rate[k] + s.integral[k]
+        w[k] = -force
+    w[1] -= r.mass * G_m_s2
