@@ -13,19 +13,21 @@ from cdpr_rt.jit import jit
 G_m_s2 = 9.80665
 _MOST_TURN_rad = 0.02
 _SOLVED_m = 1e-9
+_ITERATIONS = 3
 
 ROBOT = np.dtype(
     [
         ("mass", "<f8"),
         ("period", "<f8"),
-        ("stiffness", "<f8"),  # N/m, of the position loop
-        ("damping", "<f8"),  # N s/m
-        ("integral", "<f8"),  # N/(m s)
+        ("stiffness", "<f8"),  # Nm/rad, of each motor's loop
+        ("damping", "<f8"),  # Nm s/rad
+        ("inertia", "<f8"),  # kg m2 of each motor
+        ("observer", "<f8"),  # rad/s, double pole of the motors' observers
+        ("integral", "<f8"),  # N/(m s), of the platform's loop
         ("most_N", "<f8"),  # of the integral part
         ("dead_m", "<f8"),  # error around which the integral part fades out and in
-        ("inertia", "<f8"),  # kg m2 of each motor
-        ("velocity_gain", "<f8"),  # Nm s/rad, of each motor's loop
-        ("observer", "<f8"),  # rad/s, double pole of the motors' observers
+        ("regulator_N", "<f8"),  # by how much the motors' loops may change a tension
+        ("share", "<f8"),  # where between the least and the greatest tensions to be
     ]
 )
 """What a cycle has to know besides the geometry; one row."""
@@ -181,21 +183,58 @@ def push(
 ) -> None:
     """Write into `w` (2,) what acts on the platform besides its cables, the wanted force reversed.
 
-    Position loop with velocity and acceleration known beforehand. The integral part goes to sleep
-    by a sigmoid where the error is within what cannot be told from friction, so that the platform
-    stands still at its target instead of hunting around it.
+    The integral part is the platform's, not the motors': three motors that each insist on a length
+    of their own would pull against each other. It goes to sleep by a sigmoid where the error is
+    within what cannot be told from friction, so that the platform stands still at its target; two
+    thresholds, as in fig. 2.3: once asleep it takes twice the error to wake it.
     """
     r, s = robot[0], state[0]
     ex, ey = wanted[0] - s.position[0], wanted[1] - s.position[1]
     size = math.sqrt(ex * ex + ey * ey)
-    # two thresholds, as fig. 2.3 has them: once asleep it takes twice the error to wake it
     threshold = r.dead_m * (2.0 - s.awake)
     moving = abs(speed[0]) + abs(speed[1]) > 0.0
     s.awake = 1.0 if moving else 1.0 / (1.0 + math.exp(-8.0 * (size / threshold - 1.0)))
-    error, rate = (ex, ey), (speed[0] - s.velocity[0], speed[1] - s.velocity[1])
+    error = (ex, ey)
     for k in range(2):
         s.integral[k] += s.awake * r.integral * r.period * error[k]
         s.integral[k] = min(max(s.integral[k], -r.most_N), r.most_N)
-        force = r.mass * slope[k] + r.stiffness * error[k] + r.damping * rate[k] + s.integral[k]
-        w[k] = -force
+        w[k] = -r.mass * slope[k] - s.integral[k]
     w[1] -= r.mass * G_m_s2
+
+
+@jit
+def drive(
+    robot: Any,
+    cables: Any,
+    wanted: FloatArray,
+    speed: FloatArray,
+    slope: FloatArray,
+    tensions: FloatArray,
+    known: FloatArray,
+    reference: FloatArray,
+    reference_speed: FloatArray,
+    reference_slope: FloatArray,
+    effort: FloatArray,
+    torque: FloatArray,
+) -> None:
+    """Write the motors' set-points and torques: tension, loop, and what is known of the motor.
+
+    The loop is proportional in angle and velocity, and saturated (section 2.4.3): it may not
+    unwind a cable, nor pull it beyond its bounds, but lets the mechanism drive the motor back.
+    """
+    r = robot[0]
+    for i in range(cables.size):
+        c = cables[i]
+        c.tension += 0.2 * (tensions[i] - c.tension)
+        x = c.exit[0] - wanted[0] - c.arm[0]
+        y = c.exit[1] - wanted[1] - c.arm[1]
+        rho = math.sqrt(x * x + y * y)
+        free = rho / (1.0 + c.tension / c.rigidity)
+        reference[i] = (free - c.length_at_zero) / c.m_per_rad
+        reference_speed[i] = -(x * speed[0] + y * speed[1]) / (rho * c.m_per_rad)
+        reference_slope[i] = -(x * slope[0] + y * slope[1]) / (rho * c.m_per_rad)
+        loop = r.stiffness * (reference[i] - c.theta) + r.damping * (reference_speed[i] - c.omega)
+        most = r.regulator_N * abs(c.m_per_rad)
+        loop = min(max(loop, -most), most)
+        effort[i] = loop + r.inertia * reference_slope[i] - c.m_per_rad * tensions[i]
+        torque[i] = min(max(effort[i] + known[i], -c.torque), c.torque)

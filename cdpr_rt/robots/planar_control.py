@@ -1,0 +1,222 @@
+"""Control of a planar robot with three cables: where it is, and the torques that move it.
+
+Tremblay (thesis), section 2.4, with what the thesis leaves to a velocity loop divided in two: each
+motor has a loop of its own that may not unwind its cable, and what stays as an error of position
+is the platform's, in two directions, so that the motors never pull against each other.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdpr_rt.controllers.pid import Compensation
+from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.robots import planar_kernel as kernel
+from cdpr_rt.robots.planar_kinematics import GeometryError
+from cdpr_rt.robots.planar_tensions import PlanarTensions, distribute
+from profiles import RobotAxis
+from profiles.platform import Platform
+
+RESERVE = 0.16
+"""Share of the span of tensions that is left to what no plan knows: loops, friction, swinging."""
+_REGULATOR = 0.10
+_BANDWIDTH_Hz = 12.0
+_DAMPING_RATIO = 0.8
+_INTEGRAL_RATE = 6.0
+_INTEGRAL_SHARE = 0.12
+_DEAD_m = 1e-4
+_OBSERVER_Hz = 60.0
+_SETTLING_STEPS = 60
+_ITERATIONS = 3
+
+
+class PlanarControl:
+    """A controller whose set-point is a platform's: position, velocity, acceleration, (2,) each.
+
+    As a `Controller` it writes the axes' set-points itself, so that others may go on from there.
+    `low_N` and `high_N` (3,) are the tensions' bounds, `torque_Nm` (3,) what the motors may be
+    asked for. Raises GeometryError for a robot that is not planar or has not three cables.
+    """
+
+    def __init__(
+        self,
+        platform: Platform,
+        axes: list[RobotAxis],
+        low_N: FloatArray,
+        high_N: FloatArray,
+        torque_Nm: FloatArray,
+        period_s: float,
+        compensation: Compensation | None = None,
+    ) -> None:
+        if not platform.is_planar or len(axes) != 3:
+            raise GeometryError(f"{len(axes)} axes; allowed: 3 in a plane")
+        span = np.asarray(high_N, float) - low_N
+        self.tensions = PlanarTensions(low_N + RESERVE * span, high_N - RESERVE * span)
+        self.least_N = np.array(low_N, float)
+        self.position_m = np.array(platform.home_m, float)
+        self.velocity_m_s = np.zeros(2)
+        self.acceleration_m_s2 = np.zeros(2)
+        self.tension_N = np.array(self.tensions.low)
+        self.outcome, self.outside_N = 0, 0.0
+        self.effort_Nm, self.compensation_Nm = np.zeros(3), np.zeros(3)
+        self._compensation = compensation
+        self._robot = self._robot_row(platform, axes, float(span.min()), period_s)
+        self._state = np.zeros(1, kernel.STATE)
+        self._cables = self._cable_rows(platform, axes, torque_Nm)
+        self._J, self._wrench, self._room = np.zeros((3, 2)), np.zeros(2), np.zeros((2, 3))
+        self._home = np.array(platform.home_m, float)
+        self._pose = np.zeros(7)
+
+    @staticmethod
+    def _robot_row(
+        platform: Platform, axes: list[RobotAxis], span_N: float, period_s: float
+    ) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+        row = np.zeros(1, kernel.ROBOT)
+        inertia = max(axis.winch.motor.rotor_inertia_kg_m2 for axis in axes)
+        omega = 2.0 * math.pi * _BANDWIDTH_Hz
+        row["mass"], row["period"], row["inertia"] = platform.mass_kg, period_s, inertia
+        row["stiffness"] = inertia * omega**2
+        row["damping"] = 2.0 * _DAMPING_RATIO * inertia * omega
+        row["observer"] = 2.0 * math.pi * _OBSERVER_Hz
+        cable = min(abs(axis.winch.cable_m_per_motor_rad) for axis in axes)
+        row["integral"] = _INTEGRAL_RATE * inertia * (omega / cable) ** 2
+        row["most_N"] = _INTEGRAL_SHARE * span_N
+        row["dead_m"], row["regulator_N"] = _DEAD_m, _REGULATOR * span_N
+        return row
+
+    @staticmethod
+    def _cable_rows(
+        platform: Platform, axes: list[RobotAxis], torque_Nm: FloatArray
+    ) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+        rows = np.zeros(len(axes), kernel.CABLE)
+        rows["exit"], rows["anchor"] = platform.exit_points_m, platform.anchor_points_m
+        rows["rigidity"] = [axis.winch.cable.stiffness_N for axis in axes]
+        rows["m_per_rad"] = [axis.winch.cable_m_per_motor_rad for axis in axes]
+        rows["torque"] = torque_Nm
+        return rows
+
+    # -- Controller
+
+    def reset(self) -> None:
+        """Forget what was integrated."""
+        self._state["integral"] = 0.0
+        self._state["awake"] = 1.0
+        if self._compensation is not None:
+            self._compensation.reset()
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write torques and the axes' set-points for the platform's present set-point."""
+        if self._compensation is not None:
+            self._compensation.torque(feedback, setpoint, self.compensation_Nm)
+        self.observe(feedback)
+        robot, cables = self._robot, self._cables
+        motion = self.position_m, self.velocity_m_s, self.acceleration_m_s2
+        kernel.push(robot, self._state, *motion, self._wrench)
+        np.negative(cables["way"], out=self._J)
+        self.outcome, self.outside_N = distribute(
+            self._J,
+            self._wrench,
+            self.tensions.low,
+            self.tensions.high,
+            0.0,
+            self.tension_N,
+            self._room,
+        )
+        kernel.drive(
+            robot,
+            cables,
+            *motion,
+            self.tension_N,
+            self.compensation_Nm,
+            setpoint.position_rad,
+            setpoint.velocity_rad_s,
+            setpoint.acceleration_rad_s2,
+            self.effort_Nm,
+            torque_Nm,
+        )
+
+    # -- where the platform is
+
+    def begin(self, feedback: AxisFeedback) -> None:
+        """Take the motors to stand where they are, and the platform where its cables have it."""
+        self._cables["theta"] = feedback.position_rad
+        self._cables["omega"] = 0.0
+        self._cables["tension"] = np.maximum(self._cables["tension"], self.tensions.low)
+        self._state["position"][0] = self._home
+        for _ in range(_SETTLING_STEPS):
+            self.observe(feedback)
+
+    def observe(self, feedback: AxisFeedback) -> None:
+        """Bring the estimate of the platform's position up to date, by one cycle."""
+        kernel.estimate(self._robot, self._state, self._cables, feedback.position_rad, _ITERATIONS)
+
+    def set_home(self, feedback: AxisFeedback, tension_N: FloatArray) -> None:
+        """Take the platform to be at home now, its cables under `tension_N` (3,)."""
+        cables, state = self._cables, self._state
+        cables["tension"] = tension_N
+        state["position"][0], state["angle"] = self._home, 0.0
+        for _ in range(_SETTLING_STEPS):
+            kernel.turn_to_equilibrium(state, cables)
+        angle = float(state["angle"][0])
+        turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+        anchors = self._home + cables["anchor"] @ turn.T
+        free = np.linalg.norm(anchors - cables["exit"], axis=1) / (
+            1.0 + tension_N / cables["rigidity"]
+        )
+        cables["length_at_zero"] = free - cables["m_per_rad"] * feedback.position_rad
+        self.begin(feedback)
+
+    def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
+        """Take the cables to have these lengths without tension at the motors' angles, (3,).
+
+        Those that are not a number, since this very cycle has set them, stay.
+        """
+        cables = self._cables
+        at_zero = length_m - cables["m_per_rad"] * feedback.position_rad
+        cables["length_at_zero"] = np.where(
+            np.isfinite(at_zero), at_zero, cables["length_at_zero"]
+        )
+
+    @property
+    def inertia_kg_m2(self) -> float:
+        """Of each motor."""
+        return float(self._robot["inertia"][0])
+
+    @property
+    def free_lengths_m(self) -> FloatArray:
+        """Lengths of the cables without tension, as the motors' angles have them, (3,)."""
+        c = self._cables
+        return np.asarray(c["length_at_zero"] + c["m_per_rad"] * c["theta"])
+
+    @property
+    def estimated_m(self) -> FloatArray:
+        """Where the platform's origin is, (2,), a view."""
+        return np.asarray(self._state["position"][0])
+
+    @property
+    def residual_m(self) -> float:
+        """How far the cables' lengths are from agreeing with each other, root mean square."""
+        return float(self._state["residual"][0])
+
+    @property
+    def pose(self) -> FloatArray:
+        """Where the platform is, (7,): x y z, quaternion w x y z; overwritten."""
+        state, pose = self._state[0], self._pose
+        pose[0], pose[1] = state["position"][0], state["position"][1]
+        half = 0.5 * state["angle"]
+        pose[3], pose[6] = math.cos(half), math.sin(half)
+        return pose
+
+    def missing(self) -> str:
+        """Return why the last cycle's tensions are not feasible, an empty text where they are."""
+        return self.tensions.missing(self.outcome, self.outside_N, self.tension_N)
+
+    def feasible(self, position_m: FloatArray) -> str:
+        """Return why the platform cannot stand at a position (2,), an empty text where it can."""
+        c = self._cables
+        vectors = position_m + c["anchor"] - c["exit"]
+        J = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        weight = np.array([0.0, -float(self._robot["mass"][0]) * kernel.G_m_s2])
+        return self.tensions.distribute(J, weight)[1]

@@ -1,0 +1,166 @@
+"""What programs that move a planar platform have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.approach import approach
+from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.robots.planar_control import PlanarControl
+from cdpr_rt.runtime.estimate import Estimator
+from cdpr_rt.runtime.programs.base import ProgramError
+from cdpr_rt.runtime.programs.handover import Handover
+from cdpr_rt.runtime.programs.wanted import Wanted
+from profiles.platform import Platform
+
+
+class PlatformParts:
+    """What the programs of one platform share."""
+
+    def __init__(
+        self, platform: Platform, control: PlanarControl, estimator: Estimator, period_s: float
+    ) -> None:
+        self.platform = platform
+        self.control = control
+        self.estimator = estimator
+        self.period_s = period_s
+        self.speed_m_s = np.full(2, platform.speed_m_s)
+        self.acceleration_m_s2 = np.full(2, platform.acceleration_m_s2)
+        self.cycle = -2
+        """The last cycle in which one of the programs moved the platform."""
+
+    @property
+    def known(self) -> bool:
+        """Whether it is known where the platform is."""
+        return bool(self.estimator.estimate.length_known.all())
+
+
+class PlatformProgram:
+    """Keeps the platform where it is, its cables tight; others have their own `_move`.
+
+    Where it is has to be known: `tighten` finds it.
+    """
+
+    name = "platform"
+    needs_lease = False
+
+    def __init__(self, parts: PlatformParts, torque_Nm: FloatArray) -> None:
+        self._parts = parts
+        self.controller = parts.control
+        self._control = parts.control
+        self._loop = Handover(parts.control, torque_Nm, parts.period_s)
+        self._target = np.zeros(2)
+        self._speed = np.array(parts.speed_m_s)
+        self._stopping = False
+        self._at_rest = True
+        self._seen = np.zeros(7)
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque; the platform brakes and stays."""
+        parts, control = self._parts, self._control
+        self._stopping = False
+        self._at_rest = False
+        if feedback.cycle - parts.cycle not in (0, 1):
+            if parts.known:
+                control.take_lengths(parts.estimator.estimate.cable_length_m, feedback)
+            control.begin(feedback)
+            control.position_m[:] = control.estimated_m
+            control.velocity_m_s[:] = control.acceleration_m_s2[:] = 0.0
+            self._loop.take_over(feedback, torque_Nm)
+        self._target[:] = self._resting_place()
+        self._speed[:] = parts.speed_m_s
+
+    def check(self, wanted: Mapping[str, Any]) -> None:
+        """Raise ProgramError where `command` would, of a program that need not run."""
+        self._parsed(wanted)
+
+    def command(self, wanted: Mapping[str, Any]) -> None:
+        """Take over what an operator wants; raises ProgramError and changes nothing then."""
+        parsed = self._parsed(wanted)
+        if self._stopping:
+            raise ProgramError(f"{self.name}: it is being stopped; start it anew")
+        self._at_rest = False
+        self._take(parsed)
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (3,) each, in place."""
+        self._parts.cycle = feedback.cycle
+        if self._stopping:
+            self._at_rest = self._approach()
+        else:
+            self._at_rest = self._move()
+        self._loop.update(feedback, setpoint, torque_Nm)
+
+    def stop(self) -> None:
+        """Begin to brake to a standstill."""
+        self._stopping = True
+        self._at_rest = False
+        self._target[:] = self._resting_place()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the set-point stands still and nothing is left to do."""
+        return self._at_rest
+
+    @property
+    def stream_age_s(self) -> float:
+        """There is no stream."""
+        return float("nan")
+
+    @property
+    def pose(self) -> FloatArray | None:
+        """Return where the platform is, (7,)."""
+        return self._control.pose if self._parts.known else None
+
+    @property
+    def pose_setpoint(self) -> FloatArray | None:
+        """Return where the platform is to be, (7,)."""
+        if not self._parts.known:
+            return None
+        self._seen[:2] = self._control.position_m
+        self._seen[3] = 1.0
+        return self._seen
+
+    def progress(self) -> dict[str, Any]:
+        """Return where the platform is, and what of its tensions is missing."""
+        control = self._control
+        return {
+            "position_m": control.estimated_m.tolist(),
+            "target_m": self._target.tolist(),
+            "tension_N": control.tension_N.tolist(),
+            "missing": control.missing(),
+        }
+
+    def _parsed(self, wanted: Mapping[str, Any]) -> Any:
+        """Return what `_take` takes; raises ProgramError."""
+        return Wanted(self.name, wanted, ())
+
+    def _take(self, _parsed: Any) -> None:
+        """Do from now on what was wanted."""
+
+    def _move(self) -> bool:
+        """Move the platform's set-point; return whether nothing is left to do."""
+        return self._approach()
+
+    def _approach(self) -> bool:
+        control, parts = self._control, self._parts
+        return approach(
+            self._target,
+            self._speed,
+            parts.acceleration_m_s2,
+            parts.period_s,
+            control.position_m,
+            control.velocity_m_s,
+            control.acceleration_m_s2,
+        )
+
+    def _resting_place(self) -> FloatArray:
+        """Return where the platform comes to rest when it is braked from now on."""
+        control = self._control
+        pace = control.velocity_m_s
+        return np.asarray(
+            control.position_m + 0.5 * pace * np.abs(pace) / self._parts.acceleration_m_s2
+        )
