@@ -24,7 +24,7 @@ RESERVE = 0.16
 _REGULATOR = 0.10
 _BANDWIDTH_Hz = 12.0
 _DAMPING_RATIO = 0.8
-_INTEGRAL_RATE = 6.0
+_INTEGRAL_RATE = 3.0
 _INTEGRAL_SHARE = 0.12
 _DEAD_m = 1e-4
 _OBSERVER_Hz = 60.0
@@ -102,7 +102,7 @@ class PlanarControl:
     def reset(self) -> None:
         """Forget what was integrated."""
         self._state["integral"] = 0.0
-        self._state["awake"] = 1.0
+        self._state["awake"] = self._state["free"] = 1.0
         if self._compensation is not None:
             self._compensation.reset()
 
@@ -126,6 +126,7 @@ class PlanarControl:
         )
         kernel.drive(
             robot,
+            self._state,
             cables,
             *motion,
             self.tension_N,
