@@ -102,7 +102,7 @@ class PlanarControl:
     def reset(self) -> None:
         """Forget what was integrated."""
         self._state["integral"] = 0.0
-        self._state["awake"] = self._state["free"] = 1.0
+        self._state["awake"] = 1.0
         if self._compensation is not None:
             self._compensation.reset()
 
@@ -126,7 +126,6 @@ class PlanarControl:
         )
         kernel.drive(
             robot,
-            self._state,
             cables,
             *motion,
             self.tension_N,

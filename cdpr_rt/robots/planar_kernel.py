@@ -39,7 +39,6 @@ STATE = np.dtype(
         ("integral", "<f8", (2,)),  # N
         ("residual", "<f8"),  # m
         ("awake", "<f8"),  # share of the integral part, 0 to 1
-        ("free", "<f8"),  # share of the motors' loops that is not saturated, 0 to 1
     ]
 )
 """What a cycle leaves to the next; one row."""
@@ -197,7 +196,7 @@ def push(
     s.awake = 1.0 if moving else 1.0 / (1.0 + math.exp(-8.0 * (size / threshold - 1.0)))
     error = (ex, ey)
     for k in range(2):
-        s.integral[k] += s.awake * s.free * r.integral * r.period * error[k]
+        s.integral[k] += s.awake * r.integral * r.period * error[k]
         s.integral[k] = min(max(s.integral[k], -r.most_N), r.most_N)
         w[k] = -r.mass * slope[k] - s.integral[k]
     w[1] -= r.mass * G_m_s2
@@ -206,7 +205,6 @@ def push(
 @jit
 def drive(
     robot: Any,
-    state: Any,
     cables: Any,
     wanted: FloatArray,
     speed: FloatArray,
@@ -225,7 +223,6 @@ def drive(
     unwind a cable, nor pull it beyond its bounds, but lets the mechanism drive the motor back.
     """
     r = robot[0]
-    free = 1.0
     for i in range(cables.size):
         c = cables[i]
         c.tension += 0.2 * (tensions[i] - c.tension)
@@ -238,9 +235,6 @@ def drive(
         reference_slope[i] = -(x * slope[0] + y * slope[1]) / (rho * c.m_per_rad)
         loop = r.stiffness * (reference[i] - c.theta) + r.damping * (reference_speed[i] - c.omega)
         most = r.regulator_N * abs(c.m_per_rad)
-        # while a loop is at its bounds the platform's would only wind up
-        free = min(free, max(0.0, 2.0 - 2.0 * abs(loop) / most))
         loop = min(max(loop, -most), most)
         effort[i] = loop + r.inertia * reference_slope[i] - c.m_per_rad * tensions[i]
         torque[i] = min(max(effort[i] + known[i], -c.torque), c.torque)
-    state[0].free = free
