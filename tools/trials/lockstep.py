@@ -1,0 +1,332 @@
+"""A robot's daemon in the present process, on simulated drives, cycle by cycle in bus time.
+
+The loop, its programs, its supervisor and the bus are those of `cdpr run`; only the clock that
+leases and streams count by is the bus' own, so that minutes of motion pass as fast as the machine
+computes them and come out alike each time.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from cdpr_rt.runtime import procedures
+from cdpr_rt.runtime.cycle_row import Row
+from cdpr_rt.runtime.loop import ControlLoop
+from cdpr_rt.runtime.programs.base import Program
+from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.recording import Recorder
+from drivers.bus import query_status
+from profiles import Robot, load_robot
+from tools.daemon.loop_process import description, loop_parts
+from tools.daemon.machine import RobotMachine
+from tools.daemon.settings import RunSettings
+from tools.errors import WorkFailedError
+from tools.robot_buses import robot_urls
+from tools.simulator import OwnSimulator
+from tools.trials.pose_log import PoseLogTail
+from tools.trials.right import RightInBusTime
+from tools.trials.stream import StreamInBusTime
+
+RING_S: Final = 30.0
+_PATIENCE_S: Final = 60.0
+"""Time by the clock in which no cycle runs at all, as while drives boot."""
+_LOOK_CYCLES: Final = 512
+_names = count()
+
+
+class LockstepRobot:
+    """One robot, booted and checked, that moves on only when it is turned; a context manager.
+
+    `robot` is a profile's name or file. `plant` is the simulator's plant file. `truth_log` is where
+    the simulator logs the true pose, a file of its own where left out; `record` a folder for the
+    recording (MCAP), none where left out. `programs` are run besides the robot's own. The right to
+    move is held from the beginning, see `right`. Raises CommandError, DriverError and ProfileError
+    as `cdpr run` does, WorkFailedError where the robot does not get ready.
+    """
+
+    def __init__(
+        self,
+        robot: str | Path,
+        *,
+        plant: Path | None = None,
+        truth_log: Path | None = None,
+        record: Path | None = None,
+        programs: Mapping[str, Program] | None = None,
+    ) -> None:
+        self.robot: Robot = load_robot(robot)
+        self.period_s = self.robot.sync_period_s
+        self._reference = str(robot)
+        self._plant, self._truth_path, self._record = plant, truth_log, record
+        self._more_programs = dict(programs or {})
+        self._stack = ExitStack()
+        self._turns = 0
+        self.block: SharedBlock
+        self.machine: RobotMachine
+        self.loop: ControlLoop
+        self.right: RightInBusTime
+        """The right to move, and who holds it."""
+        self.stream: StreamInBusTime
+        """Takes the packets of set-point streams."""
+        self.recorder: Recorder | None = None
+        self._truth: PoseLogTail | None = None
+
+    def __enter__(self) -> Self:
+        with self._stack as stack:
+            self._start(stack)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Take the power away at once, however the platform stands; `shut_down` lowers it first."""
+        self._stack.close()
+
+    def _start(self, stack: ExitStack) -> None:
+        robot, n = self.robot, len(self.robot.axes)
+        bus = f"simbus:trial-{os.getpid()}-{next(_names)}"
+        if self._truth_path is None and robot.platform is not None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-"))
+            self._truth_path = Path(folder) / "truth.log"
+        simulator = OwnSimulator(self._reference, bus, self._plant, self._truth_path)
+        stack.callback(simulator.stop)
+        self.simulator = simulator
+        self.block = block = SharedBlock.create(n, RING_S, 1.0 / self.period_s)
+        stack.callback(os.close, block.fd)
+        block.counters["start_monotonic_ns"] = time.monotonic_ns()
+        block.counters["start_realtime_ns"] = time.time_ns()
+        settings = RunSettings(
+            robot=self._reference, name=robot.profile, buses=(bus,), socket=Path("unused")
+        )
+        self.machine = RobotMachine(robot, settings)
+        stack.callback(self.machine.close)
+        parts = loop_parts(robot, block)
+        parts = replace(parts, programs={**parts.programs, **self._more_programs})
+        block.write_description(description(robot, parts))
+        self.loop = ControlLoop(block, self.machine, parts)
+        self.right = RightInBusTime(block, lambda: self.now_ns)
+        self.stream = StreamInBusTime(block, self.right, lambda: self.now_ns)
+        self._reader = RowReader(block)
+        self._channels = [url.channel for url in robot_urls(robot, (bus,)).values()]
+        if self._record is not None:
+            self.recorder = Recorder(block, self._record, robot.profile)
+            stack.callback(self._end_recording)
+            self.recorder.start()
+        self._boot()
+        if self._truth_path is not None:
+            self._truth = stack.enter_context(PoseLogTail(self._truth_path))
+
+    def _boot(self) -> None:
+        loop = self.loop
+        loop.begin(procedures.start_up(loop))
+        self._turn_until(lambda: not loop.busy, 60.0, "the boot")
+        if loop.life.state is not LoopState.READY:
+            raise WorkFailedError(loop.life.reason or "the drives are not ready")
+        self.right.take("trial")
+
+    def _end_recording(self) -> None:
+        recorder, self.recorder = self.recorder, None
+        if recorder is not None:
+            recorder.stop()
+
+    # -- time
+
+    @property
+    def cycle(self) -> int:
+        """SYNCs since cycles began, as the recording counts them."""
+        device = self.machine.device
+        return 0 if device is None else device.feedback.cycle
+
+    @property
+    def now_s(self) -> float:
+        """Bus time since cycles began, as the recording has it."""
+        return self.cycle * self.period_s
+
+    @property
+    def now_ns(self) -> int:
+        """The same in ns."""
+        return round(self.now_s * 1e9)
+
+    def turn(self, turns: int = 1) -> None:
+        """Run so many cycles."""
+        loop, right, stream = self.loop, self.right, self.stream
+        for _ in range(turns):
+            right.look()
+            stream.look()
+            loop.turn()
+            self._turns += 1
+            if self._turns % _LOOK_CYCLES == 0:
+                self._wait_for_recorder()
+
+    def run(self, seconds: float) -> Row:
+        """Run cycles for `seconds` of bus time; return their rows."""
+        self.rows()
+        self.turn(round(seconds / self.period_s))
+        return self.rows()
+
+    def until(self, done: Callable[[], bool], within_s: float, what: str = "the end") -> None:
+        """Run cycles until `done`; raises WorkFailedError where that takes longer than `within_s`.
+
+        It fails at once where the drives have lost their power meanwhile.
+        """
+        driven = self.loop.driving
+
+        def done_or_lost() -> bool:
+            return done() or (driven and not self.loop.driving)
+
+        self._turn_until(done_or_lost, within_s, what)
+        if not done():
+            self._turn_until(lambda: not self.loop.busy, within_s, "the drives' power off")
+            raise WorkFailedError(f"{what}: {self.loop.life.reason or 'the power was taken'}")
+
+    def _turn_until(self, done: Callable[[], bool], within_s: float, what: str) -> None:
+        last_cycle, last = self.cycle, time.monotonic()
+        end_s = self.now_s + within_s
+        while not done():
+            if self.cycle != last_cycle:
+                last_cycle, last = self.cycle, time.monotonic()
+                if self.now_s > end_s:
+                    raise WorkFailedError(f"{what}: not within {within_s:g} s: {self.told()}")
+            elif time.monotonic() - last > _PATIENCE_S:
+                raise WorkFailedError(f"{what}: no cycle ran for {_PATIENCE_S:g} s: {self.told()}")
+            self.turn()
+
+    def _wait_for_recorder(self) -> None:
+        """Let the recorder catch up before rows are lost to it."""
+        recorder, counters = self.recorder, self.block.counters
+        while recorder is not None and recorder.told()["recording"]:
+            behind = int(counters["rows"][0]) - int(counters["recorded"][0])
+            if behind < self.block.capacity // 2:
+                return
+            time.sleep(0.01)
+
+    # -- commands
+
+    def order(self, do: str, within_s: float = 60.0, **what: Any) -> dict[str, Any]:
+        """Give an order as the service does and turn until it is answered, in bus time.
+
+        `what` are its keys: program, wanted. Raises WorkFailedError where it is refused or fails.
+        """
+        number = self.block.post_command({"do": do, "client": "trial", **what})
+        answers: list[dict[str, Any]] = []
+
+        def answered() -> bool:
+            while (answer := self.block.take_reply()) is not None:
+                if answer["to"] == number:
+                    answers.append(answer)
+            return bool(answers)
+
+        self._turn_until(answered, within_s, do)
+        if not answers[0]["ok"]:
+            raise WorkFailedError(f"{do}: {answers[0]['text']}")
+        return answers[0]
+
+    def enable(self, program: str = "hold", **wanted: Any) -> None:
+        """Give the drives power and run `program`."""
+        self.order("enable", program=program, wanted=wanted)
+
+    def program(self, name: str, **wanted: Any) -> None:
+        """Change over to a program that does what is `wanted`; returns at once."""
+        self.order("program", program=name, wanted=wanted)
+
+    def carry_out(self, name: str, within_s: float = 60.0, **wanted: Any) -> None:
+        """Run a program until nothing is left for it to do; raises WorkFailedError otherwise."""
+        self.program(name, **wanted)
+        self.finish(within_s)
+
+    def finish(self, within_s: float = 60.0) -> None:
+        """Run cycles until the present program has nothing left to do."""
+        program = self.loop.program
+
+        def over() -> bool:
+            return self.loop.program is not program or program.at_rest
+
+        self.until(over, within_s, program.name)
+        if self.loop.program is not program:
+            raise WorkFailedError(f"{program.name} was ended: {self.told()}")
+
+    def misbehave(self, axis: int, sub: int, value: int) -> None:
+        """Have a simulated drive do something on purpose (2F00h), told between two cycles."""
+        where = self.robot.axes[axis]
+        networks = self.machine._networks
+        networks[where.bus].write(where.node_id, 0x2F00, sub, value)
+
+    def shut_down(self) -> None:
+        """End as `cdpr run` does when it is told to stop: under control, then without power."""
+        self.loop.request_stop()
+        self._turn_until(lambda: self.loop.ended, 120.0, "the end")
+
+    # -- what is known
+
+    def rows(self) -> Row:
+        """Return the rows since the last call, at most those of the last `RING_S`."""
+        return self._reader.read()
+
+    @property
+    def row(self) -> Any:
+        """The newest row."""
+        written = int(self.block.counters["rows"][0])
+        return self.block.rows[(written - 1) % self.block.capacity]
+
+    def truth(self) -> Any:
+        """Return what was true at the last SYNC, a record of the pose log."""
+        assert self._truth is not None  # of a robot with a platform
+        return self._truth.last()
+
+    @property
+    def truth_log(self) -> Path:
+        """The file of the pose log."""
+        assert self._truth_path is not None  # of a robot with a platform
+        return self._truth_path
+
+    @property
+    def sync_offset(self) -> int:
+        """How many SYNCs the simulator had seen before our first cycle."""
+        return int(query_status(self._channels[0]).get("sync_count", 0)) - self.cycle
+
+    @property
+    def state(self) -> LoopState:
+        """Where the loop stands."""
+        return self.loop.life.state
+
+    @property
+    def progress(self) -> dict[str, Any]:
+        """What the running program tells."""
+        return self.loop.program.progress()
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """What the daemon would tell now."""
+        self.loop.status.publish()
+        return self.block.status()
+
+    def told(self) -> str:
+        """Return where it stands, for messages."""
+        life = self.loop.life
+        reason = f": {life.reason}" if life.reason else ""
+        return f"{life.state.label}, {self.loop.program.name}{reason}"
+
+    def recordings(self) -> Sequence[Path]:
+        """Return the files recorded so far, in their order."""
+        return [] if self._record is None else sorted(self._record.glob("*.mcap"))
+
+
+@contextmanager
+def opened(robot: str | Path, **options: Any) -> Iterator[LockstepRobot]:
+    """Open a robot whose drives have power and hold."""
+    with LockstepRobot(robot, **options) as opened_robot:
+        opened_robot.enable()
+        yield opened_robot

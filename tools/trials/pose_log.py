@@ -1,0 +1,88 @@
+"""Reads the simulator's log of a robot's true pose; reports, trials and tests alone use it."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tools.errors import BadInputError
+
+_HEADER_BYTES = 1024
+_FORMAT = "cdpr-rt pose log 1"
+
+Truth = NDArray[np.void]
+"""Records of the log, (k,): `sync_index`, `time_s` (bus time), `position_m` (3,), `velocity_m_s`
+(3,), `rotation` (3, 3), `tension_N` (n,) and `motor_rad` (n,), all true at their SYNC."""
+
+
+class PoseLogTail:
+    """A log that is still being written; its newest record can be read at any time.
+
+    Raises BadInputError when `path` is no such log.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._fd = -1
+        try:
+            self._fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+            header = json.loads(os.pread(self._fd, _HEADER_BYTES, 0))
+            self.dtype = _dtype(header["fields"])
+            if header["format"] != _FORMAT or header["record_bytes"] != self.dtype.itemsize:
+                raise ValueError(header["format"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            self.close()
+            raise BadInputError(f"{path}: not a log of true poses: {error}") from error
+
+    def __len__(self) -> int:
+        return max(0, os.fstat(self._fd).st_size - _HEADER_BYTES) // self.dtype.itemsize
+
+    def last(self) -> Any:
+        """Return the newest record, a scalar of `dtype`; raises BadInputError where none is."""
+        count = len(self)
+        if not count:
+            raise BadInputError(f"{self.path}: holds no record yet")
+        return self.read(count - 1, count)[0]
+
+    def read(self, first: int = 0, last: int | None = None) -> Truth:
+        """Return the records from `first` to before `last`, as far as there are some."""
+        size = self.dtype.itemsize
+        last = len(self) if last is None else min(last, len(self))
+        parts, at, end = [], _HEADER_BYTES + first * size, _HEADER_BYTES + last * size
+        while at < end:
+            parts.append(os.pread(self._fd, end - at, at))
+            at += len(parts[-1])
+        return np.frombuffer(b"".join(parts), self.dtype)
+
+    def close(self) -> None:
+        """Close the file; safe to repeat."""
+        fd, self._fd = self._fd, -1
+        if fd >= 0:
+            os.close(fd)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def read_pose_log(path: Path) -> Truth:
+    """Return all records of a log; raises BadInputError when `path` is no such log."""
+    with PoseLogTail(path) as log:
+        return log.read()
+
+
+def _dtype(fields: list[list[Any]]) -> np.dtype[np.void]:
+    return np.dtype([(name, kind, *map(tuple, shape)) for name, kind, *shape in fields])

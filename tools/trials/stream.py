@@ -1,0 +1,77 @@
+"""A set-point stream in bus time: packets as on the wire, taken by the daemon's own desk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.service.stream_desk import Address, StreamDesk
+from cdpr_rt.service.stream_packet import (
+    NO_RIGHT,
+    StreamAnswer,
+    StreamSetpoint,
+    parse,
+    right_digest,
+    seal,
+)
+from tools.trials.right import RightInBusTime
+
+_HERE: Final[Address] = ("127.0.0.1", 1)
+_LOOK_NS: Final = 10_000_000
+
+
+class StreamInBusTime:
+    """Hands packets to the desk that the daemon's UDP socket serves, at the bus' time."""
+
+    def __init__(
+        self, block: SharedBlock, right: RightInBusTime, clock_ns: Callable[[], int]
+    ) -> None:
+        self.desk = StreamDesk(block, right.lease)
+        self._clock_ns = clock_ns
+        self._look_ns = 0
+
+    def take(self, data: bytes, address: Address = _HERE) -> bytes | None:
+        """Take one packet as it arrives now; return the answer, None where none is due."""
+        return self.desk.take(data, address, self._clock_ns())
+
+    def look(self) -> None:
+        """Free the stream of a sender that is silent; called every cycle."""
+        now_ns = self._clock_ns()
+        if now_ns >= self._look_ns:
+            self._look_ns = now_ns + _LOOK_NS
+            self.desk.expire(now_ns)
+
+
+class Hand:
+    """A sender's packets, numbered and stamped; `session` names it, `token` is a right held."""
+
+    def __init__(self, session: int = 1, token: str | None = None) -> None:
+        self._session = session
+        self._sequence = 0
+        self._right = NO_RIGHT if token is None else right_digest(token)
+
+    def packet(
+        self,
+        sent_s: float,
+        position_m: Sequence[float],
+        scale: float = 1.0,
+        buttons: int = 0,
+        quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    ) -> bytes:
+        """Return the bytes of the next set-point, sent at `sent_s` by the sender's clock."""
+        self._sequence += 1
+        x, y, z = position_m
+        w, i, j, k = quaternion
+        setpoint = StreamSetpoint(
+            self._session, self._sequence, round(sent_s * 1e9), (x, y, z), (w, i, j, k), scale,
+            buttons, right=self._right,
+        )  # fmt: skip
+        return seal(setpoint, None)
+
+
+def answer_of(data: bytes) -> StreamAnswer:
+    """Return the robot's answer; raises PacketError for what is none."""
+    packet = parse(data, None)
+    assert isinstance(packet, StreamAnswer)  # the desk gives no other
+    return packet
