@@ -18,6 +18,7 @@ _SCALARS = (
     ("missed", "<u8"),  # answers that did not come in time, over all axes, since the beginning
     ("late_cycles", "<u8"),  # cycles that began more than a tenth of a period late
     ("stream_age_s", "<f8"),  # age of the newest sample of the set-point stream; nan without
+    ("stream_buttons", "<u8"),  # those of the sample that is played, see stream_buttons.py
     ("state", "<u1"),  # LoopState
     ("program", "<u1"),  # its number in the robot's description
     ("reaction", "<u1"),  # Reaction of this cycle

@@ -14,7 +14,7 @@ from cdpr_rt.runtime.estimate import AxisEstimate
 from cdpr_rt.runtime.programs.base import Program
 from cdpr_rt.runtime.shared_block import RowWriter, SharedBlock
 
-_SCALARS = struct.Struct("<QdqdddQQdBBBBhH")
+_SCALARS = struct.Struct("<QdqdddQQdQBBBBhH")
 _UNKNOWN = np.full(7, np.nan)
 
 

@@ -188,6 +188,7 @@ class ControlLoop:
             self.missed,
             cycle.lateness.late,
             program.stream_age_s,
+            program.stream_buttons,
             self.life.state,
             self.program_number,
             reaction,

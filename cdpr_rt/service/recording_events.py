@@ -10,12 +10,13 @@ import numpy as np
 from cdpr_rt.limits import Limit
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.states import LoopState, Reaction
+from cdpr_rt.runtime.stream_buttons import confirmation
 
-_WATCHED = ("state", "program", "reaction", "limit", "limit_axis")
+_WATCHED = ("state", "program", "reaction", "limit", "limit_axis", "stream_buttons")
 
 
 class Events:
-    """Finds changes of state, of program and of reactions in rows, and new reasons in a status.
+    """Finds changes of state, program and reaction and confirmations in rows, reasons in a status.
 
     Clamping is no event: it may come and go with every cycle.
     """
@@ -54,7 +55,8 @@ class Events:
         if not rows.size:
             return []
         seen = np.stack([rows[name].astype(np.int64) for name in _WATCHED], axis=1)
-        seen[seen[:, 2] <= Reaction.CLAMP, 2:] = 0
+        seen[seen[:, 2] <= Reaction.CLAMP, 2:5] = 0
+        seen[:, 5] = confirmation(seen[:, 5])
         last = self._last if self._last is not None else (-1, *seen[0, 1:])
         before = np.vstack([np.array(last), seen[:-1]])
         self._last = tuple(int(value) for value in seen[-1])
@@ -79,11 +81,13 @@ class Events:
             words.append(f"state {_label(LoopState, now[0])}")
         if now[1] != before[1]:
             words.append(f"program {_name(self._programs, now[1])}")
-        if now[2] and now[2:] != before[2:]:
+        if now[2] and now[2:5] != before[2:5]:
             words.append(_label(Reaction, now[2]))
             if now[3]:
                 axis = f" of {_name(self._axes, now[4])}" if now[4] >= 0 else ""
                 words[-1] += f" by {_label(Limit, now[3])}{axis}"
+        if now[5] and now[5] != before[5]:
+            words.append(f"the operator confirmed, number {now[5]}")
         return ", ".join(words)
 
 

@@ -25,6 +25,8 @@ MEANING: Final = {
     "missed": "answers that did not come in time, over all axes, since the beginning",
     "late_cycles": "cycles that began more than a tenth of a period late, since the beginning",
     "stream_age_s": "age of the newest sample of the set-point stream; null without",
+    "stream_buttons": "buttons of the sample that is played: bit 0 the clutch, "
+    "bits 8 to 15 the number of the confirmation",
     "state": f"state of the loop: {_STATES}",
     "program": "number of the program in the description's list",
     "reaction": f"reaction of the supervisor in this cycle: {_REACTIONS}",

@@ -60,6 +60,10 @@ class Program(Protocol):
     def stream_age_s(self) -> float:
         """Return the age of the newest sample that it follows, nan where it follows none."""
 
+    @property
+    def stream_buttons(self) -> int:
+        """Return the buttons of the sample that it plays, 0 where it follows none."""
+
     def progress(self) -> dict[str, Any]:
         """Return what a person would want to know of it, such as the part done; asked rarely."""
 
@@ -81,6 +85,11 @@ class WithoutPlatform:
     def stream_age_s(self) -> float:
         """Return the age of the newest sample that it follows, nan where it follows none."""
         return math.nan
+
+    @property
+    def stream_buttons(self) -> int:
+        """Return the buttons of the sample that it plays, 0 where it follows none."""
+        return 0
 
     def progress(self) -> dict[str, Any]:
         """Return nothing, where a program has no end."""

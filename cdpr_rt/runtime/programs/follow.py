@@ -63,6 +63,11 @@ class FollowProgram(AxisProgram):
         """Return the age of the newest sample that it follows, nan before the first."""
         return self.stream.age_s
 
+    @property
+    def stream_buttons(self) -> int:
+        """Return the buttons of the sample that is played."""
+        return self.stream.buttons
+
     def progress(self) -> dict[str, Any]:
         """Return what the stream is worth and what became of its samples."""
         stream = self.stream

@@ -31,6 +31,8 @@ class PlatformParts:
         self.acceleration_m_s2 = np.full(2, platform.acceleration_m_s2)
         self.cycle = -2
         """The last cycle in which one of the programs moved the platform."""
+        self.tight = False
+        """Whether all cables are tight and carry the platform, where it is known to be."""
 
     @property
     def known(self) -> bool:
@@ -109,6 +111,11 @@ class PlatformProgram:
     def stream_age_s(self) -> float:
         """There is no stream."""
         return float("nan")
+
+    @property
+    def stream_buttons(self) -> int:
+        """There is no stream."""
+        return 0
 
     @property
     def pose(self) -> FloatArray | None:

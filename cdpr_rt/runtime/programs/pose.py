@@ -13,6 +13,7 @@ from cdpr_rt.runtime.pose_stream import PoseStream, StreamState
 from cdpr_rt.runtime.programs.base import ProgramError
 from cdpr_rt.runtime.programs.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.runtime.programs.wanted import Wanted
+from cdpr_rt.runtime.stream_buttons import CLUTCH
 
 _SLOWEST_m_s = 1e-4
 
@@ -51,6 +52,11 @@ class PoseProgram(PlatformProgram):
         """Age of the newest sample, nan where no hand leads."""
         return self.stream.age_s if self._following else math.nan
 
+    @property
+    def stream_buttons(self) -> int:
+        """The buttons of the sample that is played, 0 where no hand leads."""
+        return self.stream.buttons if self._following else 0
+
     def progress(self) -> dict[str, Any]:
         """Return where the platform is, where it goes, and what the stream is worth."""
         told = {**super().progress(), "refused": self._refused}
@@ -62,8 +68,8 @@ class PoseProgram(PlatformProgram):
         keys = Wanted(self.name, wanted, ("position_m", "stream", "speed_m_s"))
         most = float(self._parts.speed_m_s[0])
         speed = keys.number("speed_m_s", _SLOWEST_m_s, most, most)
-        if not self._parts.known:
-            raise ProgramError("pose: it is not known where the platform is; run tighten first")
+        if not self._parts.tight:
+            raise ProgramError("pose: the cables are not tight; run tighten first")
         if not wanted:
             return self._resting_place(), speed
         if keys.one_of("position_m", "stream") == "stream":
@@ -107,7 +113,7 @@ class PoseProgram(PlatformProgram):
         if stream.update() is StreamState.STOPPED:
             self._target[:] = self._resting_place()
             return
-        if stream.epoch != self._epoch or stream.buttons & 1:
+        if stream.epoch != self._epoch or stream.buttons & CLUTCH:
             self._epoch = stream.epoch
             self._hand[:] = stream.pose[:2]
             return

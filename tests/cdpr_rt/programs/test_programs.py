@@ -158,12 +158,14 @@ def test_follow_pays_out_cable_as_the_hand_moves() -> None:
     rig.run(0.3)
     rig.switch("follow")
     start = rig.setpoint.position_rad.copy()
+    rig.sample["buttons"] = 0x201
     for k in range(60):
         t = k / 30.0
         rig.send((7.0 + 0.05 * t, -3.0, 0.04 * t), scale=2.0)
         rig.run(1 / 30.0)
     assert rig.program.progress()["stream"] == "fresh"
     assert rig.program.stream_age_s == pytest.approx(0.033, abs=0.002)
+    assert rig.program.stream_buttons == 0x201
     rig.run(0.3)
     way = rig.setpoint.position_rad - start
     np.testing.assert_allclose(

@@ -23,7 +23,9 @@ from recording_rig import (
 
 from cdpr_rt.runtime.shared_block import RowWriter
 from cdpr_rt.runtime.states import Reaction
+from cdpr_rt.runtime.stream_buttons import confirmation, stream_buttons
 from cdpr_rt.service.recording import Recorder, reserve_of
+from cdpr_rt.service.recording_events import Events
 from cdpr_rt.service.recording_file import RecordingError
 from cdpr_rt.service.recording_reader import CLOSED, CUT, KILLED, RecordingReader, read_columns
 
@@ -390,6 +392,23 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
     ]
     assert [event.get("cycle") for event in events] == [0, 10, 20, 60, 70, None, None]
     assert events[-1]["client"] == "panel" and events[-1]["at"] is None
+
+
+def test_what_an_operator_confirms_is_an_event_once() -> None:
+    rows = made_rows(0, 60)
+    rows["stream_buttons"][10:20] = stream_buttons(clutch=True, confirmed=0)
+    rows["stream_buttons"][20:40] = stream_buttons(clutch=False, confirmed=1)
+    rows["stream_buttons"][40:] = stream_buttons(clutch=True, confirmed=3)  # number 2 was lost
+    rows["reaction"][50:] = Reaction.HOLD
+    watched = Events()
+    watched.of_rows(rows[:5])
+    told = [event for some in (rows[5:30], rows[30:]) for event, _ in watched.of_rows(some)]
+    assert [(event["cycle"], event["text"]) for event in told] == [
+        (20, "the operator confirmed, number 1"),
+        (40, "the operator confirmed, number 3"),
+        (50, "hold"),
+    ]
+    assert confirmation(stream_buttons(clutch=True, confirmed=256)) == 1
 
 
 def test_states_without_cycles_are_events_too(tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ class Wild:
     at_rest = True
     pose = pose_setpoint = None
     stream_age_s = math.nan
+    stream_buttons = 0
 
     def __init__(self) -> None:
         self.controller = Idle(2)
