@@ -176,7 +176,8 @@ def _axes(path: Path, file: RobotFile) -> list[RobotAxis]:
         )
         name = axis.name or default_name(i)
         known = _calibration(path, i, axis.calibration, winch)
-        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name, known))
+        learnt = None if axis.commissioned is None else _path_from(path, axis.commissioned)
+        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name, known, learnt))
     return axes
 
 
@@ -223,7 +224,12 @@ def _beside(file: Path, name: str) -> str:
     text, at, place = name.partition("@")
     if "/" not in text and not text.endswith(".toml"):
         return name
-    return str((file.parent / Path(text).expanduser()).resolve()) + at + place
+    return str(_path_from(file, text)) + at + place
+
+
+def _path_from(file: Path, text: str) -> Path:
+    """Return the path that a profile's file gives from its own folder."""
+    return (file.parent / Path(text).expanduser()).resolve()
 
 
 def load_machine(name: str | Path) -> Winch | Robot:

@@ -21,7 +21,7 @@ class PlatformFile(Profile):
 
     mass_kg: float = Field(gt=0, le=10_000)
     home_m: Point
-    """Where its origin is when the robot is started."""
+    """Where its origin is at rest, on its stand: when the robot is started, and at its end."""
     home_tolerance_m: float = Field(default=0.05, gt=0, le=1)
     """How far from there it may really be."""
     workspace_min_m: Point
@@ -81,6 +81,7 @@ def platform_faults(
 
 
 def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with the box; the stand may be under it, not beside or above it."""
     size = len(file.home_m)
     for key in ("workspace_min_m", "workspace_max_m"):
         point = getattr(file, key)
@@ -91,5 +92,7 @@ def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
     for i, (low, home, high) in enumerate(box):
         if not low < high:
             yield f"platform.workspace_max_m[{i}]", f"value {high:g}; allowed: above {low:g}"
-        elif not low <= home <= high:
+        elif i == size - 1 and home > high:
+            yield f"platform.home_m[{i}]", f"value {home:g}; allowed: up to {high:g}"
+        elif i < size - 1 and not low <= home <= high:
             yield f"platform.home_m[{i}]", f"value {home:g}; allowed: {low:g} to {high:g}"

@@ -35,6 +35,8 @@ class AxisFile(Profile):
     name: str | None = Field(default=None, min_length=1, max_length=32)
     cable_sign: Annotated[int, one_of(-1, 1)] | None = None
     calibration: str | None = None
+    commissioned: str | None = Field(default=None, min_length=1)
+    """Folder in which `cdpr commission` left its motor's profile, or the profile's file."""
     exit_point_m: Point | None = None
     """Where its cable leaves for the platform."""
     anchor_point_m: Point | None = None
@@ -115,7 +117,8 @@ def default_name(axis: int) -> str:
 class RobotAxis:
     """One axis: its winch, told the robot's bit rate, cycle, node ids and heartbeat.
 
-    `name` is what messages call it; `calibration` its measured tension-to-torque gain.
+    `name` is what messages call it; `calibration` its measured tension-to-torque gain,
+    `commissioned` where its motor's cogging profile is: a file, or the folder that holds it.
     """
 
     winch: Winch
@@ -124,6 +127,7 @@ class RobotAxis:
     mandatory: bool
     name: str
     calibration: WinchCalibration | None = None
+    commissioned: Path | None = None
 
 
 @dataclass(frozen=True)

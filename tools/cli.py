@@ -35,6 +35,7 @@ _COMMANDS = (
     "log",
     "profiles",
     "rail",
+    "robot",
     "run",
     "service-unit",
     "sim",

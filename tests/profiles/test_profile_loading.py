@@ -33,6 +33,7 @@ FILES: dict[Path, type[Profile]] = {
     SHIPPED / "winches" / "winch-mpp0923d.toml": WinchFile,
     SHIPPED / "robots" / "bench-2.toml": RobotFile,
     SHIPPED / "robots" / "one-bus-8.toml": RobotFile,
+    SHIPPED / "robots" / "planar-3.toml": RobotFile,
     SHIPPED / "robots" / "spatial-8.toml": RobotFile,
     SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml": TensionSensors,
     SHIPPED / "tension_sensors" / "rtu-load-cells-8.toml": TensionSensors,
