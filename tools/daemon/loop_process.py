@@ -11,12 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import AxisFeedback, Setpoint
 from cdpr_rt.realtime import settle_memory, stay_punctual
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.loop import ControlLoop, LoopParts
 from cdpr_rt.runtime.programs.model import model_of
-from cdpr_rt.runtime.programs.registry import build_programs, rehearse_programs
+from cdpr_rt.runtime.programs.registry import (
+    build_programs,
+    platform_parts,
+    rehearse_programs,
+)
 from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.supervisor import Supervisor
@@ -41,10 +46,10 @@ def main() -> int:
         require_fit(robot)
         kind = ListeningMachine if settings.read_only else RobotMachine
         machine = kind(robot, settings)
-    except (ProfileError, CommandError) as error:
+        parts = loop_parts(robot, block)
+    except (ProfileError, CommandError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)
         return BAD_INPUT
-    parts = loop_parts(robot, block)
     block.write_description(description(robot, parts))
     loop = ControlLoop(block, machine, parts)
     loop.notices += settle_memory()
@@ -68,15 +73,17 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
     limits = limits_of(robot)
     latencies = [latency_s(axis.winch) for axis in axes]
     model = model_of(axes, period_s, latencies, limits)
-    programs = build_programs(model, block)
+    estimator = Estimator(n, period_s, winches_of(axes))
+    platform = platform_parts(robot, limits, model, estimator)
+    programs = build_programs(model, block, platform)
     names = [axis.name for axis in axes]
     parts = LoopParts(
         programs=programs,
         supervisor=Supervisor(limits, n, period_s, names),
-        estimator=Estimator(n, period_s, winches_of(axes)),
+        estimator=estimator,
         punctual=stay_punctual,
     )
-    rehearse_programs(programs, n)
+    rehearse_programs(programs, n, platform)
     _rehearse_judgement(parts, n)
     return parts
 

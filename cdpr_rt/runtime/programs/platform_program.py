@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.approach import approach
+from cdpr_rt.controllers.base import Controller
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_control import PlanarControl
 from cdpr_rt.runtime.estimate import Estimator
@@ -21,9 +22,16 @@ class PlatformParts:
     """What the programs of one platform share."""
 
     def __init__(
-        self, platform: Platform, control: PlanarControl, estimator: Estimator, period_s: float
+        self,
+        platform: Platform,
+        control: PlanarControl,
+        estimator: Estimator,
+        period_s: float,
+        most_N: FloatArray,
     ) -> None:
         self.platform = platform
+        self.most_N = most_N
+        """What each cable may be pulled with."""
         self.control = control
         self.estimator = estimator
         self.period_s = period_s
@@ -39,6 +47,18 @@ class PlatformParts:
         """Whether it is known where the platform is."""
         return bool(self.estimator.estimate.length_known.all())
 
+    def pretend(self, feedback: AxisFeedback) -> None:
+        """Take the platform to be at home on tight cables, for a rehearsal."""
+        self.control.set_home(feedback, self.control.least_N)
+        self.estimator.set_lengths(feedback.position_rad, self.control.free_lengths_m)
+        self.tight = True
+
+    def forget(self) -> None:
+        """Forget where the platform is."""
+        self.tight = False
+        self.estimator.forget_lengths()
+        self.control.reset()
+
 
 class PlatformProgram:
     """Keeps the platform where it is, its cables tight; others have their own `_move`.
@@ -51,7 +71,7 @@ class PlatformProgram:
 
     def __init__(self, parts: PlatformParts, torque_Nm: FloatArray) -> None:
         self._parts = parts
-        self.controller = parts.control
+        self.controller: Controller = parts.control
         self._control = parts.control
         self._loop = Handover(parts.control, torque_Nm, parts.period_s)
         self._target = np.zeros(2)
@@ -60,7 +80,7 @@ class PlatformProgram:
         self._at_rest = True
         self._seen = np.zeros(7)
 
-    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+    def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; the platform brakes and stays."""
         parts, control = self._parts, self._control
         self._stopping = False

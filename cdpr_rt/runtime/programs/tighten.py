@@ -121,6 +121,7 @@ class TightenProgram(PlatformProgram):
         return {
             **super().progress(),
             "tight": self._tight,
+            "done": float(self._tight),
             "pull_N": self._pull.tolist(),
             "trouble": self._why,
         }
@@ -139,6 +140,6 @@ class TightenProgram(PlatformProgram):
         if not parts.known:
             control.set_home(feedback, self._least)
             parts.estimator.set_lengths(feedback.position_rad, control.free_lengths_m)
-        self._tight = True
+        self._tight = parts.tight = True
         super().start(feedback, setpoint, torque_Nm)
         self._parts.cycle = feedback.cycle
