@@ -153,6 +153,8 @@ class Compensation:
                 self._tables[i] = axis.table_Nm
                 self._parameters[i] = _row(axis, period_s)
         self._state = np.zeros((n, _STATES))
+        self.available: BoolArray = self._parameters[:, _AVAILABLE] != 0.0
+        """Which axes have a profile, (n,); until its index is known nothing comes of it."""
         self._period_s = period_s
         self._fade_step = min(1.0, period_s / fade_in_s) if fade_in_s > 0.0 else 1.0
 

@@ -239,6 +239,10 @@ class AxisBuses:
         groups = (group for group in self.groups if not group.mode_confirmed())
         return next(groups, self.groups[0]).unconfirmed_mode()
 
+    def part_of(self, axis: int) -> tuple[AxisGroup, int]:
+        """Return the group that an axis belongs to, and its number there."""
+        return self._where[axis]
+
     def _in_order(self) -> list[tuple[AxisGroup, int]]:
         return [self._where[place] for place in range(self.n)]
 

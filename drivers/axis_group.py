@@ -184,12 +184,16 @@ class AxisGroup(AxisExchange):
         self.feedback.index_rad[axis] = position_rad
         self.feedback.index_known[axis] = True
 
+    def tells_probe(self, axis: int) -> bool:
+        """Whether the drive's PDOs carry touch probe status and position."""
+        return bool(self._layout.probe_mapped[axis])
+
     def expect_index(self, axis: int, armed: bool) -> None:
         """Take the next latched touch probe position of an axis for its index, or no longer.
 
         Raises DriverError when the drive's PDOs do not carry touch probe status and position.
         """
-        if armed and not self._layout.probe_mapped[axis]:
+        if armed and not self.tells_probe(axis):
             raise DriveFaultError(
                 f"drive profile {self.axes[axis].drive.name!r}: tpdos: no TPDO holds both 60B9h "
                 "and 60BAh, which finding the index by touch probe needs"

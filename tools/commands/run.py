@@ -18,6 +18,7 @@ from drivers.errors import BusError
 from profiles import Robot, load_robot
 from tools.bus_fit import require_fit
 from tools.commands.options import JsonOption, SafetyIoOption, YesOption
+from tools.commissioned import load_profiles, with_commissioned
 from tools.consent import require_consent
 from tools.daemon.launcher import Launcher
 from tools.daemon.notify import ServiceManager
@@ -67,6 +68,12 @@ _TensionPort = Annotated[
     str | None,
     typer.Option(metavar="PORT", help="Serial port of the robot's tension sensors."),
 ]
+_Commissioned = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR", help="What `cdpr commission ROBOT` has left: motors to compensate."
+    ),
+]
 _ReadOnly = Annotated[
     bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
 ]
@@ -91,6 +98,7 @@ def run(
     read_only: _ReadOnly = False,
     safety_io: SafetyIoOption = None,
     tension_port: _TensionPort = None,
+    commissioned: _Commissioned = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -114,6 +122,7 @@ def run(
         read_only=read_only,
         safety_io=safety_io,
         tension_port=tension_port,
+        commissioned=commissioned,
     )
     _require_free(settings.socket)
     _require_no_master(profile, settings)
@@ -143,11 +152,13 @@ def settings_for(
     read_only: bool,
     safety_io: str | None,
     tension_port: str | None = None,
+    commissioned: Path | None = None,
 ) -> RunSettings:
     """Return what the options of `cdpr run` ask for; raises BadInputError."""
     if len(robot.axes) > MOST_AXES:
         raise BadInputError(f"{robot.path}: {len(robot.axes)} axes; allowed: 1 to {MOST_AXES}")
     require_fit(robot)
+    load_profiles(with_commissioned(robot, commissioned))
     if record is not None and no_record:
         raise BadInputError("--record and --no-record: one of them")
     own = asks_for_own_simulator(bus or ())
@@ -165,6 +176,7 @@ def settings_for(
         read_only=read_only,
         safety_io=safety_io,
         tension_port=tension_port,
+        commissioned=commissioned,
         socket=unix or default_socket(robot.profile),
         http=None if http is None else Address.parse("--http", http),
         key_file=key_file,

@@ -15,6 +15,7 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.machine import MachineError
 from cdpr_rt.runtime.robot_arrays import limits_of
 from cdpr_rt.tension import TensionFeedback
+from drivers import touch_probe
 from drivers.axis_buses import AxisBuses
 from drivers.axis_shutdown import switch_off_by_sdo
 from drivers.cia402 import POWER_OFF, State, state_of
@@ -22,6 +23,7 @@ from drivers.errors import BusError, DriverError
 from drivers.network import CanNetwork
 from profiles import Robot
 from profiles.errors import ProfileError
+from tools.commissioned import load_profiles, refuse_strangers
 from tools.daemon.settings import RunSettings
 from tools.daemon.tensions import RobotTensions
 from tools.errors import CommandError
@@ -58,6 +60,7 @@ class RobotMachine:
 
     def __init__(self, robot: Robot, settings: RunSettings) -> None:
         self._robot = robot
+        self._profiles = load_profiles(robot)
         self._urls = robot_urls(robot, settings.buses)
         real = not all(url.is_simulated for url in self._urls.values())
         self._tensions = RobotTensions(robot, settings.tension_port)
@@ -85,10 +88,12 @@ class RobotMachine:
                     "; ".join(f"axis {i}: {reason}" for i, reason in absent.items())
                     + " (the daemon runs all axes of a robot or none)"
                 )
+            refuse_strangers(self._robot, self._profiles, booted)
             device = device_of(self._robot, networks, booted, torque_Nm)
             stack.callback(device.close)
             # the supervisor judges silence before the device does
             device.tolerate_silence(self._robot.limits.missed_cycles + 1)
+            self._seek_indices(device)
             # the collector keeps every thread waiting: it looks at what stays now, and never again
             gc.collect()
             gc.freeze()
@@ -100,6 +105,17 @@ class RobotMachine:
         self.notices = [notice for notice in notices if notice]
         self.watches = () if self._safety is None else (self._safety.io,)
         self._device = device
+
+    def _seek_indices(self, device: AxisBuses) -> None:
+        """Have each drive latch its encoder's index in whatever motion comes (touch probe).
+
+        Axes of a platform are all sought, since an index tells of a motor that was turned while
+        nobody looked; others where a cogging profile counts from it.
+        """
+        for i, profile in enumerate(self._profiles):
+            group, place = device.part_of(i)
+            if profile is not None or (self._robot.platform and group.tells_probe(place)):
+                touch_probe.arm(group, place)
 
     def _open_safety(self, stack: ExitStack) -> SessionSafety | None:
         if self._reference is None:

@@ -76,6 +76,8 @@ class RunSettings(BaseModel):
     buses: tuple[str, ...] = ()
     """What was given with --bus; never `simbus:` alone, its simulator has a name already."""
     read_only: bool = False
+    commissioned: _Path | None = None
+    """Folder with the cogging profiles of the axes' motors."""
     safety_io: str | None = None
     tension_port: str | None = None
     """Serial port at which the robot's tension sensors are."""

@@ -59,12 +59,13 @@ def model_of(
     period_s: float,
     latency_s: Sequence[float],
     limits: Limits,
+    compensation: Sequence[AxisCompensation | None] = (),
 ) -> RobotModel:
     """Return the model of axes whose loops are as stiff as the latency of each allows.
 
     `latency_s` (n,) is from the instant an angle was true to the middle of the cycle in which its
-    torque acts. The loops are those of the bare rotors. Raises TuningError where a latency is too
-    long for any loop.
+    torque acts; `compensation` (n,) or empty what is known of each motor. The loops are those of
+    the bare rotors. Raises TuningError where a latency is too long for any loop.
     """
     cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
     inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
@@ -80,4 +81,5 @@ def model_of(
         cable_m_per_rad=cable,
         gains=tuple(designs[pair] for pair in pairs),
         sweep_gain_Nm_rad=np.array([sweep_gain(J, latency) for J, latency in pairs]),
+        compensation=tuple(compensation),
     )
