@@ -100,7 +100,7 @@ class CableRobot:
     def position_m(self) -> FloatArray:
         """True position of the platform's origin, (3,)."""
         p = self.platform[0]
-        return np.asarray(p["position"] - p["rotation"] @ self._com)
+        return np.asarray(p["position"] - p["rotation"] @ p["com"])
 
     @property
     def rotation(self) -> FloatArray:
@@ -116,6 +116,10 @@ class CableRobot:
         """Cut cable `i` for good."""
         self.motors["rigidity"][i] = 1e-9
         self.motors["weight"][i] = 0.0
+
+    def slip(self, i: int, metres: float) -> None:
+        """Let so much of cable `i` slip through its fastening on the drum."""
+        self.motors["cable_start"][i] += metres
 
     def distance_m(self, i: int) -> float:
         """Return the distance from exit to anchor point of cable `i`, m."""
@@ -134,9 +138,9 @@ class CableRobot:
         anchors = self._moved(
             anchors, plant.geometry.anchor_errors_m, plant.geometry.anchor_sigma_m, planar
         )
-        self._com = _vector(plant.platform.centre_of_mass_m)
         platform: PlatformArray = np.zeros(1, PLATFORM_DTYPE)
         p: Any = platform[0]
+        com = p["com"] = _vector(plant.platform.centre_of_mass_m)
         p["cables"], p["planar"] = n, planar
         p["mass"] = shape.mass_kg * (1.0 + plant.platform.mass_error)
         reach = plant.platform.radius_of_gyration_m or _plate_radius(anchors)
@@ -145,12 +149,12 @@ class CableRobot:
         p["inverse_inertia"] = np.linalg.inv(p["inertia"])
         p["gravity"] = (0.0, -9.80665, 0.0) if planar else (0.0, 0.0, -9.80665)
         p["exit"][:n] = exits
-        p["anchor"][:n] = anchors - self._com
+        p["anchor"][:n] = anchors - com
         angle = math.radians(plant.start.angle_deg)
         cosine, sine = math.cos(angle), math.sin(angle)
         p["rotation"] = ((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0))
         start = plant.start.position_m or shape.home_m
-        p["position"] = _vector(start) + p["rotation"] @ self._com
+        p["position"] = _vector(start) + p["rotation"] @ com
         self._put_floor(
             p, _corners(anchors) if shape.feet_m is None else _points(shape.feet_m, None, "feet")
         )
@@ -159,7 +163,7 @@ class CableRobot:
     def _put_floor(self, p: Any, feet: FloatArray) -> None:
         floor = self._plant.floor
         p["feet"] = len(feet)
-        p["foot"][: len(feet)] = feet - self._com
+        p["foot"][: len(feet)] = feet - p["com"]
         up = -p["gravity"] / np.linalg.norm(p["gravity"])
         lowest = min(
             float(up @ (p["position"] + p["rotation"] @ f)) for f in p["foot"][: len(feet)]
@@ -194,6 +198,14 @@ class RobotMember:
     def step(self, until: float, kind: int, target: float) -> MotorSample:
         """See `CableRobot.step`."""
         return self.robot.step(self.number, until, kind, target)
+
+    def cut(self) -> None:
+        """See `CableRobot.cut`."""
+        self.robot.cut(self.number)
+
+    def slip(self, metres: float) -> None:
+        """See `CableRobot.slip`."""
+        self.robot.slip(self.number, metres)
 
 
 def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:

@@ -181,6 +181,22 @@ def build_motor(
     return motor
 
 
+def cut_off(motor: MotorArray) -> bool:
+    """Take the cable of a motor that belongs to no robot away; return whether there was one."""
+    m: Any = motor[0]
+    had_one = bool(m["load_kind"] != LOAD_KINDS.index("none"))
+    m["load_kind"] = LOAD_KINDS.index("none")
+    m["tension"] = m["load_friction"] = 0.0
+    return had_one
+
+
+def let_slip(motor: MotorArray, metres: float) -> bool:
+    """Lengthen the cable of a motor that belongs to no robot; return whether there is one."""
+    m: Any = motor[0]
+    m["cable_start"] -= metres
+    return bool(m["load_kind"] != LOAD_KINDS.index("none"))
+
+
 def _set_physics(m: Any, plant: Plant) -> None:
     friction, thermal = plant.friction, plant.thermal
     m["inertia"] = plant.inertia_kg_m2

@@ -26,6 +26,7 @@ PLATFORM_DTYPE = np.dtype(
         ("air", _F8),  # N s/m, and N m s/rad times `reach` squared
         ("reach", _F8),  # m
         ("exit", _F8, (MOST_CABLES, 3)),  # m, in the room
+        ("com", _F8, (3,)),  # m, centre of mass from the origin, in the platform's frame
         ("anchor", _F8, (MOST_CABLES, 3)),  # m, from the centre of mass, in the platform's frame
         ("foot", _F8, (MOST_FEET, 3)),  # m, likewise; what stands on the floor
         ("floor", _F8),  # m, height of the floor against gravity; -inf without

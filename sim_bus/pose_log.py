@@ -1,7 +1,8 @@
 """Log of a robot's true pose and tensions, one record at every SYNC; for reports and tests alone.
 
 The file begins with one line of JSON, padded with spaces to HEADER_BYTES, newline included; then
-follow records of the little-endian layout named in it.
+follow records of the little-endian layout named in it. Each record is written at once, whole, so
+that the last one can be read while the robot runs.
 """
 
 from __future__ import annotations
@@ -9,13 +10,14 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from sim_bus.cable_robot import CableRobot
+from sim_bus.jit import jit
 
 HEADER_BYTES = 1024
-_BUFFERED = 256
 
 
 class PoseLog:
@@ -33,45 +35,63 @@ class PoseLog:
             ("rotation", "<f8", (3, 3)),
             ("tension_N", "<f8", (n,)),
             ("motor_rad", "<f8", (n,)),
+            ("torque_Nm", "<f8", (n,)),
         ]
-        self._rows = np.zeros(_BUFFERED, np.dtype(fields))
-        self._used = 0
+        self._row = np.zeros(1, np.dtype(fields))
+        self._bytes = self._row.view(np.uint8).data
         self._file = path.open("wb", buffering=0)
         header = {
             "format": "cdpr-rt pose log 1",
-            "record_bytes": self._rows.itemsize,
+            "record_bytes": self._row.itemsize,
             "fields": fields,
         }
         self._write(json.dumps(header).encode().ljust(HEADER_BYTES - 1) + b"\n")
+        describe(self._row, robot.platform, robot.motors)
 
     def append(self, sync_index: int, time_s: float, _truth: tuple[float, ...]) -> None:
         """Append what is true of the robot now; what its first motor tells of itself is in it."""
-        robot, row = self._robot, self._rows[self._used]
+        row = self._row[0]
         row["sync_index"], row["time_s"] = sync_index, time_s
-        row["position_m"], row["rotation"] = robot.position_m, robot.rotation
-        row["velocity_m_s"] = robot.platform["velocity"][0]
-        row["tension_N"] = robot.motors["tension"]
-        row["motor_rad"] = robot.motors["angle"]
-        self._used += 1
-        if self._used == _BUFFERED:
-            self.flush()
+        describe(self._row, self._robot.platform, self._robot.motors)
+        self._write(self._bytes)
 
     def flush(self) -> None:
-        """Write what is buffered."""
-        if self._used:
-            self._write(self._rows[: self._used].tobytes())
-            self._used = 0
+        """Do nothing: records do not wait."""
 
     def close(self) -> None:
-        """Flush and close the file."""
-        self.flush()
+        """Close the file."""
         self._file.close()
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, data: bytes | memoryview) -> None:
         if self._file.closed:
             return
         try:
-            self._file.write(data)
+            while data:
+                data = data[self._file.write(data) :]
         except OSError as error:
             print(f"pose log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
             self._file.close()
+
+
+@jit
+def describe(rows: Any, platform: Any, motors: Any) -> None:
+    """Write pose, tensions and motors to a record: position and velocity are of the origin."""
+    row, p = rows[0], platform[0]
+    R, w = p.rotation, p.spin
+    x = R[0, 0] * p.com[0] + R[0, 1] * p.com[1] + R[0, 2] * p.com[2]
+    y = R[1, 0] * p.com[0] + R[1, 1] * p.com[1] + R[1, 2] * p.com[2]
+    z = R[2, 0] * p.com[0] + R[2, 1] * p.com[1] + R[2, 2] * p.com[2]
+    row.position_m[0] = p.position[0] - x
+    row.position_m[1] = p.position[1] - y
+    row.position_m[2] = p.position[2] - z
+    row.velocity_m_s[0] = p.velocity[0] - (w[1] * z - w[2] * y)
+    row.velocity_m_s[1] = p.velocity[1] - (w[2] * x - w[0] * z)
+    row.velocity_m_s[2] = p.velocity[2] - (w[0] * y - w[1] * x)
+    for k in range(3):
+        for j in range(3):
+            row.rotation[k, j] = R[k, j]
+    for i in range(p.cables):
+        m = motors[i]
+        row.tension_N[i] = m.tension
+        row.motor_rad[i] = m.angle
+        row.torque_Nm[i] = m.torque_gain * m.current

@@ -9,7 +9,7 @@ from sim_bus import servo
 from sim_bus.cable_robot import MotorSample, RobotMember
 from sim_bus.canopen.od import ObjectDictionary
 from sim_bus.motor import run
-from sim_bus.motor_state import MotorRatings, Transmission, build_motor
+from sim_bus.motor_state import MotorRatings, Transmission, build_motor, cut_off, let_slip
 from sim_bus.plant import Plant
 from sim_bus.rotor import restart_counter
 from sim_bus.twins import Twin
@@ -102,6 +102,24 @@ class Axis:
         self.motor["observed_position"] = 0.0
         self.motor["i2t"] = 0.0
         self.configure()
+
+    def jump(self, counts: int) -> None:
+        """Have the encoder miscount once; its index pulse stays where it is on the rotor."""
+        self.motor["zero"] -= counts
+
+    def cut_cable(self) -> bool:
+        """Cut the cable for good; return whether there is one."""
+        if self._robot is not None:
+            self._robot.cut()
+            return True
+        return cut_off(self.motor)
+
+    def slip_cable(self, metres: float) -> bool:
+        """Let so much cable slip through its fastening on the drum; return whether there is one."""
+        if self._robot is not None:
+            self._robot.slip(metres)
+            return True
+        return let_slip(self.motor, metres)
 
     def read(self, field: str) -> float:
         """Return a field of the motor's record."""

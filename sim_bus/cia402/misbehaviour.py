@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.datatypes import Value
 from sim_bus.canopen.od import ObjectDictionary
 from sim_bus.cia402.machine import Machine
@@ -13,6 +14,7 @@ from sim_bus.frame import pack_frame
 
 _RAISE_FAULT, _DROP_TPDOS, _REFUSE_MODES, _SHOW_MODE, _MUTE_HEARTBEAT = 1, 2, 3, 4, 5
 _FALL_SILENT, _DOUBLE_TPDOS, _DELAY_TPDOS, _BABBLE, _VANISH_IN_SDO = 6, 7, 8, 9, 10
+_JUMP, _CUT_CABLE, _SLIP = 11, 12, 13
 _COUNTED = (_DROP_TPDOS, _DOUBLE_TPDOS, _DELAY_TPDOS, _VANISH_IN_SDO)
 _DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
 _ERROR_CONTROL, _SDO_ANSWER, _EMCY = 0x700, 0x580, 0x080
@@ -28,6 +30,7 @@ class Misbehaviour:
     def __init__(self, od: ObjectDictionary, machine: Machine, outbox: list[bytes]) -> None:
         self._od = od
         self._machine = machine
+        self._axis = machine.axis
         self._outbox = outbox
         self._left = dict.fromkeys(_COUNTED, 0)
         """How many more frames each of the counted kinds concerns."""
@@ -47,6 +50,9 @@ class Misbehaviour:
             _MUTE_HEARTBEAT: self._mute,
             _FALL_SILENT: self._silence_after_the_answer,
             _BABBLE: self._set_babble,
+            _JUMP: self._jump,
+            _CUT_CABLE: self._cut_cable,
+            _SLIP: self._slip,
         }
         writers |= {sub: self._counter(sub) for sub in _COUNTED}
         for sub, writer in writers.items():
@@ -139,6 +145,17 @@ class Misbehaviour:
     def _raise_fault(self, code: Value) -> None:
         if code:
             self._machine.trip(int(code))
+
+    def _jump(self, counts: Value) -> None:
+        self._axis.jump(int(counts))
+
+    def _cut_cable(self, cut: Value) -> None:
+        if cut and not self._axis.cut_cable():
+            raise SdoAbort(Abort.HARDWARE_ERROR)
+
+    def _slip(self, millimetres: Value) -> None:
+        if millimetres and not self._axis.slip_cable(int(millimetres) * 1e-3):
+            raise SdoAbort(Abort.HARDWARE_ERROR)
 
     def _mute(self, on: Value) -> None:
         self._muted = bool(on)

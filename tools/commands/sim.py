@@ -22,7 +22,7 @@ from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
 from tools.bus_fit import require_fit
-from tools.commands import sim_rail, sim_robot, sim_safety_io, sim_tension
+from tools.commands import sim_fault, sim_rail, sim_robot, sim_safety_io, sim_tension
 from tools.errors import BadInputError
 
 app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
@@ -33,6 +33,7 @@ def register(parent: typer.Typer) -> None:
     parent.add_typer(app, name="sim")
     sim_safety_io.add(app)
     sim_rail.add(app)
+    sim_fault.add(app)
     sim_tension.add(app)
 
 
@@ -87,6 +88,10 @@ def up(
             metavar="PORT", min=0, max=65535, help="Serve socketcand on 127.0.0.1:PORT; 0: any."
         ),
     ] = None,
+    detached: Annotated[
+        bool,
+        typer.Option("--detached", help="A robot whose cables are not attached: motors alone."),
+    ] = False,
     board: Annotated[
         Path | None,
         typer.Option(help="Make this file, a physics board for simulated sensors and safety I/O."),
@@ -102,8 +107,10 @@ def up(
         if nodes > 1 or unconfigured or slcan or socketcand is not None:
             raise BadInputError("--nodes, --unconfigured, --slcan, --socketcand: for a winch only")
         stores = partial(_store_file, store)
-        sim_robot.up(profile, bus, plant, mode, stores, board, exit_with_stdin, truth_log)
+        sim_robot.up(profile, bus, plant, mode, stores, board, exit_with_stdin, truth_log, detached)
         return
+    if detached:
+        raise BadInputError("--detached: for a robot; a winch's plant file says what it pulls")
     truth = Plant() if plant is None else Plant.load_file(plant)
     require_fit(profile)
     url = _bus(bus)

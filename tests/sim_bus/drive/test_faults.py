@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from drive_rig import Rig
+from drive_rig import Rig, SdoRefusedError
 
 from sim_bus.plant import Plant
 
@@ -161,3 +161,32 @@ def test_power_is_off_in_fault() -> None:
     rig.cycles(800)
     assert rig.actual_torque == 0
     assert abs(rig.truth[1]) < 1e-3
+
+
+def test_an_encoder_that_jumps_miscounts_from_then_on() -> None:
+    rig = Rig()
+    rig.enable(10)
+    rig.cycles(50)
+    before = rig.position
+    rig.write(0x2F00, 700, 11)
+    rig.cycles(50)
+    assert rig.position - before == pytest.approx(700, abs=3)
+    rig.write(0x2F00, -700, 11)
+    rig.cycles(50)
+    assert rig.position == pytest.approx(before, abs=3)
+
+
+def test_a_cable_is_cut_or_slips_only_where_there_is_one() -> None:
+    bare = Rig()
+    for sub in (12, 13):
+        with pytest.raises(SdoRefusedError, match="06060000h"):
+            bare.write(0x2F00, 1, sub)
+    for sub, value in ((12, 1), (13, 100)):
+        pulled = rig_with(
+            load={"kind": "fixed_anchor", "pretension_N": 30.0, "winch_friction_Nm": 2.0}
+        )
+        motor = pulled.drive.axis.motor
+        assert motor["tension"][0] > 15.0
+        pulled.write(0x2F00, value, sub)
+        pulled.run(0.02)
+        assert motor["tension"][0] == 0.0
