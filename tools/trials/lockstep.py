@@ -18,6 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
+from cdpr_rt.realtime import one_core
 from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.loop import ControlLoop
@@ -128,6 +129,7 @@ class LockstepRobot:
         self._boot()
         if self._truth_path is not None:
             self._truth = stack.enter_context(PoseLogTail(self._truth_path))
+        stack.enter_context(one_core(simulator.process.pid))
 
     def _boot(self) -> None:
         loop = self.loop
