@@ -15,21 +15,24 @@ from cdpr_rt.controllers.pid import Compensation
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots import planar_kernel as kernel
 from cdpr_rt.robots.planar_kinematics import GeometryError
-from cdpr_rt.robots.planar_tensions import PlanarTensions, distribute
+from cdpr_rt.robots.planar_tensions import PlanarTensions, carry
 from profiles import RobotAxis
 from profiles.platform import Platform
 
-RESERVE = 0.16
+RESERVE = 0.12
 """Share of the span of tensions that is left to what no plan knows: loops, friction, swinging."""
-_REGULATOR = 0.10
-_BANDWIDTH_Hz = 12.0
-_DAMPING_RATIO = 0.8
-_INTEGRAL_RATE = 3.0
-_INTEGRAL_SHARE = 0.12
+_OBSERVER_Hz = 250.0
+_DAMPING_RATIO = 0.7
+_ROTOR_SHARE = 1.7
+_SLOWEST_LOOP_s = 5.0
+_INTEGRAL_RATE = 5.0
+_INTEGRAL_SHARE = 0.15
+_REGULATOR_SHARE = 0.25
+_LOOSE_SHARE = 0.1
 _DEAD_m = 1e-4
-_OBSERVER_Hz = 60.0
 _SETTLING_STEPS = 60
 _ITERATIONS = 3
+_LATENCY_s = 2.3e-3
 
 
 class PlanarControl:
@@ -53,19 +56,22 @@ class PlanarControl:
         if not platform.is_planar or len(axes) != 3:
             raise GeometryError(f"{len(axes)} axes; allowed: 3 in a plane")
         span = np.asarray(high_N, float) - low_N
-        self.tensions = PlanarTensions(low_N + RESERVE * span, high_N - RESERVE * span)
+        self._reserve_N = float(RESERVE * span.min())
+        self.tensions = PlanarTensions(low_N + self._reserve_N, high_N - self._reserve_N)
         self.least_N = np.array(low_N, float)
         self.position_m = np.array(platform.home_m, float)
         self.velocity_m_s = np.zeros(2)
         self.acceleration_m_s2 = np.zeros(2)
         self.tension_N = np.array(self.tensions.low)
-        self.outcome, self.outside_N = 0, 0.0
+        self.outcome, self.outside_N, self.share = 0, 0.0, 1.0
         self.effort_Nm, self.compensation_Nm = np.zeros(3), np.zeros(3)
         self._compensation = compensation
         self._robot = self._robot_row(platform, axes, float(span.min()), period_s)
         self._state = np.zeros(1, kernel.STATE)
         self._cables = self._cable_rows(platform, axes, torque_Nm)
-        self._J, self._wrench, self._room = np.zeros((3, 2)), np.zeros(2), np.zeros((2, 3))
+        self._J, self._room = np.zeros((3, 2)), np.zeros((4, 3))
+        self._wrench, self._force = np.zeros(2), np.zeros(2)
+        self._carried, self._inner = np.array(self.tensions.low), np.zeros(3)
         self._home = np.array(platform.home_m, float)
         self._pose = np.zeros(7)
 
@@ -75,15 +81,19 @@ class PlanarControl:
     ) -> np.ndarray[tuple[int], np.dtype[np.void]]:
         row = np.zeros(1, kernel.ROBOT)
         inertia = max(axis.winch.motor.rotor_inertia_kg_m2 for axis in axes)
-        omega = 2.0 * math.pi * _BANDWIDTH_Hz
-        row["mass"], row["period"], row["inertia"] = platform.mass_kg, period_s, inertia
-        row["stiffness"] = inertia * omega**2
-        row["damping"] = 2.0 * _DAMPING_RATIO * inertia * omega
-        row["observer"] = 2.0 * math.pi * _OBSERVER_Hz
         cable = min(abs(axis.winch.cable_m_per_motor_rad) for axis in axes)
-        row["integral"] = _INTEGRAL_RATE * inertia * (omega / cable) ** 2
+        rotor_kg = inertia / cable**2
+        mass = platform.mass_kg + 1.5 * rotor_kg
+        observer = 2.0 * math.pi * _OBSERVER_Hz
+        late_s = _LATENCY_s + 2.0 / observer
+        damping = min(_ROTOR_SHARE * rotor_kg / late_s, 1.4 * mass / (_SLOWEST_LOOP_s * late_s))
+        row["mass"], row["period"], row["inertia"] = platform.mass_kg, period_s, inertia
+        row["observer"], row["damping"] = observer, damping
+        row["stiffness"] = mass * (damping / (2.0 * _DAMPING_RATIO * mass)) ** 2
+        row["integral"] = _INTEGRAL_RATE * row["stiffness"]
+        row["loose"] = _LOOSE_SHARE * damping
         row["most_N"] = _INTEGRAL_SHARE * span_N
-        row["dead_m"], row["regulator_N"] = _DEAD_m, _REGULATOR * span_N
+        row["dead_m"], row["regulator_N"] = _DEAD_m, _REGULATOR_SHARE * span_N
         return row
 
     @staticmethod
@@ -108,31 +118,40 @@ class PlanarControl:
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write torques and the axes' set-points for the platform's present set-point."""
+        self.observe(feedback)
+        robot, state, cables = self._robot, self._state, self._cables
+        motion = self.position_m, self.velocity_m_s, self.acceleration_m_s2
+        kernel.refer(
+            cables,
+            *motion,
+            setpoint.position_rad,
+            setpoint.velocity_rad_s,
+            setpoint.acceleration_rad_s2,
+        )
         if self._compensation is not None:
             self._compensation.torque(feedback, setpoint, self.compensation_Nm)
-        self.observe(feedback)
-        robot, cables = self._robot, self._cables
-        motion = self.position_m, self.velocity_m_s, self.acceleration_m_s2
-        kernel.push(robot, self._state, *motion, self._wrench)
+        kernel.correct(robot, state, *motion, self.share, self._wrench, self._force)
         np.negative(cables["way"], out=self._J)
-        self.outcome, self.outside_N = distribute(
+        self.outcome, self.outside_N, self.share = carry(
             self._J,
             self._wrench,
+            self._force,
             self.tensions.low,
             self.tensions.high,
-            0.0,
+            self._reserve_N,
             self.tension_N,
+            self._carried,
+            self._inner,
             self._room,
         )
         kernel.drive(
             robot,
             cables,
-            *motion,
             self.tension_N,
-            self.compensation_Nm,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
+            self._carried,
+            self._inner,
             setpoint.acceleration_rad_s2,
+            self.compensation_Nm,
             self.effort_Nm,
             torque_Nm,
         )

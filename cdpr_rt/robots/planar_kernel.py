@@ -13,21 +13,21 @@ from cdpr_rt.jit import jit
 G_m_s2 = 9.80665
 _MOST_TURN_rad = 0.02
 _SOLVED_m = 1e-9
-_ITERATIONS = 3
+_STRETCH_SHARE = 0.2
 
 ROBOT = np.dtype(
     [
-        ("mass", "<f8"),
-        ("period", "<f8"),
-        ("stiffness", "<f8"),  # Nm/rad, of each motor's loop
-        ("damping", "<f8"),  # Nm s/rad
-        ("inertia", "<f8"),  # kg m2 of each motor
+        ("mass", "<f8"),  # kg, of the platform
+        ("period", "<f8"),  # s
+        ("inertia", "<f8"),  # kg m2, of each motor
         ("observer", "<f8"),  # rad/s, double pole of the motors' observers
-        ("integral", "<f8"),  # N/(m s), of the platform's loop
-        ("most_N", "<f8"),  # of the integral part
+        ("stiffness", "<f8"),  # N/m, of the platform's loop
+        ("damping", "<f8"),  # N s/m
+        ("integral", "<f8"),  # N/(m s)
+        ("loose", "<f8"),  # N s/m, by which cables that work against each other are damped
+        ("regulator_N", "<f8"),  # the most that stiffness and damping ask for together
+        ("most_N", "<f8"),  # of the integral part, in each direction
         ("dead_m", "<f8"),  # error around which the integral part fades out and in
-        ("regulator_N", "<f8"),  # by how much the motors' loops may change a tension
-        ("share", "<f8"),  # where between the least and the greatest tensions to be
     ]
 )
 """What a cycle has to know besides the geometry; one row."""
@@ -50,14 +50,12 @@ CABLE = np.dtype(
         ("rigidity", "<f8"),  # N, EA
         ("m_per_rad", "<f8"),  # paid out, signed
         ("length_at_zero", "<f8"),  # m, without tension
-        ("low", "<f8"),  # N
-        ("high", "<f8"),
         ("torque", "<f8"),  # Nm, the motor's limit
         # state
         ("arm", "<f8", (2,)),  # anchor point from the platform's origin, turned with it
         ("way", "<f8", (2,)),  # unit vector from anchor to exit
         ("length", "<f8"),  # m, under tension, as the motor's angle has it
-        ("tension", "<f8"),  # N, asked for
+        ("tension", "<f8"),  # N, with which the cable is taken to be stretched
         ("theta", "<f8"),  # observer: angle and velocity of the motor
         ("omega", "<f8"),
     ]
@@ -178,63 +176,101 @@ def estimate(robot: Any, state: Any, cables: Any, position: FloatArray, iteratio
 
 
 @jit
-def push(
-    robot: Any, state: Any, wanted: FloatArray, speed: FloatArray, slope: FloatArray, w: FloatArray
+def refer(
+    cables: Any,
+    wanted: FloatArray,
+    speed: FloatArray,
+    slope: FloatArray,
+    reference: FloatArray,
+    reference_speed: FloatArray,
+    reference_slope: FloatArray,
 ) -> None:
-    """Write into `w` (2,) what acts on the platform besides its cables, the wanted force reversed.
+    """Write the motors' set-points (m,) for the platform's position, velocity, acceleration (2,).
 
-    The integral part is the platform's, not the motors': three motors that each insist on a length
-    of their own would pull against each other. It goes to sleep by a sigmoid where the error is
-    within what cannot be told from friction, so that the platform stands still at its target; two
-    thresholds, as in fig. 2.3: once asleep it takes twice the error to wake it.
+    Eqs. (2.2) and (2.4), with the stretch of each cable taken off.
+    """
+    for i in range(cables.size):
+        c = cables[i]
+        x = c.exit[0] - wanted[0] - c.arm[0]
+        y = c.exit[1] - wanted[1] - c.arm[1]
+        rho = math.sqrt(x * x + y * y)
+        free = rho / (1.0 + c.tension / c.rigidity)
+        reference[i] = (free - c.length_at_zero) / c.m_per_rad
+        reference_speed[i] = -(x * speed[0] + y * speed[1]) / (rho * c.m_per_rad)
+        reference_slope[i] = -(x * slope[0] + y * slope[1]) / (rho * c.m_per_rad)
+
+
+@jit
+def correct(
+    robot: Any,
+    state: Any,
+    wanted: FloatArray,
+    speed: FloatArray,
+    slope: FloatArray,
+    share: float,
+    wrench: FloatArray,
+    force: FloatArray,
+) -> None:
+    """Write what acts on the platform besides its cables (2,), and the loop's correction (2,).
+
+    `wrench` is known beforehand: weight, and the wanted acceleration reversed. `force` is what the
+    cables are to exert besides: proportional to the error of position and velocity, saturated, and
+    its integral. `share` is how much of the last cycle's force could be had: while it was not all,
+    nothing is integrated that would only ask for more.
+
+    The integral part goes to sleep by a sigmoid where the error is within what cannot be told from
+    friction, so that the platform stands still at its target; two thresholds, as in fig. 2.3: once
+    asleep it takes twice the error to wake it.
     """
     r, s = robot[0], state[0]
     ex, ey = wanted[0] - s.position[0], wanted[1] - s.position[1]
+    px = r.stiffness * ex + r.damping * (speed[0] - s.velocity[0])
+    py = r.stiffness * ey + r.damping * (speed[1] - s.velocity[1])
+    much = math.sqrt(px * px + py * py) / r.regulator_N
+    if much > 1.0:
+        px, py = px / much, py / much
     size = math.sqrt(ex * ex + ey * ey)
     threshold = r.dead_m * (2.0 - s.awake)
     moving = abs(speed[0]) + abs(speed[1]) > 0.0
     s.awake = 1.0 if moving else 1.0 / (1.0 + math.exp(-8.0 * (size / threshold - 1.0)))
-    error = (ex, ey)
+    gain = s.awake * r.integral * r.period
+    limited = share < 1.0 or much > 1.0
     for k in range(2):
-        s.integral[k] += s.awake * r.integral * r.period * error[k]
-        s.integral[k] = min(max(s.integral[k], -r.most_N), r.most_N)
-        w[k] = -r.mass * slope[k] - s.integral[k]
-    w[1] -= r.mass * G_m_s2
+        step = gain * (ex if k == 0 else ey)
+        if not limited or step * s.integral[k] < 0.0:
+            s.integral[k] = min(max(s.integral[k] + step, -r.most_N), r.most_N)
+    force[0], force[1] = px + s.integral[0], py + s.integral[1]
+    wrench[0] = -r.mass * slope[0]
+    wrench[1] = -r.mass * slope[1] - r.mass * G_m_s2
 
 
 @jit
 def drive(
     robot: Any,
     cables: Any,
-    wanted: FloatArray,
-    speed: FloatArray,
-    slope: FloatArray,
     tensions: FloatArray,
-    known: FloatArray,
-    reference: FloatArray,
-    reference_speed: FloatArray,
+    carried: FloatArray,
+    inner: FloatArray,
     reference_slope: FloatArray,
+    known: FloatArray,
     effort: FloatArray,
     torque: FloatArray,
 ) -> None:
-    """Write the motors' set-points and torques: tension, loop, and what is known of the motor.
+    """Write the motors' torques (m,) for the tensions wanted, and what is known of the motors.
 
-    The loop is proportional in angle and velocity, and saturated (section 2.4.3): it may not
-    unwind a cable, nor pull it beyond its bounds, but lets the mechanism drive the motor back.
+    `carried` are the tensions without the loop's correction, which is there to overcome friction
+    in the winches: with those the cables are stretched. `inner` is the unit vector of tensions
+    that move nothing: cables that pull against each other are damped along it, so that they do
+    not sing. A cable is asked for its tension whatever its speed: the mechanism is back-drivable.
     """
     r = robot[0]
+    against = 0.0
     for i in range(cables.size):
         c = cables[i]
-        c.tension += 0.2 * (tensions[i] - c.tension)
-        x = c.exit[0] - wanted[0] - c.arm[0]
-        y = c.exit[1] - wanted[1] - c.arm[1]
-        rho = math.sqrt(x * x + y * y)
-        length = rho / (1.0 + c.tension / c.rigidity)
-        reference[i] = (length - c.length_at_zero) / c.m_per_rad
-        reference_speed[i] = -(x * speed[0] + y * speed[1]) / (rho * c.m_per_rad)
-        reference_slope[i] = -(x * slope[0] + y * slope[1]) / (rho * c.m_per_rad)
-        loop = r.stiffness * (reference[i] - c.theta) + r.damping * (reference_speed[i] - c.omega)
-        most = r.regulator_N * abs(c.m_per_rad)
-        loop = min(max(loop, -most), most)
-        effort[i] = loop + r.inertia * reference_slope[i] - c.m_per_rad * tensions[i]
+        c.tension += _STRETCH_SHARE * (carried[i] - c.tension)
+        against += inner[i] * c.m_per_rad * c.omega
+    for i in range(cables.size):
+        c = cables[i]
+        pull = tensions[i] + r.loose * inner[i] * against
+        effort[i] = r.inertia * reference_slope[i] - c.m_per_rad * pull
         torque[i] = min(max(effort[i] + known[i], -c.torque), c.torque)

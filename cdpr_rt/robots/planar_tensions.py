@@ -15,6 +15,8 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.planar_kinematics import GeometryError
 
+_HALVINGS = 10
+
 
 class TensionOutcome(IntEnum):
     """Whether tensions within their bounds carry the wrench."""
@@ -151,6 +153,73 @@ def distribute(
     for i in range(3):
         t[i] = t0[i] + k * u[i]
     return outcome, outside
+
+
+@jit
+def carry(
+    J: FloatArray,
+    wrench: FloatArray,
+    force: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    reserve: float,
+    t: FloatArray,
+    carried: FloatArray,
+    u: FloatArray,
+    room: FloatArray,
+) -> tuple[int, float, float]:
+    """Write tensions that carry `wrench` (2,) and exert `force` (2,) besides, as far as they can.
+
+    `low` and `high` (3,) lie within the true bounds by `reserve`, N: between them are the least
+    tensions that carry the wrench alone, `carried` (3,). `t` (3,) exerts the force besides: what
+    a loop asks for to overcome friction, so that most of it does not get to the cables; it may use
+    half of the reserve, and share of it is left out which does not fit. `u` (3,) is the unit
+    vector of the kernel, `room` (4, 3) is overwritten. Returns a `TensionOutcome` for the wrench,
+    by how much a tension is outside low and high, N, and which share of the force is exerted.
+    """
+    t0, more, least_t, most_t = room[0], room[1], room[2], room[3]
+    for k in range(2):
+        force[k] = -force[k]  # as if all else exerted it on the platform
+    singular = not line_of_tensions(J, force, more, u)
+    for k in range(2):
+        force[k] = -force[k]
+    if singular or not line_of_tensions(J, wrench, t0, u):
+        for i in range(3):
+            t[i] = carried[i] = low[i]
+            u[i] = 0.0
+        return 2, math.inf, 0.0
+    first, last = bounds_of_k(t0, u, low, high)
+    if not first <= last:
+        k, outside = least_violation(t0, u, low, high)
+        for i in range(3):
+            carried[i] = t0[i] + k * u[i]
+            t[i] = carried[i] + more[i]
+            t[i] = min(max(t[i], low[i] - reserve), high[i] + reserve)
+        return 1, outside, 0.0
+    for i in range(3):
+        least_t[i] = low[i] - 0.5 * reserve
+        most_t[i] = high[i] + 0.5 * reserve
+        t[i] = t0[i] + more[i]
+    k = first
+    share, step = 1.0, 1.0
+    a, b = bounds_of_k(t, u, least_t, most_t)
+    if max(first, a) <= min(last, b):
+        k = max(first, a)
+    else:
+        # what can be exerted is convex: the share is found by halving
+        share, step = 0.0, 0.5
+        for _ in range(_HALVINGS):
+            for i in range(3):
+                t[i] = t0[i] + (share + step) * more[i]
+            a, b = bounds_of_k(t, u, least_t, most_t)
+            if max(first, a) <= min(last, b):
+                share += step
+                k = max(first, a)
+            step *= 0.5
+    for i in range(3):
+        carried[i] = t0[i] + k * u[i]
+        t[i] = carried[i] + share * more[i]
+    return 0, 0.0, share
 
 
 class PlanarTensions:
