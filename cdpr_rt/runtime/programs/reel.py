@@ -8,7 +8,7 @@ from cdpr_rt.exchange import AxisFeedback, FloatArray
 from cdpr_rt.jit import jit
 
 _BANDWIDTH_rad_s = 100.0
-_INTEGRAL_RATE = 30.0
+_INTEGRAL_RATE = 60.0
 _FILTER_S = 0.005
 
 
