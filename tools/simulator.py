@@ -30,10 +30,13 @@ class OwnSimulator:
         nodes: int = 1,
         board: Path | None = None,
         paced: bool = False,
+        detached: bool = False,
     ) -> None:
         command = [sys.executable, "-m", "tools.cli", "sim", "up", winch, "--bus", bus]
         command += ["--paced" if paced else "--lockstep", "--exit-with-stdin"]
         command += ["--nodes", str(nodes)]
+        if detached:
+            command.append("--detached")
         if plant is not None:
             command += ["--plant", str(plant)]
         if truth_log is not None:

@@ -1,35 +1,39 @@
-"""`cdpr commission`: a winch's motor from a drive that is off to a validated cogging profile."""
+"""`cdpr commission`: motors from drives that are off to validated cogging profiles."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from cdpr_rt.errors import ControlError
+from drivers.bus import BusUrl
 from drivers.errors import DriverError
-from profiles import load_winch
+from profiles import Robot, Winch, load_machine
 from tools import summary
 from tools.commands.options import (
-    BusOption,
     IndexOption,
     JsonOption,
     PlantOption,
     SafetyIoOption,
-    WinchArgument,
     YesOption,
 )
 from tools.commissioning import Paths
 from tools.errors import BadInputError, WorkFailedError
+from tools.finding_index import Index
 from tools.output import Output, to_json
-from tools.procedure import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH, Commissioning, identify
+from tools.procedure import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH, Commissioning, Plan, identify
 from tools.report import build
 from tools.results import assemble
+from tools.robot_commissioning import MotorOfRobot, chosen_axes, free_motors, lines_for_robot
 from tools.session import confirm_motion, open_bus, open_winch
+
+_TURNS = "turns the motor for about 20 minutes"
 
 
 def register(parent: typer.Typer) -> None:
@@ -37,12 +41,45 @@ def register(parent: typer.Typer) -> None:
     parent.command()(commission)
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """How a motor is commissioned."""
+
+    plan: Plan
+    bandwidth_Hz: float
+    index: Index
+    safety_io: str | None
+
+
 def commission(
-    winch: WinchArgument,
-    bus: BusOption,
+    machine: Annotated[
+        str,
+        typer.Argument(
+            help="Winch or robot profile: a name or the path of a file.", metavar="WINCH|ROBOT"
+        ),
+    ],
+    bus: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--bus",
+            help="simbus: (starts simulated drives of its own), simbus:NAME, socketcan:can0, ...; "
+            "for a robot also BUS=URL, or as its file says.",
+            metavar="URL",
+        ),
+    ] = None,
+    axis: Annotated[
+        list[str] | None,
+        typer.Option(help="Of a robot, the axis whose motor is measured; may be repeated."),
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Of a robot, all motors one after the other.")
+    ] = False,
     plant: PlantOption = None,
     out_dir: Annotated[
-        Path | None, typer.Option("--out", help="Folder for raw data, profile and report.")
+        Path | None,
+        typer.Option(
+            "--out", help="Folder for raw data, profile and report; of a robot, one in it an axis."
+        ),
     ] = None,
     bandwidth_Hz: Annotated[
         float,
@@ -61,22 +98,77 @@ def commission(
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure, identify, validate and report one motor, detached from its load."""
+    """Measure, identify, validate and report motors, each detached from its load."""
     out = Output(as_json)
-    profile = load_winch(winch)
-    url = open_bus(bus)
-    paths = prepare(out_dir or Path("out") / f"commission-{profile.profile}", overwrite)
-    confirm_motion(url, yes, "commissioning turns the motor for about 20 minutes")
-    plan = QUICK if quick else THOROUGH
+    profile = load_machine(machine)
+    folder = out_dir or Path("out") / f"commission-{profile.profile}"
+    wanted = _Wanted(QUICK if quick else THOROUGH, bandwidth_Hz, index, safety_io)
+    if isinstance(profile, Robot):
+        motors = chosen_axes(profile, axis or (), every, folder)
+        for motor in motors:
+            prepare(motor.paths.out, overwrite)
+        with free_motors(profile, bus or (), motors, out, plant) as urls:
+            _ask(motors, urls, yes)
+            out.result(_commission_robot(profile, motors, urls, wanted, out))
+        return
+    if axis or every:
+        raise BadInputError("--axis, --all: for a robot; a winch has one motor")
+    url = open_bus(_only(bus))
+    paths = prepare(folder, overwrite)
+    confirm_motion(url, yes, f"commissioning {_TURNS}")
+    out.result(_commission(profile, url, paths, wanted, out, plant))
+
+
+def _only(buses: Sequence[str] | None) -> str:
+    if not buses or len(buses) > 1:
+        raise BadInputError("--bus: allowed: one, such as simbus: or socketcan:can0, for a winch")
+    return buses[0]
+
+
+def _ask(motors: Sequence[MotorOfRobot], urls: Sequence[BusUrl], yes: bool) -> None:
+    for motor, url in zip(motors, urls, strict=True):
+        what = f"commissioning axis {motor.axis.name} {_TURNS}: its cable has to be off the drum"
+        confirm_motion(url, yes, what)
+
+
+def _commission_robot(
+    robot: Robot,
+    motors: Sequence[MotorOfRobot],
+    urls: Sequence[BusUrl],
+    wanted: _Wanted,
+    out: Output,
+) -> dict[str, Any]:
+    """Commission one motor after the other; return what the command ends with."""
+    results = {}
+    for motor, url in zip(motors, urls, strict=True):
+        out.say(f"axis {motor.axis.name}, node {motor.axis.node_id} on {url}")
+        results[motor.axis.name] = _commission(motor.winch, url, motor.paths, wanted, out)
+    for line in lines_for_robot(robot, motors):
+        out.say(line)
+    folder = motors[0].paths.out.parent
+    return {"ok": True, "robot": robot.reference, "commissioned": str(folder), "axes": results}
+
+
+def _commission(
+    winch: Winch,
+    url: BusUrl,
+    paths: Paths,
+    wanted: _Wanted,
+    out: Output,
+    plant: Path | None = None,
+) -> dict[str, Any]:
+    """Commission the motor of `winch`; return what was found, as the report tells it."""
     with keeping_raw_data(paths):
-        with open_winch(profile, url, out, plant, paths.truth, safety_io) as session:
-            run = Commissioning(session, out, paths, plan).run(bandwidth_Hz, index)
+        with open_winch(winch, url, out, plant, paths.truth, wanted.safety_io) as session:
+            run = Commissioning(session, out, paths, wanted.plan).run(
+                wanted.bandwidth_Hz, wanted.index
+            )
         write(paths.run, to_json(run, indent=1))
-        found = identify(profile, run["latency_s"], paths)
+        found = identify(winch, run["latency_s"], paths)
         results = assemble(paths, run, found)
-        build(paths, profile, results, found)
+        build(paths, winch, results, found)
     summary.show(out, results)
-    out.result(results)
+    return results
 
 
 def prepare(folder: Path, overwrite: bool) -> Paths:
