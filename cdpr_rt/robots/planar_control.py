@@ -59,6 +59,7 @@ class PlanarControl:
         self._reserve_N = float(RESERVE * span.min())
         self.tensions = PlanarTensions(low_N + self._reserve_N, high_N - self._reserve_N)
         self.least_N = np.array(low_N, float)
+        self.torque_Nm = np.array(torque_Nm, float)
         self.position_m = np.array(platform.home_m, float)
         self.velocity_m_s = np.zeros(2)
         self.acceleration_m_s2 = np.zeros(2)

@@ -41,6 +41,8 @@ class PlatformParts:
         """The last cycle in which one of the programs moved the platform."""
         self.tight = False
         """Whether all cables are tight and carry the platform, where it is known to be."""
+        self.loop = Handover(control, control.torque_Nm, period_s)
+        """The platform's control, which the programs hand on to each other as it runs."""
 
     @property
     def known(self) -> bool:
@@ -69,11 +71,11 @@ class PlatformProgram:
     name = "platform"
     needs_lease = False
 
-    def __init__(self, parts: PlatformParts, torque_Nm: FloatArray) -> None:
+    def __init__(self, parts: PlatformParts, _torque_Nm: FloatArray) -> None:
         self._parts = parts
         self.controller: Controller = parts.control
         self._control = parts.control
-        self._loop = Handover(parts.control, torque_Nm, parts.period_s)
+        self._loop = parts.loop
         self._target = np.zeros(2)
         self._speed = np.array(parts.speed_m_s)
         self._stopping = False
