@@ -77,6 +77,13 @@ class CableRobot:
         here["damping_time"] = plant.damping_s
         here["winch_friction"] = plant.winch_friction_Nm
         here["friction_share"] = plant.friction_share * abs(gain)
+        winding = self._plant.winding
+        here["drum_gain"] = 1.0 / transmission.gear_ratio
+        here["run_out"] = winding.run_out_m
+        here["run_out_phase"] = self._chance.uniform(0.0, 2.0 * math.pi)
+        here["lag"] = winding.carriage_error * winding.pitch_m / (2.0 * math.pi)
+        here["carriage_offset"] = winding.carriage_offset_m
+        here["carriage_distance"] = winding.carriage_distance_m
         here["angle_start"] = here["angle"]
         here["cable_start"] = self.distance_m(i) + self._plant.start.slack_m
         self._adopted += 1
@@ -140,7 +147,7 @@ class CableRobot:
         )
         platform: PlatformArray = np.zeros(1, PLATFORM_DTYPE)
         p: Any = platform[0]
-        com = p["com"] = _vector(plant.platform.centre_of_mass_m)
+        com = p["com"] = _vector(plant.platform.centre_of_mass_m or (0.0, 0.0))
         p["cables"], p["planar"] = n, planar
         p["mass"] = shape.mass_kg * (1.0 + plant.platform.mass_error)
         reach = plant.platform.radius_of_gyration_m or _plate_radius(anchors)

@@ -67,6 +67,12 @@ _CABLE = [
     ("rigidity", _F8),  # N, EA of a cable that leads to a platform
     ("weight", _F8),  # N/m, of that cable
     ("damping_time", _F8),  # s, its damping over its stiffness
+    ("drum_gain", _F8),  # turn of its drum per motor angle
+    ("run_out", _F8),  # m, of the drum
+    ("run_out_phase", _F8),  # rad, at power-up
+    ("lag", _F8),  # m, of the carriage that guides the cable, per radian of the drum
+    ("carriage_offset", _F8),  # m, off its cable at power-up
+    ("carriage_distance", _F8),  # m, from the drum
     # where its far end is, written by the platform's physics before every step
     ("far_distance", _F8),  # m, from exit to anchor point
     ("far_rate", _F8),  # m/s
@@ -165,6 +171,8 @@ class Transmission:
     """Cable paid out per radian of the motor, signed."""
     cable_stiffness_N: float = 40_000.0
     """Axial stiffness EA of the cable."""
+    gear_ratio: float = 4.0
+    """Motor turns per turn of the drum."""
 
 
 def build_motor(

@@ -21,7 +21,7 @@ def steps_within(motors: Any, h: float) -> int:
     """
     most = 1
     for m in motors:
-        length = max(0.02, m.cable_start + m.cable_gain * (m.angle - m.angle_start))
+        length, _ = rotor.paid_out(m)
         swing = math.sqrt(m.rigidity / length * m.cable_gain * m.cable_gain / m.inertia)
         most = max(most, m.steps_per_control, math.ceil(swing * h / _RINGING))
     return min(40, most)

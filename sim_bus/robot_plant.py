@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from profiles.reader import Profile, read_toml_model
-from sim_bus.plant import CoggingTerm, Plant
+from sim_bus.plant import CoggingTerm, LoadPlant, Plant
 
 Vector = tuple[float, ...]
 _Relative = Annotated[float, Field(ge=-0.5, le=0.5)]
@@ -21,8 +21,8 @@ class PlatformPlant(Profile):
 
     mass_error: _Relative = 0.0
     """Relative: true mass = that of the profile × (1 + this)."""
-    centre_of_mass_m: Annotated[Vector, Field(min_length=2, max_length=3)] = (0.0, 0.0)
-    """In the platform's frame."""
+    centre_of_mass_m: Annotated[Vector, Field(min_length=2, max_length=3)] | None = None
+    """In the platform's frame; its origin where left out."""
     radius_of_gyration_m: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
     """Where left out, that of a plate whose corners are the anchor points."""
     air_Ns_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
@@ -53,6 +53,21 @@ class CablesPlant(Profile):
     """Dry friction of gear and drum without tension, on the motor side."""
     friction_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.02
     """Further dry friction, as a share of the torque that the tension exerts."""
+
+
+class WindingPlant(Profile):
+    """How the cables lie on their drums, whose carriages guide them to and fro."""
+
+    run_out_m: Annotated[float, Field(ge=0.0, le=0.01)] = 3e-5
+    """How far a drum's middle is off its axis: so much more and less cable once a turn."""
+    pitch_m: Annotated[float, Field(ge=0.0, le=0.2)] = 0.006
+    """From one turn on the drum to the next."""
+    carriage_error: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+    """Share of its way along the drum by which a carriage lags behind; 1: it stands still."""
+    carriage_offset_m: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
+    """How far it is off its cable at power-up."""
+    carriage_distance_m: Annotated[float, Field(gt=0.0, le=10.0)] = 0.3
+    """From the drum."""
 
 
 class StartPlant(Profile):
@@ -95,6 +110,7 @@ class RobotPlant(Profile):
     platform: PlatformPlant = PlatformPlant()
     geometry: GeometryPlant = GeometryPlant()
     cables: CablesPlant = CablesPlant()
+    winding: WindingPlant = WindingPlant()
     start: StartPlant = StartPlant()
     floor: FloorPlant = FloorPlant()
     variation: VariationPlant = VariationPlant()
@@ -108,6 +124,31 @@ class RobotPlant(Profile):
         Raises profiles.errors.ProfileError naming file, key, value and what is allowed.
         """
         return read_toml_model(Path(path), cls)
+
+    def require_fit(self, n: int, size: int) -> None:
+        """Raise ValueError where the plant does not fit a robot of n axes and 2 or 3 directions."""
+        geometry = self.geometry
+        errors = {
+            "geometry.exit_errors_m": geometry.exit_errors_m,
+            "geometry.anchor_errors_m": geometry.anchor_errors_m,
+        }
+        radii, motors = self.cables.drum_radius_errors, self.motors
+        for key, values in {**errors, "cables.drum_radius_errors": radii, "motors": motors}.items():
+            if values and len(values) != n:
+                raise ValueError(f"{key}: {len(values)} entries; allowed: {n}, one for each axis")
+        points: dict[str, Vector | None] = {
+            "platform.centre_of_mass_m": self.platform.centre_of_mass_m,
+            "start.position_m": self.start.position_m,
+        }
+        for key, vectors in errors.items():
+            points |= {f"{key}[{i}]": vector for i, vector in enumerate(vectors)}
+        for key, point in points.items():
+            if point is not None and len(point) != size:
+                raise ValueError(f"{key}: {len(point)} coordinates; allowed: {size}")
+        for i, motor in enumerate(self.motors or (self.motor,)):
+            if motor.load.model_copy(update={"inertia_kg_m2": 0.0}) != LoadPlant():
+                where = f"motors[{i}].load" if self.motors else "motor.load"
+                raise ValueError(f"{where}: allowed: inertia_kg_m2; the platform is the load")
 
     def motor_plants(self, n: int) -> list[Plant]:
         """Return the plant of each of n motors."""

@@ -146,14 +146,37 @@ def cable_force(stretch: float, stiffness: float, sag: float, last: float) -> tu
 
 
 @jit
+def paid_out(m: Any) -> tuple[float, float]:
+    """Return the unstretched cable between exit point and platform, m, and what a radian adds.
+
+    A drum that is out of true adds and takes once a turn; a carriage that is off its cable leads
+    it askew, along the hypotenuse of the distance to the drum and of how far it is off.
+    """
+    turned = m.angle - m.angle_start
+    length = m.cable_start + m.cable_gain * turned
+    gain = m.cable_gain
+    drum = m.drum_gain
+    if m.run_out > 0.0:
+        phase = m.run_out_phase + drum * turned
+        length += m.run_out * (math.sin(phase) - math.sin(m.run_out_phase))
+        gain += m.run_out * drum * math.cos(phase)
+    if m.lag > 0.0 or m.carriage_offset != 0.0:
+        away = m.carriage_distance
+        off = m.carriage_offset + m.lag * drum * turned
+        askew = math.hypot(away, off)
+        length -= askew - math.hypot(away, m.carriage_offset)
+        gain -= off / askew * m.lag * drum
+    return max(_SHORTEST_m, length), gain
+
+
+@jit
 def wind(m: Any, A: float, B: float) -> float:
     """Return the rotor's new velocity, A·w = B without load, where its cable holds a platform.
 
     The platform stands still during the step: it is heavy, and moved afterwards by the tension
     found here. The spring acts from where it is (symplectic Euler), damping is implicit.
     """
-    c = m.cable_gain
-    length = max(_SHORTEST_m, m.cable_start + c * (m.angle - m.angle_start))
+    length, c = paid_out(m)
     hanging = m.weight * length * m.far_level
     sag = hanging * hanging * length / 24.0
     stiffness = m.rigidity / length

@@ -90,6 +90,7 @@ def _physics(
         return None, [one.model_copy(update={"seed": (one.seed + i) % 2**32}) for i in range(n)]
     whole = RobotPlant() if plant is None else RobotPlant.load_file(plant)
     try:
+        whole.require_fit(n, len(platform.home_m))
         motors = whole.motor_plants(n)
         if detached:
             return None, motors

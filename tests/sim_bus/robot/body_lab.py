@@ -48,6 +48,7 @@ def body(
         "floor": {"present": False},
         "platform": {"air_Ns_m": 0.0},
         "start": {"slack_m": 0.0},
+        "winding": {"run_out_m": 0.0, "carriage_error": 0.0, "carriage_offset_m": 0.0},
     }
     for name, table in plant.items():
         sections[name] = {**sections.get(name, {}), **table}

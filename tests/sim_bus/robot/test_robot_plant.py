@@ -1,0 +1,48 @@
+"""The plant file of a robot: what is refused, and how its motors differ."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from profiles.errors import ProfileError
+from sim_bus.robot_plant import RobotPlant
+
+
+def test_each_motor_is_its_own() -> None:
+    motors = RobotPlant().motor_plants(3)
+    assert motors == RobotPlant().motor_plants(3)
+    assert len({motor.cogging[0].phase_deg for motor in motors}) == 3
+    assert len({motor.encoder.index_deg for motor in motors}) == 3
+    given = RobotPlant.model_validate({"motors": ({}, {"seed": 1}, {"seed": 2})})
+    assert [motor.seed for motor in given.motor_plants(3)] == [7, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("table", "reason"),
+    [
+        ({"motors": ({},)}, "motors: 1 entries; allowed: 3, one for each axis"),
+        ({"cables": {"drum_radius_errors": (0.01,)}}, "cables.drum_radius_errors: 1 entries"),
+        (
+            {"geometry": {"exit_errors_m": ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.1))}},
+            r"geometry.exit_errors_m\[2\]: 3 coordinates; allowed: 2",
+        ),
+        ({"start": {"position_m": (0.0, 1.0, 2.0)}}, "start.position_m: 3 coordinates"),
+        ({"motor": {"load": {"kind": "hung_mass"}}}, "motor.load: allowed: inertia_kg_m2;"),
+    ],
+)
+def test_a_plant_that_does_not_fit_the_robot_is_refused(
+    table: dict[str, object], reason: str
+) -> None:
+    with pytest.raises(ValueError, match=reason):
+        RobotPlant.model_validate(table).require_fit(3, 2)
+
+
+def test_a_single_motors_plant_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "plant.toml"
+    path.write_text("[friction]\ncoulomb_Nm = 0.1\n")
+    with pytest.raises(ProfileError, match="friction"):
+        RobotPlant.load_file(path)
+    path.write_text("[motor.load]\ninertia_kg_m2 = 1e-4\n[motor.friction]\ncoulomb_Nm = 0.1\n")
+    RobotPlant.load_file(path).require_fit(3, 2)

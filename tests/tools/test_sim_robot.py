@@ -1,0 +1,117 @@
+"""A simulated cable robot as its commands show it: its true pose, its faults, its bare motors."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import can
+import numpy as np
+import pytest
+from robot_rig import Simulator, simulated, unique
+
+from sim_bus.pose_log import HEADER_BYTES
+from tools.commands.sim_fault import Fault, fault
+from tools.errors import BadInputError, WorkFailedError
+
+PLANT = """
+[start]
+slack_m = 0.0
+"""
+
+
+def records(path: Path) -> np.ndarray:
+    """Return what stands in the log by now."""
+    data = path.read_bytes()
+    header = json.loads(data[:HEADER_BYTES])
+    fields = [(name, kind, *map(tuple, shape)) for name, kind, *shape in header["fields"]]
+    record = np.dtype(fields)
+    assert record.itemsize == header["record_bytes"]
+    assert (len(data) - HEADER_BYTES) % record.itemsize == 0, "no record is ever half there"
+    return np.frombuffer(data[HEADER_BYTES:], record)
+
+
+class Robot:
+    """planar-3 on a bus, its log and a stranger who sends SYNC."""
+
+    def __init__(self, folder: Path) -> None:
+        self.name = unique()
+        self.log = folder / "pose.bin"
+        plant = folder / "plant.toml"
+        plant.write_text(PLANT)
+        self.simulator = Simulator(
+            *("planar-3", "--bus", f"simbus:{self.name}"),
+            *("--plant", str(plant), "--truth-log", str(self.log)),
+        )
+        self.bus = can.Bus(interface="simbus", channel=f"{self.name}-can0")
+
+    def sync(self, seconds: float) -> np.ndarray:
+        """Let the robot go on, a SYNC every 10 ms; return the record of the last one, read live."""
+        before = len(records(self.log))
+        count = round(seconds / 0.01)
+        for _ in range(count):
+            self.bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+            time.sleep(0.01)
+        seen = records(self.log)
+        assert len(seen) == before + count
+        return seen[-1]
+
+    def fault(self, what: Fault, value: str | None = None, axis: str = "1") -> None:
+        fault("planar-3", what, value, bus=[f"simbus:{self.name}"], axis=axis)
+
+    def close(self) -> None:
+        self.bus.shutdown()
+        self.simulator.close()
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+    robot = Robot(tmp_path_factory.mktemp("robot"))
+    yield robot
+    robot.close()
+
+
+def test_the_pose_is_in_the_log_at_once(robot: Robot):
+    before = robot.sync(0.1)
+    assert before["rotation"].ravel() == pytest.approx(np.eye(3).ravel(), abs=0.02)
+    assert before["tension_N"].min() > 0.0
+    assert len(before["torque_Nm"]) == 3
+    again = robot.sync(0.05)
+    assert again["time_s"] > before["time_s"]
+    assert again["sync_index"] == before["sync_index"] + 5
+
+
+def test_a_cable_is_cut_while_the_robot_runs(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert robot.sync(0.05)["tension_N"].min() > 0.0
+    robot.fault(Fault.CUT_CABLE, axis="upper right")
+    assert capsys.readouterr().out == "upper right: cut-cable 1\n"
+    assert (robot.sync(0.05)["tension_N"] > 1e-3).tolist() == [True, False, True]
+    # by its number, more cable than was taut
+    robot.fault(Fault.SLIP, "500", axis="1")
+    assert robot.sync(0.05)["tension_N"][0] < 0.5
+
+
+@pytest.mark.parametrize(
+    ("what", "reason"),
+    [
+        ((Fault.SLIP, None, "upper"), "--axis upper: allowed: 1 to 3, or upper left, upper right"),
+        ((Fault.SLIP, "0"), "slip 0: allowed: whole numbers 1 to 65535"),
+        ((Fault.ENCODER_JUMP, "far"), "encoder-jump far: allowed: whole numbers"),
+    ],
+)
+def test_a_fault_that_cannot_be_is_refused(robot: Robot, what: tuple[Any, ...], reason: str):
+    with pytest.raises(BadInputError, match=reason):
+        robot.fault(*what)
+
+
+def test_detached_motors_have_no_cable_to_cut() -> None:
+    with (
+        simulated("planar-3", "--detached") as bus,
+        pytest.raises(WorkFailedError, match=r"axis 'lower'.*06060000h"),
+    ):
+        fault("planar-3", Fault.CUT_CABLE, bus=[bus], axis="lower")
