@@ -28,6 +28,7 @@ from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording import Recorder
 from drivers.bus import query_status
 from profiles import Robot, load_robot
+from tools.commissioned import with_commissioned, without_commissioned
 from tools.daemon.loop_process import description, loop_parts
 from tools.daemon.machine import RobotMachine
 from tools.daemon.settings import RunSettings
@@ -45,14 +46,20 @@ _LOOK_CYCLES: Final = 512
 _names = count()
 
 
+class OrderRefusedError(WorkFailedError):
+    """An order was not carried out, for the reason that the daemon tells; nothing has changed."""
+
+
 class LockstepRobot:
     """One robot, booted and checked, that moves on only when it is turned; a context manager.
 
     `robot` is a profile's name or file. `plant` is the simulator's plant file. `truth_log` is where
     the simulator logs the true pose, a file of its own where left out; `record` a folder for the
-    recording (MCAP), none where left out. `programs` are run besides the robot's own. The right to
-    move is held from the beginning, see `right`. Raises CommandError, DriverError and ProfileError
-    as `cdpr run` does, WorkFailedError where the robot does not get ready.
+    recording (MCAP), none where left out. `programs` are run besides the robot's own.
+    `commissioned` is the folder of what commissioning has learnt of the motors, where the robot's
+    file does not name it; nothing is made of it where the robot is not to be `compensated`. The
+    right to move is held from the beginning, see `right`. Raises CommandError, DriverError and
+    ProfileError as `cdpr run` does, WorkFailedError where the robot does not get ready.
     """
 
     def __init__(
@@ -63,8 +70,12 @@ class LockstepRobot:
         truth_log: Path | None = None,
         record: Path | None = None,
         programs: Mapping[str, Program] | None = None,
+        commissioned: Path | None = None,
+        compensated: bool = True,
     ) -> None:
-        self.robot: Robot = load_robot(robot)
+        self.robot: Robot = with_commissioned(load_robot(robot), commissioned)
+        if not compensated:
+            self.robot = without_commissioned(self.robot)
         self.period_s = self.robot.sync_period_s
         self._reference = str(robot)
         self._plant, self._truth_path, self._record = plant, truth_log, record
@@ -140,7 +151,7 @@ class LockstepRobot:
         self.right.take("trial")
 
     def _end_recording(self) -> None:
-        recorder, self.recorder = self.recorder, None
+        recorder = self.recorder
         if recorder is not None:
             recorder.stop()
 
@@ -220,7 +231,7 @@ class LockstepRobot:
     def order(self, do: str, within_s: float = 60.0, **what: Any) -> dict[str, Any]:
         """Give an order as the service does and turn until it is answered, in bus time.
 
-        `what` are its keys: program, wanted. Raises WorkFailedError where it is refused or fails.
+        `what` are its keys: program, wanted. Raises OrderRefusedError where it is refused or fails.
         """
         number = self.block.post_command({"do": do, "client": "trial", **what})
         answers: list[dict[str, Any]] = []
@@ -233,7 +244,7 @@ class LockstepRobot:
 
         self._turn_until(answered, within_s, do)
         if not answers[0]["ok"]:
-            raise WorkFailedError(f"{do}: {answers[0]['text']}")
+            raise OrderRefusedError(f"{do}: {answers[0]['text']}")
         return answers[0]
 
     def enable(self, program: str = "hold", **wanted: Any) -> None:

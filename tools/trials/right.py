@@ -26,32 +26,33 @@ class RightInBusTime:
         self._published = block.counters["lease_ns"]
         self._clock_ns = clock_ns
         self._until_ns = 0
-        self._token: str | None = None
+        self.token: str | None = None
+        """That of the right which is held here, None while none is."""
         self._renew_ns = 0
         self.lease = Lease(self._publish, clock_ns)
 
     def take(self, client: str) -> str:
         """Take the right and keep it; return the token. Raises LeaseError where another has it."""
-        self._token = self.lease.take(client, _TTL_S)
+        self.token = self.lease.take(client, _TTL_S)
         self._renew_ns = self._clock_ns() + _RENEWED_NS
-        return self._token
+        return self.token
 
     def drop(self) -> None:
         """Give the right back."""
-        token, self._token = self._token, None
+        token, self.token = self.token, None
         with suppress(LeaseError):  # it has run out
             self.lease.release(token)
 
     def fall_silent(self) -> None:
         """Renew it no more: it runs out by itself."""
-        self._token = None
+        self.token = None
 
     def look(self) -> None:
         """Renew what is held, end what has run out; called every cycle."""
         now_ns = self._clock_ns()
-        if self._token is not None and now_ns >= self._renew_ns:
+        if self.token is not None and now_ns >= self._renew_ns:
             self._renew_ns = now_ns + _RENEWED_NS
-            self.lease.renew(self._token)
+            self.lease.renew(self.token)
         if self._until_ns and now_ns >= self._until_ns:
             self._publish(0)
 

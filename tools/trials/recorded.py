@@ -1,0 +1,128 @@
+"""What a trial has left: the recording of its cycles (MCAP), joined with the log of true poses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.service.recording_reader import Columns, RecordingReader
+from tools.errors import BadInputError, WorkFailedError
+from tools.trials.pose_log import Truth, read_pose_log
+
+TRUTH: Final = "truth.log"
+FIELDS: Final = (
+    "cycle",
+    "time_s",
+    "state",
+    "program",
+    "pose",
+    "pose_setpoint",
+    "position_rad",
+    "tension_N",
+    "torque_actual_Nm",
+    "torque_sent_Nm",
+    "compensation_Nm",
+)
+_LAGS: Final = (-1, 0, 1)
+
+
+class Recorded:
+    """One part of a trial, from its `begin` to its `end`, cycle by cycle.
+
+    `cycles` are the recording's columns, `truth` the records of the same SYNCs. `marks` are what
+    the trial wrote among the recording's events, in their order. Raises RecordingError and
+    BadInputError for files that are missing or no such files, WorkFailedError for files that do not
+    belong together.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        paths = sorted(folder.glob("*.mcap"))
+        if not paths:
+            raise BadInputError(f"{folder}: holds no recording (*.mcap)")
+        columns, self.marks = _read(paths)
+        self.folder = folder
+        begin, end = self._only("begin"), self._only("end")
+        cycle = columns["cycle"]
+        kept = (cycle >= begin["cycle"]) & (cycle <= end["cycle"])
+        self.cycles: Columns = {name: column[kept] for name, column in columns.items()}
+        cycle = self.cycles["cycle"]
+        if cycle.size < 2 or not (np.diff(cycle) == 1).all():
+            raise WorkFailedError(f"{folder}: the recording has gaps, or no cycles")
+        self.first = int(cycle[0])
+        self.truth: Truth = _joined(read_pose_log(folder / TRUTH), cycle + begin["sync_offset"] - 1)
+        self._require_alignment()
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Bus time since the trial began, (k,)."""
+        return np.asarray(self.cycles["time_s"] - self.cycles["time_s"][0])
+
+    @property
+    def period_s(self) -> float:
+        """Time from one cycle to the next."""
+        return float(self.time_s[1])
+
+    @property
+    def true_m(self) -> NDArray[np.float64]:
+        """Where the platform truly was, in the plane, (k, 2)."""
+        return np.asarray(self.truth["position_m"][:, :2])
+
+    @property
+    def setpoint_m(self) -> NDArray[np.float64]:
+        """Where it was to be, as the controller has recorded, (k, 2)."""
+        return np.asarray(self.cycles["pose_setpoint"][:, :2])
+
+    def row(self, cycle: int) -> int:
+        """Return the row of a cycle."""
+        return min(max(cycle - self.first, 0), len(self.truth) - 1)
+
+    def marked(self, what: str) -> list[dict[str, Any]]:
+        """Return the marks of one kind."""
+        return [mark for mark in self.marks if mark["mark"] == what]
+
+    def _only(self, what: str) -> dict[str, Any]:
+        found = self.marked(what)
+        if len(found) != 1:
+            raise WorkFailedError(f"{self.folder}: the trial was not finished (no {what!r} in it)")
+        return found[0]
+
+    def _require_alignment(self) -> None:
+        """Raise WorkFailedError where the motors' angles are not those that were true then.
+
+        While motors turn, records that are off by a cycle agree less.
+        """
+        measured = np.diff(self.cycles["position_rad"], axis=0)
+        true = np.diff(self.truth["motor_rad"], axis=0)
+        misfit = [
+            np.mean((measured[1:-1] - np.roll(true, lag, axis=0)[1:-1]) ** 2) for lag in _LAGS
+        ]
+        if not np.isfinite(misfit).all() or int(np.argmin(misfit)) != 1:
+            raise WorkFailedError(
+                f"{self.folder}: recording and {TRUTH} do not belong together: the motors' angles "
+                "are not those of the same SYNCs"
+            )
+
+
+def _read(paths: list[Path]) -> tuple[Columns, list[dict[str, Any]]]:
+    parts, marks = [], []
+    for path in paths:
+        reader = RecordingReader(path)
+        parts += list(reader.cycles(FIELDS))
+        marks += [event for event in reader.events if "mark" in event]
+    if not parts:
+        raise BadInputError(f"{paths[0]}: holds no cycles")
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}, marks
+
+
+def _joined(truth: Truth, index: NDArray[np.int64]) -> Truth:
+    """Return the records of the SYNCs `index`; raises WorkFailedError where some are missing."""
+    first = int(truth["sync_index"][0]) if truth.size else 0
+    rows = index.astype(np.int64) - first
+    if rows[0] < 0 or rows[-1] >= truth.size or not (truth["sync_index"][rows] == index).all():
+        raise WorkFailedError(
+            f"{TRUTH}: does not hold the SYNCs {int(index[0])} to {int(index[-1])}"
+        )
+    return truth[rows]
