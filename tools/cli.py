@@ -39,6 +39,7 @@ _COMMANDS = (
     "run",
     "service-unit",
     "sim",
+    "teleop",
     "tension",
 )
 _OF_A_DAEMON = {

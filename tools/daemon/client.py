@@ -127,19 +127,19 @@ class Control:
 
     def __init__(self, daemon: Daemon, token: str) -> None:
         self.daemon = daemon
-        self._token = token
+        self.token = token
         self.obeyed = False
         """Whether a command has been carried out."""
 
     def post(self, path: str, body: dict[str, Any]) -> dict[str, Any]:
         """Give a command that needs the right."""
-        answer = self.daemon.post(path, body, self._token)
+        answer = self.daemon.post(path, body, self.token)
         self.obeyed = True
         return answer
 
     def renew(self) -> None:
         """Keep the right."""
-        self.daemon.renew(self._token)
+        self.daemon.renew(self.token)
 
     def hold(self) -> None:
         """Stop the motion, stay there."""

@@ -1,0 +1,105 @@
+"""A hand that follows a written script: `cdpr teleop ROBOT --device script --script FILE`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from tools.errors import BadInputError
+from tools.teleop.hand import End, Hand
+
+_WORDS = ("clutch", "confirm")
+_SHAPE = "seconds x_mm y_mm [clutch] [confirm]"
+_LONGEST_m = 20.0
+
+
+@dataclass(frozen=True)
+class ScriptLine:
+    """Where the hand is at a time, in s and m, and what it does from then on."""
+
+    time_s: float
+    position_m: tuple[float, float]
+    clutch: bool = False
+    """Open until the next line."""
+    confirm: bool = False
+    """Pressed once, at this time."""
+
+
+def read_script(path: Path) -> tuple[ScriptLine, ...]:
+    """Return the lines of a script; raises BadInputError, which names file and line.
+
+    `#` begins a comment. Between two lines the hand moves straight and at constant speed.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "is no text"
+        raise BadInputError(f"--script {path}: cannot be read: {reason}") from None
+    lines: list[ScriptLine] = []
+    for number, raw in enumerate(text.splitlines(), 1):
+        words = raw.partition("#")[0].split()
+        if words:
+            line = _parsed(f"--script {path}, line {number}", words)
+            if lines and line.time_s <= lines[-1].time_s:
+                raise BadInputError(
+                    f"--script {path}, line {number}: {line.time_s:g} s; allowed: more than "
+                    f"{lines[-1].time_s:g} s, the time of the line before"
+                )
+            lines.append(line)
+    if not lines:
+        raise BadInputError(f"--script {path}: no lines; allowed: {_SHAPE}")
+    return tuple(lines)
+
+
+def _parsed(where: str, words: list[str]) -> ScriptLine:
+    try:
+        time_s, x_mm, y_mm = (float(word) for word in words[:3])
+    except ValueError:
+        raise BadInputError(f"{where}: {' '.join(words)!r}; allowed: {_SHAPE}") from None
+    for word in words[3:]:
+        if word not in _WORDS:
+            raise BadInputError(f"{where}: {word!r}; allowed: {', '.join(_WORDS)}")
+    if not (math.isfinite(time_s) and time_s >= 0.0):
+        raise BadInputError(f"{where}: {words[0]} s; allowed: 0 and more")
+    x, y = x_mm * 1e-3, y_mm * 1e-3
+    if not (abs(x) <= _LONGEST_m and abs(y) <= _LONGEST_m):
+        raise BadInputError(f"{where}: {x_mm:g} {y_mm:g} mm; allowed: up to {_LONGEST_m:g} m")
+    return ScriptLine(time_s, (x, y), "clutch" in words[3:], "confirm" in words[3:])
+
+
+class ScriptHand:
+    """Plays a script from when it is first read on; positions count from its first line's."""
+
+    hint = "a script leads; Ctrl-C ends"
+
+    def __init__(self, lines: tuple[ScriptLine, ...]) -> None:
+        self._lines = lines
+        self._begin_s = math.nan
+
+    def read(self, now_s: float) -> Hand:
+        """Return where the hand is; it has ended after the last line."""
+        if math.isnan(self._begin_s):
+            self._begin_s = now_s
+        lines, time_s = self._lines, now_s - self._begin_s
+        done = sum(line.time_s <= time_s for line in lines)
+        last = lines[max(done - 1, 0)]
+        towards, part = last, 0.0
+        if 0 < done < len(lines):
+            towards = lines[done]
+            part = (time_s - last.time_s) / (towards.time_s - last.time_s)
+        x, y = (
+            here + part * (there - here) - first
+            for here, there, first in zip(
+                last.position_m, towards.position_m, lines[0].position_m, strict=True
+            )
+        )
+        return Hand(
+            (x, y),
+            clutch=done > 0 and last.clutch,
+            confirmed=sum(line.confirm for line in lines[:done]),
+            end=End("the script is done", arrive=True) if done == len(lines) else None,
+        )
+
+    def close(self) -> None:
+        """There is nothing to be left."""

@@ -1,0 +1,192 @@
+"""One hand that leads one robot: set-points out, answers in, until one of them ends."""
+
+from __future__ import annotations
+
+import math
+import select
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.runtime.stream_buttons import stream_buttons
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import Standing, StreamAnswer
+from tools.teleop.hand import End, Hand, HandDevice
+
+RATE_Hz: Final = 60.0
+_GREET_S: Final = 3.0
+_SILENCE_S: Final = 2.5
+"""Longer than the right to move lasts unasked: the robot holds by then."""
+_TAKEN_AWAY_S: Final = 0.4
+_STILL_m: Final = 2e-5
+_STILL_S: Final = 0.6
+_ARRIVE_S: Final = 15.0
+_UNSEEN_S: Final = 1.0
+"""Where the robot does not say where it is: longer than what has come waits to be played."""
+_MOST_KEPT: Final = 36_000
+_WHY_NOT: Final = {
+    Standing.BUSY: "another sender holds the set-point stream",
+    Standing.NO_RIGHT: "the right to move has ended, or is somebody else's now",
+}
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What was known when the hand confirmed; poses are (x, y) in m, nan where not known."""
+
+    number: int
+    time_s: float
+    hand_m: tuple[float, float]
+    pose_m: tuple[float, float]
+    setpoint_m: tuple[float, float]
+    round_trip_s: float
+
+
+class Session:
+    """Leads through `stream` with `device` at `scale`, while program number `program` runs.
+
+    The hand leads from the first set-point on that the robot has taken; its motion before counts
+    for nothing.
+    """
+
+    def __init__(
+        self, stream: StreamClient, device: HandDevice, scale: float, program: int
+    ) -> None:
+        self.stream, self.device, self.scale = stream, device, scale
+        self.hand = Hand()
+        self.leading = False
+        self.confirmations: list[Confirmation] = []
+        self.round_trips_s: deque[float] = deque(maxlen=_MOST_KEPT)
+        """Of the newest answers, the last one's at the end."""
+        self._program = program
+        self._begin_s = self._heard_s = self._fine_s = 0.0
+
+    @property
+    def answer(self) -> StreamAnswer | None:
+        """Return the robot's newest answer."""
+        return self.stream.state
+
+    @property
+    def pose_m(self) -> tuple[float, float]:
+        """Return where the platform is as the robot knows it."""
+        return _place(None if self.answer is None else self.answer.pose)
+
+    @property
+    def turn_rad(self) -> float:
+        """Return by how much the platform is turned in its plane."""
+        pose = () if self.answer is None else self.answer.pose
+        return 2.0 * math.atan2(pose[6], pose[3]) if pose else math.nan
+
+    @property
+    def setpoint_m(self) -> tuple[float, float]:
+        """Return where the platform is to be now."""
+        return _place(None if self.answer is None else self.answer.pose_setpoint)
+
+    def lead(self, stop_requested: Callable[[], bool]) -> End:
+        """Lead until the device, the robot or the user ends it; return why."""
+        self._begin_s = self._heard_s = self._fine_s = next_s = time.monotonic()
+        end: End | None = None
+        while end is None:
+            end = self._turn(time.monotonic())
+            if stop_requested():
+                return End("ended on request")
+            next_s = max(next_s + 1.0 / RATE_Hz, time.monotonic())
+            self._listen(next_s)
+        if end.arrive:
+            self._arrive(stop_requested)
+        return end
+
+    def figures(self) -> dict[str, Any]:
+        """Return what was sent and answered, delays there and back, and the confirmations."""
+        trips = np.array(self.round_trips_s)
+        quantiles = np.quantile(trips, (0.5, 0.99, 1.0)) if trips.size else np.full(3, np.nan)
+        return {
+            "sent": self.stream.sent,
+            "answered": self.stream.answered,
+            "round_trip_ms": dict(zip(("p50", "p99", "max"), 1e3 * quantiles, strict=True)),
+            "confirmations": [vars(one) for one in self.confirmations],
+        }
+
+    def _turn(self, now_s: float) -> End | None:
+        if not self.leading:
+            self.leading = self._runs()
+        if self.leading:
+            before, self.hand = self.hand, self.device.read(now_s)
+            if self.hand.confirmed > before.confirmed:
+                self._confirm(now_s)
+        self._send()
+        return self._lost(now_s) or self.hand.end
+
+    def _send(self) -> None:
+        hand = self.hand
+        buttons = stream_buttons(hand.clutch or bool(hand.trouble), hand.confirmed)
+        self.stream.send((*hand.position_m, 0.0), scale=self.scale, buttons=buttons)
+
+    def _listen(self, until_s: float) -> None:
+        """Take answers as they come, so that the delay is that of the network."""
+        poll = select.poll()
+        poll.register(self.stream.fileno(), select.POLLIN)
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            if not poll.poll(math.ceil(1e3 * left_s)):
+                return
+            for _ in self.stream.receive():
+                self._heard_s = time.monotonic()
+                self.round_trips_s.append(self.stream.round_trip_s)
+
+    def _runs(self) -> bool:
+        """Return whether the robot takes set-points and its program follows them."""
+        answer = self.answer
+        if answer is None or answer.standing in _WHY_NOT:
+            return False
+        return (answer.state, answer.program) == (LoopState.ACTIVE, self._program)
+
+    def _lost(self, now_s: float) -> End | None:
+        """Say why the robot does not follow, where that has lasted."""
+        patience_s = _SILENCE_S if self.leading else _GREET_S
+        if now_s - self._heard_s > patience_s:
+            return End(f"the robot has not answered for {patience_s:g} s", failed=True)
+        if self._runs():
+            self._fine_s = now_s
+        elif now_s - self._fine_s > (_TAKEN_AWAY_S if self.leading else _GREET_S):
+            standing = None if self.answer is None else self.answer.standing
+            why = "" if standing is None else _WHY_NOT.get(standing, "")
+            return End(why or "the robot does not follow the stream any more", failed=True)
+        return None
+
+    def _confirm(self, now_s: float) -> None:
+        self.confirmations.append(
+            Confirmation(
+                self.hand.confirmed,
+                now_s - self._begin_s,
+                self.hand.position_m,
+                self.pose_m,
+                self.setpoint_m,
+                self.stream.round_trip_s,
+            )
+        )
+
+    def _arrive(self, stop_requested: Callable[[], bool]) -> None:
+        """Keep the hand where it is until the robot has come to where it was led."""
+        begin_s = since_s = time.monotonic()
+        place = self.setpoint_m
+        while not stop_requested():
+            self._send()
+            now_s = time.monotonic()
+            self._listen(now_s + 1.0 / RATE_Hz)
+            if not math.dist(place, self.setpoint_m) < _STILL_m:
+                since_s, place = now_s, self.setpoint_m
+            known = math.isfinite(place[0])
+            waited_s = now_s - begin_s
+            if (known and now_s - since_s > _STILL_S) or self._lost(now_s) is not None:
+                return
+            if waited_s > (_ARRIVE_S if known else _UNSEEN_S):
+                return
+
+
+def _place(pose: tuple[float, ...] | None) -> tuple[float, float]:
+    return (math.nan, math.nan) if pose is None else (pose[0], pose[1])

@@ -1,0 +1,132 @@
+"""What the operator sees in the terminal: the robot in its plane, and the link to it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from cdpr_rt.runtime.states import LoopState
+from tools.teleop.canvas import Canvas
+from tools.teleop.session import Session
+
+_WIDTH, _HEIGHT = 64, 22
+_MARGIN_m = 0.1
+_SHOWN_TRIPS = 120
+_MARKS: Final = {"target": ("+", "bold cyan"), "platform": ("o", "bold green")}
+
+Point = tuple[float, float]
+
+
+class View:
+    """Draws a session again whenever it is asked to; `status` is what the daemon told last."""
+
+    def __init__(self, session: Session, description: dict[str, Any]) -> None:
+        self._session = session
+        platform = description.get("platform") or {}
+        self._platform = platform if len(platform.get("home_m", ())) == 2 else None
+        self._axes = [str(axis.get("name")) for axis in description.get("axes", [])]
+        self.status: dict[str, Any] = {}
+
+    def __rich__(self) -> RenderableType:
+        """Return the picture, where the platform's plane is known, above the figures."""
+        parts: list[RenderableType] = [] if self._platform is None else [self._picture()]
+        return Group(*parts, *self._lines())
+
+    def _picture(self) -> Text:
+        assert self._platform is not None
+        session, platform = self._session, self._platform
+        exits = [_point(each) for each in platform["exit_points_m"]]
+        low, high = _point(platform["workspace_min_m"]), _point(platform["workspace_max_m"])
+        shown = [*exits, low, high]
+        canvas = Canvas(
+            _WIDTH,
+            _HEIGHT,
+            (min(x for x, _ in shown) - _MARGIN_m, min(y for _, y in shown) - _MARGIN_m),
+            (max(x for x, _ in shown) + _MARGIN_m, max(y for _, y in shown) + _MARGIN_m),
+        )
+        canvas.outline([low, (high[0], low[1]), high, (low[0], high[1])])
+        x, y = session.pose_m
+        if math.isfinite(x):
+            turn = session.turn_rad
+            anchors = [
+                (x + math.cos(turn) * b - math.sin(turn) * c,
+                 y + math.sin(turn) * b + math.cos(turn) * c)
+                for b, c in map(_point, platform["anchor_points_m"])
+            ]  # fmt: skip
+            canvas.outline(anchors)
+            for exit_point, anchor in zip(exits, anchors, strict=True):
+                canvas.line(exit_point, anchor)
+        canvas.mark((x, y), *_MARKS["platform"])
+        canvas.mark(self._target(), *_MARKS["target"])
+        for exit_point in exits:
+            canvas.mark(exit_point, "◉", "")
+        text = Text(no_wrap=True)
+        for row in canvas.rows():
+            for letter, style in row:
+                text.append(letter, style or "dim")
+            text.append("\n")
+        return text
+
+    def _target(self) -> Point:
+        told = self.status.get("program_progress", {}).get("target_m")
+        return self._session.setpoint_m if told is None else _point(told)
+
+    def _lines(self) -> list[Text]:
+        session, hand = self._session, self._session.hand
+        lines = [self._state()]
+        if math.isfinite(session.pose_m[0]):
+            lines.append(
+                Text(
+                    f"platform {_mm(session.pose_m)}, {math.degrees(session.turn_rad):+.2f} deg; "
+                    f"target {_mm(self._target())}"
+                )
+            )
+        lines.append(Text(f"hand {_mm(hand.position_m)} times {session.scale:g}; {self._link()}"))
+        tensions = [axis.get("tension_N") for axis in self.status.get("axes", [])]
+        if any(value is not None for value in tensions):
+            named = zip(self._axes, tensions, strict=False)
+            told = [f"{name} {'-' if t is None else f'{t:.0f}'}" for name, t in named]
+            lines.append(Text(f"tensions in N: {', '.join(told)}"))
+        refused = self.status.get("program_progress", {}).get("refused")
+        for text in (hand.trouble, refused, self.status.get("reason")):
+            if text:
+                lines.append(Text(str(text), style="yellow"))
+        lines.append(Text(session.device.hint, style="dim"))
+        return lines
+
+    def _state(self) -> Text:
+        session, hand = self._session, self._session.hand
+        if not session.leading:
+            return Text("waiting for the robot's answer", style="yellow")
+        answer = session.answer
+        state = "" if answer is None else LoopState(answer.state).label
+        leads = "HOLDS" if hand.clutch or hand.trouble else "LEADS"
+        count = f", {hand.confirmed} confirmed" if hand.confirmed else ""
+        return Text.assemble(
+            (leads, "bold yellow" if leads == "HOLDS" else "bold green"), f"  {state}{count}"
+        )
+
+    def _link(self) -> str:
+        session = self._session
+        recent = list(session.round_trips_s)[-_SHOWN_TRIPS:]
+        if not recent:
+            return "no answer yet"
+        missing = max(session.stream.sent - session.stream.answered, 0)
+        share = 100.0 * missing / max(session.stream.sent, 1)
+        stream = self.status.get("program_progress", {}).get("stream", "")
+        return (
+            f"round trip {1e3 * recent[-1]:.1f} ms (at most {1e3 * max(recent):.1f} in 2 s), "
+            f"{share:.0f} % unanswered{f', stream {stream}' if stream else ''}"
+        )
+
+
+def _point(values: Any) -> Point:
+    x, y = values[:2]
+    return float(x), float(y)
+
+
+def _mm(point: Point) -> str:
+    return f"{1e3 * point[0]:+.1f} {1e3 * point[1]:+.1f} mm"
