@@ -63,6 +63,7 @@ class RobotFile(Profile):
         """Yield (key, problem) for what contradicts itself."""
         yield from self.limits.faults(len(self.axes))
         yield from self._repeated_names()
+        yield from self._unbounded_tensions()
         yield from platform_faults(
             self.platform,
             [axis.exit_point_m for axis in self.axes],
@@ -99,6 +100,12 @@ class RobotFile(Profile):
                     f"a safety_io, which knows its brakes by it (axes[{other}] has it too)"
                 )
                 yield f"axes[{i}].node_id", problem
+
+    def _unbounded_tensions(self) -> Iterator[tuple[str, str]]:
+        if self.platform is not None:
+            for key in ("tension_min_N", "tension_max_N"):
+                if getattr(self.limits, key) is None:
+                    yield f"limits.{key}", "missing; allowed: given where there is a [platform]"
 
     def _repeated_names(self) -> Iterator[tuple[str, str]]:
         names = [axis.name or default_name(i) for i, axis in enumerate(self.axes)]

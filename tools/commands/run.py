@@ -27,6 +27,7 @@ from tools.daemon.settings import Address, RunSettings
 from tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
 from tools.output import Output, to_json
 from tools.robot_buses import RobotBusOption, asks_for_own_simulator, robot_urls
+from tools.robots.checks import refuse_impossible
 from tools.simulator import OwnSimulator
 
 _RING_S = 15.0  # longer than a service that hangs is waited for and started again
@@ -108,6 +109,8 @@ def run(
     """
     out = Output(as_json)
     profile = load_robot(robot)
+    for doubt in refuse_impossible(profile):
+        out.note(doubt)
     settings = settings_for(
         profile,
         bus=bus,

@@ -1,0 +1,219 @@
+"""Whether a cable robot can work as its file describes it, and what to change where it cannot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_rt.exchange import FloatArray
+from cdpr_rt.runtime.robot_arrays import limits_of
+from profiles import ProfileError, Robot
+from tools.robots.statics import PlanarStatics, can_be_computed
+
+_GRID = 25
+_NEAREST_m = 0.1
+"""An anchor point closer than this to an exit point is about to be pulled into it."""
+_FAR_TURNED_rad = math.radians(10.0)
+_WIDE_ARMS = 0.5
+"""Anchor points further apart than this share of the exit points are probably not in metres."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a key of a robot's file: what is wrong, and what to change."""
+
+    key: str
+    text: str
+    impossible: bool
+    """Whether the robot cannot work like this; else it can, less well than it seems."""
+
+
+def findings(robot: Robot) -> list[Finding]:
+    """Return what is impossible or doubtful about a robot's platform, the worst first."""
+    if robot.platform is None or not can_be_computed(robot):
+        return []
+    statics = PlanarStatics(robot)
+    found = list(_shape(robot, statics))
+    if not any(finding.impossible for finding in found):
+        # with points that cannot be meant, tensions and torques only repeat it
+        found += [*_tensions(statics), *_motors(robot, statics), *_turning(statics)]
+        found += _lengths(robot, statics)
+    return sorted(found, key=lambda finding: not finding.impossible)
+
+
+def refuse_impossible(robot: Robot) -> list[str]:
+    """Return what is doubtful about a robot, a line each.
+
+    Raises ProfileError where it is impossible: a line for each key, with what to change.
+    """
+    found = findings(robot)
+    wrong = [finding for finding in found if finding.impossible]
+    if wrong:
+        further = "".join(f"\n{robot.path}: {f.key}: {f.text}" for f in wrong[1:])
+        raise ProfileError(robot.path, wrong[0].key, wrong[0].text + further)
+    return [f"{robot.path}: {finding.key}: {finding.text}" for finding in found]
+
+
+def _shape(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
+    a, b = statics.geometry.a, statics.geometry.b
+    apart = [(i, j, float(np.linalg.norm(a[i] - a[j]))) for i in range(3) for j in range(i)]
+    for i, j, distance in apart:
+        if distance < _NEAREST_m:
+            text = f"{distance:.3g} m from that of axes[{j}]; allowed: {_NEAREST_m:g} m and more"
+            yield Finding(f"axes[{i}].exit_point_m", text, impossible=True)
+    span = max(distance for _, _, distance in apart)
+    wide = max(float(np.linalg.norm(b[i] - b[j])) for i in range(3) for j in range(i))
+    if wide > _WIDE_ARMS * span:
+        text = (
+            f"anchor points are up to {wide:.3g} m apart, exit points {span:.3g} m; allowed: half "
+            "of that (is one of them in millimetres?)"
+        )
+        yield Finding("axes[0].anchor_point_m", text, impossible=True)
+        return
+    lengths = statics.geometry.lengths(statics.box.grid(_GRID, _GRID))
+    for i, nearest in enumerate(lengths.min(axis=(0, 1))):
+        if nearest < _NEAREST_m:
+            text = (
+                f"the box of targets goes up to {nearest:.2g} m from the exit point of "
+                f"axes[{i}] ({robot.axes[i].name}); allowed: {_NEAREST_m:g} m and more"
+            )
+            yield Finding("platform.workspace_min_m", text, impossible=True)
+
+
+def _tensions(statics: PlanarStatics) -> Iterator[Finding]:
+    platform = statics.platform
+    home = np.array(platform.home_m)
+    if statics.reserve_N(home) < 0.0:
+        yield Finding("platform.home_m", _not_held(statics, home), impossible=True)
+    else:
+        way = np.linspace(home, np.clip(home, statics.box.low_m, statics.box.high_m), _GRID)
+        missing = statics.reserve_N(way) < 0.0
+        if missing.any():
+            text = "on the way to the box of targets, " + _not_held(statics, way[missing.argmax()])
+            yield Finding("platform.home_m", text, impossible=True)
+    points = statics.box.grid(_GRID, _GRID)
+    still = float(np.mean(statics.reserve_N(points) >= 0.0))
+    moving = float(np.mean(statics.reserve_N(points, platform.acceleration_m_s2) >= 0.0))
+    key, text = "platform.workspace_min_m", ""
+    if still < 1.0:
+        text = f"tensions within the limits hold the platform in {100 * still:.0f} % of the box"
+    elif moving < 1.0:
+        key = "platform.acceleration_m_s2"
+        text = (
+            f"{platform.acceleration_m_s2:g} m/s2 along both directions at once can be had in "
+            f"{100 * moving:.0f} % of the box"
+        )
+    if text:
+        yield Finding(key, text + _what_would_be_held(statics), impossible=still == 0.0)
+
+
+def _what_would_be_held(statics: PlanarStatics) -> str:
+    smaller = statics.largest_box(statics.box, 0.0, statics.platform.acceleration_m_s2)
+    if smaller is not None:
+        return f"; all of it would be held: {_point(smaller.low_m)} to {_point(smaller.high_m)} m"
+    points = statics.box.grid(_GRID, _GRID).reshape(-1, 2)
+    worst = points[int(statics.reserve_N(points).argmin())]
+    return "; " + _not_held(statics, worst)
+
+
+def _not_held(statics: PlanarStatics, position_m: FloatArray) -> str:
+    """Say what cannot be held there, and what would be."""
+    where = f"at {_point(position_m)} m"
+    reserve = float(statics.reserve_N(position_m))
+    if not math.isfinite(reserve):
+        return f"{where} the cables cannot hold one direction, whatever their tensions"
+    needed = ", ".join(f"{value:.0f}" for value in statics.tensions_N(position_m))
+    text = (
+        f"{where} the cables would need {needed} N, {-reserve:.0f} N outside of tension_min_N and "
+        "tension_max_N in [limits]"
+    )
+    shares = np.linspace(0.0, 1.0, 101)
+    lighter = [s for s in shares if statics.reserve_N(position_m, mass_share=s) >= 0.0]
+    if lighter:
+        most_kg = statics.platform.mass_kg * max(lighter)
+        return f"{text}; a platform of up to {most_kg:.3g} kg could be held there"
+    looser = [s for s in shares if statics.reserve_N(position_m, low_share=s) >= 0.0]
+    if looser:
+        most_N = float(statics.low_N.min()) * max(looser)
+        return f"{text}; with tension_min_N up to {most_N:.3g} it could be held there"
+    return f"{text}; only a place further inside the exit points helps"
+
+
+def _motors(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
+    limits, platform = limits_of(robot), statics.platform
+    arm_m = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
+    allowed_Nm = np.broadcast_to(limits.torque_Nm, (3,))
+    needed_Nm = statics.high_N * arm_m
+    i = int((needed_Nm / allowed_Nm).argmax())
+    if needed_Nm[i] > allowed_Nm[i]:
+        text = (
+            f"{statics.high_N[i]:g} N are {needed_Nm[i]:.3g} Nm at the motor of axes[{i}], whose "
+            f"torque_Nm is {allowed_Nm[i]:g}; allowed: up to {allowed_Nm[i] / arm_m[i]:.0f} N, "
+            "less friction"
+        )
+        yield Finding("limits.tension_max_N", text, impossible=True)
+    stall_Nm = np.array([axis.winch.motor.stall_torque_Nm for axis in robot.axes])
+    held_N = statics.least_tensions_N(statics.box.grid(_GRID, _GRID))
+    held_N = np.minimum(np.where(np.isfinite(held_N), held_N, 0.0), statics.high_N).max((0, 1))
+    i = int((held_N * arm_m / stall_Nm).argmax())
+    if held_N[i] * arm_m[i] > stall_Nm[i]:
+        text = (
+            f"to stand still somewhere in the box axes[{i}] needs {held_N[i] * arm_m[i]:.3g} Nm, "
+            f"its motor bears {stall_Nm[i]:g} Nm for long; a smaller box or a larger gear helps"
+        )
+        yield Finding("platform.workspace_max_m", text, impossible=False)
+    # each direction has the speed of its own, so that both together are faster along a diagonal
+    cable_m_s = math.sqrt(2.0) * platform.speed_m_s
+    most_m_s = arm_m * np.broadcast_to(limits.speed_rad_s, (3,))
+    i = int(most_m_s.argmin())
+    if cable_m_s > most_m_s[i]:
+        text = (
+            f"value {platform.speed_m_s:g}; allowed: up to {most_m_s[i] / math.sqrt(2.0):.3g}, "
+            f"where axes[{i}] reaches the limit of its speed"
+        )
+        yield Finding("platform.speed_m_s", text, impossible=True)
+
+
+def _turning(statics: PlanarStatics) -> Iterator[Finding]:
+    home = np.array(statics.platform.home_m)
+    places = np.concatenate([home[None], statics.box.grid(_GRID, _GRID).reshape(-1, 2)])
+    places = places[statics.reserve_N(places) >= 0.0]
+    if not len(places):
+        return
+    angle = statics.angle_rad(places)
+    if np.isnan(angle).any():
+        x, y = places[int(np.isnan(angle).argmax())]
+        text = (
+            f"at {_point((x, y))} m the cables would turn the platform over; each cable should be "
+            "made fast on the side of the platform that faces its exit point"
+        )
+        yield Finding("axes[0].anchor_point_m", text, impossible=True)
+    elif np.abs(angle).max() > _FAR_TURNED_rad:
+        worst = int(np.abs(angle).argmax())
+        text = (
+            f"at {_point(places[worst])} m the platform turns by "
+            f"{abs(math.degrees(angle[worst])):.0f} deg, which no cable can prevent; anchor points "
+            "closer together turn it less"
+        )
+        yield Finding("axes[0].anchor_point_m", text, impossible=False)
+
+
+def _lengths(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
+    limits = limits_of(robot)
+    lengths = statics.geometry.lengths(statics.box.grid(_GRID, _GRID))
+    for key, needed, allowed, sign in (
+        ("cable_length_min_m", lengths.min((0, 1)), limits.cable_length_min_m, 1.0),
+        ("cable_length_max_m", lengths.max((0, 1)), limits.cable_length_max_m, -1.0),
+    ):
+        bound = np.broadcast_to(allowed, (3,))
+        i = int((sign * (bound - needed)).argmax())
+        if sign * (bound[i] - needed[i]) > 0.0:
+            text = f"{bound[i]:g} m; in the box of targets axes[{i}] has {needed[i]:.3g} m of cable"
+            yield Finding(f"limits.{key}", text, impossible=True)
+
+
+def _point(position_m: FloatArray | tuple[float, float]) -> str:
+    return f"({position_m[0]:.2f}, {position_m[1]:.2f})"
