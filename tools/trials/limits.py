@@ -18,6 +18,7 @@ OVERSHOOT_mm: Final = 2.0
 _FINISHED_SHARE: Final = 0.7
 _REST_S: Final = (0.0, 1.0)
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
+_MOVED_m: Final = 2e-3
 _TORQUE_STEP_SHARE: Final = 1e-3
 """Torque crosses the bus in per mille of the rated one."""
 
@@ -37,38 +38,48 @@ def drive(run: TrialRun, seconds: float) -> None:
 
 @dataclass(frozen=True)
 class Leg:
-    """The rows of one leg, its target, and the box in which the platform may be meanwhile."""
+    """The rows of one leg, where it began, its target, and where it could be stopped, (2,) each."""
 
     rows: slice
+    from_m: FloatArray
     target_m: FloatArray
-    low_m: FloatArray
-    high_m: FloatArray
+    stop_m: FloatArray
 
-    def beyond_m(self, true_m: FloatArray) -> FloatArray:
-        """Return how far out of its box the platform (k, 2) was at most, in each direction."""
+    def overshoot_m(self, true_m: FloatArray) -> FloatArray:
+        """Return how far the platform (k, 2) was beyond its target at most, in each direction.
+
+        A direction in which it had hardly to move has none.
+        """
+        way = self.target_m - self.from_m
+        sign = np.sign(way)
+        farthest = np.maximum(sign * self.target_m, sign * self.stop_m)
+        beyond = (sign * true_m[self.rows]).max(axis=0) - farthest
+        return np.where(np.abs(way) > _MOVED_m, np.maximum(beyond, 0.0), 0.0)
+
+    def off_m(self, true_m: FloatArray) -> float:
+        """Return how far it was, in a direction, out of the box that beginning and target span."""
+        corners = np.array([self.from_m, self.target_m, self.stop_m])
         true = true_m[self.rows]
-        out = np.maximum(self.low_m - true, true - self.high_m)
-        return np.asarray(np.maximum(out.max(axis=0), 0.0))
+        out = np.maximum(corners.min(axis=0) - true, true - corners.max(axis=0))
+        return max(0.0, float(out.max()))
 
 
 def legs(recorded: Recorded, acceleration_m_s2: float) -> list[Leg]:
     """Return all legs of a trial.
 
-    A leg's box spans, in each direction, from where the platform truly was at its beginning to its
-    target; with it the place where the set-point could stop at the earliest, which may lie further
-    where the target was changed half-way.
+    Where a target was changed half-way the platform still moves: `stop_m` is the nearest place
+    where its set-point can stop, in each direction, which may lie beyond the new target.
     """
     marks = recorded.marked("leg")
     first = [recorded.row(mark["cycle"]) for mark in marks]
     last = [*first[1:], len(recorded.truth)]
     found = []
     for mark, begin, end in zip(marks, first, last, strict=True):
-        target = np.array(mark["target_m"])
         setpoint = recorded.setpoint_m[max(begin - 1, 0) : begin + 1]
         speed = (setpoint[-1] - setpoint[0]) / recorded.period_s
         stop = setpoint[-1] + speed * np.abs(speed) / (2.0 * acceleration_m_s2)
-        corners = np.array([recorded.true_m[begin], target, stop])
-        found.append(Leg(slice(begin, end), target, corners.min(axis=0), corners.max(axis=0)))
+        target = np.array(mark["target_m"])
+        found.append(Leg(slice(begin, end), recorded.true_m[begin], target, stop))
     return found
 
 
@@ -82,7 +93,8 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
     sent = np.abs(recorded.cycles["torque_sent_Nm"])
     rated = np.array([axis.winch.motor.rated_torque_Nm for axis in robot.axes])
     found = legs(recorded, platform.acceleration_m_s2)
-    beyond = np.array([leg.beyond_m(recorded.true_m) for leg in found]).reshape(-1, 2)
+    beyond = np.array([leg.overshoot_m(recorded.true_m) for leg in found]).reshape(-1, 2)
+    off = max(leg.off_m(recorded.true_m) for leg in found)
     speed = np.abs(recorded.truth["velocity_m_s"][:, :2]).max(axis=0)
     bound = "Nm", float(most.max() + _TORQUE_STEP_SHARE * rated.max())
     return [
@@ -98,4 +110,5 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
         Figure("torque_sent_Nm", "greatest torque asked of a motor", float(sent.max()), *bound),
         Figure("torque_true_Nm", "greatest torque of a motor", float(np.abs(torque).max()), "Nm"),
         Figure("overshoot_mm", "overshoot", 1e3 * float(beyond.max()), "mm", OVERSHOOT_mm),
+        Figure("off_mm", "farthest from the box of a leg, sideways too", 1e3 * off, "mm"),
     ]

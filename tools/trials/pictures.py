@@ -77,7 +77,7 @@ def of_limits(recorded: Recorded, robot: Robot) -> Figure:
     tension.set(xlabel="min", ylabel="N", title="true tension of the cables, and its bounds")
     torque.set(xlabel="min", ylabel="Nm", title="torque asked of the motors, and its limit")
     acceleration = platform_of(robot).acceleration_m_s2
-    beyond = [leg.beyond_m(recorded.true_m) for leg in limits.legs(recorded, acceleration)]
+    beyond = [leg.overshoot_m(recorded.true_m) for leg in limits.legs(recorded, acceleration)]
     over.hist(1e3 * np.array(beyond), bins=30, color=_AXES[:2], label=["in x", "in y"])
     over.axvline(limits.OVERSHOOT_mm, color=_BOUND, lw=1.0)
     over.set(xlabel="mm", ylabel="legs", title="overshoot of each leg")
