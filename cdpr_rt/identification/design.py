@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdpr_rt.exchange import FloatArray
-from cdpr_rt.identification.friction import FrictionShape, relative_friction
+from cdpr_rt.identification.friction import FrictionShape, relative_friction, sliding
 from cdpr_rt.identification.sweep import TWO_PI
 from cdpr_rt.identification.windows import Windows, average
 from cdpr_rt.jit import jit
@@ -112,9 +112,8 @@ def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArra
     out[:, LATENCY] = windows.torque_rate_Nm_s[rows] * (
         np.abs(windows.speed_rad_s[rows]) > _QUICK_rad_s
     )
-    friction = relative_friction(
-        windows.angle_rad, windows.velocity_rad_s, windows.play_rad, layout.shape
-    )
+    slid = sliding(windows.angle_rad, windows.play_rad)
+    friction = relative_friction(slid, windows.velocity_rad_s, layout.shape)
     values = (np.maximum(friction, 0.0), np.minimum(friction, 0.0), windows.velocity_rad_s)
     out[:, COULOMB : VISCOUS + 1] = average(np.column_stack(values), windows, first, last)
     return out

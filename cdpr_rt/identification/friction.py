@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.identification.simplex import minimise
-from cdpr_rt.identification.windows import IntArray, Windows, average
+from cdpr_rt.identification.windows import IntArray, Windows, average, average_by_sign
 from cdpr_rt.jit import jit
 
 _LOWEST = (0.003, 0.02, 2e-4)
@@ -41,39 +42,39 @@ STARTS = (FrictionShape(0.3, 0.1, 3e-3), FrictionShape(0.3, 0.4, 3e-3))
 
 
 @jit
-def _follow(
-    angle: FloatArray,
-    velocity: FloatArray,
-    play: float,
-    rise: float,
-    speed: float,
-    way: float,
-    out: FloatArray,
-) -> None:
-    state = 1.0 if velocity[0] > 0.0 else -1.0
-    out[0] = state
+def _slide(angle: FloatArray, play: float, out: FloatArray) -> None:
     place = angle[0]
+    out[0] = 0.0
     for i in range(1, angle.size):
         before = place
         place = min(max(place, angle[i] - play), angle[i] + play)
-        step = place - before
-        ratio = velocity[i] / speed
-        height = 1.0 + rise * math.exp(-ratio * ratio)
-        goal = height if step > 0.0 else -height
-        state = goal + (state - goal) * math.exp(-abs(step) / (way * height))
-        out[i] = state
+        out[i] = place - before
 
 
-def relative_friction(
-    angle: FloatArray, velocity: FloatArray, play: float, shape: FrictionShape
-) -> FloatArray:
-    """Return friction over Coulomb friction along a motion, signed; all arrays (k,).
+@jit
+def _develop(state: float, slid: FloatArray, height: FloatArray, out: FloatArray) -> None:
+    """Turn `out` from what each step leaves of the friction before it into the friction itself."""
+    for i in range(out.size):
+        goal = height[i] if slid[i] > 0.0 else -height[i]
+        out[i] = state = goal + (state - goal) * out[i]
+
+
+def sliding(angle: FloatArray, play: float) -> FloatArray:
+    """Return the way that the rotor slides before each sample of a motion, signed; arrays (k,).
 
     Movements within `play` to either side count as noise of the reading: to and fro, they would
     seem to wear the friction down.
     """
-    out = np.zeros_like(angle)
-    _follow(angle, velocity, play, shape.rise, shape.speed_rad_s, shape.way_rad, out)
+    out = np.empty_like(angle)
+    _slide(angle, play, out)
+    return out
+
+
+def relative_friction(slid: FloatArray, velocity: FloatArray, shape: FrictionShape) -> FloatArray:
+    """Return friction over Coulomb friction along a motion, signed; all arrays (k,)."""
+    height = 1.0 + shape.rise * np.exp(-((velocity / shape.speed_rad_s) ** 2))
+    out: FloatArray = np.exp(-np.abs(slid) / (shape.way_rad * height))
+    _develop(1.0 if velocity[0] > 0.0 else -1.0, slid, height, out)
     return out
 
 
@@ -84,6 +85,27 @@ class Motion:
     windows: Windows
     torque_Nm: FloatArray
     rows: IntArray
+
+    @cached_property
+    def speed_rad_s(self) -> FloatArray:
+        """Mean velocity in each of the rows."""
+        w = self.windows
+        means = average(w.velocity_rad_s[:, np.newaxis], w, 0, w.torque_Nm.size)
+        return np.asarray(means[self.rows, 0])
+
+    @cached_property
+    def slid_rad(self) -> FloatArray:
+        """See `sliding`."""
+        return sliding(self.windows.angle_rad, self.windows.play_rad)
+
+    def regressors(self, shape: FrictionShape) -> FloatArray:
+        """Return forward friction, backward friction and velocity of the rows, (rows, 3)."""
+        w = self.windows
+        friction = relative_friction(self.slid_rad, w.velocity_rad_s, shape)
+        out = np.zeros((self.rows.size, 3))
+        average_by_sign(friction, w, self.rows, out)
+        out[:, 2] = self.speed_rad_s
+        return out
 
 
 def fit_shape(motions: Sequence[Motion], starts: Sequence[FrictionShape] = STARTS) -> FrictionShape:
@@ -125,12 +147,7 @@ def _residuals(
     motions: Sequence[Motion], weights: Sequence[FloatArray], shape: FrictionShape
 ) -> list[FloatArray]:
     """Return each run's errors after solving for the linear coefficients."""
-    xs = []
-    for motion in motions:
-        w = motion.windows
-        friction = relative_friction(w.angle_rad, w.velocity_rad_s, w.play_rad, shape)
-        values = (np.maximum(friction, 0.0), np.minimum(friction, 0.0), w.velocity_rad_s)
-        xs.append(average(np.column_stack(values), w, 0, w.torque_Nm.size)[motion.rows])
+    xs = [motion.regressors(shape) for motion in motions]
     parts = list(zip(xs, motions, weights, strict=True))
     gram = np.sum([(x.T * w) @ x for x, _, w in parts], axis=0)
     right = np.sum([(x.T * w) @ m.torque_Nm for x, m, w in parts], axis=0)

@@ -203,6 +203,31 @@ def average(values: FloatArray, windows: Windows, first: int, last: int) -> Floa
     return out
 
 
+def average_by_sign(values: FloatArray, windows: Windows, rows: IntArray, out: FloatArray) -> None:
+    """Write some windows' averages of `values` (samples,) to the columns 0, where positive, and 1.
+
+    The rest counts as zero.
+    """
+    _average_by_sign(values, windows.bump, windows.stride, rows, out)
+
+
+@jit
+def _average_by_sign(
+    values: FloatArray, bump: FloatArray, stride: int, rows: IntArray, out: FloatArray
+) -> None:
+    last = values.size - 1
+    for i in range(rows.size):
+        start = rows[i] * stride
+        above, below = 0.0, 0.0
+        for k in range(bump.size):
+            share = bump[k] * values[min(start + k, last)]
+            if share > 0.0:
+                above += share
+            else:
+                below += share
+        out[i, 0], out[i, 1] = above, below
+
+
 @jit
 def _average(
     values: FloatArray, bump: FloatArray, stride: int, first: int, out: FloatArray
