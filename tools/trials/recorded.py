@@ -18,6 +18,7 @@ FIELDS: Final = (
     "time_s",
     "state",
     "program",
+    "stream_buttons",
     "pose",
     "pose_setpoint",
     "position_rad",
