@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -66,7 +67,8 @@ def lead(wish: Wish, out: Output) -> None:
                 session = Session(stream, device, wish.scale, number)
                 out.note(f"{program} by {host}:{port}; {device.hint}")
                 end = _shown(session, View(session, description), daemon, out)
-            control.hold()
+            with suppress(CommandError) if end.failed else nullcontext():  # it tells why itself
+                control.hold()
         _tell(session, end, daemon, out)
 
 
@@ -153,7 +155,8 @@ def _tell(session: Session, end: End, daemon: Daemon, out: Output) -> None:
     figures, status = session.figures(), daemon.get("/status")
     for one in session.confirmations:
         x, y = (1e3 * value for value in one.pose_m)
-        out.say(f"confirmed {one.number} at {one.time_s:.2f} s: platform {x:+.2f} {y:+.2f} mm")
+        where = f": platform {x:+.2f} {y:+.2f} mm" if math.isfinite(x) else ""
+        out.say(f"confirmed {one.number} at {one.time_s:.2f} s{where}")
     trip = figures["round_trip_ms"]
     out.say(
         f"{figures['sent']} set-points sent, {figures['answered']} answered; round trip "

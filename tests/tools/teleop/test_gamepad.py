@@ -1,0 +1,209 @@
+"""The gamepad: what its events do to a hand, and what becomes of it when it is unplugged.
+
+No kernel that these tests run on has input devices. `StandIn` takes the place of
+`evdev.InputDevice`, with the events that the kernel documents; it shows nothing of a real pad.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from evdev import AbsInfo, InputEvent, ecodes
+
+from tools.errors import BadInputError
+from tools.teleop.gamepad import EvdevFinder, Gamepad, InputDevice, stick_map
+
+MAP = stick_map("ABS_X,-ABS_Y", "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
+SCALE = 8.0
+
+
+class StandIn:
+    """Gives what was put into it as an InputDevice does, until it is unplugged."""
+
+    path = "/dev/input/event7"
+    name = "a pad that is not there"
+
+    def __init__(self, least: int = 0, most: int = 255) -> None:
+        self.events: deque[InputEvent] = deque()
+        self.values = {ecodes.ABS_X: (least + most + 1) // 2, ecodes.ABS_Y: (least + most + 1) // 2}
+        self.range = least, most
+        self.plugged = True
+        self.closed = False
+
+    def put(self, kind: int, code: int, value: int) -> None:
+        if kind == ecodes.EV_ABS:
+            self.values[code] = value
+        self.events.append(InputEvent(0, 0, kind, code, value))
+
+    def read(self) -> Iterator[InputEvent]:
+        if not self.plugged:
+            raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+        if not self.events:
+            raise BlockingIOError
+        some = [self.events.popleft() for _ in range(min(2, len(self.events)))]
+        return iter(some)
+
+    def absinfo(self, axis_num: int) -> AbsInfo:
+        return AbsInfo(self.values[axis_num], *self.range, 0, 15, 0)
+
+    def capabilities(self, verbose: bool = False, absinfo: bool = True) -> dict[Any, Any]:
+        return {}
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@dataclass
+class Pads:
+    """A finder of the pads that are plugged in, one after the other."""
+
+    there: list[StandIn] = field(default_factory=list)
+
+    def find(self) -> InputDevice | None:
+        return self.there.pop(0) if self.there else None
+
+    def nowhere(self) -> str:
+        return "nothing is plugged in"
+
+
+class Rig:
+    """A gamepad whose time the test tells."""
+
+    def __init__(self, *pads: StandIn) -> None:
+        self.pad = pads[0]
+        self.pads = Pads(list(pads[:1]))
+        self.device = Gamepad(self.pads, MAP, SCALE)
+        self.now_s = 10.0
+        self.hand = self.device.read(self.now_s)
+
+    def key(self, code: int, down: bool) -> None:
+        self.pad.put(ecodes.EV_KEY, code, int(down))
+
+    def push(self, x: int, y: int) -> None:
+        self.pad.put(ecodes.EV_ABS, ecodes.ABS_X, x)
+        self.pad.put(ecodes.EV_ABS, ecodes.ABS_Y, y)
+
+    def run(self, seconds: float) -> tuple[float, float]:
+        """Return by how much the hand has moved."""
+        before = self.hand.position_m
+        for _ in range(round(seconds * 60.0)):
+            self.now_s += 1.0 / 60.0
+            self.hand = self.device.read(self.now_s)
+        after = self.hand.position_m
+        return after[0] - before[0], after[1] - before[1]
+
+
+def test_the_stick_leads_while_the_dead_man_is_held() -> None:
+    rig = Rig(StandIn())
+    rig.push(255, 127)
+    assert rig.run(0.5) == (0.0, 0.0)
+    assert rig.hand.clutch
+    rig.key(ecodes.BTN_TR, True)
+    assert rig.run(1.0) == pytest.approx((0.05, 0.0), abs=1e-3)
+    assert not rig.hand.clutch
+    rig.push(128, 0)  # the kernel counts downward
+    assert rig.run(1.0) == pytest.approx((0.0, 0.05), abs=2e-3)
+    rig.key(ecodes.BTN_TR, False)
+    assert rig.run(0.5) == (0.0, 0.0)
+    assert rig.hand.clutch
+
+
+def test_the_dead_zone_is_round_and_speed_grows_slowly_from_its_edge() -> None:
+    rig = Rig(StandIn(-1000, 1000))
+    rig.key(ecodes.BTN_TR, True)
+    rig.push(69, -69)
+    assert rig.run(1.0) == (0.0, 0.0)
+    rig.push(0, -550)  # half of the way that is left
+    x, y = rig.run(1.0)
+    assert (x, y) == pytest.approx((0.0, 0.25 * 0.05), rel=0.02)
+    rig.push(1000, -1000)  # a square stick: no faster in its corner
+    x, y = rig.run(1.0)
+    assert math.hypot(x, y) == pytest.approx(0.05, rel=0.02)
+
+
+def test_a_loop_that_stood_still_moves_the_hand_no_further_for_it() -> None:
+    rig = Rig(StandIn())
+    rig.key(ecodes.BTN_TR, True)
+    rig.push(255, 127)
+    rig.run(0.1)
+    before = rig.hand.position_m[0]
+    rig.hand = rig.device.read(rig.now_s + 5.0)
+    assert rig.hand.position_m[0] - before <= 0.05 * 0.1 + 1e-9
+
+
+def test_each_press_confirms_once() -> None:
+    rig = Rig(StandIn())
+    for _ in range(3):
+        rig.key(ecodes.BTN_SOUTH, True)
+        rig.pad.put(ecodes.EV_KEY, ecodes.BTN_EAST, 1)
+        rig.run(0.05)
+        rig.key(ecodes.BTN_SOUTH, False)
+    rig.run(0.05)
+    assert rig.hand.confirmed == 3
+
+
+def test_unplugged_it_holds_and_waits_to_be_pressed_anew() -> None:
+    rig = Rig(StandIn())
+    rig.key(ecodes.BTN_TR, True)
+    rig.push(255, 127)
+    rig.run(0.5)
+    rig.pad.plugged = False
+    gone = rig.run(2.5)
+    assert gone == (0.0, 0.0)
+    assert rig.hand.clutch and "plug it in again" in rig.hand.trouble
+    assert rig.pad.closed
+    again = StandIn()
+    again.values[ecodes.ABS_X] = 255  # pushed, and held, while it is plugged in
+    rig.pads.there, rig.pad = [again], again
+    assert rig.run(1.5) == (0.0, 0.0)
+    assert (rig.hand.clutch, rig.hand.trouble) == (True, "")
+    rig.key(ecodes.BTN_TR, True)
+    assert rig.run(1.0)[0] == pytest.approx(0.05, abs=1e-3)
+
+
+def test_events_that_were_lost_let_go() -> None:
+    rig = Rig(StandIn())
+    rig.key(ecodes.BTN_TR, True)
+    rig.push(255, 127)
+    rig.run(0.5)
+    rig.pad.values[ecodes.ABS_X] = 0
+    rig.pad.put(ecodes.EV_SYN, ecodes.SYN_DROPPED, 0)
+    assert rig.run(0.5) == (0.0, 0.0)
+    rig.key(ecodes.BTN_TR, True)
+    assert rig.run(0.5)[0] == pytest.approx(-0.025, abs=1e-3)  # as the pad stands now
+
+
+def test_nothing_that_fits_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInputError, match="nothing is plugged in"):
+        Gamepad(Pads(), MAP, SCALE)
+    missing = tmp_path / "event0"
+    finder = EvdevFinder(missing, MAP)
+    assert finder.find() is None
+    assert f"--input {missing}: is no input device" in finder.nowhere()
+    missing.write_text("no device either")
+    assert EvdevFinder(missing, MAP).find() is None
+
+
+@pytest.mark.parametrize(
+    ("axes", "dead_man", "confirm", "told"),
+    [
+        ("ABS_X", "BTN_TR", "BTN_SOUTH", "--axes ABS_X: allowed: two axes"),
+        ("ABS_X,ABS_X", "BTN_TR", "BTN_SOUTH", "two different ones"),
+        ("ABS_X,ABS_Q", "BTN_TR", "BTN_SOUTH", "--axes: 'ABS_Q'; allowed: a name of the kernel's"),
+        ("ABS_X,ABS_Y", "KEY_A", "BTN_SOUTH", "--dead-man: 'KEY_A'"),
+        ("ABS_X,ABS_Y", "BTN_TR", "BTN_TR", "--confirm BTN_TR: allowed: another button"),
+    ],
+)
+def test_names_that_mean_nothing_are_refused(
+    axes: str, dead_man: str, confirm: str, told: str
+) -> None:
+    with pytest.raises(BadInputError, match=told):
+        stick_map(axes, dead_man, confirm, 0.1, 0.05)

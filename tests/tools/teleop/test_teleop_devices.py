@@ -1,0 +1,194 @@
+"""What leads: scripts, keys and sticks; and a keyboard on a real pseudo-terminal."""
+
+from __future__ import annotations
+
+import math
+import os
+import pty
+import termios
+import time
+from pathlib import Path
+
+import pytest
+
+from cdpr_rt.service.stream_packet import REACH_M
+from tools.errors import BadInputError
+from tools.teleop.hand import Hand, HandDevice, parse_scale
+from tools.teleop.keyboard import Keyboard, Keys, STEPS_mm
+from tools.teleop.script import ScriptHand, read_script
+
+UP, DOWN, RIGHT, LEFT = "\x1b[A", "\x1b[B", "\x1b[C", "\x1bOD"
+TICK_S = 1.0 / 60.0
+
+
+@pytest.mark.parametrize(
+    ("text", "scale"), [("8:1", 8.0), ("1:4", 0.25), ("2", 2.0), ("0.5", 0.5), ("3:2", 1.5)]
+)
+def test_a_scale_is_metres_of_the_robot_for_a_metre_of_the_hand(text: str, scale: float) -> None:
+    assert parse_scale(text) == scale
+
+
+@pytest.mark.parametrize("text", ["", "8:0", "0", "-2", "nan", "1e9", "8:1:1", "big", "inf:1"])
+def test_a_scale_that_cannot_be_is_refused(text: str) -> None:
+    with pytest.raises(BadInputError, match=r"--scale .*allowed: 0\.001 to 100"):
+        parse_scale(text)
+
+
+def script(folder: Path, text: str) -> Path:
+    path = folder / "a.script"
+    path.write_text(text)
+    return path
+
+
+def test_a_script_is_played_straight_between_its_lines(tmp_path: Path) -> None:
+    hand = ScriptHand(
+        read_script(
+            script(
+                tmp_path,
+                "# a way\n0 5 5\n1.0 15 5  # ten on\n1.5 15 5 confirm\n2 15 25 clutch\n\n"
+                "3 5 5 confirm",
+            )
+        )
+    )
+    begin = 77.0
+    seen = {t: hand.read(begin + t) for t in (0.0, 0.5, 1.0, 1.4, 1.5, 1.99, 2.5, 3.0, 9.0)}
+    # positions count from the first line's, wherever the hand really is
+    for t, (x_mm, y_mm) in {
+        0.0: (0, 0), 0.5: (5, 0), 1.4: (10, 0), 2.5: (5, 10), 3.0: (0, 0), 9.0: (0, 0)
+    }.items():  # fmt: skip
+        assert seen[t].position_m == pytest.approx((1e-3 * x_mm, 1e-3 * y_mm), abs=1e-12)
+    assert [seen[t].confirmed for t in (1.4, 1.5, 2.5, 3.0)] == [0, 1, 1, 2]
+    assert [seen[t].clutch for t in (1.5, 1.99, 2.5, 3.0)] == [False, False, True, False]
+    assert seen[2.5].end is None
+    end = seen[3.0].end
+    assert end is not None and end.arrive and not end.failed
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "no lines; allowed: seconds x_mm y_mm"),
+        ("0 0", r"line 1: '0 0'; allowed: seconds x_mm y_mm \[clutch\]"),
+        ("0 0 0\n\n1 0 zero", "line 3: '1 0 zero'"),
+        ("0 0 0 clutsh", "line 1: 'clutsh'; allowed: clutch, confirm"),
+        ("1 0 0\n1 0 0", "line 2: 1 s; allowed: more than 1 s"),
+        ("-1 0 0", "line 1: -1 s; allowed: 0 and more"),
+        ("nan 0 0", "line 1: nan s"),
+        ("0 nan 0", "line 1: nan 0 mm; allowed: up to 20 m"),
+        ("0 0 30000", "line 1: 0 30000 mm"),
+    ],
+)
+def test_a_script_that_cannot_be_played_is_refused(tmp_path: Path, text: str, told: str) -> None:
+    path = script(tmp_path, text)
+    with pytest.raises(BadInputError, match=told) as refused:
+        read_script(path)
+    assert str(path) in str(refused.value)
+
+
+def test_what_is_no_script_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
+    for name in ("binary", "missing", "."):
+        with pytest.raises(BadInputError, match="cannot be read"):
+            read_script(tmp_path / name)
+
+
+def test_each_press_is_a_step_and_nothing_moves_without() -> None:
+    keys = Keys(scale=8.0)
+    step = keys.step_m
+    for key in (RIGHT, RIGHT, UP, "d", LEFT, DOWN, "w"):
+        keys.press(key, TICK_S)
+    assert keys.position_m == pytest.approx((2 * step, step))
+    keys.press("+", TICK_S)
+    assert keys.step_m > step
+    for _ in range(20):
+        keys.press("-", TICK_S)
+    assert keys.step_m == 1e-3 * STEPS_mm[0]
+
+
+def test_keys_that_come_in_pieces_are_understood() -> None:
+    keys = Keys(scale=1.0)
+    step = keys.step_m
+    for piece in ("\x1b", "[", "C", "\x1b[", "C", "\x1b", "\x1b[C", "\x1b[1;5C\x1b[3~", "x\x1bOC"):
+        keys.press(piece, TICK_S)
+    assert keys.position_m == pytest.approx((4 * step, 0.0))  # not for Ctrl-right and Delete
+
+
+def test_space_holds_enter_confirms_q_ends() -> None:
+    keys = Keys(scale=1.0)
+    keys.press(" ", TICK_S)
+    assert keys.clutch
+    keys.press(RIGHT, TICK_S)
+    assert keys.position_m == (0.0, 0.0)
+    keys.press(" \r" + "\n", TICK_S)
+    assert not keys.clutch
+    assert keys.confirmed == 2
+    assert not keys.quit
+    keys.press("q", TICK_S)
+    assert keys.quit
+
+
+def test_keys_nobody_meant_do_not_carry_the_robot_away() -> None:
+    keys = Keys(scale=1.0)
+    keys.press(RIGHT * 500, 30.0)  # typed while the program stood still
+    assert 0.0 < keys.position_m[0] <= 7 * keys.step_m
+    pasted = Keys(scale=1.0)
+    pasted.press("dddddddddddddddddddd", TICK_S)
+    assert pasted.position_m[0] <= 2 * pasted.step_m
+
+
+def test_no_hand_goes_where_packets_are_refused() -> None:
+    keys = Keys(scale=100.0)
+    for _ in range(10):
+        keys.press("+", TICK_S)
+    for _ in range(200):
+        keys.press(LEFT, TICK_S)
+    assert keys.position_m[0] < -0.1
+    assert 100.0 * math.hypot(*keys.position_m) < REACH_M
+
+
+def read_soon(device: HandDevice, what: str) -> Hand:
+    """Read until something is true of the hand: terminals pass bytes on in their own time."""
+    end = time.monotonic() + 5.0
+    while not getattr(hand := device.read(time.monotonic()), what):
+        assert time.monotonic() < end, hand
+        time.sleep(0.005)
+    return hand
+
+
+def test_a_terminal_leads_and_is_given_back_as_it_was() -> None:
+    ours, its = pty.openpty()
+    before = termios.tcgetattr(its)
+    device = Keyboard(1.0, its)
+    during = termios.tcgetattr(its)
+    assert not during[3] & (termios.ECHO | termios.ICANON)
+    assert during[3] & termios.ISIG  # Ctrl-C stays what it is
+    os.write(ours, RIGHT.encode())
+    time.sleep(0.05)
+    os.write(ours, b"\n")
+    hand = read_soon(device, "confirmed")
+    assert hand.position_m[0] > 0.0
+    assert not hand.clutch and hand.end is None
+    still = device.read(time.monotonic())
+    assert still.position_m == hand.position_m
+    device.close()
+    assert termios.tcgetattr(its) == before
+    os.close(ours)
+    os.close(its)
+
+
+def test_a_terminal_that_goes_away_ends_it() -> None:
+    ours, its = pty.openpty()
+    device = Keyboard(1.0, its)
+    os.close(ours)
+    end = read_soon(device, "end").end
+    assert end is not None and end.failed and "terminal is gone" in end.text
+    device.close()
+    os.close(its)
+
+
+def test_what_is_no_terminal_is_refused() -> None:
+    reading, writing = os.pipe()
+    with pytest.raises(BadInputError, match="standard input is no terminal"):
+        Keyboard(1.0, reading)
+    os.close(reading)
+    os.close(writing)
