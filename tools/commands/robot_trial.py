@@ -78,6 +78,8 @@ def trial(
         if out_dir is None:
             raise BadInputError("--again: needs --out, the folder of a trial that was run")
         result = trials.judge(out_dir)
+        if result["kind"] != kind.value:
+            raise BadInputError(f"{out_dir}: holds a trial of {result['kind']}, not {kind}")
     else:
         profile = load_robot(robot)
         name = f"trial-{profile.profile}-{kind}-{time.strftime('%Y%m%d-%H%M%S')}"

@@ -77,6 +77,9 @@ def judge(parts: dict[str, Recorded]) -> list[Figure]:
                 f"setpoint_{part}_mm", f"RMS distance from the set-point, {names[part]}", off, "mm"
             ),
         ]
+    for part, recorded in parts.items():
+        text = f"of it, about its mean on each line, {names[part]}"
+        figures.append(Figure(f"ripple_{part}_mm", text, _ripple_mm(recorded), "mm"))
     if len(rms) == len(names):
         texts = ("path_ratio", "line"), ("setpoint_ratio", "set-point")
         for i, (key, what) in enumerate(texts):
@@ -84,3 +87,9 @@ def judge(parts: dict[str, Recorded]) -> list[Figure]:
             text = f"distance from the {what}, without over with"
             figures.append(Figure(key, text, ratio, "", RATIO, at_least=True))
     return figures
+
+
+def _ripple_mm(recorded: Recorded) -> float:
+    """Return the root mean square of the distance from the lines less its mean on each."""
+    rest = [across - across.mean() for _, across, _ in path_errors(recorded)]
+    return float(np.sqrt(np.mean(np.concatenate(rest) ** 2)))

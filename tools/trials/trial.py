@@ -13,10 +13,11 @@ from matplotlib.figure import Figure as Picture
 from profiles import Robot, load_robot
 from tools.errors import BadInputError
 from tools.output import Output, to_json
+from tools.robots.checks import refuse_impossible
 from tools.trials import limits, line, pictures, streaming, targets
 from tools.trials.figures import Figure, all_reached
 from tools.trials.recorded import Recorded
-from tools.trials.run import TrialRun, trial_run
+from tools.trials.run import TrialRun, platform_of, trial_run
 
 ASKED, PICTURE, FIGURES = "trial.json", "trial.png", "figures.json"
 _ONE: Final = "run"
@@ -99,6 +100,8 @@ def perform(asked: Asked, folder: Path, out: Output) -> dict[str, Any]:
     """Run a trial, recorded in `folder`, and judge it; return what `judge` does."""
     kind = KINDS[asked.kind]
     robot = load_robot(asked.robot)
+    platform_of(robot)
+    refuse_impossible(robot)
     knows = asked.commissioned is not None or any(axis.commissioned for axis in robot.axes)
     if kind.fixed and asked.compensated and not knows:
         raise BadInputError(
