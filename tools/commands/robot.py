@@ -12,7 +12,8 @@ from tools.commands import robot_trial
 from tools.commands.options import JsonOption
 from tools.errors import BAD_INPUT, BadInputError
 from tools.output import Output
-from tools.robots import checks, summary
+from tools.robots import checks, new_robot, summary
+from tools.robots.questions import Question
 
 app = typer.Typer(help="Describe a cable robot, look at it, try it.", no_args_is_help=True)
 
@@ -54,9 +55,7 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
         _draw(profile, png, out)
     found = checks.findings(profile)
     out.say("")
-    for finding in found:
-        kind = "impossible" if finding.impossible else "mind"
-        out.say(f"{kind}: {finding.key}: {finding.text}")
+    _say_findings(out, found)
     if not found:
         out.say("nothing to object to" if "held_share" in told else _UNKNOWN)
     told["findings"] = [{"key": f.key, "text": f.text, "impossible": f.impossible} for f in found]
@@ -64,6 +63,71 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
     out.result({"ok": possible, **told})
     if not possible:
         raise typer.Exit(BAD_INPUT)
+
+
+@app.command()
+def new(
+    path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
+    answers: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="An answer beforehand; several times."),
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Take the defaults for all that is not answered.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Ask what is to be known of a planar robot on three cables, and write its file.
+
+    Each question has a default, most of them following from the answers before. Never writes over
+    a file. Ends with status 2 where the robot that was described cannot work.
+    """
+    out = Output(as_json)
+    if path.suffix != ".toml" or path.exists() or not path.parent.is_dir():
+        raise BadInputError(f"{path}: allowed: NAME.toml, not there yet, in a folder that is there")
+    given = dict(_key_and_value(text) for text in answers or ())
+    told = new_robot.answers_of(path, given, _default if yes else _ask)
+    profile = new_robot.write_robot(told, path)
+    out.say(f"{path}: written")
+    impossible = [finding for finding in checks.findings(profile) if finding.impossible]
+    _say_findings(out, checks.findings(profile))
+    out.say(f"next: cdpr robot show {path}")
+    if not impossible:
+        out.say(f"      cdpr run {path} --bus simbus:      # on simulated winches")
+    out.result({"ok": not impossible, "file": str(path)})
+    if impossible:
+        raise typer.Exit(BAD_INPUT)
+
+
+def _key_and_value(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise BadInputError(f"--set {text}: allowed: KEY=VALUE")
+    return key.strip(), value.strip()
+
+
+def _default(question: Question, default: str, problem: str) -> str:
+    if problem:
+        raise BadInputError(f"{question.key}: {problem}; answer it with --set")
+    return default
+
+
+def _ask(question: Question, default: str, problem: str) -> str:
+    if problem:
+        typer.echo(f"  {problem}", err=True)
+    try:
+        return str(typer.prompt(question.text, default=default, err=True))
+    except typer.Abort:
+        typer.echo(err=True)  # the question's line is not at its end
+        raise BadInputError(
+            f"no answer to {question.key!r} (--yes takes the defaults); nothing was written"
+        ) from None
+
+
+def _say_findings(out: Output, found: list[checks.Finding]) -> None:
+    for finding in found:
+        kind = "impossible" if finding.impossible else "mind"
+        out.say(f"{kind}: {finding.key}: {finding.text}")
 
 
 _UNKNOWN = "not checked: tensions are known of planar robots with three cables only"

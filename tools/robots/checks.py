@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.runtime.robot_arrays import limits_of
 from profiles import ProfileError, Robot
-from tools.robots.statics import PlanarStatics, can_be_computed
+from tools.robots.statics import PlanarStatics, can_be_computed, statics_of
 
 _GRID = 25
 _NEAREST_m = 0.1
@@ -35,7 +35,7 @@ def findings(robot: Robot) -> list[Finding]:
     """Return what is impossible or doubtful about a robot's platform, the worst first."""
     if robot.platform is None or not can_be_computed(robot):
         return []
-    statics = PlanarStatics(robot)
+    statics = statics_of(robot)
     found = list(_shape(robot, statics))
     if not any(finding.impossible for finding in found):
         # with points that cannot be meant, tensions and torques only repeat it
@@ -196,7 +196,7 @@ def _turning(statics: PlanarStatics) -> Iterator[Finding]:
         text = (
             f"at {_point(places[worst])} m the platform turns by "
             f"{abs(math.degrees(angle[worst])):.0f} deg, which no cable can prevent; anchor points "
-            "closer together turn it less"
+            "that lie towards their exit points let it turn less"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
 

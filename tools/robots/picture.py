@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 import tools.report.style  # noqa: F401 - how the project's pictures look
 from profiles import Robot
 from profiles.platform import Platform
-from tools.robots.statics import Box, PlanarStatics, can_be_computed, view_of
+from tools.robots.statics import Box, PlanarStatics, can_be_computed, statics_of, view_of
 
 _CABLE, _PLATFORM, _TARGETS = "#444444", "#d1581a", "#7a3fa0"
 _WIDE_in = 7.4
@@ -30,7 +30,7 @@ def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
     figure = Figure(figsize=(_WIDE_in, _WIDE_in * height / width * 0.9), layout="constrained")
     ax = figure.subplots()
     if can_be_computed(robot):
-        _draw_workspace(figure, ax, PlanarStatics(robot), shown)
+        _draw_workspace(figure, ax, statics_of(robot), shown)
     _draw_machine(ax, robot, platform)
     (left, right), (bottom, top) = zip(shown.low_m, shown.high_m, strict=True)
     ax.set(title=robot.name, xlabel="x (m)", ylabel="y (m)", aspect="equal")

@@ -57,24 +57,31 @@ def view_of(platform: Platform) -> Box:
     )
 
 
+def statics_of(robot: Robot) -> PlanarStatics:
+    """Return the statics of a robot that `can_be_computed`, within its limits."""
+    platform, limits = robot.platform, limits_of(robot)
+    assert platform is not None
+    low, high = (
+        np.broadcast_to(bound, (CABLES,)).astype(float)
+        for bound in (limits.tension_min_N, limits.tension_max_N)
+    )
+    return PlanarStatics(platform, low, high)
+
+
 class PlanarStatics:
     """Tensions of a planar robot with three cables, wherever its platform stands.
 
     After Tremblay (thesis), eqs. (2.13) to (2.19), for whole arrays of positions (..., 2), m.
-    Gravity is along -y. The robot must be one that `can_be_computed`.
+    Gravity is along -y.
     """
 
-    def __init__(self, robot: Robot) -> None:
-        platform = robot.platform
-        assert platform is not None
-        limits = limits_of(robot)
-        shape = (CABLES,)
-        self.platform: Platform = platform
+    def __init__(self, platform: Platform, low_N: FloatArray, high_N: FloatArray) -> None:
+        """Take the bounds of the tensions, (3,) each."""
+        self.platform = platform
         self.geometry = PlanarGeometry(
             np.array(platform.exit_points_m), np.array(platform.anchor_points_m)
         )
-        self.low_N = np.broadcast_to(limits.tension_min_N, shape)
-        self.high_N = np.broadcast_to(limits.tension_max_N, shape)
+        self.low_N, self.high_N = low_N, high_N
         self.box = Box(_pair(platform.workspace_min_m), _pair(platform.workspace_max_m))
 
     def reserve_N(
@@ -159,12 +166,17 @@ class PlanarStatics:
 
     def _line(self, position_m: FloatArray, force_N: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return t0 and u, (..., 3) each: all tensions that exert the force are t0 + k·u."""
-        W = -np.swapaxes(self.geometry.jacobian(position_m), -1, -2)
-        u = np.cross(W[..., 0, :], W[..., 1, :])
-        size = np.linalg.norm(u, axis=-1, keepdims=True)
+        cables = self.geometry.a - np.asarray(position_m, float)[..., None, :] - self.geometry.b
         with np.errstate(divide="ignore", invalid="ignore"):
+            W = np.swapaxes(cables / np.linalg.norm(cables, axis=-1, keepdims=True), -1, -2)
+            x, y = W[..., 0, :], W[..., 1, :]
+            u = np.cross(x, y)
+            size = np.linalg.norm(u, axis=-1, keepdims=True)
             u = u / size * np.where(u.sum(axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-        t0 = np.linalg.pinv(W) @ force_N
+            # Wᵀ (W Wᵀ)^-1 f, with det(W Wᵀ) = |x × y|^2
+            xx, xy, yy = ((a * b).sum(axis=-1) for a, b in ((x, x), (x, y), (y, y)))
+            zx, zy = yy * force_N[0] - xy * force_N[1], xx * force_N[1] - xy * force_N[0]
+            t0 = (x * zx[..., None] + y * zy[..., None]) / size**2
         return np.where(size > 1e-9, t0, np.nan), u
 
     def _best(

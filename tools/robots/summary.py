@@ -12,7 +12,7 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.runtime.robot_arrays import limits_of
 from profiles import Robot
 from profiles.platform import Platform
-from tools.robots.statics import PlanarStatics, can_be_computed, view_of
+from tools.robots.statics import can_be_computed, statics_of, view_of
 
 _GRID = 25
 _COLUMNS, _ROWS = 65, 23
@@ -40,7 +40,7 @@ def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
 def _of_tensions(
     robot: Robot, platform: Platform, axes: Sequence[dict[str, Any]]
 ) -> dict[str, Any]:
-    statics, limits = PlanarStatics(robot), limits_of(robot)
+    statics, limits = statics_of(robot), limits_of(robot)
     home, points = np.array(platform.home_m), statics.box.grid(_GRID, _GRID)
     still, moving = (
         statics.reserve_N(points, acceleration)
@@ -124,7 +124,7 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     points = shown.grid(columns, rows)
     known = can_be_computed(robot)
     if known:
-        cells[PlanarStatics(robot).reserve_N(points) >= 0.0] = "."
+        cells[statics_of(robot).reserve_N(points) >= 0.0] = "."
     box = (points >= np.array(platform.workspace_min_m)).all(axis=-1)
     box &= (points <= np.array(platform.workspace_max_m)).all(axis=-1)
     cells[box & (cells == ".")] = "#"

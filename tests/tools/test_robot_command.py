@@ -1,0 +1,188 @@
+"""`cdpr robot show` and `new`: what they tell, draw, write and refuse."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from profiles import load_robot
+from profiles.catalogue import SHIPPED
+from tools.robots.checks import findings
+from tools.robots.statics import statics_of
+
+PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
+
+
+def cdpr(
+    *arguments: str | Path, answers: str = "", cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+    environment = os.environ | {"COLUMNS": "100", "PYTHONPATH": str(SHIPPED.parents[0])}
+    return subprocess.run(
+        command, input=answers, capture_output=True, text=True, timeout=120, cwd=cwd,
+        env=environment, check=False,
+    )  # fmt: skip
+
+
+def as_json(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert isinstance(told, dict)
+    return told
+
+
+# -- show
+
+
+def test_the_planar_robot_is_told_sketched_and_drawn(tmp_path: Path) -> None:
+    picture = tmp_path / "planar.png"
+    shown = cdpr("robot", "show", "planar-3", "--png", picture, "--json")
+    assert shown.returncode == 0, shown.stderr
+    told = as_json(shown)
+    assert told["ok"] is True and told["findings"] == []
+    assert told["held_share"] == 1.0 and told["reserve_in_motion_N"] > 18.0  # type: ignore[operator]
+    lines = shown.stderr.splitlines()
+    assert any("hold it in 100 % of the box at rest" in line for line in lines)
+    assert any("nothing to object to" in line for line in lines)
+    # exit points where they are, the box of targets full, the stand under it
+    first = next(i for i, line in enumerate(lines) if line.strip().startswith("1  "))
+    assert lines[first].split() == ["1", "2"]
+    home = next(line for line in lines[first:] if "o" in line)
+    left, right = lines[first].index("1"), lines[first].index("2")
+    assert home.index("o") == (left + right) // 2
+    assert sum(line.count("#") for line in lines[first:]) > 80
+    assert not any("!" in line for line in lines[first:] if "targets" not in line)
+    image = matplotlib.image.imread(picture)
+    assert image.shape[0] > 400 and image.shape[1] > 800
+    assert len(np.unique(image.reshape(-1, image.shape[2]), axis=0)) > 200  # not a blank page
+
+
+def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) -> None:
+    path = tmp_path / "heavy.toml"
+    path.write_text(PLANAR.replace("mass_kg = 2.0", "mass_kg = 20.0"))
+    shown = cdpr("robot", "show", path, "--json")
+    assert shown.returncode == 2
+    assert "impossible: platform.home_m: at (0.00, 1.30) m the cables would need" in shown.stderr
+    assert re.search(r"a platform of up to 17\.\d kg could be held there", shown.stderr)
+    assert "!!!" in shown.stderr
+    told = as_json(shown)
+    assert told["ok"] is False and told["held_share"] == 0.0
+    # and it is not run either
+    run = cdpr("run", path, "--bus", "simbus:", "--json")
+    assert run.returncode == 2
+    assert f"{path}: platform.home_m: at (0.00, 1.30) m" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["spatial-8"], "this robot has none"),
+        (["planar-4"], "did you mean 'planar-3'?"),
+        (["planar-3", "--png", "/nowhere/robot.png"], "No such file or directory"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_clear_line(arguments: list[str], problem: str) -> None:
+    shown = cdpr("robot", "show", *arguments)
+    assert shown.returncode == 2
+    (line,) = shown.stderr.strip().splitlines()
+    assert line.startswith("cdpr: ") and problem in line
+
+
+# -- new
+
+
+def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    done = cdpr("robot", "new", path, "--yes", "--json")
+    assert done.returncode == 0, done.stderr
+    assert as_json(done) == {"ok": True, "file": str(path)}
+    robot = load_robot(path)
+    assert robot.name == "mine" and findings(robot) == []
+    assert [axis.name for axis in robot.axes] == ["upper left", "upper right", "lower"]
+    platform, shipped = robot.platform, load_robot("planar-3").platform
+    assert platform is not None and shipped is not None
+    assert platform.exit_points_m == shipped.exit_points_m
+    np.testing.assert_allclose(platform.anchor_points_m, shipped.anchor_points_m, atol=1e-4)
+    statics = statics_of(robot)
+    spare = 0.1 * (statics.high_N - statics.low_N).min()
+    points = statics.box.grid(21, 21)
+    assert statics.reserve_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
+    again = cdpr("robot", "new", path, "--yes")
+    assert again.returncode == 2 and "not there yet" in again.stderr
+    assert load_robot(path) == robot
+
+
+def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
+    answers = ["Wall robot", "winch-mpp0932d", "", "socketcan:can1", "1, 1, 2", "4 5 6", "3, 2.5"]
+    answers += ["", "", "here", "0.1, 0.1", "-1", "0.2", "", "", "", "1.5", "400", "4", "15"]
+    answers += ["10", "140", "", "", "", "-5, 0", "0.3, 1.9", "9, 9", ""]
+    path = tmp_path / "wall.toml"
+    done = cdpr("robot", "new", path, answers="\n".join(answers) + "\n")
+    assert done.returncode == 0, done.stderr
+    for problem in (
+        "did you mean 'winch-mpp0923d'?",
+        "allowed: 3 different numbers from 1 to 126",
+        "value 'here'; allowed: two numbers in m",
+        "allowed: a number from 0 to 10",
+        "allowed: a number from 0.001 to 11.55",
+        "allowed: a number from 15 to",
+        "allowed: right of -0",
+        "allowed: x from -0",
+    ):
+        assert problem in done.stderr, problem
+    robot = load_robot(path)
+    platform = robot.platform
+    assert platform is not None
+    assert (robot.name, robot.buses[0].url) == ("Wall robot", "socketcan:can1")
+    assert [axis.node_id for axis in robot.axes] == [4, 5, 6]
+    assert platform.exit_points_m == ((-1.5, 2.5), (1.5, 2.5), (0.1, 0.1))
+    assert platform.workspace_max_m == (0.3, 1.9)
+    assert (robot.limits.tension_min_N, robot.limits.tension_max_N) == ((15.0,), (140.0,))
+    assert platform.mass_kg == 1.5
+
+
+def test_questions_nobody_answers_write_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    done = cdpr("robot", "new", path, answers="Mine\n\n")
+    assert done.returncode == 2
+    assert "no answer to 'bus' (--yes takes the defaults); nothing was written" in done.stderr
+    assert "Traceback" not in done.stderr and not path.exists()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        ("mass=2", "--set mass: no such question; allowed: name, winch,"),
+        ("mass_kg", "--set mass_kg: allowed: KEY=VALUE"),
+        ("mass_kg=nan", "--set mass_kg: value 'nan'; allowed: a number from 0.01 to 10000"),
+        ("exit_1_m=1,2,3", "--set exit_1_m: value '1,2,3'; allowed: two numbers"),
+    ],
+)
+def test_wrong_answers_beforehand_are_refused(tmp_path: Path, wrong: str, problem: str) -> None:
+    done = cdpr("robot", "new", tmp_path / "mine.toml", "--yes", "--set", wrong)
+    assert done.returncode == 2 and problem in done.stderr
+    assert not (tmp_path / "mine.toml").exists()
+
+
+def test_what_cannot_work_is_written_and_told(tmp_path: Path) -> None:
+    path = tmp_path / "point.toml"
+    line = ["exit_1_m=-1,2", "exit_2_m=0,2", "exit_3_m=1,2", "side_m=0", 'name=A "line" é']
+    done = cdpr("robot", "new", path, "--yes", *(p for text in line for p in ("--set", text)))
+    assert done.returncode == 2
+    assert "\nimpossible: platform." in done.stdout and "cdpr run" not in done.stdout
+    assert load_robot(path).name == 'A "line" é'
+
+
+def test_a_file_can_only_be_new_toml_in_a_folder(tmp_path: Path) -> None:
+    for name in ("mine.json", "nowhere/mine.toml"):
+        done = cdpr("robot", "new", tmp_path / name, "--yes")
+        assert done.returncode == 2
+        assert "allowed: NAME.toml, not there yet, in a folder that is there" in done.stderr

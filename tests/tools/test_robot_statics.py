@@ -1,0 +1,196 @@
+"""What a planar robot's cables can hold: against linear programming, statics and the controller."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from cdpr_rt.robots.planar_tensions import PlanarTensions
+from profiles import ProfileError, load_robot
+from profiles.catalogue import SHIPPED
+from tools.robots.checks import findings, refuse_impossible
+from tools.robots.statics import Box, PlanarStatics, statics_of
+
+PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
+UP = np.array([0.0, 9.80665])
+LOW, HIGH = np.full(3, 20.0), np.full(3, 150.0)
+
+
+def shipped() -> PlanarStatics:
+    return statics_of(load_robot("planar-3"))
+
+
+def by_linear_programming(statics: PlanarStatics, p: np.ndarray, a: np.ndarray) -> float:
+    """Return the greatest distance of all tensions from their bounds: another way to the same."""
+    ways = statics.geometry.a - p - statics.geometry.b
+    W = (ways / np.linalg.norm(ways, axis=1)[:, None]).T
+    force = statics.platform.mass_kg * (a + UP)
+    bounds = np.concatenate([-statics.low_N, statics.high_N])
+    rows = np.hstack([np.concatenate([-np.eye(3), np.eye(3)]), np.ones((6, 1))])
+    found = linprog(
+        [0.0, 0.0, 0.0, -1.0],
+        A_ub=rows, b_ub=bounds, A_eq=np.hstack([W, np.zeros((2, 1))]), b_eq=force,
+        bounds=[(None, None)] * 4,
+    )  # fmt: skip
+    assert found.success
+    return float(-found.fun)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.floats(-1.9, 1.9), st.floats(0.05, 2.9), st.floats(-5, 5), st.floats(-5, 5))
+def test_the_reserve_is_what_linear_programming_finds(
+    x: float, y: float, ax: float, ay: float
+) -> None:
+    statics, p, a = shipped(), np.array([x, y]), np.array([ax, ay])
+    tensions, reserve = statics._best(p, statics._force_N(a))
+    assert reserve == pytest.approx(by_linear_programming(statics, p, a), abs=1e-6)
+    ways = statics.geometry.a - p - statics.geometry.b
+    pull = tensions @ (ways / np.linalg.norm(ways, axis=1)[:, None])
+    np.testing.assert_allclose(pull, statics.platform.mass_kg * (a + UP), atol=1e-9)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.floats(-2.2, 2.2), st.floats(-0.5, 3.3))
+def test_what_can_be_held_is_what_the_controller_distributes(x: float, y: float) -> None:
+    statics, p = shipped(), np.array([x, y])
+    weight = np.array([0.0, -9.80665 * statics.platform.mass_kg])
+    t, missing = PlanarTensions(LOW, HIGH).distribute(statics.geometry.jacobian(p), weight)
+    reserve = float(statics.reserve_N(p))
+    if abs(reserve) > 1e-6:
+        assert (missing == "") == (reserve > 0.0)
+    if reserve > 1e-6:
+        least = statics.least_tensions_N(p)
+        assert (least >= LOW - 1e-6).all() and least.sum() <= t.sum() + 1e-6
+
+
+def test_in_motion_the_worst_direction_counts_and_arrays_keep_their_shape() -> None:
+    statics, points = shipped(), shipped().box.grid(4, 3)
+    assert points.shape == (3, 4, 2)
+    moving = statics.reserve_N(points, 2.0)
+    worst = [
+        min(
+            by_linear_programming(statics, p, np.array([i, j]))
+            for i in (-2.0, 2.0)
+            for j in (-2.0, 2.0)
+        )
+        for p in points.reshape(-1, 2)
+    ]
+    np.testing.assert_allclose(moving.ravel(), worst, atol=1e-6)
+
+
+def test_the_platform_turns_to_where_the_tensions_have_no_moment() -> None:
+    statics = shipped()
+    p = np.array([0.5, 1.5])
+    angle, t = float(statics.angle_rad(p)), statics.tensions_N(p)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    arms = statics.geometry.b @ turn.T
+    ways = statics.geometry.a - p - arms
+    pulls = t[:, None] * ways / np.linalg.norm(ways, axis=1)[:, None]
+    assert np.sum(arms[:, 0] * pulls[:, 1] - arms[:, 1] * pulls[:, 0]) == pytest.approx(0, abs=1e-9)
+    assert statics.angle_rad(p * [-1, 1]) == pytest.approx(-angle)
+    assert 1e-3 < abs(angle) < 0.1
+
+
+def test_the_largest_box_holds_everywhere_and_no_wider_one_does() -> None:
+    statics = shipped()
+    found = statics.largest_box(Box((-2.0, 0.0), (2.0, 3.0)), 15.0, 2.0)
+    assert found is not None
+    assert statics.reserve_N(found.grid(41, 41), 2.0).min() > 14.0
+    wider = Box((found.low_m[0] - 0.15, found.low_m[1]), (found.high_m[0] + 0.15, found.high_m[1]))
+    assert statics.reserve_N(wider.grid(41, 41), 2.0).min() < 15.0
+    assert statics.largest_box(Box((-2.0, 0.0), (2.0, 3.0)), 200.0, 2.0) is None
+
+
+def test_a_platform_that_is_a_point_does_not_turn_and_may_sit_in_an_exit_point() -> None:
+    platform = dataclasses.replace(shipped().platform, anchor_points_m=((0.0, 0.0),) * 3)
+    statics = PlanarStatics(platform, LOW, HIGH)
+    assert statics.angle_rad(np.array([0.3, 1.5])) == 0.0
+    at_exits = statics.reserve_N(np.array(platform.exit_points_m))
+    assert (at_exits == -np.inf).all()
+
+
+# -- checks
+
+
+def told_of(folder: Path, *replaced: tuple[str, str]) -> list[tuple[str, str, bool]]:
+    text = PLANAR
+    for old, new in replaced:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "mine.toml"
+    path.write_text(text)
+    return [(f.key, f.text, f.impossible) for f in findings(load_robot(path))]
+
+
+def test_the_shipped_robot_is_held_with_a_reserve_in_its_whole_box() -> None:
+    robot, statics = load_robot("planar-3"), shipped()
+    assert findings(robot) == [] and refuse_impossible(robot) == []
+    points = statics.box.grid(31, 31)
+    assert statics.reserve_N(points, statics.platform.acceleration_m_s2).min() > 18.0
+    assert findings(load_robot("spatial-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("replaced", "key", "problem", "impossible"),
+    [
+        ([("mass_kg = 2.0", "mass_kg = 60.0")], "platform.home_m", "up to 17.4 kg could", True),
+        ([("mass_kg = 2.0", "mass_kg = 15.0")], "platform.workspace_min_m", "in 17 % of", False),
+        ([("[0.0, 1.3]", "[0.5, 0.3]")], "platform.home_m", "tension_min_N up to 5.8", True),
+        ([("[0.0, 1.3]", "[0.6, -0.5]")], "platform.home_m", "N outside of", True),
+        ([("[-0.6, 1.4]", "[-0.6, 0.9]")], "platform.workspace_min_m", "to (0.60, 2.40) m", False),
+        ([("n_m_s2 = 2.0", "n_m_s2 = 30")], "platform.acceleration_m_s2", "30 m/s2 along", False),
+        ([("torque_Nm = 4.5", "torque_Nm = 2.5")], "limits.tension_max_N", "up to 96 N", True),
+        ([("speed_m_s = 0.5", "speed_m_s = 5")], "platform.speed_m_s", "allowed: up to 1.9", True),
+        ([("[-0.075, 0.0433]", "[-75.0, 43.3]")], "axes[0].anchor_point_m", "in millimetres", True),
+        ([("[0.0, 0.0]", "[2.0, 3.0]")], "axes[2].exit_point_m", "0 m from that of axes[1]", True),
+        ([("[0.0, 0.0]", "[0.0, 3.0]")], "platform.home_m", "could be held there", True),
+        ([("[-2.0, 3.0]", "[-0.5, 2.0]")], "platform.workspace_min_m", "from the exit point", True),
+        (
+            [("slack_N", "cable_length_max_m = 2.5\nslack_N")],
+            "limits.cable_length_max_m",
+            "axes[0] has 2.97 m",
+            True,
+        ),
+        (
+            [("torque_Nm = 4.5", "torque_Nm = 11.0"), ("max_N = 150", "max_N = 400"),
+             ("[0.6, 2.4]", "[0.6, 2.8]")],
+            "platform.workspace_max_m",
+            "its motor bears 4.03 Nm for long",
+            False,
+        ),
+        (
+            [("[-0.075, 0.0433]", "[0.0751, 0.0433]"), ("[0.075, 0.0433]", "[-0.075, 0.0433]")],
+            "axes[0].anchor_point_m",
+            "turn the platform over",
+            True,
+        ),
+        (
+            [("[-0.075, 0.0433]", "[-0.075, 0.0]"), ("[0.075, 0.0433]", "[0.075, 0.0]"),
+             ("[0.0, -0.0866]", "[0.0, -0.3]")],
+            "axes[0].anchor_point_m",
+            "which no cable can prevent",
+            False,
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_work_is_told_with_what_would(
+    tmp_path: Path, replaced: list[tuple[str, str]], key: str, problem: str, impossible: bool
+) -> None:
+    told = told_of(tmp_path, *replaced)
+    about = [(text, bad) for found, text, bad in told if found == key]
+    assert about, told
+    assert any(problem in text and bad is impossible for text, bad in about), about
+    robot = load_robot(tmp_path / "mine.toml")
+    if impossible:
+        with pytest.raises(ProfileError, match=r"mine\.toml: ") as caught:
+            refuse_impossible(robot)
+        assert f"{key}: " in str(caught.value)
+    else:
+        assert any(f"{key}: " in line for line in refuse_impossible(robot))
