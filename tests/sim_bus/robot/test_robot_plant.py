@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -46,3 +47,20 @@ def test_a_single_motors_plant_is_refused(tmp_path: Path) -> None:
         RobotPlant.load_file(path)
     path.write_text("[motor.load]\ninertia_kg_m2 = 1e-4\n[motor.friction]\ncoulomb_Nm = 0.1\n")
     RobotPlant.load_file(path).require_fit(3, 2)
+
+
+def test_the_page_shows_the_defaults_and_a_plant_that_works(tmp_path: Path) -> None:
+    page = Path(__file__).parents[3] / "docs" / "simulated-robot.md"
+    shown, other = re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL)
+    path = tmp_path / "plant.toml"
+    path.write_text(shown)
+    default = RobotPlant()
+    assert RobotPlant.load_file(path) == default
+    for section in ("platform", "geometry", "cables", "winding", "start", "floor", "variation"):
+        for key in type(getattr(default, section)).model_fields:
+            assert f"\n{key} = " in shown or f"\n# {key} = " in shown, f"{section}.{key}"
+    path.write_text(other)
+    worse = RobotPlant.load_file(path)
+    worse.require_fit(3, 2)
+    assert worse.geometry.anchor_errors_m[2] == (0.001, 0.001)
+    assert [term.order for term in worse.motor_plants(3)[0].cogging] == [4, 24]
