@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from tools.commands import teleop_experiment
 from tools.commands.options import JsonOption
 from tools.daemon.client import KeyFileOption, SocketOption, UrlOption
 from tools.errors import BadInputError
@@ -48,6 +49,7 @@ class Device(StrEnum):
 
 def register(parent: typer.Typer) -> None:
     """Add the command group."""
+    teleop_experiment.add(app)
     parent.add_typer(app, name="teleop")
 
 

@@ -1,0 +1,203 @@
+"""The whole experiment: its sessions in processes side by side, and what comes of them."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from profiles import load_robot
+from tools.errors import BadInputError, CommandError, WorkFailedError
+from tools.experiment import figures
+from tools.experiment.path import centre_m
+from tools.experiment.points import Points, points_of_perfect_robot, points_of_session
+from tools.experiment.report import lines
+from tools.experiment.session import Asked, run_session
+from tools.experiment.statistics import rows, variance_analysis
+from tools.output import Output, to_json
+from tools.trials.run import platform_of
+
+ASKED: Final = "experiment.json"
+RESULT: Final = "result.json"
+_SESSIONS: Final = "sessions"
+_DONE: Final = "done"
+_SESSION_S: Final = 300.0
+"""What one session takes in the robot's time, for the progress shown."""
+
+
+def begin(asked: Asked, folder: Path) -> None:
+    """Make the folder of an experiment, or find in it what was begun with the same wishes.
+
+    Raises BadInputError where the robot has no room for the pattern, or the folder holds another
+    experiment.
+    """
+    robot = load_robot(asked.robot)
+    for place in asked.places:
+        centre_m(robot, place)
+    path = folder / ASKED
+    if path.exists():
+        if load(folder) != asked:
+            raise BadInputError(f"{path}: holds an experiment with other options; choose --out")
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise BadInputError(f"{folder}: not empty; allowed: a new folder, or an experiment's")
+        path.write_text(to_json(asked.as_dict(), indent=1), encoding="utf-8")
+    except OSError as error:
+        raise BadInputError(f"{folder}: {error.strerror}") from error
+
+
+def load(folder: Path) -> Asked:
+    """Return what the experiment in `folder` was asked for; raises BadInputError."""
+    path = folder / ASKED
+    try:
+        return Asked.of(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise BadInputError(f"{path}: not of an experiment: {error}") from error
+
+
+def perform(asked: Asked, folder: Path, jobs: int, out: Output) -> None:
+    """Run the sessions that are still to be run, `jobs` side by side.
+
+    One that fails ends the experiment when those under way have ended; raises its error then.
+    """
+    missing = [name for name in asked.sessions() if not (_session(folder, name) / _DONE).exists()]
+    total = len(asked.sessions())
+    if not missing:
+        return
+    out.note(f"{total - len(missing)} of {total} sessions are there; {jobs} side by side ...")
+    with _processes(jobs) as pool, out.progress("sessions", total * _SESSION_S) as advance:
+        waiting = {pool.submit(_perform_session, asked, folder, name): name for name in missing}
+        done, failed = total - len(missing), None
+        for future in as_completed(waiting):
+            error = _failure(future, waiting[future])
+            if error is not None and failed is None:
+                failed = error
+                for other in waiting:
+                    other.cancel()
+            done += error is None
+            advance(done * _SESSION_S)
+            out.note(f"{waiting[future]}: {error or 'done'}")
+    if failed is not None:
+        raise failed
+
+
+def _failure(future: Future[None], name: str) -> CommandError | None:
+    if future.cancelled():
+        return WorkFailedError(f"{name}: not begun")
+    error = future.exception()
+    if error is None or isinstance(error, CommandError):
+        return error
+    return WorkFailedError(f"{name}: {error}")
+
+
+@contextmanager
+def _processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _perform_session(asked: Asked, folder: Path, name: str) -> None:
+    session = _session(folder, name)
+    if session.exists():  # it was broken off
+        session.rename(_unused(session))
+    try:
+        run_session(asked, asked.sessions()[name], session)
+        points_of_session(session)
+    except CommandError:
+        raise
+    except Exception as error:  # whatever it is, it has to reach the other process
+        raise WorkFailedError(f"{name}: {error}") from error
+    (session / _DONE).touch()
+
+
+def _unused(session: Path) -> Path:
+    count = 1
+    while (broken := session.with_name(f"{session.name}.broken-{count}")).exists():
+        count += 1
+    return broken
+
+
+def _session(folder: Path, name: str) -> Path:
+    return folder / _SESSIONS / name
+
+
+def finished(asked: Asked, folder: Path) -> list[Path]:
+    """Return the folders of the sessions that have ended, in their order."""
+    sessions = (_session(folder, name) for name in asked.sessions())
+    return [session for session in sessions if (session / _DONE).exists()]
+
+
+def measured(sessions: Iterable[Path], jobs: int) -> Points:
+    """Return the targets confirmed in sessions, from their recordings; raises CommandError."""
+    with _processes(jobs) as pool:
+        return np.concatenate(list(pool.map(points_of_session, sessions)))
+
+
+def without_robot(asked: Asked) -> Points:
+    """Return what the same operator reaches with a perfect robot."""
+    robot = load_robot(asked.robot)
+    platform = platform_of(robot)
+    return np.concatenate(
+        [
+            points_of_perfect_robot(
+                platform,
+                centre_m(robot, condition.place),
+                condition,
+                asked.operator,
+                asked.station,
+                asked.seed,
+            )
+            for conditions in asked.sessions().values()
+            for condition in conditions
+        ]
+    )
+
+
+def operator_alone(asked: Asked) -> dict[str, Any]:
+    """Return the tables of the same operator with a perfect robot, with `lines` for people."""
+    points = without_robot(asked)
+    table = rows(points)
+    result: dict[str, Any] = {
+        **asked.as_dict(),
+        "rows": table,
+        "variance_analysis": variance_analysis(points),
+    }
+    return result | {"lines": lines(result)}
+
+
+def judge(folder: Path, jobs: int) -> dict[str, Any]:
+    """Compute tables and analysis of the sessions that have ended, and draw them.
+
+    Returns the result, with `lines` for people; it is kept beside the sessions. Raises
+    CommandError.
+    """
+    asked = load(folder)
+    sessions = finished(asked, folder)
+    if not sessions:
+        raise BadInputError(f"{folder}: no session has ended")
+    points, alone = measured(sessions, jobs), without_robot(asked)
+    table = rows(points)
+    compared = [row["reached"] for row in table if "reached" in row]
+    result: dict[str, Any] = {
+        **asked.as_dict(),
+        "sessions": f"{len(sessions)} of {len(asked.sessions())}",
+        "rows": table,
+        "operator_alone": rows(alone),
+        "variance_analysis": variance_analysis(points),
+        "reached": bool(compared) and all(compared),
+        "pictures": [str(path) for path in figures.draw(points, alone, folder)],
+    }
+    np.save(folder / "points.npy", points)
+    (folder / RESULT).write_text(to_json(result, indent=1), encoding="utf-8")
+    return result | {"lines": lines(result)}
