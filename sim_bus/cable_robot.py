@@ -157,6 +157,8 @@ class CableRobot:
         p["gravity"] = (0.0, -9.80665, 0.0) if planar else (0.0, 0.0, -9.80665)
         p["exit"][:n] = exits
         p["anchor"][:n] = anchors - com
+        longest = float(np.linalg.norm(p["anchor"][:n], axis=1).max())
+        p["mobility"] = (1.0 + (longest / reach) ** 2) / p["mass"]
         angle = math.radians(plant.start.angle_deg)
         cosine, sine = math.cos(angle), math.sin(angle)
         p["rotation"] = ((cosine, -sine, 0.0), (sine, cosine, 0.0), (0.0, 0.0, 1.0))

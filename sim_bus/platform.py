@@ -25,6 +25,7 @@ PLATFORM_DTYPE = np.dtype(
         ("gravity", _F8, (3,)),  # m/s2
         ("air", _F8),  # N s/m, and N m s/rad times `reach` squared
         ("reach", _F8),  # m
+        ("mobility", _F8),  # 1/kg, how much a force along any cable accelerates its anchor point
         ("exit", _F8, (MOST_CABLES, 3)),  # m, in the room
         ("com", _F8, (3,)),  # m, centre of mass from the origin, in the platform's frame
         ("anchor", _F8, (MOST_CABLES, 3)),  # m, from the centre of mass, in the platform's frame

@@ -10,21 +10,28 @@ from sim_bus.jit import jit
 from sim_bus.motor_state import CONTROL_STEP_S
 from sim_bus.platform import look_along_cables, step_platform
 
-_TIME, _RINGING = 1e-12, 0.15
+_TIME, _RINGING, _DYING = 1e-12, 0.15, 0.4
+_MOST_PARTS = 400
 
 
 @jit
-def steps_within(motors: Any, h: float) -> int:
-    """Return into how many steps to divide `h` so that the stiffest cable's rotor does not ring.
+def steps_within(motors: Any, mobility: float, h: float) -> int:
+    """Return into how many steps to divide `h` so that nothing on the stiffest cable rings.
 
-    A rotor on a cable swings at sqrt(EA c² / (l J)), c the cable it pays out per radian.
+    A rotor on a cable swings at sqrt(EA c² / (l J)), c the cable it pays out per radian; the
+    platform on all of them, `mobility` (1/kg) being how lightly it gives way to one, at
+    sqrt(mobility EA / l), and their damping must not stop it more than once a step.
     """
-    most = 1
+    most, stiffness, damping = 1, 0.0, 0.0
     for m in motors:
-        length, _ = rotor.paid_out(m)
-        swing = math.sqrt(m.rigidity / length * m.cable_gain * m.cable_gain / m.inertia)
+        length, gain = rotor.paid_out(m)
+        k = m.rigidity / length
+        stiffness += k
+        damping += k * m.damping_time
+        swing = math.sqrt(k * gain * gain / m.inertia)
         most = max(most, m.steps_per_control, math.ceil(swing * h / _RINGING))
-    return min(40, most)
+    most = max(most, math.ceil(math.sqrt(stiffness * mobility) * h / _RINGING))
+    return min(_MOST_PARTS, max(most, math.ceil(damping * mobility * h / _DYING)))
 
 
 @jit
@@ -44,7 +51,7 @@ def run_together(
     for k in range(n):
         for i in range(p.cables):
             flags[i] |= servo.control(motors[i], kinds[i], targets[i], h)
-        parts = steps_within(motors, h)
+        parts = steps_within(motors, p.mobility, h)
         for _ in range(parts):
             look_along_cables(p, motors)
             for i in range(p.cables):

@@ -42,7 +42,7 @@ class CablesPlant(Profile):
 
     stiffness_error: _Relative = 0.0
     """Relative: true EA = that of the cable's profile × (1 + this)."""
-    damping_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.002
+    damping_s: Annotated[float, Field(ge=0.0, le=0.05)] = 0.002
     """Damping over stiffness."""
     sag: bool = True
     """Whether cables have weight."""

@@ -111,6 +111,21 @@ def test_stiff_short_cables_stay_stable(length_m: float) -> None:
     assert np.isfinite(robot.position_m).all()
 
 
+@pytest.mark.parametrize("damping_s", [0.0, 0.002, 0.05])
+@pytest.mark.parametrize("mass_kg", [0.1, 4.0])
+def test_light_platforms_and_strong_damping_stay_stable(damping_s: float, mass_kg: float) -> None:
+    exits = ((-0.125, 1.5433), (0.125, 1.5433), (0.0, 1.3634))
+    robot = body(
+        exits=exits, home=(0.0, 1.5), mass_kg=mass_kg, locked=True, pretension_N=200.0,
+        cables={"damping_s": damping_s},
+    )  # fmt: skip
+    robot.platform["velocity"][0, :2] = 0.5, 0.2
+    begin = energy_J(robot)
+    for k in range(50):
+        run(robot, 1e-3, begin_s=k * 1e-3)
+        assert energy_J(robot) < begin + 0.02 * mass_kg
+
+
 def test_the_floor_carries_a_slack_platform() -> None:
     robot = body(
         pretension_N=0.0, start={"slack_m": 0.05}, floor={"present": True}, weight_N_m=0.122
