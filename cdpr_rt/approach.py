@@ -12,6 +12,7 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.jit import jit
 
 _EXACT = 1e-11
+_STEEPNESS, _MOST_STEEP = 8.0, 50.0
 
 
 @jit
@@ -83,3 +84,33 @@ def change_pace(
         slope[i] = (new - v) / period
         at_rest = at_rest and new == 0.0 and v == 0.0
     return at_rest
+
+
+@jit
+def attend(
+    target: FloatArray, position: FloatArray, awake: float, asleep_m: float, goal: FloatArray
+) -> float:
+    """Write a goal that is the target, or nearer the less the distance to it deserves a motion.
+
+    The two sigmoids of Tremblay (thesis), fig. 2.3: the remaining distance counts by a share that
+    rises around `asleep_m`, and around a tenth of it once awake, so that what trembles around a
+    point does not move it. Arrays are (n,); returns the share, to be given back as `awake`.
+    """
+    size = 0.0
+    for i in range(target.size):
+        size += (target[i] - position[i]) ** 2
+    size = math.sqrt(size)
+    threshold = asleep_m * (1.0 - 0.9 * awake)
+    share = 1.0 / (1.0 + math.exp(max(-_STEEPNESS * (size / threshold - 1.0), -_MOST_STEEP)))
+    for i in range(target.size):
+        goal[i] = position[i] + share * (target[i] - position[i])
+    return share
+
+
+@jit
+def place_to_rest(
+    position: FloatArray, velocity: FloatArray, acceleration: FloatArray, rest: FloatArray
+) -> None:
+    """Write where what moves comes to rest when it is braked from now on; all are (n,)."""
+    for i in range(rest.size):
+        rest[i] = position[i] + 0.5 * velocity[i] * abs(velocity[i]) / acceleration[i]

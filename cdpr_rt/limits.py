@@ -41,6 +41,10 @@ class Limit(IntEnum):
     """A watch beside the axes wants the torque gone."""
     DRIVE = 18
     """A drive or its bus has failed."""
+    LENGTHS = 19
+    """The cables' lengths do not agree with each other."""
+    ENCODER_JUMP = 20
+    """A motor cannot have turned so far since it was last heard."""
 
     @property
     def key(self) -> str:
@@ -48,10 +52,36 @@ class Limit(IntEnum):
         return self.name.lower()
 
 
-def reactions_of(named: Reactions) -> dict[Limit, Reaction]:
-    """Return what a robot's file wants done about each limit."""
+BLINDING: Final = frozenset(
+    {
+        Limit.SPEED,
+        Limit.FOLLOWING_ERROR,
+        Limit.TENSION_HIGH,
+        Limit.BROKEN_CABLE,
+        Limit.STALE,
+        Limit.MISSED,
+        Limit.NOT_FINITE,
+        Limit.DRIVE,
+        Limit.LENGTHS,
+        Limit.ENCODER_JUMP,
+    }
+)
+"""After these a platform's pose is not to be believed, or not all of its winches obey."""
+
+
+def reactions_of(named: Reactions, lowers: bool = False) -> dict[Limit, Reaction]:
+    """Return what a robot's file wants done about each limit.
+
+    Of a robot whose platform can be lowered, quick stops of which its file says nothing are
+    controlled stops: the winches that are left let it down.
+    """
     by_label = {reaction.label: reaction for reaction in Reaction}
-    return {limit: by_label[getattr(named, limit.key)] for limit in Limit if limit}
+    wanted = {limit: by_label[getattr(named, limit.key)] for limit in Limit if limit}
+    if lowers:
+        for limit in BLINDING:
+            if limit.key not in named.model_fields_set:
+                wanted[limit] = Reaction.CONTROLLED_STOP
+    return wanted
 
 
 DEFAULT_REACTIONS: Final = reactions_of(Reactions())
@@ -76,6 +106,12 @@ TEXTS: Final[dict[Limit, tuple[str, float, str]]] = {
     Limit.MISSED: ("no feedback for {:.0f} cycles, {:.0f} allowed", 1.0, ""),
     Limit.MISSED_IN_WINDOW: ("{:.0f} answers missed in a window, {:.0f} allowed", 1.0, ""),
     Limit.LATE: ("the loop was held up for {:.0f} ms, {:.0f} ms allowed", 1e3, "s"),
+    Limit.LENGTHS: (
+        "the cables' lengths disagree by {:.1f} mm, {:.1f} mm allowed",
+        1e3,
+        "m",
+    ),
+    Limit.ENCODER_JUMP: ("angle jumped by {:.1f} deg, {:.1f} deg possible", _DEG, "rad"),
     Limit.NOT_FINITE: ("the controller's torque is {}, a finite number is required", 1.0, "Nm"),
 }
 """Text with value and allowed value in the unit people read, the factor to it, the unit in SI."""
@@ -107,6 +143,8 @@ class Limits:
     window_cycles: int = 1
     stale_cycles: int = 1 << 30
     """Cycles for which a drive may be unheard or its answers irregular."""
+    lengths_disagree_m: float = math.inf
+    """By how much the cables of a platform may contradict each other, root mean square."""
     late_s: float = math.inf
     """For how long the loop itself may be held up."""
     reactions: Mapping[Limit, Reaction] = field(default_factory=dict)

@@ -25,9 +25,10 @@ _TENSION_LOW, _TENSION_HIGH = int(Limit.TENSION_LOW), int(Limit.TENSION_HIGH)
 _SLACK, _BROKEN_CABLE = int(Limit.SLACK), int(Limit.BROKEN_CABLE)
 _STALE, _LATE, _NOT_FINITE = int(Limit.STALE), int(Limit.LATE), int(Limit.NOT_FINITE)
 _MISSED, _MISSED_IN_WINDOW = int(Limit.MISSED), int(Limit.MISSED_IN_WINDOW)
+_ENCODER_JUMP = int(Limit.ENCODER_JUMP)
 
 _FIGURES: Final = tuple(name for name in Limits.__dataclass_fields__ if name != "reactions")
-_LIMITS: Final = np.dtype([(name, "<f8") for name in _FIGURES])
+_LIMITS: Final = np.dtype([(name, "<f8") for name in (*_FIGURES, "period_s")])
 _PAST: Final = np.dtype(
     [
         ("torque", "<f8"),  # as passed on in the last cycle
@@ -39,11 +40,20 @@ _PAST: Final = np.dtype(
         ("tight_rad", "<f8"),  # motor angle when it was
         ("may_be_low", "<f8"),  # whether it was since enabling, or since this was told last
         ("may_be_slack", "<f8"),
+        ("mean_N", "<f8"),  # its tension, low-passed
+        ("heard", "<f8"),  # how often its angle was since enabling, up to 2
+        ("heard_rad", "<f8"),  # when it was last
+        ("pace_rad_s", "<f8"),  # how fast it turned then
+        ("unheard_s", "<f8"),  # for how long it was not
     ]
 )
 _VERDICT: Final = np.dtype(
     [("reaction", "<i8"), ("limit", "<i8"), ("axis", "<i8"), ("value", "<f8"), ("allowed", "<f8")]
 )
+# an angle may be so far from where its pace leads, besides a change of pace by what is allowed
+_JUMP_rad = 0.05
+# a cable that runs in has snapped where its tension is less than a share of its mean
+_SNAPPED_SHARE, _MEAN_S = 0.6, 0.1
 # a cable is not broken where this much was paid out while its tension fell
 _PAID_OUT_m: Final = 5e-4
 
@@ -98,6 +108,21 @@ def _watch_answers(
 
 
 @jit
+def _watch_jumps(
+    i: int, lim: Any, past: Any, reactions: Any, verdict: Any, elapsed: float, position: float
+) -> None:
+    past["unheard_s"] += elapsed
+    step = position - past["heard_rad"]
+    jump = step - past["pace_rad_s"] * past["unheard_s"]
+    possible = lim["speed_rad_s"] * past["unheard_s"] + _JUMP_rad
+    if past["heard"] == 2.0 and abs(jump) > possible:
+        _judge(verdict, _ENCODER_JUMP, reactions[_ENCODER_JUMP], i, jump, possible)
+    past["pace_rad_s"] = step / past["unheard_s"] if past["heard"] else 0.0
+    past["heard"] = min(past["heard"] + 1.0, 2.0)
+    past["heard_rad"], past["unheard_s"] = position, 0.0
+
+
+@jit
 def _watch_motion(
     i: int,
     lim: Any,
@@ -124,6 +149,16 @@ def _watch_motion(
 
 
 @jit
+def _has_snapped(lim: Any, past: Any, elapsed: float, tension: float, winding_in: float) -> bool:
+    """Whether a cable that was tight comes in faster than it may and has lost its tension."""
+    before = past["mean_N"]
+    if np.isfinite(tension):
+        past["mean_N"] += elapsed / (elapsed + _MEAN_S) * (tension - before)
+    runs_away = past["may_be_slack"] != 0.0 and winding_in > lim["speed_rad_s"]
+    return bool(runs_away and tension < _SNAPPED_SHARE * before)
+
+
+@jit
 def _watch_tension(
     i: int,
     lim: Any,
@@ -132,12 +167,16 @@ def _watch_tension(
     verdict: Any,
     elapsed: float,
     tension: float,
+    may_be_slack: bool,
     position: float,
     cable_m_per_rad: float,
 ) -> None:
     if tension > lim["tension_max_N"]:
         allowed = lim["tension_max_N"]
         _judge(verdict, _TENSION_HIGH, reactions[_TENSION_HIGH], i, tension, allowed)
+    if may_be_slack:
+        past["may_be_low"] = past["may_be_slack"] = 0.0
+        return
     if not tension < lim["tension_min_N"]:
         past["low_s"] = past["slack_s"] = 0.0
         past["tight_rad"] = position
@@ -169,7 +208,6 @@ def _check(
     window: Any,
     reactions: Any,
     verdict: Any,
-    period: float,
     elapsed: float,
     position: FloatArray,
     wanted: FloatArray,
@@ -181,10 +219,12 @@ def _check(
     cable_m_per_rad: FloatArray,
     length: FloatArray,
     tension: FloatArray,
+    may_be_slack: bool,
     sensor_ok: BoolArray,
     torque: FloatArray,
 ) -> int:
     verdict[0]["reaction"] = verdict[0]["limit"] = 0
+    period = limits[0]["period_s"]
     if elapsed - period > limits[0]["late_s"]:
         _judge(verdict, _LATE, reactions[_LATE], -1, elapsed - period, limits[0]["late_s"])
     for i in range(torque.size):
@@ -193,7 +233,13 @@ def _check(
         fair = alive[i] and rate_ok[i]
         _watch_answers(i, lim, own, reactions, verdict, valid[i], fair, window)
         if not valid[i]:
+            own["unheard_s"] += elapsed
             continue
+        _watch_jumps(i, lim, own, reactions, verdict, elapsed, position[i])
+        winding_in = -velocity[i] * np.sign(cable_m_per_rad[i])
+        before = own["mean_N"]
+        if _has_snapped(lim, own, elapsed, tension[i], winding_in):
+            _judge(verdict, _BROKEN_CABLE, reactions[_BROKEN_CABLE], i, tension[i], before)
         error, paying_out = wanted[i] - position[i], wanted_velocity[i] * cable_m_per_rad[i]
         _watch_motion(i, lim, reactions, verdict, error, velocity[i], length[i], paying_out)
         if not sensor_ok[i]:
@@ -201,7 +247,9 @@ def _check(
             _judge(verdict, _TENSION_SENSOR, reactions[_TENSION_SENSOR], i, np.nan, np.nan)
             continue
         per_rad = cable_m_per_rad[i]
-        _watch_tension(i, lim, own, reactions, verdict, elapsed, tension[i], position[i], per_rad)
+        _watch_tension(
+            i, lim, own, reactions, verdict, elapsed, tension[i], may_be_slack, position[i], per_rad
+        )
     return int(verdict[0]["reaction"])
 
 
@@ -217,6 +265,7 @@ class Supervisor:
         self._limits = np.zeros(n, _LIMITS)
         for name in _FIGURES:
             self._limits[name] = getattr(limits, name)
+        self._limits["period_s"] = period_s
         wanted = DEFAULT_REACTIONS | dict(limits.reactions)
         self._reactions = np.array([wanted.get(limit, 0) for limit in Limit], np.int64)
         self._past = np.zeros(n, _PAST)
@@ -224,7 +273,6 @@ class Supervisor:
         self._turn = 0
         self._verdict = np.zeros(1, _VERDICT)
         self._told = ""
-        self._period_s = period_s
 
     def reset(self, torque_Nm: FloatArray | float = 0.0) -> None:
         """Forget the past, before motors are driven; `torque_Nm` is what they are driven with."""
@@ -250,7 +298,6 @@ class Supervisor:
             self._window[self._turn],
             self._reactions,
             self._verdict,
-            self._period_s,
             estimate.elapsed_s,
             feedback.position_rad,
             setpoint.position_rad,
@@ -262,9 +309,18 @@ class Supervisor:
             estimate.cable_m_per_rad,
             estimate.cable_length_m,
             estimate.tension_N,
+            estimate.may_be_slack,
             estimate.sensor_ok,
             torque_Nm,
         )
+
+    def compare_lengths(self, disagree_m: float) -> int:
+        """Judge by how much cable lengths contradict each other; return the `Reaction` so far."""
+        allowed = self.limits.lengths_disagree_m
+        if not disagree_m <= allowed:
+            reaction = int(self._reactions[Limit.LENGTHS])
+            _judge(self._verdict, int(Limit.LENGTHS), reaction, -1, disagree_m, allowed)
+        return int(self._verdict["reaction"][0])
 
     def report(self, limit: Limit, reason: str) -> int:
         """Take in what another found, such as a drive's alarm; return the `Reaction` to it.

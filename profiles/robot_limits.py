@@ -26,7 +26,10 @@ PerAxis = Annotated[tuple[_Positive, ...], BeforeValidator(_one_or_each)]
 
 
 class Reactions(Profile):
-    """What is done about each limit, by its name; as severe as the default or more so."""
+    """What is done about each limit, by its name; as severe as the default or more so.
+
+    Where a platform can be lowered, what is left out and would be a quick stop is a controlled one.
+    """
 
     torque: FromClamp = "clamp"
     torque_rate: FromClamp = "clamp"
@@ -46,6 +49,8 @@ class Reactions(Profile):
     safety_stop: FromControlledStop = "controlled stop"
     safety_alarm: FromOff = "torque off"
     drive: FromQuickStop = "quick stop"
+    lengths: FromControlledStop = "controlled stop"
+    encoder_jump: FromQuickStop = "quick stop"
 
 
 class RobotLimits(Profile):
@@ -74,6 +79,8 @@ class RobotLimits(Profile):
     window_cycles: int = Field(default=1000, ge=1, le=10_000)
     stale_cycles: int = Field(default=250, ge=1, le=10_000)
     """Cycles for which a drive may be unheard or its answers irregular."""
+    lengths_disagree_m: float = Field(default=0.03, gt=0, le=10)
+    """By how much the cables of a platform may contradict each other, root mean square."""
     late_s: float = Field(default=0.05, gt=0, le=10)
     """For how long the loop itself may be held up."""
     reactions: Reactions = Reactions()

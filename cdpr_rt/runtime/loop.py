@@ -14,7 +14,7 @@ import numpy as np
 from cdpr_rt.cycle import Cycle
 from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import FloatArray, Setpoint
-from cdpr_rt.limits import Limit
+from cdpr_rt.limits import BLINDING, Limit
 from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_rows import CycleRows
 from cdpr_rt.runtime.estimate import Estimator
@@ -28,7 +28,7 @@ from cdpr_rt.runtime.states import LoopState, Reaction
 from cdpr_rt.runtime.status import StatusPage
 from cdpr_rt.supervisor import Supervisor
 
-IDLE, HOLD = "idle", "hold"
+IDLE, HOLD, LOWER = "idle", "hold", "lower"
 _TURN_S = 0.005
 _AT_ONCE_AFTER_S = 1.0
 """A second request to end, so long after the first, takes the power at once."""
@@ -40,9 +40,14 @@ class LoopParts:
     """What the loop runs besides the machine; all made for its n axes."""
 
     programs: Mapping[str, Program]
-    """By name, in the order of their numbers; `idle` and `hold` are among them."""
+    """By name, in the order of their numbers; `idle` and `hold` are among them.
+
+    One that is called `lower` lets a platform down before the power goes.
+    """
     supervisor: Supervisor
     estimator: Estimator
+    lengths_disagree_m: Callable[[], float] = float
+    """Returns by how much the cables' lengths contradict each other, 0 where nobody knows."""
     punctual: Callable[[], Sequence[str]] = tuple
     """Called once before the first paced cycle; returns what was not allowed, for people."""
     cores: frozenset[int] = field(default_factory=lambda: frozenset(os.sched_getaffinity(0)))
@@ -97,6 +102,7 @@ class ControlLoop:
         self._orders = Orders(self)
         self.status = StatusPage(self)
         self._procedure: Iterator[None] | None = None
+        self._lowering_blind = False
 
     # -- running
 
@@ -212,11 +218,12 @@ class ControlLoop:
         reaction = 0
         if self.driving:
             estimate = self.parts.estimator.estimate
-            reaction = supervisor.check(cycle.device.feedback, estimate, self.setpoint, torque)
+            supervisor.check(cycle.device.feedback, estimate, self.setpoint, torque)
+            reaction = supervisor.compare_lengths(self.parts.lengths_disagree_m())
         else:
             torque[:] = 0.0
         # in a fault the drives' complaints are known, and putting them in words takes its time
-        known = self.life.state is LoopState.FAULT
+        known = self.life.state is LoopState.FAULT or self._lowering_blind
         failure = self.lost_bus or ("" if known else cycle.device_alarm())
         alarm, stop = cycle.watch_alarm(), cycle.stop_reason()
         if failure or alarm or stop:
@@ -235,8 +242,14 @@ class ControlLoop:
 
     def _react(self, reaction: Reaction, torque: FloatArray) -> None:
         supervisor, state = self.parts.supervisor, self.life.state
-        if state not in (LoopState.READY, LoopState.ACTIVE) or reaction <= self.reacting:
+        if state not in (LoopState.READY, LoopState.ACTIVE):
             return  # in a fault it is known already; while the bus is checked the check sees it
+        if self.lost_bus:
+            reaction = max(reaction, Reaction.QUICK_STOP)  # nobody can be led to a standstill
+        if reaction <= self.reacting:
+            if self.driving and supervisor.limit in BLINDING and self.lowers:
+                self._lower_blind()
+            return
         reason, self._program_error = self._program_error or supervisor.reason(), ""
         if reaction is Reaction.HOLD:
             if self.program.name != HOLD and self.driving:
@@ -254,7 +267,7 @@ class ControlLoop:
     def stop(self, reaction: Reaction, then: LoopState, torque: FloatArray | None = None) -> None:
         """End the motion as `reaction` says and go to state `then`."""
         brakes = reaction is Reaction.CONTROLLED_STOP and self.driving
-        if brakes and not self._program_brakes():
+        if brakes and not self._begins_to_brake(then):
             brakes, reaction = False, Reaction.QUICK_STOP
         self.reacting = reaction
         if not brakes:
@@ -268,19 +281,38 @@ class ControlLoop:
             self.switch(IDLE)
         self.begin(procedures.come_to_rest(self, then))
 
-    def _program_brakes(self) -> bool:
+    def _begins_to_brake(self, then: LoopState) -> bool:
+        """Have the program brake; whether it does."""
+        blind = then is LoopState.FAULT and self.parts.supervisor.limit in BLINDING
+        if blind and not self.lowers:
+            return LOWER not in self.parts.programs
         try:
-            self.program.stop()
+            if blind:
+                self._lower_blind()
+            else:
+                self.program.stop()
         except Exception:  # whatever a program does wrong: the drives can brake by themselves
             traceback.print_exc()
             return False
         return True
+
+    @property
+    def lowers(self) -> bool:
+        """Whether a platform is let down before the power goes, as no brakes would hold it."""
+        return LOWER in self.parts.programs and not self.machine.has_brakes
+
+    def _lower_blind(self) -> None:
+        """Let the platform down by the winches that are left, whatever is known of its pose."""
+        if not self._lowering_blind:
+            self._lowering_blind = True
+            self.switch(LOWER, {"blind": True})
 
     # -- programs
 
     def drive(self) -> None:
         """Hold the axes, whose drives have got their power."""
         self.parts.supervisor.reset()
+        self._lowering_blind = False
         self.driving = True
         self.switch(HOLD)
 

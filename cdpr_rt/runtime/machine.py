@@ -38,6 +38,10 @@ class Machine(Protocol):
     def safety(self) -> str:
         """What guards the power besides the bus, for people."""
 
+    @property
+    def has_brakes(self) -> bool:
+        """Whether every axis has a brake that holds it without power."""
+
     # -- slow
 
     def open(self) -> None:

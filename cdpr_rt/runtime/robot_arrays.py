@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -22,6 +23,15 @@ CABLE_SAFETY: Final = 5.0
 """Breaking force over the highest tension, where a robot's file says no other."""
 SLACK_SHARE: Final = 0.25
 """Of the least tension, where a robot's file does not say what is slack."""
+LOW_SHARE: Final = 0.5
+"""Of the least tension, where torques alone tell of tensions."""
+_PLANAR_CABLES: Final = 3
+
+
+def can_lower(robot: Robot) -> bool:
+    """Return whether there is a program that lets the robot's platform down."""
+    platform = robot.platform
+    return platform is not None and platform.is_planar and len(robot.axes) == _PLANAR_CABLES
 
 
 def limits_of(robot: Robot, booted: Sequence[int] | None = None) -> Limits:
@@ -62,8 +72,20 @@ def limits_of(robot: Robot, booted: Sequence[int] | None = None) -> Limits:
         window_cycles=told.window_cycles,
         stale_cycles=told.stale_cycles,
         late_s=told.late_s,
-        reactions=reactions_of(told.reactions),
+        lengths_disagree_m=told.lengths_disagree_m,
+        reactions=reactions_of(told.reactions, lowers=can_lower(robot)),
     )
+
+
+def supervised(limits: Limits, robot: Robot) -> Limits:
+    """Return what a robot's supervisor holds its cables against.
+
+    What is planned with are the limits themselves. A tension that is known from torques alone is
+    uncertain by the motors' friction: a platform's cables are told to be low at half the least.
+    """
+    if not can_lower(robot) or robot.tension_sensors is not None:
+        return limits
+    return replace(limits, tension_min_N=LOW_SHARE * np.asarray(limits.tension_min_N))
 
 
 def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:

@@ -16,13 +16,16 @@ from tests.cdpr_rt.supervisor_rig import PERIOD_S, SAFE, Cycle, with_rate
 Change = Callable[[Cycle, int], None]
 
 
-def run(change: Change, limits: Limits = SAFE, cycles: int = 400) -> tuple[Supervisor, int, Cycle]:
+def run(
+    change: Change, limits: Limits = SAFE, cycles: int = 400, at_rad: float = 0.0
+) -> tuple[Supervisor, int, Cycle]:
     """Run 50 cycles in which all is well, then some with `change`; return the first that trips.
 
     Its number is counted from the change, -1 where there is none.
     """
     supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
     supervisor.reset()
+    cycle.feedback.position_rad[:] = cycle.setpoint.position_rad[:] = at_rad
     for _ in range(50):
         assert cycle.check(supervisor) == Reaction.NONE
     for k in range(cycles):
@@ -49,6 +52,17 @@ def torque_by_steps(step_Nm: float) -> Change:
 def speed(value: float) -> Change:
     def change(cycle: Cycle, _k: int) -> None:
         cycle.estimate.velocity_rad_s[1] = value
+
+    return change
+
+
+def jump(value: float, missed: int = 0) -> Change:
+    """Leap once, after so many cycles without an answer."""
+
+    def change(cycle: Cycle, k: int) -> None:
+        cycle.feedback.valid[1] = k >= missed
+        cycle.feedback.position_rad[1] = value if k >= missed else 0.0
+        cycle.setpoint.position_rad[1] = cycle.feedback.position_rad[1]
 
     return change
 
@@ -147,6 +161,14 @@ CASES = [
         value=-20.1,
         does_not=(speed(19.9), speed(-19.9)),
     ),
+    Case(
+        Limit.ENCODER_JUMP,
+        jump(0.0701),
+        "axis 1: angle jumped by 4.0 deg, 4.0 deg possible",
+        value=0.0701,
+        # what a motor may turn while nobody hears of it
+        does_not=(jump(0.0699), jump(-0.0699), jump(0.0899, missed=1)),
+    ),
     Case(Limit.SPEED, speed(math.nan), "axis 1: speed nan deg/s, 1146 deg/s allowed", does_not=()),
     Case(
         Limit.FOLLOWING_ERROR,
@@ -192,7 +214,7 @@ CASES = [
     ),
     Case(
         Limit.SLACK,
-        tension(2.0, paid_out_rad=0.2),
+        tension(2.0, paid_out_rad=0.06),
         "axis 1: the cable is slack: tension 2.0 N, slack below 5.0 N",
         at=99,
         value=2.0,
@@ -286,7 +308,7 @@ def test_a_limit_is_answered_as_the_robot_wants_it(case: Case, reaction: Reactio
 
 
 def test_no_limit_of_the_kernel_is_left_untried():
-    others = {Limit.NONE, Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.DRIVE}
+    others = {Limit.NONE, Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.DRIVE, Limit.LENGTHS}
     assert {case.limit for case in CASES} == set(Limit) - others
     assert set(DEFAULT_REACTIONS) == set(Limit) - {Limit.NONE}
 
@@ -323,10 +345,10 @@ def test_slack_is_told_once_until_the_cable_was_tight_again():
 def test_a_cable_from_which_tension_was_paid_out_is_not_broken(paid_out_rad: float, limit: Limit):
     def change(cycle: Cycle, k: int) -> None:
         tension(0.0, after_cycles=20, paid_out_rad=paid_out_rad)(cycle, k)
-        cycle.feedback.position_rad += 7.0
+        cycle.feedback.position_rad[1] += 7.0
         cycle.setpoint.position_rad[:] = cycle.feedback.position_rad
 
-    supervisor, *_ = run(change)
+    supervisor, *_ = run(change, at_rad=7.0)
     assert supervisor.limit is limit
 
 

@@ -26,7 +26,7 @@ from tools.output import Output
 from tools.signals import stop_on_signals
 
 _WATCH_S = 0.2
-_END_S = 30.0
+_END_S = 90.0
 
 
 def register(parent: typer.Typer) -> None:

@@ -27,7 +27,7 @@ DEAD: Final = "dead"
 
 _TURN_S = 0.2
 # a controlled stop from full speed, and brakes that follow, take less
-_LOOP_STOP_S = 20.0
+_LOOP_STOP_S = 70.0
 # the recording is closed in this time
 _SERVICE_STOP_S = 10.0
 # the loop turns at every cycle, or some ten times a second where no cycles run

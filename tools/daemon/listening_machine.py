@@ -28,6 +28,7 @@ class ListeningMachine:
 
     failures: tuple[type[Exception], ...] = (BusError,)
     read_only = True
+    has_brakes = False
     watches: Sequence[Watch] = ()
     notices: Sequence[str] = (_NOTICE,)
     safety = ""

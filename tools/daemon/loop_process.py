@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from dataclasses import asdict
 from types import FrameType
 from typing import Any
 
@@ -22,13 +23,14 @@ from cdpr_rt.runtime.programs.registry import (
     platform_parts,
     rehearse_programs,
 )
-from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
+from cdpr_rt.runtime.robot_arrays import described, limits_of, supervised, winches_of
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.supervisor import Supervisor
 from cdpr_rt.tension import TensionFeedback
 from profiles import Robot, load_robot
 from profiles.errors import ProfileError
 from tools.bus_fit import require_fit
+from tools.commissioned import compensation_of, load_profiles, with_commissioned
 from tools.daemon.child import end_with
 from tools.daemon.listening_machine import ListeningMachine
 from tools.daemon.machine import RobotMachine
@@ -42,7 +44,7 @@ def main() -> int:
     settings = RunSettings.from_argv()
     block = SharedBlock.attach(settings.block_fd)
     try:
-        robot = load_robot(settings.robot)
+        robot = with_commissioned(load_robot(settings.robot), settings.commissioned)
         require_fit(robot)
         kind = ListeningMachine if settings.read_only else RobotMachine
         machine = kind(robot, settings)
@@ -72,15 +74,17 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
     limits = limits_of(robot)
     latencies = [latency_s(axis.winch) for axis in axes]
-    model = model_of(axes, period_s, latencies, limits)
+    known = compensation_of(load_profiles(robot))
+    model = model_of(axes, period_s, latencies, limits, known)
     estimator = Estimator(n, period_s, winches_of(axes))
     platform = platform_parts(robot, limits, model, estimator)
     programs = build_programs(model, block, platform)
     names = [axis.name for axis in axes]
     parts = LoopParts(
         programs=programs,
-        supervisor=Supervisor(limits, n, period_s, names),
+        supervisor=Supervisor(supervised(limits, robot), n, period_s, names),
         estimator=estimator,
+        lengths_disagree_m=float if platform is None else platform.lengths_disagree_m,
         punctual=stay_punctual,
     )
     rehearse_programs(programs, n, platform)
@@ -115,11 +119,13 @@ def description(robot: Robot, parts: LoopParts) -> dict[str, Any]:
                 "gear_ratio": axis.winch.gear_ratio,
                 "drum_radius_m": axis.winch.drum_radius_m,
                 "cable_m_per_motor_rad": axis.winch.cable_m_per_motor_rad,
+                "commissioned": None if axis.commissioned is None else str(axis.commissioned),
             }
             for axis in robot.axes
         ],
-        "limits": described(parts.supervisor.limits, len(robot.axes)),
+        "limits": described(limits_of(robot), len(robot.axes)),
         "programs": list(parts.programs),
+        "platform": None if robot.platform is None else asdict(robot.platform),
         "notes": list(robot.notes),
     }
 

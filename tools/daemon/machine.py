@@ -286,6 +286,12 @@ class RobotMachine:
         told = self._safety.io.state.brakes_released
         return all(told[axis] == released for axis in self._safety.braked)
 
+    @property
+    def has_brakes(self) -> bool:
+        """Whether every axis has a brake that holds it without power."""
+        braked = () if self._safety is None else self._safety.braked
+        return len(braked) == len(self._robot.axes)
+
     def states(self) -> list[str]:
         """Return what each drive says of itself, in the standard's words."""
         if self.device is None:

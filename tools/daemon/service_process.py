@@ -28,7 +28,7 @@ from tools.daemon.child import end_with, is_running, orphaned
 from tools.daemon.settings import RunSettings, read_key
 from tools.errors import DONE, FAILED, CommandError
 
-_LOOP_STOP_S, _TURN_S = 20.0, 0.05
+_LOOP_STOP_S, _TURN_S = 70.0, 0.05
 _MOST_FILES = 4096
 _LOG = logging.getLogger("cdpr.service")
 

@@ -28,7 +28,7 @@ User={user}
 # the launcher ends the loop first, the recording last
 KillMode=mixed
 TimeoutStartSec=300
-TimeoutStopSec=60
+TimeoutStopSec=100
 # bad input does not mend itself by another start
 Restart=on-failure
 RestartSec=2

@@ -23,10 +23,11 @@ _KEEPING_SHARE = 0.25
 """Of the least tension: what keeps cables on their drums."""
 _ARRIVED_m = 0.01
 _ARRIVING_S = 2.0
-_STILL_m_s = 0.002
+_LIGHT = 1.2
+_STILL_m = 0.001
 _STILL_S = 1.0
 _FADE_S = 0.2
-_MOST_S = 60.0
+_MOST_S = 40.0
 
 
 class LowerProgram(PlatformProgram):
@@ -52,6 +53,8 @@ class LowerProgram(PlatformProgram):
         self._reel = Reel(np.full(3, control.inertia_kg_m2), cable_m, parts.period_s)
         self._high = np.minimum(parts.most_N, torque_Nm / np.abs(cable_m))
         self._keeping = _KEEPING_SHARE * control.least_N
+        self._cable = np.array(cable_m)
+        self._here = np.zeros(3)
         self._stage = ""
         self._cycles = self._still = 0
         self._blind = False
@@ -82,7 +85,7 @@ class LowerProgram(PlatformProgram):
         setpoint.position_rad[:] = feedback.position_rad
         setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
         self._reel.update(feedback, torque_Nm)
-        self._watch_rest()
+        self._watch_rest(feedback)
 
     def stop(self) -> None:
         """Nothing is quicker than to go on: it is at rest when the platform stands."""
@@ -131,7 +134,7 @@ class LowerProgram(PlatformProgram):
         reel.most_in_m_s = speed_m_s
         reel.begin(feedback, self._velocity, torque_Nm)
 
-    def _watch_rest(self) -> None:
+    def _watch_rest(self, feedback: AxisFeedback) -> None:
         reel, period_s = self._reel, self._parts.period_s
         if self._stage == "fade":
             reel.low_N -= self._keeping * (period_s / _FADE_S)
@@ -139,8 +142,11 @@ class LowerProgram(PlatformProgram):
             reel.high_N[:] = reel.low_N
             self._at_rest = not reel.low_N.any()
             return
-        light = bool((reel.tension_N <= self._keeping).all())
-        still = light and bool(reel.out_m_s.max() < _STILL_m_s)
-        self._still = self._still + 1 if still else 0
+        light = bool((reel.tension_N <= _LIGHT * self._keeping).all())
+        paid_out_m = float((self._cable * (feedback.position_rad - self._here)).max())
+        if not light or paid_out_m > _STILL_m:
+            self._here[:] = feedback.position_rad
+            self._still = 0
+        self._still += 1
         if self._still * period_s > _STILL_S or self._cycles * period_s > _MOST_S:
             self._stage = "fade"

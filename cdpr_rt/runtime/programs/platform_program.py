@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.approach import approach
+from cdpr_rt.approach import approach, place_to_rest
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_control import PlanarControl
@@ -40,14 +40,26 @@ class PlatformParts:
         self.cycle = -2
         """The last cycle in which one of the programs moved the platform."""
         self.tight = False
-        """Whether all cables are tight and carry the platform, where it is known to be."""
         self.loop = Handover(control, control.torque_Nm, period_s)
         """The platform's control, which the programs hand on to each other as it runs."""
+
+    @property
+    def tight(self) -> bool:
+        """Whether all cables are tight and carry the platform, where it is known to be."""
+        return not self.estimator.estimate.may_be_slack
+
+    @tight.setter
+    def tight(self, tight: bool) -> None:
+        self.estimator.estimate.may_be_slack = not tight
 
     @property
     def known(self) -> bool:
         """Whether it is known where the platform is."""
         return bool(self.estimator.estimate.length_known.all())
+
+    def lengths_disagree_m(self) -> float:
+        """Return by how much the cables' lengths contradict each other, while they are tight."""
+        return self.control.residual_m if self.tight else 0.0
 
     def pretend(self, feedback: AxisFeedback) -> None:
         """Take the platform to be at home on tight cables, for a rehearsal."""
@@ -81,6 +93,7 @@ class PlatformProgram:
         self._stopping = False
         self._at_rest = True
         self._seen = np.zeros(7)
+        self._rest = np.zeros(2)
 
     def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; the platform brakes and stays."""
@@ -187,9 +200,8 @@ class PlatformProgram:
         )
 
     def _resting_place(self) -> FloatArray:
-        """Return where the platform comes to rest when it is braked from now on."""
+        """Return where the platform comes to rest when it is braked from now on; overwritten."""
         control = self._control
-        pace = control.velocity_m_s
-        return np.asarray(
-            control.position_m + 0.5 * pace * np.abs(pace) / self._parts.acceleration_m_s2
-        )
+        acceleration = self._parts.acceleration_m_s2
+        place_to_rest(control.position_m, control.velocity_m_s, acceleration, self._rest)
+        return self._rest

@@ -24,11 +24,11 @@ from cdpr_rt.runtime.programs.pose import PoseProgram
 from cdpr_rt.runtime.programs.position_loop import PositionLoop
 from cdpr_rt.runtime.programs.sweep import SweepProgram
 from cdpr_rt.runtime.programs.tighten import TightenProgram
+from cdpr_rt.runtime.robot_arrays import can_lower
 from cdpr_rt.runtime.shared_block import SharedBlock
 from profiles import Robot
 
 _REHEARSED_CYCLES = 5
-_PLANAR_CABLES = 3
 
 
 def platform_parts(
@@ -39,7 +39,7 @@ def platform_parts(
     Raises GeometryError where its tensions have no bounds to hold it by.
     """
     platform = robot.platform
-    if platform is None or not platform.is_planar or model.n != _PLANAR_CABLES:
+    if platform is None or not can_lower(robot):
         return None
     low, high = (
         np.broadcast_to(bound, (model.n,)).astype(float)
