@@ -64,7 +64,7 @@ def alive(pid: int) -> bool:
 
 
 class RealDaemon:
-    """`cdpr run` of a slow robot with two axes; `ready` is the line that says that it is up.
+    """`cdpr run` of a slow robot with two axes, or of `robot`; `ready` is the line that it is up.
 
     Where an answer came late while the bus was checked, it is checked again until it is ready.
     """
@@ -77,13 +77,14 @@ class RealDaemon:
         bus: str = "simbus:",
         period_s: float = PERIOD_S,
         limits: str = "",
+        robot: Path | None = None,
     ) -> None:
         self.socket = folder / "control.sock"
         self.at = ("--socket", str(self.socket))
         transport = httpx.HTTPTransport(uds=str(self.socket))
         self.http = httpx.Client(transport=transport, base_url="http://localhost", timeout=20.0)
         self._errors = (folder / "errors").open("w+")
-        self.robot = write_robot(folder, period_s, limits)
+        self.robot = robot or write_robot(folder, period_s, limits)
         asked = ("run", str(self.robot), "--bus", bus, *self.at)
         command = [sys.executable, "-m", "tools.cli", *asked]
         self.process = subprocess.Popen(

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import heapq
 import itertools
 import math
-import random
-import select
-import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from daemon_rig import RealDaemon, cdpr, until
+from hostile_proxy import hostile
 
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording_reader import RecordingReader
@@ -86,50 +81,6 @@ def setpoints(daemon: RealDaemon) -> list[float]:
     return [float(axis["setpoint_rad"]) * WINCH.cable_m_per_motor_rad for axis in axes]
 
 
-@contextmanager
-def hostile(port: int, seed: int) -> Iterator[tuple[int, list[int]]]:
-    """Yield the port of a proxy that loses, delays, repeats and reorders, and its counts."""
-    chance = random.Random(seed)
-    front = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    front.bind(("127.0.0.1", 0))
-    back = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    back.connect(("127.0.0.1", port))
-    stop = threading.Event()
-    counts = [0, 0]
-
-    def run() -> None:
-        late: list[tuple[float, int, bytes, bool]] = []
-        numbers = itertools.count()
-        sender = None
-        while not stop.is_set():
-            ready, _, _ = select.select([front, back], [], [], 0.002)
-            for sock in ready:
-                data, address = sock.recvfrom(2048)
-                if sock is front:
-                    sender = address
-                counts[0] += 1
-                for _ in range(chance.choices((0, 1, 2), (0.2, 0.75, 0.05))[0]):
-                    due = time.monotonic() + chance.uniform(0.0, 0.05)
-                    heapq.heappush(late, (due, next(numbers), data, sock is front))
-            while late and late[0][0] <= time.monotonic():
-                _, _, data, onward = heapq.heappop(late)
-                counts[1] += 1
-                if onward:
-                    back.send(data)
-                elif sender is not None:
-                    front.sendto(data, sender)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        yield front.getsockname()[1], counts
-    finally:
-        stop.set()
-        thread.join()
-        front.close()
-        back.close()
-
-
 def test_a_hand_leads_until_it_is_gone(daemon: RealDaemon) -> None:
     token = follow(daemon)
     before = setpoints(daemon)
@@ -170,11 +121,11 @@ def test_a_stranger_without_the_right_moves_nothing(daemon: RealDaemon) -> None:
 def test_a_hostile_network_makes_no_step(daemon: RealDaemon) -> None:
     token = follow(daemon)
     with (
-        hostile(port_of(daemon), 4) as (port, counts),
-        StreamClient("127.0.0.1", port, token=token) as hand,
+        hostile(port_of(daemon), 4) as proxy,
+        StreamClient("127.0.0.1", proxy.port, token=token) as hand,
     ):
         lead(hand, lambda t: 0.06 * math.sin(1.4 * math.pi * t), 4.0)
-        assert counts[1] < 0.95 * counts[0]
+        assert proxy.passed < 0.95 * proxy.came
         assert 0.0 < hand.round_trip_s < 0.5
         progress = daemon.status()["program_progress"]
         assert progress["stream"] in ("fresh", "held")

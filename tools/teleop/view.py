@@ -63,12 +63,11 @@ class View:
         canvas.mark(self._target(), *_MARKS["target"])
         for exit_point in exits:
             canvas.mark(exit_point, "◉", "")
-        text = Text(no_wrap=True)
-        for row in canvas.rows():
-            for letter, style in row:
-                text.append(letter, style or "dim")
-            text.append("\n")
-        return text
+        rows = [
+            Text.assemble(*((letter, style or "dim") for letter, style in row))
+            for row in canvas.rows()
+        ]
+        return Text("\n", no_wrap=True).join(rows)
 
     def _target(self) -> Point:
         told = self.status.get("program_progress", {}).get("target_m")
@@ -99,10 +98,10 @@ class View:
 
     def _state(self) -> Text:
         session, hand = self._session, self._session.hand
-        if not session.leading:
-            return Text("waiting for the robot's answer", style="yellow")
         answer = session.answer
-        state = "" if answer is None else LoopState(answer.state).label
+        state = "no answer yet" if answer is None else LoopState(answer.state).label
+        if not session.leading:
+            return Text(f"waiting for the robot to follow: {state}", style="yellow")
         leads = "HOLDS" if hand.clutch or hand.trouble else "LEADS"
         count = f", {hand.confirmed} confirmed" if hand.confirmed else ""
         return Text.assemble(

@@ -1,0 +1,225 @@
+"""`cdpr teleop` leads a simulated planar robot through a real daemon, over bad networks too."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from daemon_lab import PATIENT
+from daemon_rig import RealDaemon, cdpr, until
+from hostile_proxy import hostile
+from typer.testing import CliRunner
+
+import profiles
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.runtime.stream_buttons import confirmation
+from cdpr_rt.service.recording_reader import RecordingReader
+from profiles import load_robot
+from tools.commands.teleop import app
+from tools.errors import BadInputError, CommandError
+
+PERIOD_S = 0.004
+SHIPPED = Path(profiles.__file__).parent / "robots" / "planar-3.toml"
+PLATFORM = load_robot("planar-3").platform
+RIGHT = b"\x1b[C"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("teleop")
+
+
+@pytest.fixture(scope="module")
+def daemon(folder: Path) -> Iterator[RealDaemon]:
+    """The shipped robot in cycles slow enough for a machine on which other tests run."""
+    robot = folder / "planar.toml"
+    text = SHIPPED.read_text().replace(
+        "sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}\nmaster_heartbeat_s = 2.0"
+    )
+    robot.write_text(text.replace("[limits]", f"[limits]{PATIENT}"))
+    options = ("--stream", "127.0.0.1:0", "--record", str(folder / "rec"))
+    one = RealDaemon(folder, *options, robot=robot)
+    try:
+        for command in (("enable",), ("controller", "tighten")):
+            told = cdpr(*command, *one.at)
+            assert told.returncode == 0, f"{told.stderr}{one.errors()}"
+        yield one
+    finally:
+        assert one.end() == 0, one.errors()
+
+
+def port_of(daemon: RealDaemon) -> int:
+    return int(daemon.status()["parts"]["stream"]["address"].rpartition(":")[2])
+
+
+def place(daemon: RealDaemon) -> np.ndarray:
+    """Return where the platform is to come to rest, x and y in m."""
+    return np.array(daemon.status()["program_progress"]["target_m"])
+
+
+def teleop(daemon: RealDaemon, *options: str | Path) -> list[str]:
+    command = [sys.executable, "-m", "tools.cli", "teleop", str(daemon.robot), *daemon.at]
+    return [*command, *map(str, options)]
+
+
+def play(daemon: RealDaemon, folder: Path, script: str, *options: str) -> dict[str, Any]:
+    """Lead by a script to its end; return what the command tells in JSON."""
+    path = folder / "script"
+    path.write_text(script)
+    given = ("--device", "script", "--script", path, *options, "--json")
+    told = subprocess.run(
+        teleop(daemon, *given), capture_output=True, text=True, timeout=60.0, check=False
+    )
+    assert told.returncode == 0, told.stderr
+    figures: dict[str, Any] = json.loads(told.stdout.splitlines()[-1])
+    return figures
+
+
+@contextmanager
+def at_the_keys(daemon: RealDaemon) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """Lead by the keyboard of a terminal; yield the command, and the terminal's other end."""
+    ours, its = pty.openpty()
+    command = teleop(daemon, "--device", "keyboard", "--scale", "8:1")
+    process = subprocess.Popen(command, stdin=its, stderr=subprocess.PIPE, text=True)
+    os.close(its)
+    try:
+        until(lambda: daemon.status()["program"] == "pose")
+        yield process, ours
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def hold_key(terminal: int, key: bytes, seconds: float) -> None:
+    """Press a key as a terminal repeats it."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        os.write(terminal, key)
+        time.sleep(0.03)
+
+
+def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) -> None:
+    begin = place(daemon)
+    play(daemon, folder, "0 0 0\n2 0 100", "--scale", "2:1")  # away from the stand
+    np.testing.assert_allclose(place(daemon) - begin, [0.0, 0.2], atol=5e-4)
+    begin = place(daemon)
+    script = (
+        # still where the clutch closes: a set-point that is lost just then tells that too late
+        "0 0 0\n0.3 0 0\n1.3 40 10\n1.6 40 10 confirm\n1.8 40 10 clutch\n2.2 0 0\n"
+        "2.5 0 0\n3 0 20 confirm"
+    )
+    with hostile(port_of(daemon), seed=3) as proxy:
+        via = f"127.0.0.1:{proxy.port}"
+        figures = play(daemon, folder, script, "--scale", "4:1", "--via", via)
+        assert proxy.passed < 0.95 * proxy.came
+    # all that the hand has led is there, whatever was lost on the way
+    np.testing.assert_allclose(place(daemon) - begin, [0.16, 0.04 + 0.08], atol=5e-4)
+    assert figures["answered"] < 0.9 * figures["sent"]
+    assert 1.0 < figures["round_trip_ms"]["p50"] < 1000.0
+    first, second = figures["confirmations"]
+    np.testing.assert_allclose(np.subtract(first["setpoint_m"], begin), [0.16, 0.04], atol=2e-2)
+    assert [first["number"], second["number"]] == [1, 2]
+    status = daemon.status()
+    assert (status["state"], status["program"], status["control"]["held"]) == (
+        "active", "hold", False
+    )  # fmt: skip
+
+
+def test_nan_and_steps_of_a_metre_carry_nothing_away(daemon: RealDaemon, folder: Path) -> None:
+    begin = place(daemon)
+    refused = daemon.status()["parts"]["stream"]["packets"]["not_finite"]
+    with hostile(port_of(daemon), seed=8, altered=0.1) as proxy:
+        via = f"127.0.0.1:{proxy.port}"
+        play(daemon, folder, "0 0 0\n1 20 0\n2 -20 0\n3 0 0", "--scale", "2:1", "--via", via)
+        assert proxy.spoilt > 10
+    packets = daemon.status()["parts"]["stream"]["packets"]
+    assert packets["not_finite"] > refused
+    # each begin anew costs some of what the hand has led, no more than all of it
+    assert np.all(np.abs(place(daemon) - begin) <= [0.085, 5e-4])
+    assert daemon.status()["state"] == "active"
+
+
+def test_keys_lead_until_the_terminal_is_gone(daemon: RealDaemon) -> None:
+    begin = place(daemon)
+    with at_the_keys(daemon) as (process, terminal):
+        until(lambda: hold_key(terminal, RIGHT, 0.3) or place(daemon)[0] - begin[0] > 0.02)
+        os.close(terminal)  # in mid-motion
+        assert process.wait(timeout=20.0) == 1
+        assert process.stderr is not None
+        assert "the terminal is gone" in process.stderr.read()
+    assert daemon.status()["program"] == "hold"
+    assert abs(place(daemon)[1] - begin[1]) < 3e-3
+    rest = place(daemon)
+    time.sleep(0.5)
+    np.testing.assert_allclose(place(daemon), rest, atol=2e-3)
+
+
+def test_who_is_killed_in_mid_motion_is_braked(daemon: RealDaemon) -> None:
+    begin = place(daemon)
+    with at_the_keys(daemon) as (process, terminal):
+        until(lambda: hold_key(terminal, b"a", 0.3) or begin[0] - place(daemon)[0] > 0.02)
+        process.send_signal(signal.SIGKILL)
+        killed = place(daemon)
+        until(lambda: daemon.status()["program"] == "hold")
+        assert "nobody holds the right to move" in daemon.status()["reason"]
+        os.close(terminal)
+    assert daemon.status()["state"] == "active"
+    assert np.linalg.norm(place(daemon) - killed) < 0.1
+
+
+def test_what_cannot_be_led_is_told(daemon: RealDaemon, folder: Path) -> None:
+    script = folder / "still"
+    script.write_text("0 0 0")
+    plays = ("--device", "script", "--script", str(script))
+    for options, status, told in (
+        (("--device", "gamepad"), 2, "--device gamepad: none is plugged in"),
+        ((*plays, "--scale", "1000:1"), 2, "--scale 1000:1: allowed: 0.001 to 100"),
+        (("--device", "script"), 2, "--script: allowed: together with --device script"),
+        ((*plays, "--via", "nowhere"), 2, "--via nowhere: allowed: HOST:PORT"),
+        ((*plays, "--via", "127.0.0.1:9"), 1, "the robot has not answered for 3 s"),
+    ):
+        error = CliRunner().invoke(app, [str(daemon.robot), *daemon.at, *options]).exception
+        assert isinstance(error, CommandError), error
+        assert (error.exit_status, told in str(error)) == (status, True), error
+    other = CliRunner().invoke(app, ["spatial", *daemon.at]).exception
+    assert isinstance(other, BadInputError) and "runs planar" in str(other)
+    assert daemon.status()["program"] == "hold"
+
+
+def test_the_recording_shows_no_step_and_each_confirmation(
+    daemon: RealDaemon, folder: Path
+) -> None:
+    """Last: it ends the daemon, whose recording holds all that went before."""
+    followed = daemon.http.get("/description").json()["programs"].index("pose")
+    daemon.end()
+    wanted = ("pose_setpoint", "state", "program", "stream_buttons")
+    rows: dict[str, list[Any]] = {name: [] for name in wanted}
+    for path in sorted((folder / "rec").glob("*.mcap")):
+        for columns in RecordingReader(path).cycles(wanted):
+            for name in wanted:
+                rows[name].append(columns[name])
+    pose, state, program, buttons = (np.concatenate(rows[name]) for name in wanted)
+    assert PLATFORM is not None
+    xy = pose[:, :2]
+    speed = np.diff(xy, axis=0) / PERIOD_S
+    change = np.diff(speed, axis=0)
+    known = np.isfinite(xy).all(axis=1) & (state == LoopState.ACTIVE) & (program == followed)
+    led = known[2:] & known[1:-1] & known[:-2]
+    assert led.sum() > 1000
+    assert np.abs(speed[1:][led]).max() > 0.1
+    assert np.abs(speed[1:][led]).max() <= 1.001 * PLATFORM.speed_m_s
+    assert np.abs(change[led]).max() <= 1.001 * PLATFORM.acceleration_m_s2 * PERIOD_S
+    numbers = confirmation(buttons.astype(np.int64))
+    begun = numbers[1:][np.diff(numbers) != 0]
+    assert begun[begun > 0].tolist() == [1, 2]

@@ -1,0 +1,142 @@
+"""A session of teleoperation against a real receiver of set-points, over real UDP."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from cdpr_rt.runtime.shared_block import SAMPLES, SharedBlock
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.runtime.stream_buttons import CLUTCH, confirmation
+from cdpr_rt.service.lease import Lease
+from cdpr_rt.service.setpoint_stream import SetpointStream
+from cdpr_rt.service.stream_client import StreamClient
+from tools.teleop import session as session_module
+from tools.teleop.hand import End, Hand, HandDevice
+from tools.teleop.script import ScriptHand, ScriptLine
+from tools.teleop.session import Session
+
+POSE, IDLE = 3, 0
+SCALE = 4.0
+
+
+class Robot:
+    """A receiver behind which the platform is wherever it is to be."""
+
+    def __init__(self) -> None:
+        self.block = SharedBlock.create(3, 0.1, 1000.0)
+        self.lease = Lease(lambda until_ns: None)
+        self.token = self.lease.take("the operator", 2.0)
+        self.stream = SetpointStream(self.block, self.lease)
+        self.stream.start()
+        self.run(POSE)
+
+    def run(self, program: int, state: LoopState = LoopState.ACTIVE) -> None:
+        row = self.block.rows[0]
+        row["state"], row["program"] = state, program
+        row["pose"] = row["pose_setpoint"] = (0.1, 1.6, 0.0, 1.0, 0.0, 0.0, 0.0)
+        self.block.counters["rows"][0] = 1
+
+    def samples(self) -> np.ndarray:
+        """Return the newest samples, the oldest first."""
+        posted = int(self.block.counters["samples"][0])
+        first = max(0, posted - SAMPLES)
+        return self.block.samples[[k % SAMPLES for k in range(first, posted)]]
+
+
+@pytest.fixture
+def robot() -> Iterator[Robot]:
+    one = Robot()
+    try:
+        yield one
+    finally:
+        one.stream.stop()
+
+
+def lead(
+    robot: Robot, device: HandDevice, after: tuple[float, Callable[[], None]] | None = None
+) -> tuple[Session, End]:
+    """Lead to the end; have something happen after some seconds."""
+    timer = threading.Timer(*after) if after else None
+    with StreamClient("127.0.0.1", robot.stream.port, token=robot.token) as stream:
+        session = Session(stream, device, SCALE, POSE)
+        if timer:
+            timer.start()
+        try:
+            return session, session.lead(lambda: False)
+        finally:
+            if timer:
+                timer.join()
+
+
+class Still:
+    """A hand that stays where it is."""
+
+    hint = "nothing"
+
+    def __init__(self, trouble: str = "") -> None:
+        self.trouble = trouble
+
+    def read(self, now_s: float) -> Hand:
+        return Hand((0.01, 0.02), clutch=False, trouble=self.trouble)
+
+    def close(self) -> None:
+        pass
+
+
+def test_what_the_hand_does_reaches_the_loop_and_its_answer_the_hand(robot: Robot) -> None:
+    lines = (
+        ScriptLine(0.0, (0.0, 0.0)),
+        ScriptLine(0.2, (0.01, -0.02), confirm=True),
+        ScriptLine(0.3, (0.01, -0.02), clutch=True),
+        ScriptLine(0.4, (0.0, 0.0), confirm=True),
+    )
+    session, end = lead(robot, ScriptHand(lines))
+    assert (end.failed, end.text) == (False, "the script is done")
+    samples = robot.samples()
+    assert np.all(samples["scale"] == SCALE)
+    numbers = confirmation(samples["buttons"].astype(np.int64))
+    assert sorted(set(numbers.tolist())) == [0, 1, 2]
+    np.testing.assert_allclose(samples["position_m"][numbers == 1][0], [0.01, -0.02, 0], atol=2e-3)
+    clutch = (samples["buttons"] & CLUTCH) != 0
+    assert clutch[0]  # until the robot has answered nothing leads
+    assert clutch[numbers == 1][-1] and not clutch[numbers == 1][0] and not clutch[-1]
+    figures = session.figures()
+    assert [one["number"] for one in figures["confirmations"]] == [1, 2]
+    assert figures["confirmations"][0]["pose_m"] == (0.1, 1.6)
+    assert 0.0 < figures["round_trip_ms"]["p50"] < 200.0
+    assert figures["answered"] > 0.9 * figures["sent"]
+
+
+def test_a_hand_in_trouble_does_not_lead(robot: Robot) -> None:
+    session, _ = lead(robot, Still("its cable is loose"), (0.4, lambda: robot.run(IDLE)))
+    assert session.leading
+    assert np.all(robot.samples()["buttons"] & CLUTCH)
+
+
+def test_a_program_that_has_ended_ends_it(robot: Robot) -> None:
+    session, end = lead(robot, Still(), (0.3, lambda: robot.run(IDLE)))
+    assert end.failed and end.text == "the robot does not follow the stream any more"
+    assert session.leading
+
+
+def test_a_fault_ends_it(robot: Robot) -> None:
+    _, end = lead(robot, Still(), (0.3, lambda: robot.run(POSE, LoopState.FAULT)))
+    assert end.failed
+
+
+def test_a_right_that_is_gone_ends_it(robot: Robot) -> None:
+    _, end = lead(robot, Still(), (0.3, lambda: robot.lease.release(robot.token)))
+    assert end.failed and end.text.startswith("the right to move has ended")
+
+
+def test_silence_ends_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session_module, "_SILENCE_S", 0.3)
+    _, end = lead(robot, Still(), (0.3, robot.stream.stop))
+    assert end.failed and end.text == "the robot has not answered for 0.3 s"
+    monkeypatch.setattr(session_module, "_GREET_S", 0.2)
+    session, end = lead(robot, Still())
+    assert end.failed and not session.leading

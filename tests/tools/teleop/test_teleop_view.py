@@ -1,0 +1,92 @@
+"""What the operator sees in the terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import UNKNOWN_POSE, Standing, StreamAnswer
+from tools.teleop.canvas import Canvas
+from tools.teleop.hand import Hand
+from tools.teleop.script import ScriptHand, ScriptLine
+from tools.teleop.session import Session
+from tools.teleop.view import View
+
+PLATFORM = {
+    "home_m": [0.0, 0.0],
+    "exit_points_m": [[-2.0, 2.0], [2.0, 2.0], [0.0, -2.0]],
+    "anchor_points_m": [[-0.1, 0.1], [0.1, 0.1], [0.0, -0.1]],
+    "workspace_min_m": [-1.0, -1.0],
+    "workspace_max_m": [1.0, 1.0],
+}
+AXES = [{"name": name} for name in ("left", "right", "lower")]
+
+
+def seen(
+    pose: tuple[float, ...], status: dict[str, Any], platform: dict[str, Any] | None = PLATFORM
+) -> list[str]:
+    """Return the lines shown of a robot that has answered once."""
+    with StreamClient("127.0.0.1", 9) as stream:
+        stream.state = StreamAnswer(
+            1, Standing.ACCEPTED, 1, 0, 0, LoopState.ACTIVE, 3, pose=pose, pose_setpoint=pose
+        )
+        session = Session(stream, ScriptHand((ScriptLine(0.0, (0.0, 0.0)),)), 8.0, 3)
+        session.leading = True
+        session.hand = Hand((0.01, 0.0), clutch=False, confirmed=2)
+        session.round_trips_s.extend((0.35, 0.73))
+        view = View(session, {"axes": AXES, "platform": platform})
+        view.status = status
+        console = Console(width=120, color_system=None)
+        with console.capture() as shown:
+            console.print(view)
+    return shown.get().splitlines()
+
+
+def test_the_robot_stands_where_it_is_told_and_its_target_too() -> None:
+    turn = math.radians(1.5)
+    pose = (0.5, 0.5, 0.0, math.cos(turn), 0.0, 0.0, math.sin(turn))
+    axes = [{"tension_N": 40.4}, {"tension_N": None}, {"tension_N": 20.0}]
+    progress = {"target_m": [-0.5, 0.5], "refused": "left: 12 N are missing", "stream": "fresh"}
+    lines = seen(pose, {"axes": axes, "program_progress": progress, "reason": "a reason"})
+    text = "\n".join(lines)
+    picture = lines[:22]
+    assert sum(line.count("◉") for line in picture) == 3
+    (row_o, column_o), (row_t, column_t) = (
+        next((k, line.index(mark)) for k, line in enumerate(picture) if mark in line)
+        for mark in "o+"
+    )
+    assert row_o == row_t  # one height
+    # 1 m apart of 4.2 m in 22 rows of 4 dots, each character 2 dots wide
+    assert column_o - column_t == pytest.approx(1.0 * 22 * 4 / 4.2 / 2, abs=1.5)
+    for told in (
+        "LEADS  active, 2 confirmed",
+        "platform +500.0 +500.0 mm, +3.00 deg; target -500.0 +500.0 mm",
+        "hand +10.0 +0.0 mm times 8; round trip 730.0 ms (at most 730.0 in 2 s)",
+        "left 40, right -, lower 20",
+        "left: 12 N are missing",
+        "a reason",
+        "a script leads",
+    ):
+        assert told in text
+
+
+def test_without_a_plane_there_are_figures_only() -> None:
+    lines = seen(UNKNOWN_POSE, {}, platform=None)
+    assert lines[0].startswith("LEADS")
+    assert not any("platform" in line or "◉" in line for line in lines)
+
+
+def test_lines_are_drawn_where_they_are() -> None:
+    canvas = Canvas(4, 2, (0.0, 0.0), (7.0, 7.0))
+    canvas.line((0.0, 7.0), (7.0, 7.0))
+    canvas.line((0.0, 0.0), (0.0, 7.0))
+    canvas.line((-1e9, math.nan), (1.0, 1.0))  # nowhere: left out
+    canvas.mark((6.9, 0.1), "x", "red")
+    canvas.mark((70.0, 0.0), "y", "red")
+    rows = ["".join(letter for letter, _ in row) for row in canvas.rows()]
+    assert rows == ["⡏⠉⠉⠉", "⡇  x"]
