@@ -2,7 +2,7 @@
 
 The loop, its programs, its supervisor and the bus are those of `cdpr run`; only the clock that
 leases and streams count by is the bus' own, so that minutes of motion pass as fast as the machine
-computes them and come out alike each time.
+computes them.
 """
 
 from __future__ import annotations

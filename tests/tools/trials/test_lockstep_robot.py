@@ -1,0 +1,102 @@
+"""A robot's daemon in the test's own process: time, rights, streams and truth are the bus' own."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.stream_packet import Standing
+from tools.errors import WorkFailedError
+from tools.trials.lockstep import LockstepRobot, OrderRefusedError
+from tools.trials.pose_log import read_pose_log
+from tools.trials.stream import Hand, answer_of
+
+HEIGHT = 1.5
+
+
+@pytest.fixture(scope="module")
+def robot() -> Iterator[LockstepRobot]:
+    with LockstepRobot("planar-3") as opened:
+        opened.enable()
+        opened.carry_out("tighten", 60.0)
+        opened.carry_out("pose", position_m=[0.0, HEIGHT])
+        yield opened
+
+
+@pytest.fixture(autouse=True)
+def _held_right(robot: LockstepRobot) -> Iterator[None]:
+    yield
+    if robot.right.token is None:
+        robot.run(4.0)  # whoever had it has lost it by silence
+        robot.right.take("trial")
+
+
+def test_time_is_that_of_the_cycles(robot):
+    before_s = robot.now_s
+    rows = robot.run(0.25)
+    assert rows.size == 250
+    assert robot.now_s - before_s == pytest.approx(0.25)
+    assert rows["time_s"][-1] == pytest.approx(robot.now_s)
+    assert robot.row["cycle"] == robot.cycle
+
+
+def test_truth_is_that_of_the_last_sync(robot):
+    robot.program("pose", position_m=[0.0, HEIGHT + 0.1])
+    robot.turn(400)
+    record = robot.truth()
+    assert record["sync_index"] == robot.cycle - 1 + robot.sync_offset
+    assert record["velocity_m_s"][1] > 0.1
+    turned = robot.row["position_rad"] - record["motor_rad"]
+    log = read_pose_log(robot.truth_log)
+    assert log[-1] == record
+    rows = robot.run(0.1)
+    true = read_pose_log(robot.truth_log)["motor_rad"][-rows.size :]
+    np.testing.assert_allclose(rows["position_rad"] - true, np.tile(turned, (100, 1)), atol=4e-3)
+    robot.finish()
+
+
+def test_what_is_refused_is_told_and_changes_nothing(robot):
+    with pytest.raises(OrderRefusedError, match="workspace"):
+        robot.program("pose", position_m=[9.0, HEIGHT])
+    assert robot.state is LoopState.ACTIVE
+    with pytest.raises(WorkFailedError, match=r"the impossible: not within 0\.1 s: active"):
+        robot.until(lambda: False, 0.1, "the impossible")
+
+
+def test_a_right_that_is_given_back_holds_the_motion(robot):
+    robot.program("pose", position_m=[0.3, HEIGHT])
+    robot.right.drop()
+    robot.run(0.01)
+    assert robot.loop.program.name == "hold"
+    with pytest.raises(OrderRefusedError, match="nobody holds the right"):
+        robot.program("pose", position_m=[0.0, HEIGHT])
+
+
+def test_a_right_runs_out_by_the_time_of_the_bus(robot):
+    robot.program("pose", position_m=[0.0, HEIGHT + 0.2], speed_m_s=0.001)
+    robot.right.fall_silent()
+    robot.run(1.0)
+    assert robot.loop.program.name == "pose"
+    robot.run(1.5)
+    assert robot.loop.program.name == "hold"
+
+
+def test_a_stream_s_packets_are_taken_as_the_daemon_takes_them(robot):
+    robot.carry_out("pose", position_m=[0.0, HEIGHT])
+    robot.program("pose", stream=True)
+    hand = Hand(token=robot.right.token)
+    stranger = Hand(session=7)
+    answers = []
+    for step in range(50):
+        place = (0.0, 0.002 * step, 0.0)
+        answers.append(answer_of(robot.stream.take(hand.packet(robot.now_s, place, 1.0))))
+        assert robot.stream.take(b"nonsense") is None
+        robot.turn(20)
+    assert {answer.standing for answer in answers} == {Standing.ACCEPTED}
+    assert answers[-1].pose[1] > HEIGHT + 0.05
+    refused = robot.stream.take(stranger.packet(robot.now_s, (0.0, 0.0, 0.0)), ("127.0.0.1", 9))
+    assert answer_of(refused).standing is Standing.BUSY
+    robot.run(1.5)
+    assert robot.truth()["position_m"][1] == pytest.approx(HEIGHT + 0.098, abs=5e-3)
+    assert robot.truth()["velocity_m_s"][1] == pytest.approx(0.0, abs=5e-3)

@@ -1,0 +1,108 @@
+"""`cdpr robot trial`: its figures are those of its files, as a stranger reads them."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from profiles.errors import ProfileError
+from tools.commands import robot_trial
+from tools.commands.robot_trial import KindOfTrial as Kind
+from tools.errors import BadInputError, WorkFailedError
+from tools.trials.recorded import Recorded
+
+ROOT = Path(__file__).parents[3]
+BEHIND = 1024  # the header of a log of true poses
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("trial") / "targets"
+    what = ["planar-3", "targets", "--minutes", "0.12", "--out", str(folder), "--json"]
+    command = [sys.executable, "-m", "tools.cli", "robot", "trial", *what]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout.splitlines()[-1])
+
+
+def test_figures_are_those_of_the_files(trial):
+    folder, told = trial
+    (recording,) = (folder / "run").glob("*.mcap")
+    with recording.open("rb") as file:
+        marks = [
+            json.loads(message.data)
+            for _, _, message in make_reader(file).iter_messages(topics=["/events"])
+        ]
+    (begin,) = [mark for mark in marks if mark.get("mark") == "begin"]
+    measured = [mark for mark in marks if mark.get("mark") == "measured"]
+    log = (folder / "run" / "truth.log").read_bytes()
+    header = json.loads(log[:BEHIND])
+    kinds = [(name, kind, *map(tuple, shape)) for name, kind, *shape in header["fields"]]
+    true = np.frombuffer(log[BEHIND:], kinds)
+    errors = []
+    for mark in measured:
+        last = mark["cycle"] - 1 + begin["sync_offset"]
+        rows = true[(true["sync_index"] > last - 100) & (true["sync_index"] <= last)]
+        assert rows.size == 100
+        errors.append(1e3 * (rows["position_m"][:, :2].mean(axis=0) - mark["target_m"]))
+    mean, sigma = np.mean(errors, axis=0), np.std(errors, axis=0, ddof=1)
+    figures = {key: figure["value"] for key, figure in told["figures"].items()}
+    assert figures["targets"] == len(measured) >= 2
+    assert [figures["mean_x_mm"], figures["mean_y_mm"]] == pytest.approx(np.abs(mean))
+    assert [figures["three_sigma_x_mm"], figures["three_sigma_y_mm"]] == pytest.approx(3 * sigma)
+    assert figures["worst_mm"] < 10.0
+    assert (folder / "trial.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_it_can_be_judged_again(trial, capsys):
+    folder, told = trial
+    robot_trial.trial("planar-3", Kind.TARGETS, out_dir=folder, again=True, as_json=True)
+    again = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert again["figures"] == told["figures"]
+    with pytest.raises(BadInputError, match="holds a trial of targets, not line"):
+        robot_trial.trial("planar-3", Kind.LINE, out_dir=folder, again=True)
+
+
+@pytest.mark.parametrize("by", [-1, 1])
+def test_a_log_of_other_syncs_is_noticed(trial, tmp_path, by):
+    folder, _ = trial
+    part = tmp_path / "run"
+    shutil.copytree(folder / "run", part)
+    Recorded(part)
+    log = part / "truth.log"
+    data = log.read_bytes()
+    size = json.loads(data[:BEHIND])["record_bytes"]
+    records = np.frombuffer(data[BEHIND:], np.uint8).reshape(-1, size)
+    moved = np.roll(records, by, axis=0)
+    moved[:, :4] = records[:, :4]  # the number of the SYNC stays
+    log.write_bytes(data[:BEHIND] + moved.tobytes())
+    with pytest.raises(WorkFailedError, match="do not belong together"):
+        Recorded(part)
+
+
+@pytest.mark.parametrize(
+    ("robot", "kind", "options", "told"),
+    [
+        ("planar-3", Kind.LINE, {"minutes": 1.0}, "lasts as long as it lasts"),
+        ("planar-3", Kind.LINE, {}, "--commissioned DIR"),
+        ("bench-2", Kind.TARGETS, {}, "has no platform in a plane"),
+        ("nothing", Kind.TARGETS, {}, "nothing"),
+        ("planar-3", Kind.TARGETS, {"again": True, "out_dir": None}, "needs --out"),
+        ("planar-3", Kind.TARGETS, {"commissioned": Path("/nowhere")}, "/nowhere"),
+    ],
+)
+def test_what_cannot_be_tried_is_told(tmp_path, robot, kind, options, told):
+    with pytest.raises((BadInputError, ProfileError), match=told):
+        robot_trial.trial(robot, kind, **{"out_dir": tmp_path / "out", **options})
+
+
+def test_an_earlier_trial_is_not_written_over(trial):
+    folder, _ = trial
+    with pytest.raises(BadInputError, match="not empty"):
+        robot_trial.trial("planar-3", Kind.TARGETS, minutes=0.1, out_dir=folder)
