@@ -39,6 +39,7 @@ PLATFORM_DTYPE = np.dtype(
         ("velocity", _F8, (3,)),
         ("rotation", _F8, (3, 3)),  # from the platform's frame to the room
         ("spin", _F8, (3,)),  # rad/s, in the room
+        ("bent", _F8, (MOST_FEET, 3)),  # m, by how much feet that stick are off where they stand
         ("arm", _F8, (MOST_CABLES, 3)),  # m, anchor points from the centre of mass, in the room
         ("way", _F8, (MOST_CABLES, 3)),  # unit vectors from anchor to exit points
     ]
@@ -107,7 +108,7 @@ def step_platform(p: Any, motors: Any, h: float) -> None:
         ty += r[2] * x - r[0] * z
         tz += r[0] * y - r[1] * x
     if p.floor > -math.inf:
-        gx, gy, gz, hx, hy, hz = floor_force(p)
+        gx, gy, gz, hx, hy, hz = floor_force(p, h)
         fx, fy, fz = fx + gx, fy + gy, fz + gz
         tx, ty, tz = tx + hx, ty + hy, tz + hz
     p.velocity[0] += h * fx / p.mass
@@ -165,8 +166,12 @@ def rotate(p: Any, h: float) -> None:
 
 
 @jit
-def floor_force(p: Any) -> tuple[float, float, float, float, float, float]:
-    """Return force and moment of the floor: each foot on a damped spring, with dry friction."""
+def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, float]:
+    """Return force and moment of the floor over the next `h` s: each foot on a damped spring.
+
+    Along the floor it is one as well, as long as dry friction holds it: a foot that sticks stays
+    where it is, one that slides drags its spring along.
+    """
     g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)
     fx, fy, fz, tx, ty, tz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if g == 0.0:
@@ -180,7 +185,9 @@ def floor_force(p: Any) -> tuple[float, float, float, float, float, float]:
         rz = R[2, 0] * q[0] + R[2, 1] * q[1] + R[2, 2] * q[2]
         height = (p.position[0] + rx) * nx + (p.position[1] + ry) * ny + (p.position[2] + rz) * nz
         depth = p.floor - height
+        bent = p.bent[i]
         if depth <= 0.0:
+            bent[0] = bent[1] = bent[2] = 0.0
             continue
         vx = p.velocity[0] + w[1] * rz - w[2] * ry
         vy = p.velocity[1] + w[2] * rx - w[0] * rz
@@ -188,9 +195,14 @@ def floor_force(p: Any) -> tuple[float, float, float, float, float, float]:
         sinking = -(vx * nx + vy * ny + vz * nz)
         load = max(0.0, p.floor_stiffness * depth + p.floor_damping * sinking)
         sx, sy, sz = vx + sinking * nx, vy + sinking * ny, vz + sinking * nz
-        sliding = math.sqrt(sx * sx + sy * sy + sz * sz)
-        grip = p.floor_friction * load / max(sliding, 1e-2)
-        x, y, z = load * nx - grip * sx, load * ny - grip * sy, load * nz - grip * sz
+        k, d = p.floor_stiffness, p.floor_damping
+        bent[0], bent[1], bent[2] = bent[0] + h * sx, bent[1] + h * sy, bent[2] + h * sz
+        x, y, z = k * bent[0] + d * sx, k * bent[1] + d * sy, k * bent[2] + d * sz
+        most, pull = p.floor_friction * load, math.sqrt(x * x + y * y + z * z)
+        if pull > most:
+            x, y, z = x * most / pull, y * most / pull, z * most / pull
+            bent[0], bent[1], bent[2] = (x - d * sx) / k, (y - d * sy) / k, (z - d * sz) / k
+        x, y, z = load * nx - x, load * ny - y, load * nz - z
         fx, fy, fz = fx + x, fy + y, fz + z
         tx += ry * z - rz * y
         ty += rz * x - rx * z

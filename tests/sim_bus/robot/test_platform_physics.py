@@ -137,6 +137,23 @@ def test_the_floor_carries_a_slack_platform() -> None:
     assert 0.0 < robot.tension_N.max() < 3.0
 
 
+@pytest.mark.parametrize("share", [0.7, 1.3])
+def test_a_foot_sticks_until_a_force_is_more_than_its_friction(share: float) -> None:
+    friction_m_s2 = 0.3 * 9.80665
+    floor = {"present": True, "friction": 0.3}
+    robot = body(pretension_N=0.0, start={"slack_m": 0.05}, floor=floor)
+    run(robot, 0.3)
+    begun_m = robot.position_m[0]
+    for k in range(300):
+        robot.platform["velocity"][0, 0] += 1e-3 * share * friction_m_s2
+        run(robot, 1e-3, begin_s=0.3 + 1e-3 * k)
+    way_m = robot.position_m[0] - begun_m
+    if share < 1.0:
+        assert 0.0 < way_m < 2e-4
+    else:
+        assert way_m == pytest.approx(0.5 * (share - 1.0) * friction_m_s2 * 0.3**2, rel=0.1)
+
+
 @pytest.mark.parametrize("tension_N", [5.0, 20.0, 60.0])
 @pytest.mark.parametrize("span_m", [1.0, 3.0])
 def test_a_sagging_cable_is_a_catenary(tension_N: float, span_m: float) -> None:
