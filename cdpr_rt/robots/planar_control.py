@@ -172,21 +172,12 @@ class PlanarControl:
         """Bring the estimate of the platform's position up to date, by one cycle."""
         kernel.estimate(self._robot, self._state, self._cables, feedback.position_rad, _ITERATIONS)
 
-    def set_home(self, feedback: AxisFeedback, tension_N: FloatArray) -> None:
-        """Take the platform to be at home now, its cables under `tension_N` (3,)."""
-        cables, state = self._cables, self._state
-        cables["tension"] = tension_N
-        state["position"][0], state["angle"] = self._home, 0.0
-        for _ in range(_SETTLING_STEPS):
-            kernel.turn_to_equilibrium(state, cables)
-        angle = float(state["angle"][0])
-        turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-        anchors = self._home + cables["anchor"] @ turn.T
-        free = np.linalg.norm(anchors - cables["exit"], axis=1) / (
-            1.0 + tension_N / cables["rigidity"]
-        )
-        cables["length_at_zero"] = free - cables["m_per_rad"] * feedback.position_rad
-        self.begin(feedback)
+    def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
+        """Return the cables' lengths (3,) without tension, of a platform that stands upright at
+        home, its cables under `tension_N` (3,)."""
+        cables = self._cables
+        rho = np.linalg.norm(self._home + cables["anchor"] - cables["exit"], axis=1)
+        return np.asarray(rho / (1.0 + tension_N / cables["rigidity"]))
 
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
         """Take the cables to have these lengths without tension at the motors' angles, (3,).

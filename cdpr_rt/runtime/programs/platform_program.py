@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.approach import approach, place_to_rest
+from cdpr_rt.compensation import Compensation
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_control import PlanarControl
 from cdpr_rt.runtime.estimate import Estimator
+from cdpr_rt.runtime.last_lengths import LastLengths
 from cdpr_rt.runtime.programs.base import ProgramError
 from cdpr_rt.runtime.programs.handover import Handover
 from cdpr_rt.runtime.programs.wanted import Wanted
@@ -28,10 +30,14 @@ class PlatformParts:
         estimator: Estimator,
         period_s: float,
         most_N: FloatArray,
+        compensation: Compensation | None = None,
     ) -> None:
         self.platform = platform
         self.most_N = most_N
         """What each cable may be pulled with."""
+        self.compensation = compensation
+        self.last = LastLengths()
+        """The lengths at which it was stopped."""
         self.control = control
         self.estimator = estimator
         self.period_s = period_s
@@ -57,13 +63,25 @@ class PlatformParts:
         """Whether it is known where the platform is."""
         return bool(self.estimator.estimate.length_known.all())
 
+    @property
+    def home_tolerance_m(self) -> float:
+        """How far from where it is taken to be the platform may stand."""
+        return self.platform.home_tolerance_m
+
+    def wants_index(self, feedback: AxisFeedback) -> bool:
+        """Whether a motor's cogging is known, but not yet its index."""
+        known = self.compensation
+        return known is not None and bool((known.available & ~feedback.index_known).any())
+
     def lengths_disagree_m(self) -> float:
         """Return by how much the cables' lengths contradict each other, while they are tight."""
         return self.control.residual_m if self.tight else 0.0
 
     def pretend(self, feedback: AxisFeedback) -> None:
         """Take the platform to be at home on tight cables, for a rehearsal."""
-        self.control.set_home(feedback, self.control.least_N)
+        lengths_m = self.control.lengths_at_home(self.control.least_N)
+        self.control.take_lengths(lengths_m, feedback)
+        self.control.begin(feedback)
         self.estimator.set_lengths(feedback.position_rad, self.control.free_lengths_m)
         self.tight = True
 

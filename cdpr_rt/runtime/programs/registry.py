@@ -51,7 +51,7 @@ def platform_parts(
     control = PlanarControl(
         platform, list(robot.axes), low, high, model.torque_Nm, model.period_s, known
     )
-    return PlatformParts(platform, control, estimator, model.period_s, high)
+    return PlatformParts(platform, control, estimator, model.period_s, high, known)
 
 
 def build_programs(

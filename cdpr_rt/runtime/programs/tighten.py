@@ -11,7 +11,9 @@ from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_kernel import G_m_s2
 from cdpr_rt.robots.planar_kinematics import PlanarGeometry
 from cdpr_rt.robots.planar_tensions import PlanarTensions
+from cdpr_rt.runtime.last_lengths import off_index_m
 from cdpr_rt.runtime.programs.base import ProgramError
+from cdpr_rt.runtime.programs.index_way import index_way
 from cdpr_rt.runtime.programs.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.runtime.programs.reel import Reel
 from cdpr_rt.runtime.programs.wanted import Wanted
@@ -23,7 +25,10 @@ GENTLE = 0.4
 BEYOND = 1.5
 """How much harder they are pulled for a moment: coming back from there friction acts the other
 way, and what it does to the angles on the way up and down cancels out."""
-_HANGING = 0.8
+INDEX_m_s = 0.1
+"""How fast the platform is lifted while indices are looked for."""
+_STANDING = 0.8
+_HANGING = 0.5
 _RISE_1_s = 1.0
 _FALL_S = 0.2
 _STILL_m = 0.0003
@@ -33,16 +38,17 @@ _MOST_m = 1.0
 _MOST_S = 60.0
 
 _STAGES = (("slack", GENTLE), ("pull", 1.0), ("beyond", BEYOND), ("lengths", 1.0))
-_SOURCES = ("home", "lengths")
+_SOURCES = ("home", "lengths", "last")
 
 
 class TightenProgram(PlatformProgram):
     """Pulls slack cables gently until all are tight and stand still; then keeps the platform.
 
     The platform stands firm meanwhile: tensions grow together, in shares whose sum presses it down
-    where its cables can, and never pulls it sideways. Where cable lengths are not known, the
-    platform is taken to be at home: it has to stand there. A cable that does not become tight ends
-    it: the cables are let go again.
+    where its cables can, and never pulls it sideways. Its cables' lengths follow from home, where
+    it has to stand then, from what is known of them, or from the last stop. Where a motor's cogging
+    is known but not its index, the platform is lifted until all have passed theirs. A cable that
+    does not become tight, and lengths that disagree, end it: the cables are let go again.
     """
 
     name = "tighten"
@@ -55,31 +61,34 @@ class TightenProgram(PlatformProgram):
         inertia = np.full(3, parts.control.inertia_kg_m2)
         self._reel = Reel(inertia, cable_m, parts.period_s)
         self._reel.paying_out_m_s[:] = -REEL_m_s
-        self._begun = np.zeros(3)
-        self._up = np.zeros(3)
-        self._here = np.zeros(3)
+        self._begun, self._here, self._up = np.zeros(3), np.zeros(3), np.zeros(3)
         self._stage = 0
         self._share = 0.0
         self._still = self._cycles = 0
-        self._from_home = False
-        self._tight = False
+        self._source = "home"
+        self._feedback = AxisFeedback(3)
+        self._way: list[FloatArray] = []
         self._why = ""
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the torque of the last cycle, whatever it pulled."""
-        super().start(feedback, setpoint, torque_Nm)
-        self._tight = self._parts.tight
-        self._begun[:] = feedback.position_rad
-        velocity = self._parts.estimator.estimate.velocity_rad_s
-        self._reel.begin(feedback, velocity, torque_Nm)
+        parts = self._parts
+        self._feedback = feedback
+        self._why = ""
+        self._stopping = self._at_rest = False
+        self._source = self._usual_source()
+        if parts.tight:
+            super().start(feedback, setpoint, torque_Nm)
+            self._look_for_indices()
+            return
+        self._begun[:] = self._here[:] = feedback.position_rad
+        self._reel.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
         self._share = min(max(float(np.max(-torque_Nm / self._cable / self._full_N)), 0.0), 1.0)
         self._stage = self._still = self._cycles = 0
-        self._from_home = not self._parts.known
-        self._why = ""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (3,) each, in place."""
-        if self._tight:
+        if self._parts.tight:
             super().update(feedback, setpoint, torque_Nm)
             return
         goal = 0.0 if self._stopping else _STAGES[self._stage][1]
@@ -92,54 +101,97 @@ class TightenProgram(PlatformProgram):
         self._cycles += 1
         if self._stopping:
             self._at_rest = self._share == 0.0
+        elif self._stands_still(feedback, self._share == goal):
+            self._next_stage(feedback, setpoint, torque_Nm)
         else:
-            self._watch(feedback, setpoint, torque_Nm, self._share == goal)
+            self._give_up_if(self._trouble(feedback))
 
     def progress(self) -> dict[str, Any]:
         """Return how far it is, how hard the cables are pulled, and what stands in the way."""
-        told = {
-            "stage": "held" if self._tight else _STAGES[self._stage][0],
-            "tight": self._tight,
-            "done": float(self._tight),
-            "trouble": self._why,
-        }
-        if self._tight:
+        tight = self._parts.tight
+        stage = _STAGES[self._stage][0] if not tight else "index" if self._way else "held"
+        done = tight and not self._way
+        told = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._why}
+        if tight:
             return {**super().progress(), **told}
         return {"tension_N": self._reel.tension_N.tolist(), **told}
 
+    # -- what is wanted
+
+    def _usual_source(self) -> str:
+        return "lengths" if self._parts.known else "home"
+
     def _parsed(self, wanted: Mapping[str, Any]) -> str:
         Wanted(self.name, wanted, ("from",))
-        source = wanted.get("from", "lengths" if self._parts.known else "home")
+        source, last = wanted.get("from", self._usual_source()), self._parts.last
         if source not in _SOURCES:
-            allowed = " or ".join(_SOURCES)
+            allowed = ", ".join(_SOURCES)
             raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
         if source == "lengths" and not self._parts.known:
             raise ProgramError("tighten: from: the cables' lengths are not known; allowed: home")
+        if source == "last" and last.lengths is None:
+            raise ProgramError(f"tighten: from: no lengths of the last stop: {last.why}")
         return str(source)
 
     def _take(self, source: str) -> None:
-        self._from_home = source == "home"
+        self._source = source
+        hanging = self._parts.estimator.estimate.tension_N >= _HANGING * self._control.least_N
+        if source != "home" and bool(hanging.all()) and not self._parts.tight:
+            self._stage = len(_STAGES) - 1  # brakes have kept it where it was
+            self._share = 1.0
 
-    def _watch(
-        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray, pulling: bool
-    ) -> None:
+    # -- taking up slack
+
+    def _stands_still(self, feedback: AxisFeedback, pulling: bool) -> bool:
         reel = self._reel
-        moved_m = np.abs((feedback.position_rad - self._here) * self._cable).max()
         pulling = pulling and bool((reel.tension_N > _PULLED * reel.high_N).all())
+        moved_m = np.abs((feedback.position_rad - self._here) * self._cable).max()
         if not pulling or moved_m > _STILL_m:
             self._here[:] = feedback.position_rad
             self._still = 0
         self._still += 1
-        if self._still * self._parts.period_s > _STILL_S:
-            self._still = 0
-            if _STAGES[self._stage][0] == "pull":
-                self._up[:] = feedback.position_rad
+        return self._still * self._parts.period_s > _STILL_S
+
+    def _next_stage(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> None:
+        self._still = 0
+        if _STAGES[self._stage][0] == "pull":
+            self._up[:] = feedback.position_rad
+        if self._stage + 1 < len(_STAGES):
             self._stage += 1
-            if self._stage == len(_STAGES):
-                self._finish(feedback, setpoint, torque_Nm)
             return
-        self._why = self._trouble(feedback)
-        self._stopping = bool(self._why)
+        self._control.take_lengths(self._lengths(feedback), feedback)
+        self._control.begin(feedback)
+        allowed_m = self._parts.home_tolerance_m
+        if self._control.residual_m > allowed_m:
+            self._give_up_if(
+                f"the cables' lengths disagree by {1e3 * self._control.residual_m:.0f} mm, "
+                f"{1e3 * allowed_m:.0f} mm allowed; stand the platform at home and tighten from it"
+            )
+            return
+        self._finish(feedback, setpoint, torque_Nm)
+
+    def _lengths(self, feedback: AxisFeedback) -> FloatArray:
+        """Return the cables' lengths, (3,), as they are now."""
+        last = self._parts.last.lengths
+        if self._source == "last" and last is not None:
+            return last.cable_length_m
+        if self._source == "lengths":
+            return self._parts.estimator.estimate.cable_length_m
+        hysteresis = 0.5 * self._cable * (feedback.position_rad - self._up)
+        return self._control.lengths_at_home(self._full_N) + hysteresis
+
+    def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        parts, control = self._parts, self._control
+        parts.estimator.set_lengths(feedback.position_rad, control.free_lengths_m)
+        control.position_m[:] = control.estimated_m
+        control.velocity_m_s[:] = control.acceleration_m_s2[:] = 0.0
+        parts.loop.take_over(feedback, torque_Nm)
+        parts.cycle = feedback.cycle
+        parts.tight = True
+        super().start(feedback, setpoint, torque_Nm)
+        self._look_for_indices()
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         way = np.abs((feedback.position_rad - self._begun) * self._cable)
@@ -150,16 +202,53 @@ class TightenProgram(PlatformProgram):
             return f"not tight within {_MOST_S:g} s"
         return ""
 
-    def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+    def _give_up_if(self, why: str) -> None:
+        self._why = why
+        self._stopping = bool(why)
+
+    # -- finding indices
+
+    def _look_for_indices(self) -> None:
+        """Set out on a way on which all motors turn, where an index is wanted."""
         parts, control = self._parts, self._control
-        self._stage -= 1
-        if self._from_home:
-            control.set_home(feedback, self._full_N)
-            hysteresis = 0.5 * self._cable * (feedback.position_rad - self._up)
-            parts.estimator.set_lengths(feedback.position_rad, control.free_lengths_m + hysteresis)
-        self._tight = parts.tight = True
-        super().start(feedback, setpoint, torque_Nm)
-        self._parts.cycle = feedback.cycle
+        self._way = []
+        if parts.wants_index(self._feedback):
+            self._way = index_way(
+                parts.platform, self._cable, lambda there: not control.feasible(there)
+            )
+        if self._way:
+            self._target[:] = self._way[0]
+            self._speed[:] = np.minimum(INDEX_m_s, parts.speed_m_s)
+
+    def _move(self) -> bool:
+        arrived = self._approach()
+        if not self._way:
+            return arrived
+        found = not self._parts.wants_index(self._feedback)
+        if found or arrived:
+            self._way = [] if found else self._way[1:]
+            self._target[:] = self._way[0] if self._way else self._resting_place()
+            if not found and not self._way:
+                self._why = "a motor has not passed its index: its cogging is not compensated"
+            if found:
+                self._why = self._compare_indices()
+        return False
+
+    def _compare_indices(self) -> str:
+        """Return which index is not where the last stop's lengths have it, or an empty text."""
+        last = self._parts.last.lengths
+        if self._source != "last" or last is None:
+            return ""
+        length_m = self._parts.estimator.estimate.cable_length_m
+        off = np.abs(off_index_m(last, length_m, self._feedback, self._cable))
+        off[np.isnan(off)] = 0.0
+        worst, allowed_m = int(off.argmax()), self._parts.home_tolerance_m
+        if off[worst] <= allowed_m:
+            return ""
+        return (
+            f"cable {worst}: its motor's index is {1e3 * off[worst]:.0f} mm from where the last "
+            f"stop has it, {1e3 * allowed_m:.0f} mm allowed: lower, and tighten from home"
+        )
 
 
 def standing_tensions(parts: PlatformParts) -> FloatArray:
@@ -177,4 +266,4 @@ def standing_tensions(parts: PlatformParts) -> FloatArray:
     if not missing:
         return pressed
     hanging, _ = tensions.distribute(J, -weight)
-    return np.maximum(_HANGING * hanging, 0.0)
+    return np.maximum(_STANDING * hanging, 0.0)

@@ -1,0 +1,113 @@
+"""The cables' lengths of the last stop, for a start where the platform does not stand at home."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.exchange import AxisFeedback, FloatArray
+from cdpr_rt.runtime.estimate import AxisEstimate
+from cdpr_rt.state_file import StateFileError, read_state, write_state
+
+_FIELDS = ("cable_length_m", "cable_at_index_m")
+
+
+@dataclass(frozen=True)
+class StoppedLengths:
+    """Cable lengths when the power was taken, (n,), without tension."""
+
+    cable_length_m: FloatArray
+    cable_at_index_m: FloatArray
+    """With the motor at the index that it had found, nan where it had found none."""
+    date: str
+    """ISO 8601, UTC."""
+
+
+class LastLengths:
+    """What a stop has left to the next start: in memory, and in a file where there is one."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path
+        self.lengths: StoppedLengths | None = None
+        self.why = "the robot has not been stopped with known lengths yet"
+        """Why there are none, where there are none."""
+
+    def load(self, n: int) -> None:
+        """Read the file of a robot with n axes; one that is damaged leaves none."""
+        if self.path is None:
+            return
+        try:
+            held = read_state(self.path)
+            if held is not None:
+                self._take(held, n)
+        except StateFileError as error:
+            self.why = str(error)
+        except (KeyError, TypeError, ValueError):
+            self.why = f"{self.path}: is damaged: lengths of {n} cables are wanted"
+
+    def _take(self, held: dict[str, Any], n: int) -> None:
+        if not held["stopped"]:
+            self.why = f"{self.path}: the robot was in motion when it was last heard of"
+            return
+        lengths, at_index = (
+            np.array([math.nan if x is None else float(x) for x in held[key]]) for key in _FIELDS
+        )
+        if lengths.shape != (n,) or at_index.shape != (n,) or not (lengths > 0.0).all():
+            raise ValueError
+        self.lengths = StoppedLengths(lengths, at_index, str(held["date"]))
+
+    def forget(self) -> None:
+        """Have none from now on, as the robot is about to move; raises StateFileError."""
+        self.lengths = None
+        self.why = "the robot has moved since"
+        self._write({"stopped": False})
+
+    def keep(self, estimate: AxisEstimate, feedback: AxisFeedback) -> None:
+        """Keep the lengths at which it has stopped, where they are known.
+
+        Raises StateFileError.
+        """
+        if not estimate.length_known.all():
+            return
+        turned = feedback.index_rad - feedback.position_rad
+        at_index = np.where(
+            feedback.index_known,
+            estimate.cable_length_m + estimate.cable_m_per_rad * turned,
+            math.nan,
+        )
+        date = datetime.now(UTC).isoformat(timespec="seconds")
+        self.lengths = kept = StoppedLengths(estimate.cable_length_m.copy(), at_index, date)
+        self._write(
+            {
+                "stopped": True,
+                "date": date,
+                **{key: _plain(getattr(kept, key)) for key in _FIELDS},
+            }
+        )
+
+    def _write(self, held: dict[str, Any]) -> None:
+        if self.path is not None:
+            write_state(self.path, held)
+
+
+def off_index_m(
+    last: StoppedLengths, length_m: FloatArray, feedback: AxisFeedback, cable_m: FloatArray
+) -> FloatArray:
+    """Return by how much cables are longer than their motors' indices tell, (n,).
+
+    Known but for whole turns; nan where an index is not known, now or then. `cable_m` (n,) is paid
+    out per radian.
+    """
+    at_index = length_m + cable_m * (feedback.index_rad - feedback.position_rad)
+    turn = math.tau * np.abs(cable_m)
+    off = np.remainder(at_index - last.cable_at_index_m + 0.5 * turn, turn) - 0.5 * turn
+    return np.where(feedback.index_known, off, math.nan)
+
+
+def _plain(values: FloatArray) -> list[float | None]:
+    return [float(x) if math.isfinite(x) else None for x in values]
