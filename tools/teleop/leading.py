@@ -158,9 +158,10 @@ def _tell(session: Session, end: End, daemon: Daemon, out: Output) -> None:
         where = f": platform {x:+.2f} {y:+.2f} mm" if math.isfinite(x) else ""
         out.say(f"confirmed {one.number} at {one.time_s:.2f} s{where}")
     trip = figures["round_trip_ms"]
+    told = f"; round trip {trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
     out.say(
-        f"{figures['sent']} set-points sent, {figures['answered']} answered; round trip "
-        f"{trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
+        f"{figures['sent']} set-points sent, {figures['answered']} answered"
+        f"{told if figures['answered'] else ''}"
     )
     if end.failed:
         reason = f" ({status['reason']})" if status["reason"] else ""

@@ -29,6 +29,7 @@ _ARRIVE_S: Final = 15.0
 _UNSEEN_S: Final = 1.0
 """Where the robot does not say where it is: longer than what has come waits to be played."""
 _MOST_KEPT: Final = 36_000
+_NEVER_ANSWERED: Final = ": its stream cannot be reached there, or needs another --key-file"
 _WHY_NOT: Final = {
     Standing.BUSY: "another sender holds the set-point stream",
     Standing.NO_RIGHT: "the right to move has ended, or is somebody else's now",
@@ -149,7 +150,8 @@ class Session:
         """Say why the robot does not follow, where that has lasted."""
         patience_s = _SILENCE_S if self.leading else _GREET_S
         if now_s - self._heard_s > patience_s:
-            return End(f"the robot has not answered for {patience_s:g} s", failed=True)
+            hint = "" if self.stream.answered else _NEVER_ANSWERED
+            return End(f"the robot has not answered for {patience_s:g} s{hint}", failed=True)
         if self._runs():
             self._fine_s = now_s
         elif now_s - self._fine_s > (_TAKEN_AWAY_S if self.leading else _GREET_S):
