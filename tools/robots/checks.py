@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.runtime.robot_arrays import limits_of
 from profiles import ProfileError, Robot
+from profiles.platform import Platform
 from tools.robots.statics import PlanarStatics, can_be_computed, statics_of
 
 _GRID = 25
+_SHARES = np.linspace(0.99, 0.03, 97)
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
 _FAR_TURNED_rad = math.radians(10.0)
@@ -86,60 +88,58 @@ def _shape(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
 def _tensions(statics: PlanarStatics) -> Iterator[Finding]:
     platform = statics.platform
     home = np.array(platform.home_m)
-    if statics.reserve_N(home) < 0.0:
-        yield Finding("platform.home_m", _not_held(statics, home), impossible=True)
-    else:
-        way = np.linspace(home, np.clip(home, statics.box.low_m, statics.box.high_m), _GRID)
-        missing = statics.reserve_N(way) < 0.0
+    way = np.linspace(home, np.clip(home, statics.box.low_m, statics.box.high_m), _GRID)
+    for place, where in ((home[None], ""), (way, "on the way to the box of targets, ")):
+        missing = ~statics.is_target(place)
         if missing.any():
-            text = "on the way to the box of targets, " + _not_held(statics, way[missing.argmax()])
+            text = where + _not_held(statics, place[missing.argmax()])
             yield Finding("platform.home_m", text, impossible=True)
+            break
     points = statics.box.grid(_GRID, _GRID)
-    still = float(np.mean(statics.reserve_N(points) >= 0.0))
-    moving = float(np.mean(statics.reserve_N(points, platform.acceleration_m_s2) >= 0.0))
-    key, text = "platform.workspace_min_m", ""
-    if still < 1.0:
-        text = f"tensions within the limits hold the platform in {100 * still:.0f} % of the box"
-    elif moving < 1.0:
-        key = "platform.acceleration_m_s2"
-        text = (
-            f"{platform.acceleration_m_s2:g} m/s2 along both directions at once can be had in "
-            f"{100 * moving:.0f} % of the box"
-        )
-    if text:
-        yield Finding(key, text + _what_would_be_held(statics), impossible=still == 0.0)
-
-
-def _what_would_be_held(statics: PlanarStatics) -> str:
-    smaller = statics.largest_box(statics.box, 0.0, statics.platform.acceleration_m_s2)
-    if smaller is not None:
-        return f"; all of it would be held: {_point(smaller.low_m)} to {_point(smaller.high_m)} m"
-    points = statics.box.grid(_GRID, _GRID).reshape(-1, 2)
-    worst = points[int(statics.reserve_N(points).argmin())]
-    return "; " + _not_held(statics, worst)
+    taken = float(np.mean(statics.is_target(points)))
+    if taken < 1.0:
+        text = f"in {100 * taken:.0f} % of the box targets are taken; "
+        smaller = statics.largest_box(statics.box)
+        if smaller is not None:
+            text += f"in all of {_point(smaller.low_m)} to {_point(smaller.high_m)} m they would be"
+        else:
+            worst = statics.controlled.reserve_N(points, platform.acceleration_m_s2).argmin()
+            text += _not_held(statics, points.reshape(-1, 2)[worst])
+        yield Finding("platform.workspace_min_m", text, impossible=taken == 0.0)
 
 
 def _not_held(statics: PlanarStatics, position_m: FloatArray) -> str:
-    """Say what cannot be held there, and what would be."""
-    where = f"at {_point(position_m)} m"
-    reserve = float(statics.reserve_N(position_m))
+    """Say why the platform is not moved there, and what would help."""
+    where, reserve = f"at {_point(position_m)} m", float(statics.reserve_N(position_m))
     if not math.isfinite(reserve):
         return f"{where} the cables cannot hold one direction, whatever their tensions"
     needed = ", ".join(f"{value:.0f}" for value in statics.tensions_N(position_m))
-    text = (
-        f"{where} the cables would need {needed} N, {-reserve:.0f} N outside of tension_min_N and "
-        "tension_max_N in [limits]"
-    )
-    shares = np.linspace(0.0, 1.0, 101)
-    lighter = [s for s in shares if statics.reserve_N(position_m, mass_share=s) >= 0.0]
-    if lighter:
-        most_kg = statics.platform.mass_kg * max(lighter)
-        return f"{text}; a platform of up to {most_kg:.3g} kg could be held there"
-    looser = [s for s in shares if statics.reserve_N(position_m, low_share=s) >= 0.0]
-    if looser:
-        most_N = float(statics.low_N.min()) * max(looser)
-        return f"{text}; with tension_min_N up to {most_N:.3g} it could be held there"
-    return f"{text}; only a place further inside the exit points helps"
+    allowed = f"{statics.low_N.min():g} to {statics.high_N.max():g} N are allowed"
+    if reserve < 0.0:
+        text = f"{where} the cables would need {needed} N; {allowed}"
+    else:
+        text = f"{where} the cables have {needed} N; {allowed}, which leaves too little for motion"
+    return f"{text}; {_what_helps(statics, position_m)}"
+
+
+def _what_helps(statics: PlanarStatics, position_m: FloatArray) -> str:
+    """Say by how much one figure would have to change for a target there."""
+    platform, low_N = statics.platform, statics.low_N
+    most, mass_kg = platform.acceleration_m_s2, platform.mass_kg
+
+    def helps(platform: Platform, low_N: FloatArray) -> bool:
+        return bool(PlanarStatics(platform, low_N, statics.high_N).is_target(position_m))
+
+    for share in _SHARES:
+        if helps(replace(platform, acceleration_m_s2=share * most), low_N):
+            return f"acceleration_m_s2 up to {share * most:.3g} is possible there"
+    for share in _SHARES:
+        if helps(replace(platform, mass_kg=share * mass_kg), low_N):
+            return f"a platform of up to {share * mass_kg:.3g} kg is possible there"
+    for share in _SHARES:
+        if helps(platform, share * low_N):
+            return f"tension_min_N up to {share * low_N.min():.3g} is possible there"
+    return "only a place further inside the exit points helps"
 
 
 def _motors(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
@@ -155,14 +155,16 @@ def _motors(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
             "less friction"
         )
         yield Finding("limits.tension_max_N", text, impossible=True)
-    stall_Nm = np.array([axis.winch.motor.stall_torque_Nm for axis in robot.axes])
-    held_N = statics.least_tensions_N(statics.box.grid(_GRID, _GRID))
-    held_N = np.minimum(np.where(np.isfinite(held_N), held_N, 0.0), statics.high_N).max((0, 1))
-    i = int((held_N * arm_m / stall_Nm).argmax())
-    if held_N[i] * arm_m[i] > stall_Nm[i]:
+    rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in robot.axes])
+    points = statics.box.grid(_GRID, _GRID)
+    taken = points[statics.is_target(points)]
+    held_N = statics.controlled.least_tensions_N(taken).max(axis=0, initial=0.0)
+    i = int((held_N * arm_m / rated_Nm).argmax())
+    if held_N[i] * arm_m[i] > rated_Nm[i]:
         text = (
-            f"to stand still somewhere in the box axes[{i}] needs {held_N[i] * arm_m[i]:.3g} Nm, "
-            f"its motor bears {stall_Nm[i]:g} Nm for long; a smaller box or a larger gear helps"
+            f"to stand somewhere in the box axes[{i}] needs {held_N[i] * arm_m[i]:.3g} Nm, its "
+            f"motor is rated for {rated_Nm[i]:g} Nm; the drive will not bear it for long: a "
+            "smaller box or a larger gear helps"
         )
         yield Finding("platform.workspace_max_m", text, impossible=False)
     # each direction has the speed of its own, so that both together are faster along a diagonal
@@ -180,7 +182,7 @@ def _motors(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
 def _turning(statics: PlanarStatics) -> Iterator[Finding]:
     home = np.array(statics.platform.home_m)
     places = np.concatenate([home[None], statics.box.grid(_GRID, _GRID).reshape(-1, 2)])
-    places = places[statics.reserve_N(places) >= 0.0]
+    places = places[statics.is_target(places)]
     if not len(places):
         return
     angle = statics.angle_rad(places)

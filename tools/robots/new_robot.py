@@ -25,7 +25,6 @@ from tools.robots.statics import Box, PlanarStatics
 
 Ask = Callable[[Question, str, str], str]
 """Takes a question, its default and what was wrong with the last answer; returns the answer."""
-_RESERVE_SHARE = 0.1
 
 
 def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
@@ -61,22 +60,21 @@ def _answer(question: Question, told: Answers, given: Mapping[str, str], ask: As
 
 
 def proposed_box(told: Answers) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the largest box that the cables hold with a reserve, to the cm, where there is one.
+    """Return the largest box of targets that the cables can hold, to the cm, or one to begin with.
 
-    The reserve is a tenth of what lies between the least and the greatest tension.
+    It is about the middle between the exit points.
     """
     exits = np.array([told[f"exit_{i + 1}_m"] for i in range(CABLES)])
     middle, size = 0.5 * (exits.min(axis=0) + exits.max(axis=0)), np.ptp(exits, axis=0)
     around = Box(_pair(middle - 0.5 * size), _pair(middle + 0.5 * size))
     low_N, high_N = told["tension_min_N"], told["tension_max_N"]
     statics = PlanarStatics(_platform_of(told, around), np.full(3, low_N), np.full(3, high_N))
-    for reserve_N in (_RESERVE_SHARE * (high_N - low_N), 0.0):
-        found = statics.largest_box(around, reserve_N, told["acceleration_m_s2"])
-        if found is not None:
-            low = np.ceil(100.0 * np.array(found.low_m)) / 100.0
-            high = np.floor(100.0 * np.array(found.high_m)) / 100.0
-            if (low < high).all():
-                return _pair(low), _pair(high)
+    found = statics.largest_box(around)
+    if found is not None:
+        low = np.ceil(100.0 * np.array(found.low_m)) / 100.0
+        high = np.floor(100.0 * np.array(found.high_m)) / 100.0
+        if (low < high).all():
+            return _pair(low), _pair(high)
     aside = np.maximum(0.1 * size, 0.05)
     return _pair(middle - aside), _pair(middle + aside)
 

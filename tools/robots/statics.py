@@ -6,8 +6,10 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdpr_rt.exchange import FloatArray
+from cdpr_rt.robots.planar_control import RESERVE
 from cdpr_rt.robots.planar_kernel import G_m_s2
 from cdpr_rt.robots.planar_kinematics import PlanarGeometry
 from cdpr_rt.runtime.robot_arrays import limits_of
@@ -84,25 +86,29 @@ class PlanarStatics:
         self.low_N, self.high_N = low_N, high_N
         self.box = Box(_pair(platform.workspace_min_m), _pair(platform.workspace_max_m))
 
-    def reserve_N(
-        self,
-        position_m: FloatArray,
-        acceleration_m_s2: float = 0.0,
-        mass_share: float = 1.0,
-        low_share: float = 1.0,
-    ) -> FloatArray:
+    @property
+    def controlled(self) -> PlanarStatics:
+        """The same within the bounds that the controller plans with: a reserve is left to it."""
+        reserve_N = RESERVE * float((self.high_N - self.low_N).min())
+        return PlanarStatics(self.platform, self.low_N + reserve_N, self.high_N - reserve_N)
+
+    def reserve_N(self, position_m: FloatArray, acceleration_m_s2: float = 0.0) -> FloatArray:
         """Return how far all tensions can stay from both their bounds, N, (...).
 
         Below zero by how much some cable must be outside. With an acceleration: the least over its
         both signs along both directions at once. -inf where no tensions hold some direction.
-        The shares are of the mass and of the lower bounds, to see what would help.
         """
         signs = (-1.0, 1.0) if acceleration_m_s2 else (0.0,)
         worst = np.full(np.shape(position_m)[:-1], np.inf)
         for x, y in itertools.product(signs, signs):
-            force = mass_share * self._force_N(acceleration_m_s2 * np.array([x, y]))
-            worst = np.minimum(worst, self._best(position_m, force, low_share)[1])
+            force = self._force_N(acceleration_m_s2 * np.array([x, y]))
+            worst = np.minimum(worst, self._best(position_m, force)[1])
         return worst
+
+    def is_target(self, position_m: FloatArray) -> NDArray[np.bool_]:
+        """Return where the platform can be held and accelerated with the controller's reserve."""
+        reserve = self.controlled.reserve_N(position_m, self.platform.acceleration_m_s2)
+        return np.asarray(reserve >= 0.0)
 
     def tensions_N(self, position_m: FloatArray) -> FloatArray:
         """Return the tensions (..., 3) at rest that stay furthest from their bounds."""
@@ -133,14 +139,14 @@ class PlanarStatics:
         stable = (slope < 0.0) | (arm < 1e-3)  # a point has no orientation
         return np.where(stable & (np.abs(angle) < 0.5 * np.pi), angle, np.nan)
 
-    def largest_box(self, inside: Box, reserve_N: float, acceleration_m_s2: float) -> Box | None:
-        """Return the largest box within `inside`, about its middle, that has the reserve, or None.
+    def largest_box(self, inside: Box) -> Box | None:
+        """Return the largest box within `inside`, about its middle, all of targets, or None.
 
         Its lower and upper edges are free, its sides are as far from the middle of `inside`.
         """
         columns, rows = 31, 45
         points = inside.grid(columns, rows)
-        good = self.reserve_N(points, acceleration_m_s2) >= reserve_N
+        good = self.is_target(points)
         good &= good[:, ::-1]
         half = columns // 2
         # how many columns from the middle on hold, in each row
@@ -179,16 +185,14 @@ class PlanarStatics:
             t0 = (x * zx[..., None] + y * zy[..., None]) / size**2
         return np.where(size > 1e-9, t0, np.nan), u
 
-    def _best(
-        self, position_m: FloatArray, force_N: FloatArray, low_share: float = 1.0
-    ) -> tuple[FloatArray, FloatArray]:
+    def _best(self, position_m: FloatArray, force_N: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the tensions (..., 3) furthest from their bounds, and how far they are (...).
 
         The distance to each bound is a straight line over k, and the least of six such lines is
         greatest where two of them cross.
         """
         t0, u = self._line(position_m, force_N)
-        offset = np.concatenate([t0 - low_share * self.low_N, self.high_N - t0], axis=-1)
+        offset = np.concatenate([t0 - self.low_N, self.high_N - t0], axis=-1)
         slope = np.concatenate([u, -u], axis=-1)
         i, j = np.triu_indices(2 * CABLES, 1)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -42,10 +42,8 @@ def _of_tensions(
 ) -> dict[str, Any]:
     statics, limits = statics_of(robot), limits_of(robot)
     home, points = np.array(platform.home_m), statics.box.grid(_GRID, _GRID)
-    still, moving = (
-        statics.reserve_N(points, acceleration)
-        for acceleration in (0.0, platform.acceleration_m_s2)
-    )
+    still = statics.reserve_N(points)
+    moving = statics.reserve_N(points, platform.acceleration_m_s2)
     lengths, angle = statics.geometry.lengths(points), statics.angle_rad(points)
     at_home_m, least_N = statics.geometry.lengths(home), statics.least_tensions_N(home)
     for i, told in enumerate(axes):
@@ -58,7 +56,7 @@ def _of_tensions(
         told["torque_limit_Nm"] = float(np.broadcast_to(limits.torque_Nm, (len(axes),))[i])
     return {
         "held_share": float(np.mean(still >= 0.0)),
-        "held_in_motion_share": float(np.mean(moving >= 0.0)),
+        "target_share": float(np.mean(statics.is_target(points))),
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
         "turns_at_most_rad": _finite(np.abs(angle).max()),
@@ -87,13 +85,13 @@ def lines(robot: Robot, platform: Platform, told: dict[str, Any]) -> list[str]:
 
 
 def _tension_lines(told: dict[str, Any]) -> list[str]:
-    held, moving = 100.0 * told["held_share"], 100.0 * told["held_in_motion_share"]
+    held, taken = 100.0 * told["held_share"], 100.0 * told["target_share"]
     reserve, turns = told["reserve_in_motion_N"], told["turns_at_most_rad"]
-    spare = "" if reserve is None or reserve < 0.0 else f", with {reserve:.0f} N to spare"
+    spare = "" if reserve is None or reserve < 0.0 else f", with {reserve:.0f} N to spare in motion"
     turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
     return [
-        f"tensions   hold it in {held:.0f} % of the box at rest, in {moving:.0f} % at full "
-        f"acceleration{spare}; it {turning} there"
+        f"tensions   hold it in {held:.0f} % of the box; targets are taken in {taken:.0f} %{spare}",
+        f"           it {turning} there, which no cable can prevent",
     ]
 
 
@@ -120,15 +118,16 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     # a letter is about twice as high as it is wide
     columns = int(min(_COLUMNS, 2 * _ROWS * size[0] / size[1])) | 1
     rows = max(5, round(0.5 * columns * size[1] / size[0]))
-    cells = np.full((rows, columns), " ")
-    points = shown.grid(columns, rows)
+    cells, points = np.full((rows, columns), " "), shown.grid(columns, rows)
     known = can_be_computed(robot)
-    if known:
-        cells[statics_of(robot).reserve_N(points) >= 0.0] = "."
     box = (points >= np.array(platform.workspace_min_m)).all(axis=-1)
     box &= (points <= np.array(platform.workspace_max_m)).all(axis=-1)
-    cells[box & (cells == ".")] = "#"
-    cells[box & (cells == " ")] = "!"
+    if known:
+        statics = statics_of(robot)
+        cells[statics.reserve_N(points) >= 0.0] = "."
+        cells[box] = np.where(statics.is_target(points[box]), "#", "!")
+    else:
+        cells[box] = "#"
 
     def put(position_m: Sequence[float], letter: str) -> None:
         column, row = np.round((np.array(position_m) - low) / size * [columns - 1, rows - 1])
@@ -139,7 +138,7 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     put(platform.home_m, "o")
     legend = "1, 2 ... exit points   o at rest   # targets"
     if known:
-        legend += "   . held as well   ! targets that tensions cannot hold"
+        legend += "   . held as well   ! targets that are not taken"
     return ["".join(row).rstrip() for row in cells[::-1]] + [legend]
 
 
