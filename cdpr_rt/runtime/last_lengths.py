@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,12 @@ class StoppedLengths:
     """With the motor at the index that it had found, nan where it had found none."""
     date: str
     """ISO 8601, UTC."""
+    position_rad: FloatArray
+    """The motors' angles that belong to `cable_length_m`; nan until they are known again."""
+
+    def at(self, position_rad: FloatArray, cable_m: FloatArray) -> FloatArray:
+        """Return the lengths (n,) at other angles (n,); `cable_m` (n,) is paid out per radian."""
+        return self.cable_length_m + cable_m * (position_rad - self.position_rad)
 
 
 class LastLengths:
@@ -59,36 +65,42 @@ class LastLengths:
         )
         if lengths.shape != (n,) or at_index.shape != (n,) or not (lengths > 0.0).all():
             raise ValueError
-        self.lengths = StoppedLengths(lengths, at_index, str(held["date"]))
+        nowhere = np.full(n, math.nan)
+        self.lengths = StoppedLengths(lengths, at_index, str(held["date"]), nowhere)
 
-    def forget(self) -> None:
-        """Have none from now on, as the robot is about to move; raises StateFileError."""
-        self.lengths = None
-        self.why = "the robot has moved since"
-        self._write({"stopped": False})
-
-    def keep(self, estimate: AxisEstimate, feedback: AxisFeedback) -> None:
-        """Keep the lengths at which it has stopped, where they are known.
+    def begin_to_move(self, position_rad: FloatArray) -> None:
+        """Take the motors (n,) to have stood still since the stop; they may turn from now on.
 
         Raises StateFileError.
         """
-        if not estimate.length_known.all():
-            return
-        turned = feedback.index_rad - feedback.position_rad
-        at_index = np.where(
-            feedback.index_known,
-            estimate.cable_length_m + estimate.cable_m_per_rad * turned,
-            math.nan,
-        )
-        date = datetime.now(UTC).isoformat(timespec="seconds")
-        self.lengths = kept = StoppedLengths(estimate.cable_length_m.copy(), at_index, date)
-        self._write(
-            {
-                "stopped": True,
-                "date": date,
-                **{key: _plain(getattr(kept, key)) for key in _FIELDS},
-            }
-        )
+        if self.lengths is not None:
+            self.lengths = replace(self.lengths, position_rad=position_rad.copy())
+        self._write({"stopped": False})
+
+    def take(self) -> StoppedLengths | None:
+        """Return the lengths, and have none from now on, as cables are wound."""
+        lengths, self.lengths = self.lengths, None
+        self.why = "the robot has moved since"
+        return lengths
+
+    def keep(self, estimate: AxisEstimate, feedback: AxisFeedback) -> None:
+        """Keep the lengths at which it has stopped, where they are known; raises StateFileError.
+
+        Where they are not, and no cable has been wound since, those of the stop before are true.
+        """
+        if estimate.length_known.all():
+            turned = feedback.index_rad - feedback.position_rad
+            at_index = np.where(
+                feedback.index_known,
+                estimate.cable_length_m + estimate.cable_m_per_rad * turned,
+                math.nan,
+            )
+            date = datetime.now(UTC).isoformat(timespec="seconds")
+            here = feedback.position_rad.copy()
+            self.lengths = StoppedLengths(estimate.cable_length_m.copy(), at_index, date, here)
+        if self.lengths is not None:
+            lengths = {key: _plain(getattr(self.lengths, key)) for key in _FIELDS}
+            self._write({"stopped": True, "date": self.lengths.date, **lengths})
 
     def _write(self, held: dict[str, Any]) -> None:
         if self.path is not None:

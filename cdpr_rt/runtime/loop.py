@@ -19,6 +19,7 @@ from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_rows import CycleRows
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.job import Job
+from cdpr_rt.runtime.last_lengths import LastLengths
 from cdpr_rt.runtime.lifecycle import Lifecycle
 from cdpr_rt.runtime.machine import Machine
 from cdpr_rt.runtime.orders import Orders
@@ -48,6 +49,8 @@ class LoopParts:
     estimator: Estimator
     lengths_disagree_m: Callable[[], float] = float
     """Returns by how much the cables' lengths contradict each other, 0 where nobody knows."""
+    last: LastLengths | None = None
+    """Keeps the cables' lengths of the last stop, where a start can make use of them."""
     punctual: Callable[[], Sequence[str]] = tuple
     """Called once before the first paced cycle; returns what was not allowed, for people."""
     cores: frozenset[int] = field(default_factory=lambda: frozenset(os.sched_getaffinity(0)))
@@ -102,7 +105,8 @@ class ControlLoop:
         self._orders = Orders(self)
         self.status = StatusPage(self)
         self._procedure: Iterator[None] | None = None
-        self._lowering_blind = False
+        self.lowering_blind = False
+        """Whether the winches that are left let the platform down, whatever is known of it."""
 
     # -- running
 
@@ -223,7 +227,7 @@ class ControlLoop:
         else:
             torque[:] = 0.0
         # in a fault the drives' complaints are known, and putting them in words takes its time
-        known = self.life.state is LoopState.FAULT or self._lowering_blind
+        known = self.life.state is LoopState.FAULT or self.lowering_blind
         failure = self.lost_bus or ("" if known else cycle.device_alarm())
         alarm, stop = cycle.watch_alarm(), cycle.stop_reason()
         if failure or alarm or stop:
@@ -303,8 +307,8 @@ class ControlLoop:
 
     def _lower_blind(self) -> None:
         """Let the platform down by the winches that are left, whatever is known of its pose."""
-        if not self._lowering_blind:
-            self._lowering_blind = True
+        if not self.lowering_blind:
+            self.lowering_blind = True
             self.switch(LOWER, {"blind": True})
 
     # -- programs
@@ -312,7 +316,7 @@ class ControlLoop:
     def drive(self) -> None:
         """Hold the axes, whose drives have got their power."""
         self.parts.supervisor.reset()
-        self._lowering_blind = False
+        self.lowering_blind = False
         self.driving = True
         self.switch(HOLD)
 

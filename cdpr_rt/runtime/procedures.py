@@ -174,6 +174,9 @@ def enable(loop: ControlLoop, program: str, wanted: Mapping[str, Any] | None) ->
         life.blame(f"{error}: {', '.join(machine.states())}")
         loop.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
         raise ControlError(life.reason) from error
+    last, device = loop.parts.last, machine.device
+    if last is not None and device is not None:
+        yield from _slowly(loop, lambda: last.begin_to_move(device.feedback.position_rad))
     loop.drive()
     machine.set_brakes(True)
     while not machine.brakes_are(True):
@@ -195,6 +198,7 @@ def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
     yield from _up_to(loop, _POWER_OFF_AT_LAST_S, machine.unpowered)
     doubts: list[str] = []
     yield from _slowly(loop, lambda: doubts.append(machine.make_sure()))
+    yield from _keep_lengths(loop)
     if any(doubts):
         life.blame("; ".join(filter(None, (life.reason, *doubts))), life.details)
         then = LoopState.FAULT
@@ -222,6 +226,17 @@ def _brake(loop: ControlLoop) -> Iterator[None]:
     machine.power_off()
     loop.driving = False
     loop.switch("idle")
+
+
+def _keep_lengths(loop: ControlLoop) -> Iterator[None]:
+    """Keep the cables' lengths for the next start, unless they may be wrong."""
+    last, device = loop.parts.last, loop.machine.device
+    if last is None or device is None or loop.lowering_blind:
+        return
+    try:
+        yield from _slowly(loop, lambda: last.keep(loop.parts.estimator.estimate, device.feedback))
+    except ControlError as error:
+        loop.notices.append(str(error))
 
 
 def fall(loop: ControlLoop) -> Iterator[None]:

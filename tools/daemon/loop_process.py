@@ -25,6 +25,7 @@ from cdpr_rt.runtime.programs.registry import (
 )
 from cdpr_rt.runtime.robot_arrays import described, limits_of, supervised, winches_of
 from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.state_file import state_path
 from cdpr_rt.supervisor import Supervisor
 from cdpr_rt.tension import TensionFeedback
 from profiles import Robot, load_robot
@@ -53,6 +54,9 @@ def main() -> int:
         print(f"cdpr: {error}", file=sys.stderr)
         return BAD_INPUT
     block.write_description(description(robot, parts))
+    if parts.last is not None:
+        parts.last.path = state_path("lengths", robot.profile)
+        parts.last.load(len(robot.axes))
     loop = ControlLoop(block, machine, parts)
     loop.notices += settle_memory()
     _end_on_signals(loop)
@@ -85,6 +89,7 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
         supervisor=Supervisor(supervised(limits, robot), n, period_s, names),
         estimator=estimator,
         lengths_disagree_m=float if platform is None else platform.lengths_disagree_m,
+        last=None if platform is None else platform.last,
         punctual=stay_punctual,
     )
     rehearse_programs(programs, n, platform)

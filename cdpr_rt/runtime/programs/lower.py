@@ -19,6 +19,7 @@ SETTLING_m_s = 0.02
 """At which its cables let it down the last bit."""
 BLIND_m_s = 0.15
 """At which cables let it down where nobody knows how it stands."""
+_MOST_IN_m_s = 0.5
 _KEEPING_SHARE = 0.25
 """Of the least tension: what keeps cables on their drums."""
 _ARRIVED_m = 0.01
@@ -131,7 +132,7 @@ class LowerProgram(PlatformProgram):
         reel = self._reel
         reel.low_N[:], reel.high_N[:] = self._keeping, self._high
         reel.paying_out_m_s[:] = speed_m_s
-        reel.most_in_m_s = speed_m_s
+        reel.most_in_m_s = _MOST_IN_m_s
         reel.begin(feedback, self._velocity, torque_Nm)
 
     def _watch_rest(self, feedback: AxisFeedback) -> None:

@@ -108,4 +108,5 @@ class PlatformJog(JogProgram):
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until speeds are wanted."""
         self._parts.tight = False
+        self._parts.last.take()
         super().start(feedback, setpoint, torque_Nm)

@@ -11,7 +11,7 @@ from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_kernel import G_m_s2
 from cdpr_rt.robots.planar_kinematics import PlanarGeometry
 from cdpr_rt.robots.planar_tensions import PlanarTensions
-from cdpr_rt.runtime.last_lengths import off_index_m
+from cdpr_rt.runtime.last_lengths import StoppedLengths, off_index_m
 from cdpr_rt.runtime.programs.base import ProgramError
 from cdpr_rt.runtime.programs.index_way import index_way
 from cdpr_rt.runtime.programs.platform_program import PlatformParts, PlatformProgram
@@ -66,6 +66,7 @@ class TightenProgram(PlatformProgram):
         self._share = 0.0
         self._still = self._cycles = 0
         self._source = "home"
+        self._last: StoppedLengths | None = None
         self._feedback = AxisFeedback(3)
         self._way: list[FloatArray] = []
         self._why = ""
@@ -77,6 +78,7 @@ class TightenProgram(PlatformProgram):
         self._why = ""
         self._stopping = self._at_rest = False
         self._source = self._usual_source()
+        self._last = None
         if parts.tight:
             super().start(feedback, setpoint, torque_Nm)
             self._look_for_indices()
@@ -161,6 +163,8 @@ class TightenProgram(PlatformProgram):
         if self._stage + 1 < len(_STAGES):
             self._stage += 1
             return
+        last = self._parts.last.take()
+        self._last = last if self._source == "last" else None
         self._control.take_lengths(self._lengths(feedback), feedback)
         self._control.begin(feedback)
         allowed_m = self._parts.home_tolerance_m
@@ -174,9 +178,8 @@ class TightenProgram(PlatformProgram):
 
     def _lengths(self, feedback: AxisFeedback) -> FloatArray:
         """Return the cables' lengths, (3,), as they are now."""
-        last = self._parts.last.lengths
-        if self._source == "last" and last is not None:
-            return last.cable_length_m
+        if self._source == "last" and self._last is not None:
+            return self._last.at(feedback.position_rad, self._cable)
         if self._source == "lengths":
             return self._parts.estimator.estimate.cable_length_m
         hysteresis = 0.5 * self._cable * (feedback.position_rad - self._up)
@@ -212,7 +215,7 @@ class TightenProgram(PlatformProgram):
         """Set out on a way on which all motors turn, where an index is wanted."""
         parts, control = self._parts, self._control
         self._way = []
-        if parts.wants_index(self._feedback):
+        if self._wants_index():
             self._way = index_way(
                 parts.platform, self._cable, lambda there: not control.feasible(there)
             )
@@ -220,24 +223,31 @@ class TightenProgram(PlatformProgram):
             self._target[:] = self._way[0]
             self._speed[:] = np.minimum(INDEX_m_s, parts.speed_m_s)
 
+    def _wants_index(self) -> bool:
+        """Whether an index is missing that compensation needs, or that checks the last lengths."""
+        last, known = self._last, self._feedback.index_known
+        if last is not None and bool((np.isfinite(last.cable_at_index_m) & ~known).any()):
+            return True
+        return self._parts.wants_index(self._feedback)
+
     def _move(self) -> bool:
         arrived = self._approach()
         if not self._way:
             return arrived
-        found = not self._parts.wants_index(self._feedback)
+        found = not self._wants_index()
         if found or arrived:
             self._way = [] if found else self._way[1:]
             self._target[:] = self._way[0] if self._way else self._resting_place()
             if not found and not self._way:
-                self._why = "a motor has not passed its index: its cogging is not compensated"
+                self._why = "a motor has not passed its index"
             if found:
                 self._why = self._compare_indices()
         return False
 
     def _compare_indices(self) -> str:
         """Return which index is not where the last stop's lengths have it, or an empty text."""
-        last = self._parts.last.lengths
-        if self._source != "last" or last is None:
+        last = self._last
+        if last is None:
             return ""
         length_m = self._parts.estimator.estimate.cable_length_m
         off = np.abs(off_index_m(last, length_m, self._feedback, self._cable))
