@@ -45,15 +45,16 @@ def _draw_workspace(figure: Figure, ax: Axes, statics: PlanarStatics, shown: Box
     points = shown.grid(181, 141)
     xs, ys = points[0, :, 0], points[:, 0, 1]
     still = np.nan_to_num(statics.reserve_N(points), neginf=-1e3)
-    taken = statics.is_target(points)
+    moving = statics.controlled.reserve_N(points, statics.platform.acceleration_m_s2)
+    moving = np.nan_to_num(moving, neginf=-1e3)
     if still.max() > 0.0:
         levels = MaxNLocator(9).tick_values(0.0, float(still.max()))
         filled = ax.contourf(xs, ys, still, levels, cmap="YlGnBu", alpha=0.75)
         bar = figure.colorbar(filled, ax=ax, shrink=0.8, format="%.0f")
         bar.set_label("distance of all tensions from their limits, at rest (N)")
         bar.outline.set_visible(False)
-    if taken.any():
-        ax.contour(xs, ys, taken, [0.5], colors=_CABLE, linestyles="dotted", linewidths=1.0)
+    if moving.max() > 0.0:
+        ax.contour(xs, ys, moving, [0.0], colors=_CABLE, linestyles="dotted", linewidths=1.0)
         ax.plot([], [], ":", color=_CABLE, lw=1.0, label="targets can be taken")
 
 
