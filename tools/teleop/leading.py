@@ -57,7 +57,7 @@ def lead(wish: Wish, out: Output) -> None:
         description = daemon.get("/description")
         if name not in (status["robot"], description.get("robot"), description.get("reference")):
             raise BadInputError(f"{wish.robot}: {daemon.where} runs {status['robot']}")
-        host, port = _stream_address(status, wish)
+        host, port = stream_address(status, wish)
         program, wanted = _program_of(description)
         key = None if wish.key_file is None else read_key(wish.key_file)
         with closing(wish.take_up()) as device, daemon.control() as control:
@@ -123,7 +123,7 @@ def _watched(view: View, daemon: Daemon) -> Iterator[None]:
         thread.join()
 
 
-def _stream_address(status: dict[str, Any], wish: Wish) -> tuple[str, int]:
+def stream_address(status: dict[str, Any], wish: Wish) -> tuple[str, int]:
     """Return where set-points go; raises BadInputError where the daemon takes none."""
     if wish.via is not None:
         address = Address.parse("--via", wish.via)

@@ -1,0 +1,37 @@
+"""Where set-points go, as a daemon tells and a user wants it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tools.errors import BadInputError
+from tools.teleop.hand import HandDevice
+from tools.teleop.leading import Wish, stream_address
+from tools.teleop.script import ScriptHand, ScriptLine
+
+
+def take_up() -> HandDevice:
+    return ScriptHand((ScriptLine(0.0, (0.0, 0.0)),))
+
+
+def address(listens: str | None, url: str | None = None, via: str | None = None) -> tuple[str, int]:
+    parts = {} if listens is None else {"stream": {"address": listens}}
+    wish = Wish("planar-3", take_up, 1.0, via, None if url else Path("s"), url, None)
+    return stream_address({"robot": "planar-3", "parts": parts}, wish)
+
+
+def test_the_stream_is_where_the_daemon_is() -> None:
+    assert address("127.0.0.1:7710") == ("127.0.0.1", 7710)
+    assert address("0.0.0.0:7710") == ("127.0.0.1", 7710)
+    assert address("0.0.0.0:7710", url="http://robot.example:7711") == ("robot.example", 7710)
+    assert address(":::7710", url="http://[::1]:7711") == ("::1", 7710)
+    assert address("10.0.0.7:7710", url="http://10.0.0.7:7711") == ("10.0.0.7", 7710)
+    assert address("127.0.0.1:7710", via="tunnel:1234") == ("tunnel", 1234)
+    assert address(None, via="4000") == ("127.0.0.1", 4000)
+
+
+def test_a_daemon_without_stream_is_told() -> None:
+    with pytest.raises(BadInputError, match=r"planar-3: .*started with --stream HOST:PORT"):
+        address(None)
