@@ -55,14 +55,16 @@ class Canvas:
             self._marks[row, column] = letter, style
 
     def rows(self) -> list[list[tuple[str, str]]]:
-        """Return each row as (character, style), top first."""
-        return [
-            [
-                self._marks.get((row, column), (chr(_BLANK + dots) if dots else " ", ""))
-                for column, dots in enumerate(cells)
-            ]
-            for row, cells in enumerate(self._cells)
-        ]
+        """Return each row as (characters, style) of its pieces, top first."""
+        rows = []
+        for row, cells in enumerate(self._cells):
+            letters = "".join(chr(_BLANK + dots) if dots else " " for dots in cells)
+            pieces, done = [], 0
+            for column in sorted(column for at, column in self._marks if at == row):
+                pieces += [(letters[done:column], ""), self._marks[row, column]]
+                done = column + 1
+            rows.append([*pieces, (letters[done:], "")])
+        return rows
 
     def _dot(self, at: tuple[float, float]) -> tuple[float, float]:
         return self._left + self._per_m * at[0], self._top - self._per_m * at[1]

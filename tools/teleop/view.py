@@ -64,7 +64,7 @@ class View:
         for exit_point in exits:
             canvas.mark(exit_point, "◉", "")
         rows = [
-            Text.assemble(*((letter, style or "dim") for letter, style in row))
+            Text.assemble(*((letters, style or "dim") for letters, style in row))
             for row in canvas.rows()
         ]
         return Text("\n", no_wrap=True).join(rows)

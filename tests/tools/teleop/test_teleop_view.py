@@ -88,5 +88,5 @@ def test_lines_are_drawn_where_they_are() -> None:
     canvas.line((-1e9, math.nan), (1.0, 1.0))  # nowhere: left out
     canvas.mark((6.9, 0.1), "x", "red")
     canvas.mark((70.0, 0.0), "y", "red")
-    rows = ["".join(letter for letter, _ in row) for row in canvas.rows()]
+    rows = ["".join(letters for letters, _ in row) for row in canvas.rows()]
     assert rows == ["⡏⠉⠉⠉", "⡇  x"]
