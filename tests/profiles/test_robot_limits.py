@@ -18,7 +18,8 @@ from cdpr_rt.runtime.states import Reaction
 from drivers.bus.budget import machine_budget
 from profiles import ProfileError, load_robot
 from profiles.catalogue import SHIPPED
-from profiles.reader import validated
+from profiles.platform import PlatformFile
+from profiles.reader import read_toml, validated
 from profiles.robot_limits import Reactions, RobotLimits
 from profiles.winch_calibration import WinchCalibration
 
@@ -262,7 +263,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 def test_the_documented_robot_is_one(tmp_path: Path) -> None:
     text = (DOCS / "describing-your-robot.md").read_text()
-    robot, _devices, limits = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    robot, _devices, platform, limits = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     winch = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
     (tmp_path / "my-winch.toml").write_text(winch)
     path = tmp_path / "my-robot.toml"
@@ -273,6 +274,13 @@ def test_the_documented_robot_is_one(tmp_path: Path) -> None:
     assert told.axes[1].calibration == calibration()
     figures = re.findall(r"^([a-z]\w+) = ", limits.partition("[limits.reactions]")[0], re.M)
     assert figures == [key for key in RobotLimits.model_fields if key != "reactions"]
+    path.write_text(platform)
+    documented = validated(path, read_toml(path)["platform"], PlatformFile)
+    shipped = load_robot("planar-3").platform
+    assert shipped is not None
+    assert all(getattr(shipped, key) == value for key, value in documented)
+    keys = re.findall(r"^(\w+) = ", platform, re.M)
+    assert keys == list(PlatformFile.model_fields)
 
 
 def test_the_documented_reactions_are_the_defaults() -> None:
