@@ -44,6 +44,7 @@ _COMMANDS = (
 )
 _OF_A_DAEMON = {
     "daemon_motion": ("controller", "jog", "move"),
+    "daemon_platform": ("lower", "pause", "resume", "tighten"),
     "daemon_state": ("ack", "check", "disable", "enable", "hold", "status", "stop"),
 }
 _MODULES = {name: name.replace("-", "_") for name in _COMMANDS} | {

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
 
 from tools.commands.options import JsonOption
 from tools.daemon.client import (
-    Control,
     Daemon,
     KeyFileOption,
     RobotOption,
@@ -21,13 +19,12 @@ from tools.daemon.client import (
     key_values,
     open_daemon,
 )
-from tools.errors import BadInputError, WorkFailedError
+from tools.daemon.motion import RENEW_S, await_end, finish, require_program
+from tools.errors import BadInputError
 from tools.output import Output
 from tools.signals import stop_on_signals
 
-_RENEW_S, _DEADMAN_S = 0.1, 0.6
-_SETTLE_S = 2.0
-_REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
+_DEADMAN_S = 0.6
 _STANDING = frozenset({"hold", "idle"})
 
 
@@ -63,17 +60,22 @@ def jog(
         with stop_on_signals() as stop_requested, daemon.control() as control:
             control.post("/program", {"program": "jog", "wanted": wanted})
             while time.monotonic() < deadline and not stop_requested():
-                time.sleep(_RENEW_S)
-                _require_program(daemon, "jog")
+                time.sleep(RENEW_S)
+                require_program(daemon, "jog")
                 control.post("/set", {"wanted": wanted})
             control.hold()
-        _finish(daemon, out, stop_requested())
+        finish(daemon, out, stop_requested())
 
 
 def move(
     axes: Annotated[
-        list[str], typer.Argument(help="Angles in deg of the motor.", metavar="AXIS=ANGLE...")
-    ],
+        list[str] | None,
+        typer.Argument(help="Angles in deg of the motor.", metavar="[AXIS=ANGLE]..."),
+    ] = None,
+    to: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="X Y", help="The platform to this position, in mm."),
+    ] = None,
     relative: Annotated[
         bool, typer.Option("--relative", help="By so much from here, instead of to there.")
     ] = False,
@@ -81,7 +83,8 @@ def move(
         bool, typer.Option("--cable", help="By mm of cable from here, positive pays out.")
     ] = False,
     speed: Annotated[
-        float | None, typer.Option(min=0.01, help="Not faster than this, deg/s at the motor.")
+        float | None,
+        typer.Option(min=0.01, help="Not faster: deg/s at the motor, with --to mm/s."),
     ] = None,
     robot: RobotOption = None,
     socket: SocketOption = None,
@@ -89,21 +92,62 @@ def move(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Take axes to positions and wait until they are there; Ctrl-C holds them and fails."""
+    """Take axes or the platform to positions and wait until there; Ctrl-C holds and fails."""
     out = Output(as_json)
     with open_daemon(robot, socket, url, key_file) as daemon:
-        n, goals = _given(daemon, axes, "mm" if cable else "deg")
-        factor = 1e-3 if cable else math.radians(1.0)
-        key = "cable_m" if cable else "distance_rad" if relative else "position_rad"
-        values = [factor * goals[axis] if axis in goals else None for axis in range(n)]
-        wanted: dict[str, Any] = {key: values}
-        if speed is not None:
-            wanted["speed_rad_s"] = math.radians(speed)
+        if to is not None:
+            program, wanted = "pose", _to_position(daemon, axes, to, relative, cable, speed)
+        else:
+            program, wanted = "pid", _to_angles(daemon, axes or [], relative, cable, speed)
         with stop_on_signals() as stop_requested, daemon.control() as control:
-            control.post("/program", {"program": "pid", "wanted": wanted})
-            arrived = _await_end(control, "pid", stop_requested, math.inf)
+            control.post("/program", {"program": program, "wanted": wanted})
+            arrived = await_end(control, program, stop_requested, math.inf)
             control.hold()
-        _finish(daemon, out, stop_requested(), arrived=arrived)
+        finish(daemon, out, stop_requested(), arrived=arrived)
+
+
+def _to_angles(
+    daemon: Daemon, axes: list[str], relative: bool, cable: bool, speed: float | None
+) -> dict[str, Any]:
+    """Return what the program `pid` is to do; raises BadInputError."""
+    if not axes:
+        raise BadInputError("nothing to move; allowed: AXIS=ANGLE..., or --to X Y for a platform")
+    n, goals = _given(daemon, axes, "mm" if cable else "deg")
+    factor = 1e-3 if cable else math.radians(1.0)
+    key = "cable_m" if cable else "distance_rad" if relative else "position_rad"
+    wanted: dict[str, Any] = {
+        key: [factor * goals[axis] if axis in goals else None for axis in range(n)]
+    }
+    if speed is not None:
+        wanted["speed_rad_s"] = math.radians(speed)
+    return wanted
+
+
+def _to_position(
+    daemon: Daemon,
+    axes: list[str] | None,
+    to: tuple[float, float],
+    relative: bool,
+    cable: bool,
+    speed: float | None,
+) -> dict[str, Any]:
+    """Return what the program `pose` is to do; raises BadInputError."""
+    if axes or cable:
+        raise BadInputError("--to: not together with axes or --cable")
+    if not all(map(math.isfinite, to)):
+        raise BadInputError(f"--to {to[0]:g} {to[1]:g}: allowed: finite numbers of mm")
+    here = [0.0, 0.0]
+    if relative:
+        progress = daemon.get("/status").get("program_progress") or {}
+        here = progress.get("target_m") or progress.get("position_m") or []
+        if not here:
+            raise BadInputError("--relative: it is not known where the platform is; tighten first")
+    wanted: dict[str, Any] = {
+        "position_m": [x + 1e-3 * step for x, step in zip(here, to, strict=True)]
+    }
+    if speed is not None:
+        wanted["speed_m_s"] = 1e-3 * speed
+    return wanted
 
 
 def controller(
@@ -131,9 +175,9 @@ def controller(
         with stop_on_signals() as stop_requested, daemon.control() as control:
             control.post("/program", {"program": name, "wanted": wanted})
             if name not in _STANDING:
-                _await_end(control, name, stop_requested, seconds or math.inf)
+                await_end(control, name, stop_requested, seconds or math.inf)
                 control.hold()
-        _finish(daemon, out, stop_requested())
+        finish(daemon, out, stop_requested())
 
 
 def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, float]]:
@@ -144,58 +188,3 @@ def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, 
         if not math.isfinite(value):
             raise BadInputError(f"{axes[axis]['name']}={value:g}: allowed: a finite number")
     return len(axes), values
-
-
-def _require_program(daemon: Daemon, name: str) -> dict[str, Any]:
-    """Return the status; raises WorkFailedError where the program does not run any more."""
-    status = daemon.get("/status")
-    if status["state"] != "active" or status["program"] != name:
-        why = status["reason"] or f"{status['program']} was asked for by somebody else"
-        raise WorkFailedError(f"{name} was ended: {why} ({status['state']})")
-    return status
-
-
-def _await_end(
-    control: Control, name: str, stop_requested: Callable[[], bool], seconds: float
-) -> bool:
-    """Keep the right to move until the program is done; whether it was."""
-    deadline = time.monotonic() + seconds
-    while not stop_requested() and time.monotonic() < deadline:
-        time.sleep(_RENEW_S)
-        control.renew()
-        progress = _require_program(control.daemon, name).get("program_progress", {})
-        if progress.get("done") == 1.0 and progress.get("leg") == progress.get("legs"):
-            return True
-    return False
-
-
-def _at_rest(axis: dict[str, Any]) -> bool:
-    angle, wanted = axis.get("position_rad"), axis.get("setpoint_rad")
-    speed = axis.get("velocity_rad_s")
-    if angle is None or wanted is None or speed is None:
-        return True
-    return bool(abs(speed) < _REST_RAD_S and abs(angle - wanted) < _REST_RAD)
-
-
-def _finish(daemon: Daemon, out: Output, stopped: bool, **figures: Any) -> None:
-    """Say where the axes are once they have settled, or after a while where they have not.
-
-    Raises WorkFailedError where the user has stopped it, or the loop has gone to fault.
-    """
-    deadline = time.monotonic() + _SETTLE_S
-    status = daemon.get("/status")
-    while not all(map(_at_rest, status["axes"])) and time.monotonic() < deadline:
-        time.sleep(_RENEW_S)
-        status = daemon.get("/status")
-    for axis in status["axes"]:
-        angle = axis.get("position_rad")
-        shown = "-" if angle is None else f"{math.degrees(angle):.3f} deg"
-        out.say(f"{axis['name']}: {shown}")
-    out.say(f"{status['state']}, {status['program']}")
-    if status["state"] != "active":
-        raise WorkFailedError(f"{status['reason'] or 'the power was taken'} ({status['state']})")
-    if stopped:
-        raise WorkFailedError("stopped on request; the axes hold where they are")
-    angles = {axis["name"]: axis.get("position_rad") for axis in status["axes"]}
-    told = {"state": status["state"], "program": status["program"], "position_rad": angles}
-    out.result({"ok": True, **told, **figures})

@@ -29,6 +29,8 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     lines = [first]
     if status["reason"]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
+    if text := platform_text(status):
+        lines.append(Text(text))
     control = status["control"]
     if control["held"]:
         lines.append(Text(f"moved by {control['client']}"))
@@ -49,6 +51,19 @@ def _lines(status: dict[str, Any]) -> list[Text]:
         lines.append(Text(_recording(recording)))
     lines += [Text(f"note: {notice}", style="dim") for notice in status["notices"]]
     return lines
+
+
+def platform_text(status: dict[str, Any]) -> str:
+    """Return where the platform is and what is in its way, an empty text of robots without."""
+    progress = status.get("program_progress") or {}
+    words = []
+    for key, word in (("position_m", "platform at"), ("target_m", "target")):
+        if progress.get(key):
+            words.append(f"{word} {', '.join(f'{1e3 * x:.1f}' for x in progress[key])} mm")
+    if progress.get("stage"):
+        words.append(str(progress["stage"]))
+    words += [progress[key] for key in ("missing", "refused", "trouble") if progress.get(key)]
+    return "; ".join(words)
 
 
 def _recording(told: dict[str, Any]) -> str:

@@ -192,6 +192,7 @@ class PlatformProgram:
             "target_m": self._target.tolist(),
             "tension_N": control.tension_N.tolist(),
             "missing": control.missing(),
+            "done": float(self._at_rest),
         }
 
     def _parsed(self, wanted: Mapping[str, Any]) -> Any:

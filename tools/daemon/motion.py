@@ -1,0 +1,78 @@
+"""Waiting for the end of a motion that a daemon carries out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from tools.daemon.client import Control, Daemon
+from tools.daemon.status_text import platform_text
+from tools.errors import WorkFailedError
+from tools.output import Output
+
+RENEW_S = 0.1
+_SETTLE_S = 2.0
+_REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
+
+
+def require_program(daemon: Daemon, name: str) -> dict[str, Any]:
+    """Return the status; raises WorkFailedError where the program does not run any more."""
+    status = daemon.get("/status")
+    if status["state"] != "active" or status["program"] != name:
+        why = status["reason"] or f"{status['program']} was asked for by somebody else"
+        raise WorkFailedError(f"{name} was ended: {why} ({status['state']})")
+    return status
+
+
+def await_end(
+    control: Control, name: str, stop_requested: Callable[[], bool], seconds: float
+) -> bool:
+    """Keep the right to move until the program is done; whether it was."""
+    deadline = time.monotonic() + seconds
+    while not stop_requested() and time.monotonic() < deadline:
+        time.sleep(RENEW_S)
+        control.renew()
+        progress = require_program(control.daemon, name).get("program_progress", {})
+        if progress.get("trouble") and progress.get("done") != 1.0:
+            raise WorkFailedError(f"{name}: {progress['trouble']}")
+        if progress.get("done") == 1.0 and progress.get("leg") == progress.get("legs"):
+            return True
+    return False
+
+
+def _at_rest(axis: dict[str, Any]) -> bool:
+    angle, wanted = axis.get("position_rad"), axis.get("setpoint_rad")
+    speed = axis.get("velocity_rad_s")
+    if angle is None or wanted is None or speed is None:
+        return True
+    return bool(abs(speed) < _REST_RAD_S and abs(angle - wanted) < _REST_RAD)
+
+
+def finish(daemon: Daemon, out: Output, stopped: bool, **figures: Any) -> None:
+    """Say where the axes are once they have settled, or after a while where they have not.
+
+    Raises WorkFailedError where the user has stopped it, or the loop has gone to fault.
+    """
+    deadline = time.monotonic() + _SETTLE_S
+    status = daemon.get("/status")
+    while not all(map(_at_rest, status["axes"])) and time.monotonic() < deadline:
+        time.sleep(RENEW_S)
+        status = daemon.get("/status")
+    for axis in status["axes"]:
+        angle = axis.get("position_rad")
+        shown = "-" if angle is None else f"{math.degrees(angle):.3f} deg"
+        out.say(f"{axis['name']}: {shown}")
+    if text := platform_text(status):
+        out.say(text)
+    out.say(f"{status['state']}, {status['program']}")
+    if status["state"] != "active":
+        raise WorkFailedError(f"{status['reason'] or 'the power was taken'} ({status['state']})")
+    if stopped:
+        raise WorkFailedError("stopped on request; the axes hold where they are")
+    angles = {axis["name"]: axis.get("position_rad") for axis in status["axes"]}
+    told = {"state": status["state"], "program": status["program"], "position_rad": angles}
+    progress = status.get("program_progress") or {}
+    told |= {key: progress[key] for key in ("position_m", "trouble") if progress.get(key)}
+    out.result({"ok": True, **told, **figures})
