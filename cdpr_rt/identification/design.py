@@ -69,26 +69,28 @@ def _harmonics(
     orders: FloatArray,
     out: FloatArray,
 ) -> None:
+    """Add the windows' averages of sines and cosines to the columns from FIXED on."""
     rows = out.shape[0]
-    top = int(orders.max()) if orders.size else 0
-    wanted = np.full(top + 1, -1)
-    for j in range(orders.size):
-        wanted[int(orders[j])] = j
+    waves = np.zeros(2 * orders.size)
     for s in range(first * stride, (first + rows + 4) * stride):
         if s >= angle.size:
             break
         c1, s1 = np.cos(angle[s]), np.sin(angle[s])
-        c, d = 1.0, 0.0
+        c, d, last = 1.0, 0.0, 0.0
         block = s // stride
-        for n in range(1, top + 1):
-            c, d = c * c1 - d * s1, d * c1 + c * s1
-            j = wanted[n]
-            if j >= 0:
-                for r in range(max(block - 4, first), min(block, first + rows - 1) + 1):
-                    w = s - r * stride
-                    if w <= 4 * stride:
-                        out[r - first, 2 * j] += bump[w] * c
-                        out[r - first, 2 * j + 1] += bump[w] * d
+        for j in range(orders.size):
+            ahead = orders[j] - last
+            last = orders[j]
+            if ahead == 1.0:
+                c, d = c * c1 - d * s1, d * c1 + c * s1
+            else:
+                c, d = np.cos(last * angle[s]), np.sin(last * angle[s])
+            waves[2 * j], waves[2 * j + 1] = c, d
+        for r in range(max(block - 4, first), min(block, first + rows - 1) + 1):
+            w = s - r * stride
+            if w <= 4 * stride:
+                for column in range(waves.size):
+                    out[r - first, FIXED + column] += bump[w] * waves[column]
 
 
 def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArray:
@@ -101,7 +103,7 @@ def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArra
         windows.stride,
         first,
         np.array(layout.orders, float),
-        out[:, FIXED:],
+        out,
     )
     if windows.quasi_static:
         out[:, CREEP] = np.maximum(windows.direction[rows], 0.0)
