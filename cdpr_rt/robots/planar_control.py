@@ -15,21 +15,30 @@ from cdpr_rt.controllers.pid import Compensation
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots import planar_kernel as kernel
 from cdpr_rt.robots.planar_kinematics import GeometryError
-from cdpr_rt.robots.planar_tensions import PlanarTensions, carry
+from cdpr_rt.robots.planar_tensions import (
+    PlanarTensions,
+    TensionOutcome,
+    carry,
+    first_obstacle,
+    stand,
+)
 from profiles import RobotAxis
 from profiles.platform import Platform
 
 RESERVE = 0.12
 """Share of the span of tensions that is left to what no plan knows: loops, friction, swinging."""
 _OBSERVER_Hz = 250.0
-_DAMPING_RATIO = 0.7
+_DAMPING_RATIO = 0.53
 _ROTOR_SHARE = 1.7
 _SLOWEST_LOOP_s = 5.0
 _INTEGRAL_RATE = 5.0
+_INTEGRAL_PHASE = 0.15
 _INTEGRAL_SHARE = 0.15
 _REGULATOR_SHARE = 0.25
 _LOOSE_SHARE = 0.1
-_DEAD_m = 1e-4
+_DEAD_m = 1.2e-4
+_BREAKING = 4.0
+_STUCK_m_s = 0.002
 _SETTLING_STEPS = 60
 _ITERATIONS = 3
 _LATENCY_s = 2.3e-3
@@ -73,6 +82,9 @@ class PlanarControl:
         self._J, self._room = np.zeros((3, 2)), np.zeros((4, 3))
         self._wrench, self._force = np.zeros(2), np.zeros(2)
         self._carried, self._inner = np.array(self.tensions.low), np.zeros(3)
+        self._wrenches = _wrenches(platform)
+        self._there, self._tried_N = np.zeros(2), np.zeros(3)
+        self.feasible_way(self.position_m)  # compiled here, not when somebody asks
         self._home = np.array(platform.home_m, float)
         self._pose = np.zeros(7)
 
@@ -91,9 +103,10 @@ class PlanarControl:
         row["mass"], row["period"], row["inertia"] = platform.mass_kg, period_s, inertia
         row["observer"], row["damping"] = observer, damping
         row["stiffness"] = mass * (damping / (2.0 * _DAMPING_RATIO * mass)) ** 2
-        row["integral"] = _INTEGRAL_RATE * row["stiffness"]
+        row["integral"] = min(_INTEGRAL_RATE, _INTEGRAL_PHASE * damping / mass) * row["stiffness"]
         row["loose"] = _LOOSE_SHARE * damping
         row["most_N"] = _INTEGRAL_SHARE * span_N
+        row["breaking"], row["stuck_m_s"] = _BREAKING, _STUCK_m_s
         row["dead_m"], row["regulator_N"] = _DEAD_m, _REGULATOR_SHARE * span_N
         return row
 
@@ -186,9 +199,7 @@ class PlanarControl:
         """
         cables = self._cables
         at_zero = length_m - cables["m_per_rad"] * feedback.position_rad
-        cables["length_at_zero"] = np.where(
-            np.isfinite(at_zero), at_zero, cables["length_at_zero"]
-        )
+        cables["length_at_zero"] = np.where(np.isfinite(at_zero), at_zero, cables["length_at_zero"])
 
     @property
     def inertia_kg_m2(self) -> float:
@@ -224,10 +235,42 @@ class PlanarControl:
         """Return why the last cycle's tensions are not feasible, an empty text where they are."""
         return self.tensions.missing(self.outcome, self.outside_N, self.tension_N)
 
+    def stands(self, position_m: FloatArray) -> bool:
+        """Return whether the platform can be held, and accelerated, at a position (2,)."""
+        return self._stand(position_m)[0] == TensionOutcome.FEASIBLE
+
     def feasible(self, position_m: FloatArray) -> str:
-        """Return why the platform cannot stand at a position (2,), an empty text where it can."""
-        c = self._cables
-        vectors = position_m + c["anchor"] - c["exit"]
-        J = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-        weight = np.array([0.0, -float(self._robot["mass"][0]) * kernel.G_m_s2])
-        return self.tensions.distribute(J, weight)[1]
+        """Return why the platform cannot stand at a position (2,), an empty text where it can.
+
+        Tensions keep a reserve to their bounds there while it is accelerated in any direction.
+        """
+        return self._told(*self._stand(position_m))
+
+    def feasible_way(self, position_m: FloatArray) -> str:
+        """Return what is in the straight way to a position (2,), an empty text for nothing."""
+        outcome, outside_N = first_obstacle(
+            self.position_m, position_m, self._cables["exit"], self._cables["anchor"],
+            self._wrenches, self.tensions.low, self.tensions.high,
+            self._there, self._J, self._tried_N, self._room,
+        )  # fmt: skip
+        why = self._told(outcome, outside_N)
+        return f"at {self._there[0]:.3f}, {self._there[1]:.3f} m {why}" if why else ""
+
+    def _stand(self, position_m: FloatArray) -> tuple[int, float]:
+        return stand(
+            position_m, self._cables["exit"], self._cables["anchor"],
+            self._wrenches, self.tensions.low, self.tensions.high,
+            self._J, self._tried_N, self._room,
+        )  # fmt: skip
+
+    def _told(self, outcome: int, outside_N: float) -> str:
+        why = self.tensions.missing(outcome, outside_N, self._tried_N)
+        return f"{why} (with a reserve of {self._reserve_N:.1f} N)" if why else ""
+
+
+def _wrenches(platform: Platform) -> FloatArray:
+    """Return what acts on a platform that stands, or is accelerated as much as it may, (5, 2)."""
+    most = platform.mass_kg * platform.acceleration_m_s2
+    weight = np.array([0.0, -platform.mass_kg * kernel.G_m_s2])
+    ways = np.array([(0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
+    return np.asarray(weight + most * ways)

@@ -27,6 +27,8 @@ ROBOT = np.dtype(
         ("loose", "<f8"),  # N s/m, by which cables that work against each other are damped
         ("regulator_N", "<f8"),  # the most that stiffness and damping ask for together
         ("most_N", "<f8"),  # of the integral part, in each direction
+        ("breaking", "<f8"),  # by how much faster what sticks is integrated
+        ("stuck_m_s", "<f8"),  # speed below which it does
         ("dead_m", "<f8"),  # error around which the integral part fades out and in
     ]
 )
@@ -234,6 +236,9 @@ def correct(
     moving = abs(speed[0]) + abs(speed[1]) > 0.0
     s.awake = 1.0 if moving else 1.0 / (1.0 + math.exp(-8.0 * (size / threshold - 1.0)))
     gain = s.awake * r.integral * r.period
+    if not moving:
+        pace = (s.velocity[0] ** 2 + s.velocity[1] ** 2) / r.stuck_m_s**2
+        gain *= 1.0 + r.breaking * math.exp(-min(pace, 50.0))
     limited = share < 1.0 or much > 1.0
     for k in range(2):
         step = gain * (ex if k == 0 else ey)

@@ -16,6 +16,7 @@ from cdpr_rt.jit import jit
 from cdpr_rt.robots.planar_kinematics import GeometryError
 
 _HALVINGS = 10
+_STOPS = 32
 
 
 class TensionOutcome(IntEnum):
@@ -220,6 +221,76 @@ def carry(
         carried[i] = t0[i] + k * u[i]
         t[i] = carried[i] + share * more[i]
     return 0, 0.0, share
+
+
+@jit
+def stand(
+    p: FloatArray,
+    a: FloatArray,
+    b: FloatArray,
+    wrenches: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    J: FloatArray,
+    t: FloatArray,
+    room: FloatArray,
+) -> tuple[int, float]:
+    """Try whether tensions within bounds carry each of the `wrenches` (k, 2) at position `p` (2,).
+
+    `a` and `b` (3, 2) are exit and anchor points; `J` (3, 2) and `room` (2, 3) are overwritten.
+    Returns a `TensionOutcome` and by how much a tension is outside, N, of the worst of them, whose
+    tensions are in `t` (3,) then.
+    """
+    for i in range(3):
+        x, y = p[0] + b[i, 0] - a[i, 0], p[1] + b[i, 1] - a[i, 1]
+        rho = math.sqrt(x * x + y * y)
+        if not rho > 0.0:
+            return 2, math.inf
+        J[i, 0], J[i, 1] = x / rho, y / rho
+    t0, u = room[0], room[1]
+    worst = 0.0
+    for k in range(wrenches.shape[0]):
+        if not line_of_tensions(J, wrenches[k], t0, u):
+            return 2, math.inf
+        least, most = bounds_of_k(t0, u, low, high)
+        if least <= most:
+            continue
+        at, outside = least_violation(t0, u, low, high)
+        if outside > worst:
+            worst = outside
+            for i in range(3):
+                t[i] = t0[i] + at * u[i]
+    return (1 if worst > 0.0 else 0), worst
+
+
+@jit
+def first_obstacle(
+    start: FloatArray,
+    end: FloatArray,
+    a: FloatArray,
+    b: FloatArray,
+    wrenches: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    p: FloatArray,
+    J: FloatArray,
+    t: FloatArray,
+    room: FloatArray,
+) -> tuple[int, float]:
+    """Go along the straight line to `end` and stop at the first `p` (2,) where nothing can stand.
+
+    A start where nothing can is left first. Otherwise as `stand`.
+    """
+    inside = False
+    outcome, outside = 0, 0.0
+    for k in range(_STOPS + 1):
+        for i in range(2):
+            p[i] = start[i] + (end[i] - start[i]) * k / _STOPS
+        outcome, outside = stand(p, a, b, wrenches, low, high, J, t, room)
+        inside = inside or outcome == 0
+        if inside and outcome != 0:
+            return outcome, outside
+    return outcome, outside
 
 
 class PlanarTensions:
