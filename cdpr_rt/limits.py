@@ -68,6 +68,17 @@ BLINDING: Final = frozenset(
 )
 """After these a platform's pose is not to be believed, or not all of its winches obey."""
 
+MISLEADING: Final = frozenset(
+    {
+        Limit.SPEED,
+        Limit.FOLLOWING_ERROR,
+        Limit.BROKEN_CABLE,
+        Limit.LENGTHS,
+        Limit.ENCODER_JUMP,
+    }
+)
+"""After these not even the cables' lengths are known any more."""
+
 
 def reactions_of(named: Reactions, lowers: bool = False) -> dict[Limit, Reaction]:
     """Return what a robot's file wants done about each limit.

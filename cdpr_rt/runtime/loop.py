@@ -14,7 +14,7 @@ import numpy as np
 from cdpr_rt.cycle import Cycle
 from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import FloatArray, Setpoint
-from cdpr_rt.limits import BLINDING, Limit
+from cdpr_rt.limits import BLINDING, MISLEADING, Limit
 from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_rows import CycleRows
 from cdpr_rt.runtime.estimate import Estimator
@@ -287,9 +287,10 @@ class ControlLoop:
 
     def _begins_to_brake(self, then: LoopState) -> bool:
         """Have the program brake; whether it does."""
-        blind = then is LoopState.FAULT and self.parts.supervisor.limit in BLINDING
+        fault = then is LoopState.FAULT and LOWER in self.parts.programs
+        blind = fault and self.parts.supervisor.limit in BLINDING
         if blind and not self.lowers:
-            return LOWER not in self.parts.programs
+            return False
         try:
             if blind:
                 self._lower_blind()
@@ -309,6 +310,8 @@ class ControlLoop:
         """Let the platform down by the winches that are left, whatever is known of its pose."""
         if not self.lowering_blind:
             self.lowering_blind = True
+            if self.parts.supervisor.limit in MISLEADING:
+                self.parts.estimator.forget_lengths()
             self.switch(LOWER, {"blind": True})
 
     # -- programs

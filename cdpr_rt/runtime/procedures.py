@@ -229,9 +229,9 @@ def _brake(loop: ControlLoop) -> Iterator[None]:
 
 
 def _keep_lengths(loop: ControlLoop) -> Iterator[None]:
-    """Keep the cables' lengths for the next start, unless they may be wrong."""
+    """Keep the cables' lengths for the next start, where they are known."""
     last, device = loop.parts.last, loop.machine.device
-    if last is None or device is None or loop.lowering_blind:
+    if last is None or device is None:
         return
     try:
         yield from _slowly(loop, lambda: last.keep(loop.parts.estimator.estimate, device.feedback))

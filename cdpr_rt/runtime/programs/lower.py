@@ -53,7 +53,8 @@ class LowerProgram(PlatformProgram):
         control = parts.control
         self._reel = Reel(np.full(3, control.inertia_kg_m2), cable_m, parts.period_s)
         self._high = np.minimum(parts.most_N, torque_Nm / np.abs(cable_m))
-        self._keeping = _KEEPING_SHARE * control.least_N
+        self._least = np.array(control.least_N)
+        self._keeping = np.zeros(3)
         self._cable = np.array(cable_m)
         self._here = np.zeros(3)
         self._stage = ""
@@ -65,6 +66,8 @@ class LowerProgram(PlatformProgram):
         """Go on from the present set-point and torque, (3,) each."""
         self._cycles = self._still = 0
         self._blind = not self._parts.tight
+        # cables that were not tight are left as loose as they are
+        self._keeping[:] = 0.0 if self._blind else _KEEPING_SHARE * self._least
         self._stage = "home"
         if self._parts.tight:
             super().start(feedback, setpoint, torque_Nm)
