@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -66,7 +67,8 @@ def lead(
         if timer:
             timer.start()
         try:
-            return session, session.lead(lambda: False)
+            deadline_s = time.monotonic() + 20.0
+            return session, session.lead(lambda: time.monotonic() > deadline_s)
         finally:
             if timer:
                 timer.join()
