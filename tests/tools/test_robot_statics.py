@@ -152,6 +152,16 @@ def test_the_shipped_robot_is_held_with_a_reserve_in_its_whole_box() -> None:
     assert findings(load_robot("spatial-8")) == []
 
 
+def test_what_is_not_computed_is_told(tmp_path: Path) -> None:
+    fourth = PLANAR[PLANAR.rindex("[[axes]]") :].replace("node_id = 3", "node_id = 4")
+    path = tmp_path / "four.toml"
+    path.write_text(
+        PLANAR + fourth.replace('"lower"', '"fourth"').replace("0.0, 0.0]", "1.0, 0.0]")
+    )
+    (finding,) = findings(load_robot(path))
+    assert not finding.impossible and "4 cables in a plane: tensions are known" in finding.text
+
+
 @pytest.mark.parametrize(
     ("replaced", "key", "problem", "impossible"),
     [

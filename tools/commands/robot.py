@@ -57,7 +57,7 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
     out.say("")
     _say_findings(out, found)
     if not found:
-        out.say("nothing to object to" if "held_share" in told else _UNKNOWN)
+        out.say("nothing to object to")
     told["findings"] = [{"key": f.key, "text": f.text, "impossible": f.impossible} for f in found]
     possible = not any(finding.impossible for finding in found)
     out.result({"ok": possible, **told})
@@ -128,9 +128,6 @@ def _say_findings(out: Output, found: list[checks.Finding]) -> None:
     for finding in found:
         kind = "impossible" if finding.impossible else "mind"
         out.say(f"{kind}: {finding.key}: {finding.text}")
-
-
-_UNKNOWN = "not checked: tensions are known of planar robots with three cables only"
 
 
 def _draw(profile: Robot, path: Path, out: Output) -> None:

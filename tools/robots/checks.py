@@ -12,7 +12,7 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.runtime.robot_arrays import limits_of
 from profiles import ProfileError, Robot
 from profiles.platform import Platform
-from tools.robots.statics import PlanarStatics, can_be_computed, statics_of
+from tools.robots.statics import CABLES, PlanarStatics, can_be_computed, statics_of
 
 _GRID = 25
 _SHARES = np.linspace(0.99, 0.03, 97)
@@ -35,8 +35,15 @@ class Finding:
 
 def findings(robot: Robot) -> list[Finding]:
     """Return what is impossible or doubtful about a robot's platform, the worst first."""
-    if robot.platform is None or not can_be_computed(robot):
+    if robot.platform is None:
         return []
+    if not can_be_computed(robot):
+        kind = "plane" if robot.platform.is_planar else "room"
+        text = (
+            f"{len(robot.axes)} cables in a {kind}: tensions are known, and the platform is moved, "
+            f"with {CABLES} cables in a plane; here axes are moved one by one"
+        )
+        return [Finding("axes", text, impossible=False)]
     statics = statics_of(robot)
     found = list(_shape(robot, statics))
     if not any(finding.impossible for finding in found):
