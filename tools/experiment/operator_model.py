@@ -127,10 +127,12 @@ class OperatorModel:
         return error
 
     def _stand_still(self, pictures: list[Picture]) -> bool:
-        if len(pictures) < round(self._p.look_s / self._p.frame_s):
+        p = self._p
+        if len(pictures) < round(p.look_s / p.frame_s):
             return False
+        still_m = p.still_m + (0.0 if self.clutch else p.master_step_m * self._scale)
         places = np.array([picture.platform_m for picture in pictures])
-        return bool(np.all(np.ptp(places, axis=0) < self._p.still_m))
+        return bool(np.all(np.ptp(places, axis=0) < still_m))
 
     def _move(self, way_m: FloatArray) -> Iterator[bool]:
         self._hand.stroke(way_m / self._scale)

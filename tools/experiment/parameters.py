@@ -51,11 +51,11 @@ class OperatorParameters:
     """Corrections after which the operator begins to be content with less."""
     impatience: float = 0.25
     """By how much more of `tolerance_m`, for each further correction."""
-    look_s: float = 0.2
-    """For how long a picture that stands still is judged."""
-    still_m: float = 0.5e-3
-    """What may move meanwhile and still counts as standing still."""
-    patience_s: float = 1.5
+    look_s: float = 0.28
+    """For how long a picture has to stand still to be judged."""
+    still_m: float = 0.2e-3
+    """What may move meanwhile: a pixel; and what the hand moves itself, by a step of the master."""
+    patience_s: float = 2.0
     """How long the operator waits for that, before judging a picture that moves."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -47,7 +48,7 @@ class PerfectRobot:
     What an operator does with it is the operator's doing alone.
     """
 
-    def __init__(self, platform: Platform, begin_m: FloatArray, period_s: float = 0.002) -> None:
+    def __init__(self, platform: Platform, begin_m: FloatArray, period_s: float = 0.005) -> None:
         self._target = begin_m.copy()
         self._hand: FloatArray | None = None
         self._leads = False
@@ -76,7 +77,7 @@ class PerfectRobot:
 
     def advance(self, until_s: float) -> None:
         """Let time pass."""
-        while self.now_s < until_s - 1e-9:
+        for _ in range(math.ceil((until_s - 1e-9) / self._period_s) - self.cycle):
             approach(
                 self._target,
                 self._speed,

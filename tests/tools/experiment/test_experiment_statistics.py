@@ -1,0 +1,102 @@
+"""Tables and analysis of variance, on made-up errors whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tools.experiment import figures, thesis
+from tools.experiment.points import POINT
+from tools.experiment.report import lines
+from tools.experiment.statistics import rows, run_times_s, variance_analysis
+
+
+def made_up(sigma_mm: dict[float, float], runs: int = 30) -> np.ndarray:
+    """Errors whose spread depends on the scale alone; a run takes 10 s for each of its targets."""
+    random = np.random.default_rng(3)
+    found = []
+    for place in "AB":
+        for scale, sigma in sigma_mm.items():
+            for repeat in range(runs):
+                run = np.zeros(10, POINT)
+                run["place"], run["scale"], run["repeat"] = place, scale, repeat
+                run["round_trip_s"] = 0.35 if repeat % 2 else 0.73
+                run["target"] = np.arange(10)
+                run["pressed_s"] = 10.0 * np.arange(1, 11) + repeat % 2
+                run["judged_m"] = 1e-3 * random.normal((0.2, -0.1), sigma, (10, 2))
+                run["error_m"] = run["judged_m"]
+                found.append(run)
+    return np.concatenate(found)
+
+
+POINTS = made_up({2.0: 0.3, 8.0: 0.9})
+
+
+def row(variable: str, level: str) -> dict:
+    return next(r for r in rows(POINTS) if (r["variable"], r["level"]) == (variable, level))
+
+
+def test_means_and_three_sigma_of_each_level() -> None:
+    of_scale = row(thesis.SCALE, "8:1")
+    assert of_scale["mean_mm"] == pytest.approx([0.2, -0.1], abs=0.12)
+    assert of_scale["three_sigma_mm"] == pytest.approx([2.7, 2.7], rel=0.1)
+    assert of_scale["targets"] == 600
+    assert of_scale["runs"] == 60
+    both = np.sqrt((0.3**2 + 0.9**2) / 2.0)
+    assert row(thesis.PLACE, "A")["three_sigma_mm"] == pytest.approx([3 * both] * 2, rel=0.1)
+
+
+def test_half_of_the_thesis_is_what_counts() -> None:
+    assert row(thesis.SCALE, "2:1")["reached"]  # 0.9 mm: at most 1.66 and 1.195
+    assert not row(thesis.SCALE, "8:1")["reached"]  # 2.7 mm: at most 2.65 and 2.435
+    assert row(thesis.SCALE, "8:1")["share_of_thesis"][1] == pytest.approx(2.7 / 4.87, rel=0.1)
+    assert row(thesis.OPERATION, "350 ms")["thesis"]["level"] == "on site"
+    assert row(thesis.OPERATION, "730 ms")["thesis"]["level"] == "remote"
+
+
+def test_time_is_that_of_whole_runs() -> None:
+    assert sorted(set(run_times_s(POINTS))) == [100.0, 101.0]
+    assert row(thesis.OPERATION, "350 ms")["time_s"] == pytest.approx(101.0)
+    assert row(thesis.PLACE, "B")["time_sigma_s"] == pytest.approx(0.5, rel=0.05)
+
+
+def test_the_thesis_rows_are_those_of_its_tables() -> None:
+    assert len(thesis.ROWS) == 9
+    assert max(max(r.three_sigma_mm) for r in thesis.ROWS) == 5.30
+
+
+def test_variance_analysis_finds_what_differs_and_nothing_else() -> None:
+    found = {one["variable"]: one for one in variance_analysis(POINTS)}
+    assert found[thesis.SCALE]["differs"]
+    assert found[thesis.SCALE]["degrees_of_freedom"] == [1, 1198]
+    assert not found[thesis.PLACE]["differs"]
+    norms = 1e3 * np.linalg.norm(POINTS["error_m"], axis=1)
+    groups = [norms[POINTS["scale"] == scale] for scale in (2.0, 8.0)]
+    between = sum(len(g) * (g.mean() - norms.mean()) ** 2 for g in groups)
+    within = sum(((g - g.mean()) ** 2).sum() for g in groups) / (len(norms) - 2)
+    assert found[thesis.SCALE]["F"] == pytest.approx(between / within)
+
+
+def test_a_variable_with_one_level_has_no_analysis() -> None:
+    alone = POINTS[POINTS["scale"] == 2.0]
+    assert thesis.SCALE not in {one["variable"] for one in variance_analysis(alone)}
+
+
+def test_the_text_names_the_rows_above_half() -> None:
+    table = rows(POINTS)
+    text = lines(
+        {"rows": table, "operator_alone": table, "variance_analysis": variance_analysis(POINTS)}
+    )
+    assert text[-1].startswith("3 sigma above half")
+    assert "scale 8:1" in text[-1] and "scale 2:1" not in text[-1]
+    assert len([line for line in text if line.startswith("scale")]) == 7
+
+
+def test_pictures_show_every_error_and_the_thesis_bars(tmp_path) -> None:
+    drawn = figures.draw(POINTS, POINTS, tmp_path)
+    assert [path.name for path in drawn] == [
+        "figure-2.10.png", "figure-2.11.png", "figure-2.12.png", "parts.png",
+    ]  # fmt: skip
+    assert all(path.stat().st_size > 10_000 for path in drawn)
+    cloud = figures.errors(POINTS, thesis.SCALE, "").axes[0]
+    assert sum(len(line.get_xdata()) for line in cloud.lines) == len(POINTS)
