@@ -136,7 +136,7 @@ def _choose(equations: Equations) -> tuple[Choice, FloatArray, float]:
     weight = rows_counted(equations)
     for _ in range(2):
         choice = choose(equations, fixed, weight)
-        everything = total(equations.parts, weight)
+        everything = total(equations, weight)
         for step in range(2):
             columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
             beta, _ = solve(everything, columns)

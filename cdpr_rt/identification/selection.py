@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,16 +29,36 @@ class Choice:
     error_Nm: FloatArray
 
 
-def total(parts: dict[tuple[int, int], Normal], weight: FloatArray, without: int = -1) -> Normal:
-    """Sum weighted normal equations over kinds and over all folds but one."""
-    size = next(iter(parts.values())).xy.size
-    out = Normal(np.zeros((size, size)), np.zeros(size))
-    for (fold, kind), part in parts.items():
-        if fold != without and weight[kind] > 0.0:
-            out.xx += weight[kind] * part.xx
+def total(equations: Equations, weight: FloatArray) -> Normal:
+    """Sum weighted normal equations over kinds and folds."""
+    return _sum(_by_fold(equations, weight), equations.layout)
+
+
+def _by_fold(equations: Equations, weight: FloatArray) -> list[Normal]:
+    """Sum weighted normal equations over kinds, for each fold."""
+    sums = [_empty(equations.layout) for _ in range(equations.folds)]
+    weighted = np.empty_like(sums[0].xx)
+    for (fold, kind), part in equations.parts.items():
+        if weight[kind] > 0.0:
+            out = sums[fold]
+            out.xx += np.multiply(weight[kind], part.xx, out=weighted)
             out.xy += weight[kind] * part.xy
             out.yy += weight[kind] * part.yy
             out.rows += part.rows
+    return sums
+
+
+def _empty(layout: Layout) -> Normal:
+    return Normal(np.zeros((layout.columns, layout.columns)), np.zeros(layout.columns))
+
+
+def _sum(parts: Sequence[Normal], layout: Layout) -> Normal:
+    out = _empty(layout)
+    for part in parts:
+        out.xx += part.xx
+        out.xy += part.xy
+        out.yy += part.yy
+        out.rows += part.rows
     return out
 
 
@@ -88,29 +109,25 @@ def choose(equations: Equations, fixed: list[int], weight: FloatArray) -> Choice
     standard error of the paired differences between folds. Ranks are averaged over folds.
     """
     layout = equations.layout
-    held = [f for f in range(equations.folds) if _rows(equations, f, weight) >= _FEWEST_ROWS]
+    folds = _by_fold(equations, weight)
+    held = [f for f, part in enumerate(folds) if part.rows >= _FEWEST_ROWS]
     errors, ranks = [], np.zeros(len(layout.orders))
     for fold in held:
-        train = total(equations.parts, weight, without=fold)
+        train = _sum([part for f, part in enumerate(folds) if f != fold], layout)
         ranking = _rank(train, fixed, layout)
         ranks[ranking] += np.arange(ranking.size)
-        test = total({k: p for k, p in equations.parts.items() if k[0] == fold}, weight)
-        errors.append(_path(train, test, fixed, layout, ranking))
-    overall = _rank(total(equations.parts, weight), fixed, layout)
+        errors.append(_path(train, folds[fold], fixed, layout, ranking))
+    everything = _sum(folds, layout)
+    overall = _rank(everything, fixed, layout)
     mean = np.mean(errors, axis=0)
     best = int(np.argmin(mean))
     gap = np.array(errors) - np.array(errors)[:, best : best + 1]
     spread = gap.std(axis=0, ddof=1) / math.sqrt(len(held)) if len(held) > 1 else 0.0 * mean
     size = int(np.flatnonzero(gap.mean(axis=0) <= spread)[0])
-    unit = total(equations.parts, weight)
-    per_row = unit.rows / max(
+    per_row = everything.rows / max(
         float(np.sum([weight[k[1]] * p.rows for k, p in equations.parts.items()])), 1e-300
     )
     return Choice(tuple(sorted(layout.orders[i] for i in overall[:size])), np.sqrt(mean * per_row))
-
-
-def _rows(equations: Equations, fold: int, weight: FloatArray) -> int:
-    return sum(p.rows for (f, k), p in equations.parts.items() if f == fold and weight[k] > 0.0)
 
 
 def _rank(train: Normal, fixed: list[int], layout: Layout) -> IntArray:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from pathlib import Path
 
 from canopen import import_od
+from canopen.objectdictionary import ObjectDictionary as CanopenDictionary
 from canopen.objectdictionary import ODVariable
 
 from sim_bus.canopen.abort import Abort, SdoAbort
@@ -148,7 +150,7 @@ class ObjectDictionary:
         """
         od = cls()
         try:
-            parsed = import_od(str(path), 0)
+            parsed = _read_eds(path, Path(path).stat().st_mtime_ns)
         except Exception as error:
             raise DictionaryError(f"{path}: not a readable EDS: {error}") from error
         od.bitrates = frozenset(parsed.device_information.allowed_baudrates)
@@ -245,6 +247,12 @@ class ObjectDictionary:
         for entry in self:
             if entry.index in area and entry.writable:
                 entry.power_on()
+
+
+@lru_cache(maxsize=8)
+def _read_eds(path: str | Path, _changed_ns: int) -> CanopenDictionary:
+    """Read an EDS, once for all drives of its kind as long as it does not change."""
+    return import_od(str(path), 0)
 
 
 def _entry(variable: ODVariable) -> Entry:
