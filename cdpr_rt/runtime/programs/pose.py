@@ -208,7 +208,8 @@ class PoseProgram(PlatformProgram):
         state = stream.update()
         if state is StreamState.STOPPED:
             self._target[:] = self._resting_place()
-        elif stream.epoch != self._epoch or stream.buttons & CLUTCH:
+        elif stream.epoch != self._epoch or stream.buttons & CLUTCH or self._clutched:
+            # in the cycle in which the clutch closes part of the way was still made without leading
             if stream.epoch != self._epoch or not self._clutched:
                 self._target[:] = self._resting_place()
             self._epoch = stream.epoch
