@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -11,7 +12,10 @@ from typing import Any
 
 import pytest
 
+import profiles
+
 PLANTS = Path(__file__).parent / "plants"
+SHIPPED = Path(profiles.__file__).parent
 
 
 def cdpr(*arguments: str | Path, timeout_s: float = 300.0) -> subprocess.CompletedProcess[str]:
@@ -24,9 +28,22 @@ def last_line(result: subprocess.CompletedProcess[str]) -> dict[str, Any]:
     return dict(json.loads(result.stdout.splitlines()[-1]))
 
 
-def commission(out: Path, *more: str | Path) -> dict[str, Any]:
-    base: Sequence[str | Path] = ("commission", "winch-mpp0923d", "--bus", "simbus:", "--json")
+def commission(
+    out: Path, *more: str | Path, winch: str | Path = "winch-mpp0923d"
+) -> dict[str, Any]:
+    base: Sequence[str | Path] = ("commission", winch, "--bus", "simbus:", "--json")
     return last_line(cdpr(*base, "--out", out, *more))
+
+
+@pytest.fixture(scope="module")
+def slower(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same winch with half the cycles a second, which take half the time."""
+    path = tmp_path_factory.mktemp("winch") / "winch-2ms.toml"
+    shipped = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
+    text = shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.002")
+    assert text != shipped
+    path.write_text(text)
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -70,10 +87,12 @@ def test_fit_from_the_raw_data_alone(default: tuple[Path, dict[str, Any]]) -> No
     )
 
 
-def test_profile_serves_another_day(default: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
+def test_profile_serves_another_day_in_other_cycles(
+    default: tuple[Path, dict[str, Any]], slower: Path, tmp_path: Path
+) -> None:
     out, _ = default
     profile = out / "cogging-profile.json"
-    arguments = ("cogging", "validate", "winch-mpp0923d", profile, "--bus", "simbus:", "--json")
+    arguments = ("cogging", "validate", slower, profile, "--bus", "simbus:", "--json")
     result = last_line(cdpr(*arguments, "--out", tmp_path / "later"))
     validation = result["validation"]
     assert validation["better"]["ratios"]["rms_position_error"] >= 10
@@ -93,8 +112,27 @@ def test_a_raw_file_cut_short_is_said_so(
     assert "Traceback" not in result.stderr
 
 
-@pytest.mark.parametrize("plant", sorted(PLANTS.glob("*.toml")), ids=lambda path: path.stem)
-def test_other_plants(plant: Path, tmp_path: Path) -> None:
-    ratios = commission(tmp_path, "--plant", plant, "--quick")["validation"]["better"]["ratios"]
+def test_a_motor_that_runs_away_under_the_usual_gain(slower: Path, tmp_path: Path) -> None:
+    plant = PLANTS / "runaway.toml"
+    result = commission(tmp_path, "--plant", plant, "--quick", winch=slower)
+    ratios = result["validation"]["better"]["ratios"]
+    assert ratios["rms_position_error"] > 3
+    assert ratios["peak_pid_effort"] > 3
+
+
+def test_an_odd_motor_of_a_robot(tmp_path: Path) -> None:
+    plant = tmp_path / "robot.toml"
+    odd = (PLANTS / "slots-offset-asymmetric-odd-encoder.toml").read_text()
+    plant.write_text(re.sub(r"(?m)^(\[+)", r"\1motor.", odd))
+    robot = tmp_path / "planar-3-slower.toml"
+    shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
+    robot.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.002"))
+    base = ("commission", robot, "--axis", "upper right", "--bus", "simbus:", "--quick")
+    told = last_line(cdpr(*base, "--plant", plant, "--out", tmp_path, "--json"))
+    assert list(told["axes"]) == ["upper right"]
+    assert (Path(told["commissioned"]) / "upper-right" / "cogging-profile.json").is_file()
+    result = told["axes"]["upper right"]
+    assert set(result["identification"]["orders"]) >= {4, 24}
+    ratios = result["validation"]["better"]["ratios"]
     assert ratios["rms_position_error"] > 3
     assert ratios["peak_pid_effort"] > 3
