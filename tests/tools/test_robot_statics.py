@@ -152,6 +152,21 @@ def test_the_shipped_robot_is_held_with_a_reserve_in_its_whole_box() -> None:
     assert findings(load_robot("spatial-8")) == []
 
 
+def test_a_home_where_the_platform_would_tip_is_doubtful(tmp_path: Path) -> None:
+    apart = [
+        ("[-2.0, 3.0]", "[-1.0, 2.5]"),
+        ("[2.0, 3.0]", "[2.5, 2.0]"),
+        ("[0.0, 0.0]", "[-0.5, -0.5]"),
+    ]
+    box = [
+        ("[-0.6, 1.4]", "[0.4, 1.3]"),
+        ("[0.6, 2.4]", "[1.1, 1.6]"),
+        ("[0.0, 1.3]", "[0.75, 1.25]"),
+    ]
+    told = told_of(tmp_path, *apart, *box)
+    assert any(key == "platform.home_m" and "tip it on its stand" in text for key, text, _ in told)
+
+
 def test_what_is_not_computed_is_told(tmp_path: Path) -> None:
     fourth = PLANAR[PLANAR.rindex("[[axes]]") :].replace("node_id = 3", "node_id = 4")
     path = tmp_path / "four.toml"

@@ -18,7 +18,7 @@ _GRID = 25
 _SHARES = np.linspace(0.99, 0.03, 97)
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
-_FAR_TURNED_rad = math.radians(10.0)
+_FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
 
@@ -189,23 +189,27 @@ def _motors(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
 def _turning(statics: PlanarStatics) -> Iterator[Finding]:
     home = np.array(statics.platform.home_m)
     places = np.concatenate([home[None], statics.box.grid(_GRID, _GRID).reshape(-1, 2)])
-    places = places[statics.is_target(places)]
-    if not len(places):
-        return
-    angle = statics.angle_rad(places)
+    angle = np.where(statics.is_target(places), statics.angle_rad(places), 0.0)
     if np.isnan(angle).any():
-        x, y = places[int(np.isnan(angle).argmax())]
+        where = _point(places[int(np.isnan(angle).argmax())])
         text = (
-            f"at {_point((x, y))} m the cables would turn the platform over; each cable should be "
-            "made fast on the side of the platform that faces its exit point"
+            f"at {where} m the cables would turn the platform over; each cable should be made fast "
+            "on the side of the platform that faces its exit point"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=True)
-    elif np.abs(angle).max() > _FAR_TURNED_rad:
-        worst = int(np.abs(angle).argmax())
+        return
+    degrees = np.abs(np.degrees(angle))
+    if degrees[0] > _TIPPED_deg:
         text = (
-            f"at {_point(places[worst])} m the platform turns by "
-            f"{abs(math.degrees(angle[worst])):.0f} deg, which no cable can prevent; anchor points "
-            "that lie towards their exit points let it turn less"
+            f"there the cables would turn the platform by {degrees[0]:.0f} deg, and may tip it on "
+            "its stand; where it turns less, lengths learnt from there are better"
+        )
+        yield Finding("platform.home_m", text, impossible=False)
+    if degrees.max() > _FAR_TURNED_deg:
+        where = _point(places[int(degrees.argmax())])
+        text = (
+            f"at {where} m the platform turns by {degrees.max():.0f} deg, which no cable can "
+            "prevent; anchor points that lie towards their exit points let it turn less"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
 
