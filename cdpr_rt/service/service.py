@@ -31,7 +31,7 @@ _AXIS_FIELDS: Final = (
     "alive",
     "index_known",
 )
-_DESCRIBED: Final = ("name", "bus", "node_id", "winch")
+_DESCRIBED: Final = ("name", "bus", "node_id", "winch", "commissioned")
 WAIT_S: Final = {
     "configure": 60.0,
     "check": 30.0,

@@ -22,6 +22,7 @@ from tools.commissioned import (
     with_commissioned,
     without_commissioned,
 )
+from tools.daemon.status_text import compensation_text
 from tools.errors import BadInputError
 from tools.robot_commissioning import chosen_axes
 
@@ -121,3 +122,14 @@ def test_motors_to_commission_are_named(robot: Robot, tmp_path: Path) -> None:
             chosen_axes(robot, names, every, tmp_path)
     with pytest.raises(BadInputError, match=r"--axis left: no axis of .*'upper left'"):
         chosen_axes(robot, ("left",), False, tmp_path)
+
+
+def test_the_status_tells_which_motors_are_compensated() -> None:
+    axes = [
+        {"name": "left", "commissioned": "a", "index_known": True},
+        {"name": "right", "commissioned": "b", "index_known": False},
+        {"name": "lower", "commissioned": None, "index_known": True},
+    ]
+    told = compensation_text(axes)
+    assert told == "compensated: left; not compensated before its index passes: right"
+    assert compensation_text([{"name": "left"}]) == ""

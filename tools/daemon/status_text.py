@@ -31,6 +31,8 @@ def _lines(status: dict[str, Any]) -> list[Text]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
     if text := platform_text(status):
         lines.append(Text(text))
+    if text := compensation_text(status["axes"]):
+        lines.append(Text(text))
     control = status["control"]
     if control["held"]:
         lines.append(Text(f"moved by {control['client']}"))
@@ -100,6 +102,19 @@ def _trouble(axis: dict[str, Any]) -> Text:
         return Text("")
     words = ["silent"] * (not axis["alive"]) + ["not valid"] * (not axis["valid"])
     return Text(", ".join(words), style="red")
+
+
+def compensation_text(axes: list[dict[str, Any]]) -> str:
+    """Return which motors' cogging is compensated, an empty text where none has been learnt."""
+    parts = []
+    for known, words in ((True, "compensated"), (False, "not compensated before its index passes")):
+        names = [
+            str(axis["name"])
+            for axis in axes
+            if axis.get("commissioned") and bool(axis.get("index_known")) is known
+        ]
+        parts += [f"{words}: {', '.join(names)}"] * bool(names)
+    return "; ".join(parts)
 
 
 def _figure(value: float | None, digits: int, factor: float = 1.0) -> str:
