@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.robots.planar_kernel import G_m_s2
+from cdpr_rt.robots.planar_tensions import PlanarTensions
 from cdpr_rt.runtime.programs.base import ProgramError
 from cdpr_rt.runtime.programs.platform_program import PlatformParts, PlatformProgram
-from cdpr_rt.runtime.programs.reel import Reel
+from cdpr_rt.runtime.programs.reel import HANGING_1_s, Reel, STANDING_1_s
 from cdpr_rt.runtime.programs.wanted import Wanted
 
 HOME_SPEED_m_s = 0.25
@@ -51,7 +53,10 @@ class LowerProgram(PlatformProgram):
     ) -> None:
         super().__init__(parts, torque_Nm)
         control = parts.control
-        self._reel = Reel(np.full(3, control.inertia_kg_m2), cable_m, parts.period_s)
+        inertia = np.full(3, control.inertia_kg_m2)
+        self._reel = Reel(inertia, cable_m, parts.period_s)
+        self._bare = PlanarTensions(np.zeros(3), parts.most_N)
+        self._weight = np.array([0.0, -parts.platform.mass_kg * G_m_s2])
         self._high = np.minimum(parts.most_N, torque_Nm / np.abs(cable_m))
         self._least = np.array(control.least_N)
         self._keeping = np.zeros(3)
@@ -82,10 +87,12 @@ class LowerProgram(PlatformProgram):
             super().update(feedback, setpoint, torque_Nm)
             self._at_rest = False
             if self._is_home():
-                self._let_go(feedback, torque_Nm, SETTLING_m_s)
+                self._let_go(feedback, torque_Nm, SETTLING_m_s, STANDING_1_s)
             return
         if self._stage == "home":
-            self._let_go(feedback, torque_Nm, BLIND_m_s)
+            if self._parts.tight:
+                self._carry_weight(torque_Nm)
+            self._let_go(feedback, torque_Nm, BLIND_m_s, HANGING_1_s)
         setpoint.position_rad[:] = feedback.position_rad
         setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
         self._reel.update(feedback, torque_Nm)
@@ -128,7 +135,18 @@ class LowerProgram(PlatformProgram):
         control = self._control
         return bool((control.position_m == self._target).all() and not control.velocity_m_s.any())
 
-    def _let_go(self, feedback: AxisFeedback, torque_Nm: FloatArray, speed_m_s: float) -> None:
+    def _carry_weight(self, torque_Nm: FloatArray) -> None:
+        """Have the cables carry the weight and nothing else, as far as anybody knows.
+
+        What they pulled against each other would fling the platform where one of them has gone.
+        """
+        J = self._parts.geometry.jacobian(self._control.estimated_m)
+        tension, _ = self._bare.distribute(J, self._weight)
+        torque_Nm[:] = -self._cable * np.maximum(tension, self._keeping)
+
+    def _let_go(
+        self, feedback: AxisFeedback, torque_Nm: FloatArray, speed_m_s: float, rate_1_s: float
+    ) -> None:
         self._parts.tight = False
         self._stage = "down"
         self._still = self._cycles = 0
@@ -136,6 +154,7 @@ class LowerProgram(PlatformProgram):
         reel.low_N[:], reel.high_N[:] = self._keeping, self._high
         reel.paying_out_m_s[:] = speed_m_s
         reel.most_in_m_s = _MOST_IN_m_s
+        reel.integral_rate_1_s = rate_1_s
         reel.begin(feedback, self._velocity, torque_Nm)
 
     def _watch_rest(self, feedback: AxisFeedback) -> None:

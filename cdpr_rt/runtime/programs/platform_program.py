@@ -12,6 +12,7 @@ from cdpr_rt.compensation import Compensation
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_control import PlanarControl
+from cdpr_rt.robots.planar_kinematics import PlanarGeometry
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.last_lengths import LastLengths
 from cdpr_rt.runtime.programs.base import ProgramError
@@ -35,6 +36,9 @@ class PlatformParts:
         self.platform = platform
         self.most_N = most_N
         """What each cable may be pulled with."""
+        self.geometry = PlanarGeometry(
+            np.array(platform.exit_points_m), np.array(platform.anchor_points_m)
+        )
         self.compensation = compensation
         self.last = LastLengths()
         """The lengths at which it was stopped."""

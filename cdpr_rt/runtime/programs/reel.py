@@ -8,8 +8,12 @@ from cdpr_rt.exchange import AxisFeedback, FloatArray
 from cdpr_rt.jit import jit
 
 _BANDWIDTH_rad_s = 100.0
-_INTEGRAL_RATE = 60.0
 _FILTER_S = 0.005
+STANDING_1_s = 60.0
+"""Of the integral part, where the cables' ends stand still."""
+HANGING_1_s = 4.0
+"""The same where what hangs on them is ten times heavier than the rotor is at the cable: it
+follows the winches without swinging."""
 
 
 @jit
@@ -22,6 +26,7 @@ def _reel(
     most_in: float,
     cable: FloatArray,
     gain: FloatArray,
+    integral_rate: float,
     position: FloatArray,
     last: FloatArray,
     speed: FloatArray,
@@ -36,7 +41,7 @@ def _reel(
         # a cable that has come loose is not to be wound up ever faster
         least = low[i] * min(max(1.0 + out / most_in, 0.0), 1.0)
         error = paying_out[i] / cable[i] - speed[i]
-        integral[i] += gain[i] * _INTEGRAL_RATE * period * error
+        integral[i] += gain[i] * integral_rate * period * error
         wanted = gain[i] * error + integral[i]
         tension[i] = min(max(-wanted / cable[i], least), max(high[i], least))
         torque[i] = -cable[i] * tension[i]
@@ -50,7 +55,12 @@ class Reel:
     at a winch is let out at its speed, held back by no more than it may be.
     """
 
-    def __init__(self, inertia_kg_m2: FloatArray, cable_m: FloatArray, period_s: float) -> None:
+    def __init__(
+        self,
+        inertia_kg_m2: FloatArray,
+        cable_m: FloatArray,
+        period_s: float,
+    ) -> None:
         n = len(cable_m)
         self._period_s = period_s
         self._weight = period_s / (period_s + _FILTER_S)
@@ -64,6 +74,7 @@ class Reel:
         """Negative reels in."""
         self.most_in_m_s = 0.1
         """A cable that comes in as fast is not pulled by the least any more."""
+        self.integral_rate_1_s = STANDING_1_s
         self.tension_N = np.zeros(n)
         """What the winches pull with now."""
         self.speed_rad_s = np.zeros(n)
@@ -77,11 +88,6 @@ class Reel:
         self.speed_rad_s[:] = speed_rad_s
         self._integral[:] = torque_Nm
 
-    @property
-    def out_m_s(self) -> FloatArray:
-        """How fast each cable is being paid out."""
-        return self._cable * self.speed_rad_s
-
     def update(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Write the torques of this cycle."""
         _reel(
@@ -93,6 +99,7 @@ class Reel:
             self.most_in_m_s,
             self._cable,
             self._gain,
+            self.integral_rate_1_s,
             feedback.position_rad,
             self._last,
             self.speed_rad_s,

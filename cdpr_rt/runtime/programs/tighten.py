@@ -9,7 +9,6 @@ import numpy as np
 
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_kernel import G_m_s2
-from cdpr_rt.robots.planar_kinematics import PlanarGeometry
 from cdpr_rt.robots.planar_tensions import PlanarTensions
 from cdpr_rt.runtime.last_lengths import StoppedLengths, off_index_m
 from cdpr_rt.runtime.programs.base import ProgramError
@@ -267,10 +266,8 @@ def standing_tensions(parts: PlatformParts) -> FloatArray:
     None is below the least. Together they press it down with its own weight, where some cable
     pulls downward; else they carry part of its weight.
     """
-    platform = parts.platform
-    geometry = PlanarGeometry(np.array(platform.exit_points_m), np.array(platform.anchor_points_m))
-    J = geometry.jacobian(np.array(platform.home_m))
-    weight = np.array([0.0, platform.mass_kg * G_m_s2])
+    J = parts.geometry.jacobian(np.array(parts.platform.home_m))
+    weight = np.array([0.0, parts.platform.mass_kg * G_m_s2])
     tensions = PlanarTensions(parts.control.least_N, parts.most_N / BEYOND)
     pressed, missing = tensions.distribute(J, weight)
     if not missing:

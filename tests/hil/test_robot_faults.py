@@ -1,0 +1,239 @@
+"""What goes wrong on a planar robot: it is held or let down under control, and the reason is told.
+
+Speeds are those of the simulator's true pose, which no controller reads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_rt.runtime.states import LoopState
+from tools.errors import WorkFailedError
+from tools.trials.lockstep import LockstepRobot
+from tools.trials.pose_log import read_pose_log
+from tools.trials.stream import Hand
+
+UPPER_LEFT, UPPER_RIGHT, LOWER = range(3)
+HIGH = (0.1, 1.75)
+G_m_s2 = 9.80665
+TENSION_MAX_N = 150.0
+ACCELERATION_m_s2 = 2.0
+
+
+def aloft(robot: LockstepRobot, **tighten: str) -> None:
+    """Have the platform hang on its cables."""
+    robot.enable()
+    robot.carry_out("tighten", 30.0, **tighten)
+    robot.carry_out("pose", 30.0, position_m=list(HIGH))
+    robot.run(0.3)
+
+
+@pytest.fixture
+def hanging() -> Iterator[LockstepRobot]:
+    with LockstepRobot("planar-3") as robot:
+        aloft(robot)
+        yield robot
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[LockstepRobot]:
+    with LockstepRobot("planar-3") as robot:
+        aloft(robot)
+        yield robot
+
+
+@pytest.fixture
+def healthy(shared: LockstepRobot) -> LockstepRobot:
+    """A robot at rest, whose tests leave it able to go on."""
+    if shared.right.token is None:
+        shared.run(4.0)
+        shared.right.take("trial")
+    shared.carry_out("pose", 30.0, position_m=list(HIGH))
+    shared.run(0.3)
+    return shared
+
+
+class Truth:
+    """What the simulator logs from now on."""
+
+    def __init__(self, robot: LockstepRobot) -> None:
+        self._robot = robot
+        self._from = robot.cycle + robot.sync_offset
+
+    def read(self) -> Any:
+        """Return the records since."""
+        log = read_pose_log(self._robot.truth_log)
+        return log[log["sync_index"] >= self._from]
+
+
+def end_of_fault(robot: LockstepRobot) -> None:
+    robot._turn_until(lambda: robot.loop.busy, 3.0, "a reaction")
+    robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
+
+
+def height_m(records: Any) -> float:
+    return float(records["position_m"][0, 1] - records["position_m"][-1, 1])
+
+
+FAULTS = [
+    # what breaks where, by 2F00h; what is told; whether gravity can still be carried
+    ((UPPER_RIGHT, 1, 0x7305), ("7305h",), False),
+    ((UPPER_LEFT, 12, 1), ("upper left: the cable seems broken",), False),
+    ((LOWER, 12, 1), ("lower: the cable seems broken",), True),
+    ((UPPER_RIGHT, 11, 500), ("upper right: angle jumped",), True),
+]
+
+
+@pytest.mark.parametrize(
+    ("what", "told", "carries"),
+    FAULTS,
+    ids=["drive", "cut", "lower-cut", "jump"],
+)
+def test_the_winches_that_are_left_let_the_platform_down(
+    hanging: LockstepRobot, what: tuple[int, int, int], told: tuple[str, ...], carries: bool
+) -> None:
+    truth = Truth(hanging)
+    hanging.misbehave(*what)
+    end_of_fault(hanging)
+    assert hanging.state is LoopState.FAULT
+    for text in told:
+        assert text in hanging.loop.life.reason
+    records = truth.read()
+    down_m_s = -records["velocity_m_s"][:, 1].min()
+    if carries:
+        assert down_m_s < 0.45
+    # what only one upper cable is left of swings: it gains no more than its height is worth
+    speed_m_s = np.linalg.norm(records["velocity_m_s"], axis=1).max()
+    assert speed_m_s < math.sqrt(2.0 * G_m_s2 * height_m(records))
+    others = [axis for axis in range(3) if axis != what[0]]
+    assert records["tension_N"][:, others].max() < TENSION_MAX_N
+    # it rests: on the floor, the cables without load
+    assert np.abs(records["velocity_m_s"][-1]).max() < 0.02
+    assert height_m(records) > 0.4
+    assert records["tension_N"][-1].max() < 8.0
+
+
+def test_a_stop_sets_the_platform_down_where_it_stood(hanging: LockstepRobot) -> None:
+    truth = Truth(hanging)
+    hanging.program("pose", position_m=[-0.3, 1.9])
+    hanging.run(0.5)  # in motion
+    hanging.shut_down()
+    records = truth.read()
+    speeds = np.linalg.norm(records["velocity_m_s"], axis=1)
+    assert hanging.state is LoopState.UNCONFIGURED
+    assert speeds.max() < 0.75  # 0.5 m/s along each direction
+    assert speeds[-1] < 0.01
+    platform = hanging.robot.platform
+    assert platform is not None
+    home = platform.home_m
+    assert records["position_m"][-1, :2] == pytest.approx(home, abs=0.003)
+    assert records["tension_N"][-1].max() < 8.0
+
+
+def test_a_target_out_of_the_workspace_is_refused_and_nothing_moves(
+    healthy: LockstepRobot,
+) -> None:
+    truth = Truth(healthy)
+    for position, named in (
+        ([0.0, 5.0], r"position_m\[1\]: value 5; allowed: 1.4 to 2.4, the workspace"),
+        ([math.nan, 1.8], r"position_m\[0\]: value nan"),
+        ([-0.7, 1.8], r"position_m\[0\]: value -0.7; allowed: -0.6 to 0.6"),
+    ):
+        with pytest.raises(WorkFailedError, match=named):
+            healthy.program("pose", position_m=position)
+    healthy.run(0.3)
+    speeds = np.linalg.norm(truth.read()["velocity_m_s"], axis=1)
+    assert speeds.max() < 0.01
+    assert healthy.loop.program.name == "pose"
+
+
+def lead(robot: LockstepRobot, hand: Hand, places: list[list[float]]) -> Any:
+    """Send a place every 20 ms; return the rows of all cycles meanwhile."""
+    rows = []
+    for place in places:
+        robot.stream.take(hand.packet(robot.now_s, place))
+        rows.append(robot.run(0.02))
+    return np.concatenate(rows)
+
+
+def test_a_hand_that_leaps_by_a_metre_moves_nothing_at_a_step(healthy: LockstepRobot) -> None:
+    healthy.program("pose", stream=True)
+    hand = Hand(session=5, token=healthy.right.token)
+    lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
+    truth = Truth(healthy)
+    rows = lead(healthy, hand, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]] * 15)
+    steps = np.diff(rows["pose_setpoint"][:, :2], n=2, axis=0) / healthy.period_s**2
+    assert np.abs(steps).max() < 1.01 * ACCELERATION_m_s2
+    speeds = np.linalg.norm(truth.read()["velocity_m_s"], axis=1)
+    assert speeds.max() < 0.75
+    assert healthy.state is LoopState.ACTIVE
+
+
+def test_a_hand_that_is_no_number_is_not_followed(healthy: LockstepRobot) -> None:
+    healthy.program("pose", stream=True)
+    hand = Hand(session=6, token=healthy.right.token)
+    lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
+    truth = Truth(healthy)
+    lead(healthy, hand, [[math.nan, 0.0, 0.0], [0.0, math.inf, 0.0]] * 15)
+    assert np.linalg.norm(truth.read()["velocity_m_s"], axis=1).max() < 0.02
+    assert np.isfinite(healthy.row["pose_setpoint"][:2]).all()
+    assert healthy.state is LoopState.ACTIVE
+
+
+@pytest.mark.parametrize("goes", ["fall_silent", "drop"])
+def test_a_master_that_disappears_in_motion_leaves_the_platform_held(
+    healthy: LockstepRobot, goes: str
+) -> None:
+    healthy.program("pose", position_m=[-0.4, 2.1], speed_m_s=0.2)
+    healthy.run(0.5)
+    getattr(healthy.right, goes)()
+    healthy.until(lambda: healthy.loop.program.name == "hold", 5.0)
+    assert "nobody holds the right to move" in healthy.loop.life.reason
+    healthy.run(1.0)
+    truth = Truth(healthy)
+    healthy.run(0.5)
+    records = truth.read()
+    assert np.linalg.norm(records["velocity_m_s"], axis=1).max() < 0.01
+    assert records["tension_N"].min() > 10.0  # of the 20 N that are planned
+    assert healthy.progress["tight"]
+
+
+def test_what_was_paused_goes_on_to_where_it_was_going(healthy: LockstepRobot) -> None:
+    target = [-0.3, 1.6]
+    healthy.program("pose", position_m=target)
+    healthy.run(0.4)
+    healthy.order("hold")
+    healthy.run(0.5)
+    away_m = np.abs(healthy.truth()["position_m"][:2] - target).max()
+    assert away_m > 0.05
+    healthy.carry_out("pose", 20.0, resume=True)
+    healthy.run(0.5)
+    assert healthy.truth()["position_m"][:2] == pytest.approx(target, abs=0.01)
+
+
+def test_no_platform_is_dropped_by_a_word(healthy: LockstepRobot) -> None:
+    with pytest.raises(WorkFailedError, match="the platform hangs on its cables; lower it first"):
+        healthy.program("idle")
+    assert healthy.loop.program.name == "pose"
+
+
+def test_the_lengths_of_the_last_stop_serve_the_next_start(tmp_path: Path) -> None:
+    with LockstepRobot("planar-3") as robot:
+        last = robot.loop.parts.last
+        assert last is not None
+        last.path = tmp_path / "lengths.json"
+        aloft(robot)
+        robot.carry_out("lower", 30.0, blind=True)  # beside where it stood
+        robot.order("disable")
+        assert last.path.read_text().count("true") == 1
+        robot.order("check")  # boots nothing anew, but a start may not rely on that
+        robot.loop.parts.estimator.forget_lengths()
+        last.load(3)
+        aloft(robot, **{"from": "last"})
+        assert robot.truth()["position_m"][:2] == pytest.approx(HIGH, abs=0.01)
