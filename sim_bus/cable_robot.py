@@ -17,6 +17,7 @@ from sim_bus.robot_motion import run_together, sample_of
 from sim_bus.robot_plant import RobotPlant
 
 _LONGEST_STEP_S = 1e-3
+_EVEN_m = 1e-6
 FloatArray = NDArray[np.float64]
 MotorSample = tuple[int, int, int, int, float, float, float, float, float, float]
 """A `motor.Sample` as the kernels return it."""
@@ -174,10 +175,11 @@ class CableRobot:
         p["feet"] = len(feet)
         p["foot"][: len(feet)] = feet - p["com"]
         up = -p["gravity"] / np.linalg.norm(p["gravity"])
-        lowest = min(
-            float(up @ (p["position"] + p["rotation"] @ f)) for f in p["foot"][: len(feet)]
-        )
-        p["floor"] = lowest if floor.height_m is None else floor.height_m
+        heights = (p["position"] + p["foot"][: len(feet)] @ p["rotation"].T) @ up
+        carried_by = np.count_nonzero(heights < heights.min() + _EVEN_m)
+        weight = p["mass"] * np.linalg.norm(p["gravity"])
+        sunk = weight / (carried_by * floor.stiffness_N_m)
+        p["floor"] = heights.min() + sunk if floor.height_m is None else floor.height_m
         if not floor.present:
             p["floor"] = -math.inf
         p["floor_stiffness"], p["floor_damping"] = floor.stiffness_N_m, floor.damping_Ns_m
@@ -229,7 +231,8 @@ def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:
 
 def _corners(points: FloatArray) -> FloatArray:
     low, high = points.min(axis=0), points.max(axis=0)
-    return np.array([np.where(pick, high, low) for pick in np.ndindex(2, 2, 2)])
+    corners = [np.where(pick, high, low) for pick in np.ndindex(2, 2, 2)]
+    return np.unique(corners, axis=0)
 
 
 def _vector(values: Sequence[float]) -> FloatArray:

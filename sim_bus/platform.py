@@ -33,6 +33,7 @@ PLATFORM_DTYPE = np.dtype(
         ("floor", _F8),  # m, height of the floor against gravity; -inf without
         ("floor_stiffness", _F8),  # N/m of each foot
         ("floor_damping", _F8),  # N s/m
+        ("standing", np.int64),  # whether a foot touched the floor in the last step
         ("floor_friction", _F8),  # share of the load that a foot resists sliding with
         # state
         ("position", _F8, (3,)),  # m, of the centre of mass
@@ -178,6 +179,7 @@ def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, fl
         return fx, fy, fz, tx, ty, tz
     nx, ny, nz = -p.gravity[0] / g, -p.gravity[1] / g, -p.gravity[2] / g
     R, w = p.rotation, p.spin
+    p.standing = 0
     for i in range(p.feet):
         q = p.foot[i]
         rx = R[0, 0] * q[0] + R[0, 1] * q[1] + R[0, 2] * q[2]
@@ -189,6 +191,7 @@ def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, fl
         if depth <= 0.0:
             bent[0] = bent[1] = bent[2] = 0.0
             continue
+        p.standing = 1
         vx = p.velocity[0] + w[1] * rz - w[2] * ry
         vy = p.velocity[1] + w[2] * rx - w[0] * rz
         vz = p.velocity[2] + w[0] * ry - w[1] * rx

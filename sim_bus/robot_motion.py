@@ -15,14 +15,16 @@ _MOST_PARTS = 400
 
 
 @jit
-def steps_within(motors: Any, mobility: float, h: float) -> int:
+def steps_within(motors: Any, p: Any, h: float) -> int:
     """Return into how many steps to divide `h` so that nothing on the stiffest cable rings.
 
     A rotor on a cable swings at sqrt(EA c² / (l J)), c the cable it pays out per radian; the
-    platform on all of them, `mobility` (1/kg) being how lightly it gives way to one, at
-    sqrt(mobility EA / l), and their damping must not stop it more than once a step.
+    platform on all of them and its feet, its mobility (1/kg) being how lightly it gives way to
+    one, at sqrt(mobility EA / l), and their damping must not stop it more than once a step.
     """
     most, stiffness, damping = 1, 0.0, 0.0
+    if p.standing:
+        stiffness, damping = p.feet * p.floor_stiffness, p.feet * p.floor_damping
     for m in motors:
         length, gain = rotor.paid_out(m)
         k = m.rigidity / length
@@ -30,8 +32,8 @@ def steps_within(motors: Any, mobility: float, h: float) -> int:
         damping += k * m.damping_time
         swing = math.sqrt(k * gain * gain / m.inertia)
         most = max(most, m.steps_per_control, math.ceil(swing * h / _RINGING))
-    most = max(most, math.ceil(math.sqrt(stiffness * mobility) * h / _RINGING))
-    return min(_MOST_PARTS, max(most, math.ceil(damping * mobility * h / _DYING)))
+    most = max(most, math.ceil(math.sqrt(stiffness * p.mobility) * h / _RINGING))
+    return int(min(_MOST_PARTS, max(most, math.ceil(damping * p.mobility * h / _DYING))))
 
 
 @jit
@@ -51,7 +53,7 @@ def run_together(
     for k in range(n):
         for i in range(p.cables):
             flags[i] |= servo.control(motors[i], kinds[i], targets[i], h)
-        parts = steps_within(motors, p.mobility, h)
+        parts = steps_within(motors, p, h)
         for _ in range(parts):
             look_along_cables(p, motors)
             for i in range(p.cables):

@@ -84,10 +84,10 @@ class FloorPlant(Profile):
     """What the platform stands on."""
 
     height_m: float | None = None
-    """Where left out, under the platform as it stands at power-up."""
+    """Where left out, such that the platform stands at rest where it is at power-up."""
     present: bool = True
-    stiffness_N_m: Annotated[float, Field(gt=0.0, le=1e7)] = 5e4
-    damping_Ns_m: Annotated[float, Field(ge=0.0, le=1e5)] = 200.0
+    stiffness_N_m: Annotated[float, Field(gt=0.0, le=1e7)] = 1e6
+    damping_Ns_m: Annotated[float, Field(ge=0.0, le=1e5)] = 500.0
     friction: Annotated[float, Field(ge=0.0, le=2.0)] = 0.3
 
 

@@ -132,7 +132,7 @@ def test_the_floor_carries_a_slack_platform() -> None:
     )
     run(robot, 1.0)
     assert np.linalg.norm(robot.platform["velocity"][0]) < 1e-3
-    assert robot.position_m[:2] == pytest.approx((0.2, 1.5), abs=2e-3)
+    assert robot.position_m[:2] == pytest.approx((0.2, 1.5), abs=2e-5)
     # what a slack cable of some 2 m weighs
     assert 0.0 < robot.tension_N.max() < 3.0
 
@@ -149,7 +149,7 @@ def test_a_foot_sticks_until_a_force_is_more_than_its_friction(share: float) -> 
         run(robot, 1e-3, begin_s=0.3 + 1e-3 * k)
     way_m = robot.position_m[0] - begun_m
     if share < 1.0:
-        assert 0.0 < way_m < 2e-4
+        assert abs(way_m) < 5e-5
     else:
         assert way_m == pytest.approx(0.5 * (share - 1.0) * friction_m_s2 * 0.3**2, rel=0.1)
 
