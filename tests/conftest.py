@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from typing import Any
 
 import pytest
@@ -10,6 +11,9 @@ from xdist.scheduler import LoadScopeScheduling
 
 # before anything loads numpy: threads that spin for work take the cores of the other processes
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# tests start hundreds of processes, none of which is to compile all sources anew
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 class _ByFile(LoadScopeScheduling):
