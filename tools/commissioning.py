@@ -124,6 +124,7 @@ class Measurement:
         session = self._session
         meta = {**meta, "what": name, "identity": session.identity}
         meta["sync_offset"] = session.sync_offset()
+        meta["latency_s"] = session.latency_s
         total = sum(one.duration_s() for one in passes)
         recorded = []
         with self._out.progress(name, total) as advance:

@@ -91,9 +91,9 @@ def fit(
     """Identify from recorded data and write the cogging profile into the folder."""
     out = Output(as_json)
     paths = Paths(folder)
-    recorded_winch, identity = _recorded_identity(paths)
+    recorded_winch, identity, latency = _recorded_identity(paths)
     profile = load_winch(winch or recorded_winch)
-    found = identify(profile, latency_s(profile), paths)
+    found = identify(profile, latency or latency_s(profile), paths)
     store_profile(profile, identity, found, paths)
     result = identification(found)
     summary.show_identified(out, result)
@@ -101,14 +101,16 @@ def fit(
     out.result({"ok": True, "identification": result, "profile": str(paths.profile)})
 
 
-def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity]:
+def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity, float | None]:
+    """Return the winch, its drive, and its latency, which older recordings do not tell."""
     sweeps = paths.passes("sweep")
     if not sweeps:
         raise BadInputError(f"{paths.out}: holds no recorded sweep (raw/sweep-0.raw, ...)")
     try:
-        whose = read_raw_log(sweeps[0]).header["identity"]
+        header = read_raw_log(sweeps[0]).header
+        whose, latency = header["identity"], header.get("latency_s")
         identity = DriveIdentity(**{key: whose[key] for key in DriveIdentity.model_fields})
-        return str(whose["winch"]), identity
+        return str(whose["winch"]), identity, latency if latency is None else float(latency)
     except (KeyError, TypeError, ValueError) as error:
         raise RawLogError(f"{sweeps[0]}: does not say which drive it is of") from error
 
