@@ -51,7 +51,7 @@ def daemon(folder: Path) -> Iterator[RealDaemon]:
     options = ("--stream", "127.0.0.1:0", "--record", str(folder / "rec"))
     one = RealDaemon(folder, *options, robot=robot)
     try:
-        for command in (("enable",), ("controller", "tighten")):
+        for command in (("enable",), ("tighten",)):
             told = cdpr(*command, *one.at)
             assert told.returncode == 0, f"{told.stderr}{one.errors()}"
         yield one
@@ -115,9 +115,9 @@ def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) 
     np.testing.assert_allclose(place(daemon) - begin, [0.0, 0.2], atol=5e-4)
     begin = place(daemon)
     script = (
-        # still where the clutch closes: a set-point that is lost just then tells that too late
-        "0 0 0\n0.3 0 0\n1.3 40 10\n1.6 40 10 confirm\n1.8 40 10 clutch\n2.2 0 0\n"
-        "2.5 0 0\n3 0 20 confirm"
+        # still where the clutch opens and closes: a set-point that is lost tells that too late
+        "0 0 0\n0.3 0 0\n1.3 40 10\n1.6 40 10 confirm\n1.8 40 10 clutch\n2.1 40 10 clutch\n"
+        "2.3 0 0 clutch\n2.5 0 0\n2.8 0 0\n3.3 0 20 confirm"
     )
     with hostile(port_of(daemon), seed=3) as proxy:
         via = f"127.0.0.1:{proxy.port}"
