@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
 from cdpr_rt.runtime.states import LoopState
 from tools.teleop.canvas import Canvas
 from tools.teleop.session import Session
 
-_WIDTH, _HEIGHT = 64, 22
+_WIDTH, _HEIGHT, _LEAST_HEIGHT = 64, 22, 8
+_WRAPPED = 3
+"""Lines that may be needed where texts are wider than the terminal."""
 _MARGIN_m = 0.1
 _SHOWN_TRIPS = 120
 _MARKS: Final = {"target": ("+", "bold cyan"), "platform": ("o", "bold green")}
@@ -30,20 +32,22 @@ class View:
         self._axes = [str(axis.get("name")) for axis in description.get("axes", [])]
         self.status: dict[str, Any] = {}
 
-    def __rich__(self) -> RenderableType:
-        """Return the picture, where the platform's plane is known, above the figures."""
-        parts: list[RenderableType] = [] if self._platform is None else [self._picture()]
-        return Group(*parts, *self._lines())
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Yield the picture, where the plane is known and there is room, and the figures."""
+        lines = self._lines()
+        height = min(_HEIGHT, console.height - _WRAPPED - len(lines))
+        if self._platform is not None and height >= _LEAST_HEIGHT:
+            yield self._picture(self._platform, min(_WIDTH, options.max_width), height)
+        yield from lines
 
-    def _picture(self) -> Text:
-        assert self._platform is not None
-        session, platform = self._session, self._platform
+    def _picture(self, platform: dict[str, Any], width: int, height: int) -> Text:
+        session = self._session
         exits = [_point(each) for each in platform["exit_points_m"]]
         low, high = _point(platform["workspace_min_m"]), _point(platform["workspace_max_m"])
         shown = [*exits, low, high]
         canvas = Canvas(
-            _WIDTH,
-            _HEIGHT,
+            width,
+            height,
             (min(x for x, _ in shown) - _MARGIN_m, min(y for _, y in shown) - _MARGIN_m),
             (max(x for x, _ in shown) + _MARGIN_m, max(y for _, y in shown) + _MARGIN_m),
         )

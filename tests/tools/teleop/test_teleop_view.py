@@ -28,7 +28,10 @@ AXES = [{"name": name} for name in ("left", "right", "lower")]
 
 
 def seen(
-    pose: tuple[float, ...], status: dict[str, Any], platform: dict[str, Any] | None = PLATFORM
+    pose: tuple[float, ...],
+    status: dict[str, Any],
+    platform: dict[str, Any] | None = PLATFORM,
+    height: int = 40,
 ) -> list[str]:
     """Return the lines shown of a robot that has answered once."""
     with StreamClient("127.0.0.1", 9) as stream:
@@ -41,7 +44,7 @@ def seen(
         session.round_trips_s.extend((0.35, 0.73))
         view = View(session, {"axes": AXES, "platform": platform})
         view.status = status
-        console = Console(width=120, color_system=None)
+        console = Console(width=120, height=height, color_system=None)
         with console.capture() as shown:
             console.print(view)
     return shown.get().splitlines()
@@ -73,6 +76,14 @@ def test_the_robot_stands_where_it_is_told_and_its_target_too() -> None:
         "a script leads",
     ):
         assert told in text
+
+
+def test_a_small_terminal_shows_the_figures_before_the_picture() -> None:
+    pose = (0.5, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0)
+    lines = seen(pose, {}, height=24)
+    assert len(lines) <= 24
+    assert any("◉" in line for line in lines)
+    assert not any("◉" in line for line in seen(pose, {}, height=12))
 
 
 def test_without_a_plane_there_are_figures_only() -> None:
