@@ -26,7 +26,8 @@ BEYOND = 1.5
 way, and what it does to the angles on the way up and down cancels out."""
 INDEX_m_s = 0.1
 """How fast the platform is lifted while indices are looked for."""
-_STANDING = 0.8
+_STANDING = 0.85
+_SETTLING_S = 0.5
 _HANGING = 0.5
 _RISE_1_s = 1.0
 _FALL_S = 0.2
@@ -78,6 +79,7 @@ class TightenProgram(PlatformProgram):
         self._stopping = self._at_rest = False
         self._source = self._usual_source()
         self._last = None
+        self._stage = self._still = self._cycles = 0
         if parts.tight:
             super().start(feedback, setpoint, torque_Nm)
             self._look_for_indices()
@@ -85,7 +87,6 @@ class TightenProgram(PlatformProgram):
         self._begun[:] = self._here[:] = feedback.position_rad
         self._reel.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
         self._share = min(max(float(np.max(-torque_Nm / self._cable / self._full_N)), 0.0), 1.0)
-        self._stage = self._still = self._cycles = 0
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (3,) each, in place."""
@@ -111,7 +112,7 @@ class TightenProgram(PlatformProgram):
         """Return how far it is, how hard the cables are pulled, and what stands in the way."""
         tight = self._parts.tight
         stage = _STAGES[self._stage][0] if not tight else "index" if self._way else "held"
-        done = tight and not self._way
+        done = tight and not self._way and self._settled
         told = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._why}
         if tight:
             return {**super().progress(), **told}
@@ -192,6 +193,7 @@ class TightenProgram(PlatformProgram):
         parts.loop.take_over(feedback, torque_Nm)
         parts.cycle = feedback.cycle
         parts.tight = True
+        self._cycles = 0
         super().start(feedback, setpoint, torque_Nm)
         self._look_for_indices()
 
@@ -222,6 +224,11 @@ class TightenProgram(PlatformProgram):
             self._target[:] = self._way[0]
             self._speed[:] = np.minimum(INDEX_m_s, parts.speed_m_s)
 
+    @property
+    def _settled(self) -> bool:
+        """Whether the platform's control has had the time to bring its tensions about."""
+        return self._cycles * self._parts.period_s > _SETTLING_S
+
     def _wants_index(self) -> bool:
         """Whether an index is missing that compensation needs, or that checks the last lengths."""
         last, known = self._last, self._feedback.index_known
@@ -231,8 +238,9 @@ class TightenProgram(PlatformProgram):
 
     def _move(self) -> bool:
         arrived = self._approach()
+        self._cycles += 1
         if not self._way:
-            return arrived
+            return arrived and self._settled
         found = not self._wants_index()
         if found or arrived:
             self._way = [] if found else self._way[1:]
@@ -263,14 +271,17 @@ class TightenProgram(PlatformProgram):
 def standing_tensions(parts: PlatformParts) -> FloatArray:
     """Return tensions (3,) under which a platform at home stands firm on what it stands on.
 
-    None is below the least. Together they press it down with its own weight, where some cable
-    pulls downward; else they carry part of its weight.
+    None is below the least that is planned with, or at least allowed. Together they press it down
+    with its own weight, where some cable pulls downward; else they carry part of its weight, and
+    even beyond do not lift it.
     """
     J = parts.geometry.jacobian(np.array(parts.platform.home_m))
     weight = np.array([0.0, parts.platform.mass_kg * G_m_s2])
-    tensions = PlanarTensions(parts.control.least_N, parts.most_N / BEYOND)
-    pressed, missing = tensions.distribute(J, weight)
-    if not missing:
-        return pressed
-    hanging, _ = tensions.distribute(J, -weight)
-    return np.maximum(_STANDING * hanging, 0.0)
+    control = parts.control
+    most = np.maximum(parts.most_N / BEYOND, 1.1 * control.least_N)
+    for least in (np.minimum(control.tensions.low, 0.9 * most), control.least_N):
+        pressed, missing = PlanarTensions(least, most).distribute(J, weight)
+        if not missing:
+            return pressed
+    hanging, _ = PlanarTensions(control.least_N, most).distribute(J, -weight)
+    return np.maximum(_STANDING / BEYOND * hanging, 0.0)
