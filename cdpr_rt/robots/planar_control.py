@@ -27,10 +27,12 @@ from profiles.platform import Platform
 
 RESERVE = 0.12
 """Share of the span of tensions that is left to what no plan knows: loops, friction, swinging."""
-_OBSERVER_Hz = 250.0
-_DAMPING_RATIO = 0.53
-_ROTOR_SHARE = 1.7
-_SLOWEST_LOOP_s = 5.0
+_OBSERVER_Hz = 400.0
+_SMOOTHER_Hz = 25.0
+_DAMPING_RATIO = 0.55
+_ROTOR_SHARE = 0.75
+_SMOOTH_SHARE = 0.55
+_LOAD_SHARE = 0.28
 _INTEGRAL_RATE = 5.0
 _INTEGRAL_PHASE = 0.15
 _INTEGRAL_SHARE = 0.15
@@ -41,6 +43,7 @@ _BREAKING = 4.0
 _STUCK_m_s = 0.002
 _SETTLING_STEPS = 60
 _ITERATIONS = 3
+_LIFT_S = 0.05
 _LATENCY_s = 2.3e-3
 
 
@@ -75,6 +78,7 @@ class PlanarControl:
         self.tension_N = np.array(self.tensions.low)
         self.outcome, self.outside_N, self.share = 0, 0.0, 1.0
         self.effort_Nm, self.compensation_Nm = np.zeros(3), np.zeros(3)
+        self._lift, self._pace = 0.0, period_s / (period_s + _LIFT_S)
         self._compensation = compensation
         self._robot = self._robot_row(platform, axes, float(span.min()), period_s)
         self._state = np.zeros(1, kernel.STATE)
@@ -99,9 +103,11 @@ class PlanarControl:
         mass = platform.mass_kg + 1.5 * rotor_kg
         observer = 2.0 * math.pi * _OBSERVER_Hz
         late_s = _LATENCY_s + 2.0 / observer
-        damping = min(_ROTOR_SHARE * rotor_kg / late_s, 1.4 * mass / (_SLOWEST_LOOP_s * late_s))
+        quick = _ROTOR_SHARE * rotor_kg / late_s
+        damping = min(quick / (1.0 - _SMOOTH_SHARE), _LOAD_SHARE * mass / late_s)
         row["mass"], row["period"], row["inertia"] = platform.mass_kg, period_s, inertia
         row["observer"], row["damping"] = observer, damping
+        row["smoother"], row["smooth"] = 2.0 * math.pi * _SMOOTHER_Hz, _SMOOTH_SHARE
         row["stiffness"] = mass * (damping / (2.0 * _DAMPING_RATIO * mass)) ** 2
         row["integral"] = min(_INTEGRAL_RATE, _INTEGRAL_PHASE * damping / mass) * row["stiffness"]
         row["loose"] = _LOOSE_SHARE * damping
@@ -127,6 +133,7 @@ class PlanarControl:
         """Forget what was integrated."""
         self._state["integral"] = 0.0
         self._state["awake"] = 1.0
+        self._lift, self.share = 0.0, 1.0
         if self._compensation is not None:
             self._compensation.reset()
 
@@ -146,13 +153,15 @@ class PlanarControl:
             self._compensation.torque(feedback, setpoint, self.compensation_Nm)
         kernel.correct(robot, state, *motion, self.share, self._wrench, self._force)
         np.negative(cables["way"], out=self._J)
-        self.outcome, self.outside_N, self.share = carry(
+        self.outcome, self.outside_N, self.share, self._lift = carry(
             self._J,
             self._wrench,
             self._force,
             self.tensions.low,
             self.tensions.high,
             self._reserve_N,
+            self._pace,
+            self._lift,
             self.tension_N,
             self._carried,
             self._inner,
@@ -175,7 +184,8 @@ class PlanarControl:
     def begin(self, feedback: AxisFeedback) -> None:
         """Take the motors to stand where they are, and the platform where its cables have it."""
         self._cables["theta"] = feedback.position_rad
-        self._cables["omega"] = 0.0
+        for field in ("omega", "lagging", "calm"):
+            self._cables[field] = 0.0
         self._cables["tension"] = np.maximum(self._cables["tension"], self.tensions.low)
         self._state["position"][0] = self._home
         for _ in range(_SETTLING_STEPS):

@@ -21,6 +21,8 @@ ROBOT = np.dtype(
         ("period", "<f8"),  # s
         ("inertia", "<f8"),  # kg m2, of each motor
         ("observer", "<f8"),  # rad/s, double pole of the motors' observers
+        ("smoother", "<f8"),  # rad/s, double pole of the part of their velocity that is smooth
+        ("smooth", "<f8"),  # share of that part in the velocity which is damped
         ("stiffness", "<f8"),  # N/m, of the platform's loop
         ("damping", "<f8"),  # N s/m
         ("integral", "<f8"),  # N/(m s)
@@ -60,21 +62,30 @@ CABLE = np.dtype(
         ("tension", "<f8"),  # N, with which the cable is taken to be stretched
         ("theta", "<f8"),  # observer: angle and velocity of the motor
         ("omega", "<f8"),
+        ("lagging", "<f8"),  # rad/s, low-passed once and twice
+        ("calm", "<f8"),
     ]
 )
 """What belongs to one cable; one row each."""
 
 
 @jit
-def observe(cables: Any, position: FloatArray, rate: float, period: float) -> None:
-    """Track each motor's angle and velocity: an observer with a double pole at `rate`."""
+def observe(cables: Any, position: FloatArray, rate: float, smoother: float, period: float) -> None:
+    """Track each motor's angle and velocity: an observer with a double pole at `rate`.
+
+    A rotor on its cable swings at 50 to 100 Hz, where the latency turns damping into its reverse:
+    what is to damp the platform's slow swinging is low-passed by a double pole at `smoother`.
+    """
+    decay = math.exp(-rate * period)
+    weight = 1.0 - math.exp(-smoother * period)
     for i in range(cables.size):
         c = cables[i]
-        decay = math.exp(-rate * period)
         predicted = c.theta + period * c.omega
         error = position[i] - predicted
         c.theta = predicted + (1.0 - decay * decay) * error
         c.omega += (1.0 - decay) ** 2 / period * error
+        c.lagging += weight * (c.omega - c.lagging)
+        c.calm += weight * (c.lagging - c.calm)
 
 
 @jit
@@ -145,13 +156,16 @@ def locate(state: Any, cables: Any, iterations: int) -> bool:
 
 
 @jit
-def velocity_of(state: Any, cables: Any) -> None:
-    """Write the platform's velocity from those of the cables, in the sense of least squares."""
+def velocity_of(state: Any, cables: Any, smooth: float) -> None:
+    """Write the platform's velocity from those of the cables, in the sense of least squares.
+
+    `smooth` is the share of the low-passed velocities in it.
+    """
     s = state[0]
     xx, xy, yy, gx, gy = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(cables.size):
         c = cables[i]
-        rate = c.m_per_rad * c.omega
+        rate = c.m_per_rad * (c.omega + smooth * (c.calm - c.omega))
         xx += c.way[0] * c.way[0]
         xy += c.way[0] * c.way[1]
         yy += c.way[1] * c.way[1]
@@ -166,14 +180,15 @@ def velocity_of(state: Any, cables: Any) -> None:
 @jit
 def estimate(robot: Any, state: Any, cables: Any, position: FloatArray, iterations: int) -> bool:
     """Estimate pose and velocity of the platform from the motors' angles (m,)."""
-    observe(cables, position, robot[0].observer, robot[0].period)
+    r = robot[0]
+    observe(cables, position, r.observer, r.smoother, r.period)
     for i in range(cables.size):
         c = cables[i]
         free = c.length_at_zero + c.m_per_rad * c.theta
         c.length = free * (1.0 + c.tension / c.rigidity)
     turn_to_equilibrium(state, cables)
     found = locate(state, cables, iterations)
-    velocity_of(state, cables)
+    velocity_of(state, cables, r.smooth)
     return found
 
 

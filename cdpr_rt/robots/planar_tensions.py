@@ -15,7 +15,8 @@ from cdpr_rt.exchange import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.planar_kinematics import GeometryError
 
-_HALVINGS = 10
+_FAST = 0.85
+"""Share of the reserve that a loop may use at once."""
 _STOPS = 32
 
 
@@ -164,19 +165,24 @@ def carry(
     low: FloatArray,
     high: FloatArray,
     reserve: float,
+    pace: float,
+    lift: float,
     t: FloatArray,
     carried: FloatArray,
     u: FloatArray,
     room: FloatArray,
-) -> tuple[int, float, float]:
+) -> tuple[int, float, float, float]:
     """Write tensions that carry `wrench` (2,) and exert `force` (2,) besides, as far as they can.
 
     `low` and `high` (3,) lie within the true bounds by `reserve`, N: between them are the least
-    tensions that carry the wrench alone, `carried` (3,). `t` (3,) exerts the force besides: what
-    a loop asks for to overcome friction, so that most of it does not get to the cables; it may use
-    half of the reserve, and share of it is left out which does not fit. `u` (3,) is the unit
-    vector of the kernel, `room` (4, 3) is overwritten. Returns a `TensionOutcome` for the wrench,
-    by how much a tension is outside low and high, N, and which share of the force is exerted.
+    tensions that carry the wrench alone. A loop asks for the force, most of which friction takes
+    before it gets to the cables; it may use half of the reserve. Where it needs more, k is lifted,
+    by a share `pace` of what is missing in each cycle from the last cycle's `lift` on: slowly,
+    since a k that followed the loop's every swing would be a loop of its own. What does not fit
+    until then is left out. `t` (3,) are the tensions, `carried` (3,) those without the force, `u`
+    (3,) the unit vector of the kernel; `room` (4, 3) is overwritten. Returns a `TensionOutcome`
+    for the wrench, by how much a tension is outside low and high, N, the share of the force that
+    is exerted, and the lift.
     """
     t0, more, least_t, most_t = room[0], room[1], room[2], room[3]
     for k in range(2):
@@ -188,39 +194,31 @@ def carry(
         for i in range(3):
             t[i] = carried[i] = low[i]
             u[i] = 0.0
-        return 2, math.inf, 0.0
+        return 2, math.inf, 0.0, 0.0
     first, last = bounds_of_k(t0, u, low, high)
     if not first <= last:
-        k, outside = least_violation(t0, u, low, high)
+        at, outside = least_violation(t0, u, low, high)
         for i in range(3):
-            carried[i] = t0[i] + k * u[i]
-            t[i] = carried[i] + more[i]
-            t[i] = min(max(t[i], low[i] - reserve), high[i] + reserve)
-        return 1, outside, 0.0
+            carried[i] = t0[i] + at * u[i]
+            t[i] = min(max(carried[i] + more[i], low[i] - reserve), high[i] + reserve)
+        return 1, outside, 0.0, 0.0
     for i in range(3):
-        least_t[i] = low[i] - 0.5 * reserve
-        most_t[i] = high[i] + 0.5 * reserve
+        least_t[i], most_t[i] = low[i] - 0.5 * reserve, high[i] + 0.5 * reserve
         t[i] = t0[i] + more[i]
-    k = first
-    share, step = 1.0, 1.0
     a, b = bounds_of_k(t, u, least_t, most_t)
-    if max(first, a) <= min(last, b):
-        k = max(first, a)
-    else:
-        # what can be exerted is convex: the share is found by halving
-        share, step = 0.0, 0.5
-        for _ in range(_HALVINGS):
-            for i in range(3):
-                t[i] = t0[i] + (share + step) * more[i]
-            a, b = bounds_of_k(t, u, least_t, most_t)
-            if max(first, a) <= min(last, b):
-                share += step
-                k = max(first, a)
-            step *= 0.5
+    wanted = min(max(0.0, a - first), last - first) if a <= b else 0.0
+    lift = min(lift + pace * (wanted - lift), last - first)
+    share = 1.0
     for i in range(3):
-        carried[i] = t0[i] + k * u[i]
+        carried[i] = t0[i] + (first + lift) * u[i]
+        least, most = low[i] - _FAST * reserve, high[i] + _FAST * reserve
+        if carried[i] + more[i] < least:
+            share = min(share, (carried[i] - least) / -more[i])
+        elif carried[i] + more[i] > most:
+            share = min(share, (most - carried[i]) / more[i])
+    for i in range(3):
         t[i] = carried[i] + share * more[i]
-    return 0, 0.0, share
+    return 0, 0.0, share, lift
 
 
 @jit
