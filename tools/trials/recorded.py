@@ -28,6 +28,7 @@ FIELDS: Final = (
     "compensation_Nm",
 )
 _LAGS: Final = (-1, 0, 1)
+_CLEARLY: Final = 1.1
 
 
 class Recorded:
@@ -93,14 +94,14 @@ class Recorded:
     def _require_alignment(self) -> None:
         """Raise WorkFailedError where the motors' angles are not those that were true then.
 
-        While motors turn, records that are off by a cycle agree less.
+        While motors turn, records that are off by cycles agree less; by half a cycle is the same.
         """
         measured = np.diff(self.cycles["position_rad"], axis=0)
         true = np.diff(self.truth["motor_rad"], axis=0)
         misfit = [
             np.mean((measured[1:-1] - np.roll(true, lag, axis=0)[1:-1]) ** 2) for lag in _LAGS
         ]
-        if not np.isfinite(misfit).all() or int(np.argmin(misfit)) != 1:
+        if not np.isfinite(misfit).all() or misfit[1] > _CLEARLY * min(misfit):
             raise WorkFailedError(
                 f"{self.folder}: recording and {TRUTH} do not belong together: the motors' angles "
                 "are not those of the same SYNCs"
