@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+import signal
+from collections.abc import Iterable
+from functools import partial
+from multiprocessing.pool import Pool
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from profiles import load_robot
-from tools.errors import BadInputError, CommandError, WorkFailedError
+from tools.errors import BadInputError, WorkFailedError
 from tools.experiment import figures
 from tools.experiment.path import centre_m
 from tools.experiment.points import Points, points_of_perfect_robot, points_of_session
@@ -66,59 +67,44 @@ def load(folder: Path) -> Asked:
 def perform(asked: Asked, folder: Path, jobs: int, out: Output) -> None:
     """Run the sessions that are still to be run, `jobs` side by side.
 
-    One that fails ends the experiment when those under way have ended; raises its error then.
+    Where some fail the others are run all the same; raises WorkFailedError then.
     """
     missing = [name for name in asked.sessions() if not (_session(folder, name) / _DONE).exists()]
     total = len(asked.sessions())
     if not missing:
         return
     out.note(f"{total - len(missing)} of {total} sessions are there; {jobs} side by side ...")
+    done, failed = total - len(missing), []
+    work = partial(_perform_session, asked, folder)
     with _processes(jobs) as pool, out.progress("sessions", total * _SESSION_S) as advance:
-        waiting = {pool.submit(_perform_session, asked, folder, name): name for name in missing}
-        done, failed = total - len(missing), None
-        for future in as_completed(waiting):
-            error = _failure(future, waiting[future])
-            if error is not None and failed is None:
-                failed = error
-                for other in waiting:
-                    other.cancel()
-            done += error is None
+        for name, error in pool.imap_unordered(work, missing):
+            if error:
+                failed.append(f"{name}: {error}")
+            done += not error
             advance(done * _SESSION_S)
-            out.note(f"{waiting[future]}: {error or 'done'}")
-    if failed is not None:
-        raise failed
+            out.note(f"{name}: {error or 'done'}")
+    if failed:
+        raise WorkFailedError(f"{len(failed)} of {total} sessions failed; {failed[0]}")
 
 
-def _failure(future: Future[None], name: str) -> CommandError | None:
-    if future.cancelled():
-        return WorkFailedError(f"{name}: not begun")
-    error = future.exception()
-    if error is None or isinstance(error, CommandError):
-        return error
-    return WorkFailedError(f"{name}: {error}")
+def _processes(jobs: int) -> Pool:
+    """Return processes that end with the block; an interrupt of the terminal is ours to handle."""
+    own = multiprocessing.get_context("spawn")
+    return own.Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN))
 
 
-@contextmanager
-def _processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _perform_session(asked: Asked, folder: Path, name: str) -> None:
+def _perform_session(asked: Asked, folder: Path, name: str) -> tuple[str, str]:
+    """Run one session; return its name and why it failed, nothing where it did not."""
     session = _session(folder, name)
     if session.exists():  # it was broken off
         session.rename(_unused(session))
     try:
         run_session(asked, asked.sessions()[name], session)
         points_of_session(session)
-    except CommandError:
-        raise
-    except Exception as error:  # whatever it is, it has to reach the other process
-        raise WorkFailedError(f"{name}: {error}") from error
+    except Exception as error:  # whatever it is, the other sessions go on
+        return name, str(error) or repr(error)
     (session / _DONE).touch()
+    return name, ""
 
 
 def _unused(session: Path) -> Path:
@@ -141,7 +127,7 @@ def finished(asked: Asked, folder: Path) -> list[Path]:
 def measured(sessions: Iterable[Path], jobs: int) -> Points:
     """Return the targets confirmed in sessions, from their recordings; raises CommandError."""
     with _processes(jobs) as pool:
-        return np.concatenate(list(pool.map(points_of_session, sessions)))
+        return np.concatenate(pool.map(points_of_session, list(sessions)))
 
 
 def without_robot(asked: Asked) -> Points:
