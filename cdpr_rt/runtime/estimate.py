@@ -19,7 +19,7 @@ _FRICTION_FULL_rad_s = 0.1
 _PAST = np.dtype(
     [
         ("position", "<f8"),
-        ("torque", "<f8"),  # low-passed
+        ("torque", "<f8"),  # low-passed, less what is known to turn the motor alone
         ("elapsed", "<f8"),  # since the position was last heard
         ("started", "<f8"),
         ("length_at_zero", "<f8"),  # cable length at motor angle 0; nan where it is not known
@@ -92,6 +92,7 @@ def _update(
     elapsed: float,
     position: FloatArray,
     torque: FloatArray,
+    inner: FloatArray,
     valid: BoolArray,
     velocity: FloatArray,
     length: FloatArray,
@@ -102,14 +103,16 @@ def _update(
         own["elapsed"] += elapsed
         if not valid[i]:
             continue
+        # a measured friction of the winch has the motor's in it
+        outer = torque[i] - (inner[i] if winch[3, i] == 0.0 else 0.0)
         if own["started"] == 0.0:
-            own["position"], own["torque"] = position[i], torque[i]
+            own["position"], own["torque"] = position[i], outer
             own["started"], velocity[i] = 1.0, 0.0
         since = own["elapsed"]
         weight = since / (since + FILTER_S)
         gain = weight * ((position[i] - own["position"]) / since - velocity[i])
         velocity[i] += gain
-        own["torque"] += weight * (torque[i] - own["torque"])
+        own["torque"] += weight * (outer - own["torque"])
         own["position"], own["elapsed"] = position[i], 0.0
         length[i] = own["length_at_zero"] + winch[0, i] * position[i]
         tension[i] = np.nan
@@ -168,6 +171,7 @@ class Estimator:
         self._past["length_at_zero"] = np.nan
         sensors = range(n) if sensor_of_axis is None else sensor_of_axis
         self._sensor_of = np.array(sensors, np.int64)
+        self._nothing = np.zeros(n)
 
     def reset(self) -> None:
         """Forget speeds, torques and tensions, after cycles did not run; lengths stay known."""
@@ -195,10 +199,12 @@ class Estimator:
         feedback: AxisFeedback,
         tension: TensionFeedback | None = None,
         elapsed_s: float = 0.0,
+        inner_Nm: FloatArray | None = None,
     ) -> None:
         """Take in this cycle's feedback and the tensions as last read.
 
-        `elapsed_s` is from the last SYNC to this one, where it was not one period.
+        `elapsed_s` is from the last SYNC to this one, where it was not one period; `inner_Nm` (n,)
+        is the part of the torque that the motors' own cogging and friction take up.
         """
         told = self.estimate
         told.elapsed_s = elapsed_s or self._period_s
@@ -208,6 +214,7 @@ class Estimator:
             told.elapsed_s,
             feedback.position_rad,
             feedback.torque_Nm,
+            self._nothing if inner_Nm is None else inner_Nm,
             feedback.valid,
             told.velocity_rad_s,
             told.cable_length_m,

@@ -172,7 +172,12 @@ class ControlLoop:
         self.exchange_s = (came_ns - cycle.began_ns) * 1e-9
         self.missed += device.n - answered
         estimator = self.parts.estimator
-        estimator.update(feedback, machine.read_tension(), self._elapsed_s(cycle))
+        estimator.update(
+            feedback,
+            machine.read_tension(),
+            self._elapsed_s(cycle),
+            program.controller.compensation_Nm,
+        )
         try:
             program.update(feedback, self.setpoint, torque)
         except Exception as error:  # whatever a program does wrong: its drives are stopped

@@ -125,6 +125,19 @@ def test_tension_is_found_from_the_torque(
     assert not estimator.estimate.tension_measured[0]
 
 
+@pytest.mark.parametrize("measured_Nm", [0.0, 0.08])
+def test_what_turns_the_motor_alone_is_not_on_the_cable(measured_Nm: float) -> None:
+    """Friction counts once: as the motor's, or as the whole winch's where that was measured."""
+    winch = Winch(1.0, 0.08)
+    estimator = Estimator(1, PERIOD_S, winches(np.array([1.0]), measured_Nm))
+    for _ in range(1500):
+        winding = DRUM_m * 60.0 + 0.02 - 0.02 * (-5.0 - winch.speed)
+        winch.step(winding, 60.0)
+        estimator.update(winch.feedback, inner_Nm=np.full(1, -0.08))
+    assert winch.speed < 0.0
+    assert estimator.estimate.tension_N[0] == pytest.approx(60.0, abs=1.0)
+
+
 def test_what_accelerates_the_motor_is_not_on_the_cable() -> None:
     """A cable is cut while the motor goes on pulling: the torque alone would say 50 N still."""
     winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))

@@ -101,7 +101,7 @@ def _rehearse_judgement(parts: LoopParts, n: int) -> None:
     """Have the estimate's and the supervisor's kernels compiled as well."""
     feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
     feedback.valid[:] = True
-    parts.estimator.update(feedback, TensionFeedback(n))
+    parts.estimator.update(feedback, TensionFeedback(n), inner_Nm=np.zeros(n))
     parts.supervisor.check(feedback, parts.estimator.estimate, setpoint, torque)
     parts.estimator.reset()
     parts.supervisor.reset()

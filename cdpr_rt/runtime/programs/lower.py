@@ -156,6 +156,7 @@ class LowerProgram(PlatformProgram):
         reel.most_in_m_s = _MOST_IN_m_s
         reel.integral_rate_1_s = rate_1_s
         reel.begin(feedback, self._velocity, torque_Nm)
+        self._control.compensation_Nm[:] = 0.0
 
     def _watch_rest(self, feedback: AxisFeedback) -> None:
         reel, period_s = self._reel, self._parts.period_s

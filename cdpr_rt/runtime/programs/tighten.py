@@ -86,6 +86,7 @@ class TightenProgram(PlatformProgram):
             return
         self._begun[:] = self._here[:] = feedback.position_rad
         self._reel.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
+        self._control.compensation_Nm[:] = 0.0
         self._share = min(max(float(np.max(-torque_Nm / self._cable / self._full_N)), 0.0), 1.0)
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
