@@ -18,7 +18,7 @@ from profiles import load_robot
 from profiles.catalogue import SHIPPED
 from tools.errors import BadInputError
 from tools.robots.checks import findings
-from tools.robots.new_robot import answers_of
+from tools.robots.new_robot import answers_of, write_robot
 from tools.robots.questions import Question
 from tools.robots.statics import statics_of
 
@@ -122,6 +122,24 @@ def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
     again = cdpr("robot", "new", path, "--yes")
     assert again.returncode == 2 and "not there yet" in again.stderr
     assert load_robot(path) == robot
+
+
+def test_defaults_follow_from_where_the_cables_leave(tmp_path: Path) -> None:
+    def usual(question: Question, default: str, wrong: str) -> str:
+        assert not wrong
+        return default
+
+    given = {"exit_1_m": "-2, 0", "exit_2_m": "2, 0", "exit_3_m": "0.2, 3", "side_m": "0.2"}
+    path = tmp_path / "upright.toml"
+    robot = write_robot(answers_of(path, given, usual), path)
+    assert findings(robot) == []
+    platform = robot.platform
+    assert platform is not None
+    # one corner up, the others towards their exit points
+    (x1, y1), (x2, y2), (x3, y3) = platform.anchor_points_m
+    assert x1 < 0 < x2 and y1 < 0 and y2 < 0 and abs(x3) < 1e-9 and y3 > 0
+    assert platform.home_m[1] < platform.workspace_min_m[1]
+    assert [axis.name for axis in robot.axes] == ["cable 1", "cable 2", "cable 3"]
 
 
 def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:

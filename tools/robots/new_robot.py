@@ -14,6 +14,7 @@ from profiles.platform import Platform
 from tools.errors import BadInputError
 from tools.robots.questions import (
     CABLES,
+    STAND_SHARE,
     AnswerError,
     Answers,
     Question,
@@ -62,7 +63,7 @@ def _answer(question: Question, told: Answers, given: Mapping[str, str], ask: As
 def proposed_box(told: Answers) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the largest box of targets that the cables can hold, to the cm, or one to begin with.
 
-    It is about the middle between the exit points.
+    It is about the middle between the exit points; a tenth of it is left below for the stand.
     """
     exits = np.array([told[f"exit_{i + 1}_m"] for i in range(CABLES)])
     middle, size = 0.5 * (exits.min(axis=0) + exits.max(axis=0)), np.ptp(exits, axis=0)
@@ -71,7 +72,10 @@ def proposed_box(told: Answers) -> tuple[tuple[float, float], tuple[float, float
     statics = PlanarStatics(_platform_of(told, around), np.full(3, low_N), np.full(3, high_N))
     found = statics.largest_box(around)
     if found is not None:
-        low = np.ceil(100.0 * np.array(found.low_m)) / 100.0
+        height = found.high_m[1] - found.low_m[1]
+        low = (
+            np.ceil(100.0 * (np.array(found.low_m) + STAND_SHARE * np.array([0.0, height]))) / 100.0
+        )
         high = np.floor(100.0 * np.array(found.high_m)) / 100.0
         if (low < high).all():
             return _pair(low), _pair(high)

@@ -15,6 +15,8 @@ from profiles import ProfileError, Winch, load_winch
 Answers = dict[str, Any]
 """What was answered, by key, of the type that the key's question gives it; SI."""
 CABLES = 3
+STAND_SHARE = 0.1
+"""Of the height in which targets could be taken, what is left between the stand and the box."""
 _TORQUE_RESERVE = 0.85
 """Share of the torque that tensions may take; the rest is for friction and for control."""
 
@@ -226,7 +228,8 @@ def _home(text: str, told: Answers) -> tuple[float, float]:
 
 def _under_the_box(told: Answers) -> str:
     (left, bottom), (right, top) = told["low_m"], told["high_m"]
-    return _text(((left + right) / 2, bottom - 0.1 * (top - bottom)), digits=2)
+    below = STAND_SHARE / (1.0 - STAND_SHARE) * (top - bottom)
+    return _text(((left + right) / 2, math.ceil(100.0 * (bottom - below)) / 100.0))
 
 
 def _text(point_m: tuple[float, float], digits: int = 3) -> str:
