@@ -1,0 +1,142 @@
+"""The experiment with a robot on its bus: recorded, judged from files, gone on with, refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tools.errors import BadInputError, WorkFailedError
+from tools.experiment import experiment
+from tools.experiment.parameters import OperatorParameters, Station
+from tools.experiment.points import points_of_session
+from tools.experiment.session import Asked, run_session
+from tools.experiment.trial import Condition
+from tools.output import Output
+
+OFFSETS_M = ((0.05, 0.02), (0.0, 0.0))
+CONDITION = Condition("A", 4.0, 0.35, 1)
+ASKED = Asked(
+    robot="planar-3", plant=None, commissioned=None, compensated=False, seed=1,
+    operator=OperatorParameters(tolerance_m=2.5e-3), station=Station(),
+    places=("A",), scales=(4.0,), round_trips_s=(0.35,), repeats=1,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two targets with motors of which nothing is known, and an operator who is soon content."""
+    folder = tmp_path_factory.mktemp("experiment") / "A-350ms-1"
+    with pytest.MonkeyPatch.context() as patch:
+        short = "tools.experiment.session.targets_m"
+        patch.setattr(short, lambda centre: centre + np.array(OFFSETS_M))
+        run_session(ASKED, [CONDITION], folder)
+    return folder
+
+
+def test_errors_come_from_the_recording_and_the_true_poses(session: Path) -> None:
+    points = points_of_session(session)
+    assert points["target"].tolist() == [0, 1]
+    assert points["scale"].tolist() == [4.0, 4.0]
+    assert np.abs(points["error_m"]).max() < 8e-3
+    assert np.abs(points["error_m"]).max() > 1e-6
+    assert np.abs(points["hand_m"]).max() < 1e-4  # the clutch was closed
+    parts = points["judged_m"] + points["hand_m"] + points["robot_m"]
+    assert parts == pytest.approx(points["error_m"], abs=1e-12)
+
+
+def test_what_the_operator_saw_is_where_the_platform_was(session: Path) -> None:
+    """The truth kept with each packet, and that of the log at the confirmations, agree."""
+    ticks = np.load(session / f"{CONDITION.name}.npy")
+    points = points_of_session(session)
+    for point in points:
+        target_m = OFFSETS_M[point["target"]]
+        near = np.argmin(np.abs(ticks["time_s"] - point["pressed_s"]))
+        centre_m = ticks["truth_m"][0]
+        off_m = ticks["truth_m"][near] - centre_m - target_m
+        assert off_m == pytest.approx(point["error_m"], abs=4e-3)
+
+
+def test_a_session_broken_off_is_not_judged(session: Path, tmp_path: Path) -> None:
+    with pytest.raises(WorkFailedError, match="not finished"):
+        half = tmp_path / "half"
+        half.mkdir()
+        for path in session.glob("*"):
+            data = path.read_bytes()
+            (half / path.name).write_bytes(
+                data[: len(data) // 2] if path.suffix == ".mcap" else data
+            )
+        points_of_session(half)
+
+
+def test_an_experiment_goes_on_and_is_judged_from_its_files(session: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "whole"
+    experiment.begin(ASKED, folder)
+    (name,) = ASKED.sessions()
+    kept = folder / "sessions" / name
+    shutil.copytree(session, kept)
+    with pytest.raises(BadInputError, match="no session has ended"):
+        experiment.judge(folder, 1)
+    (kept / "done").touch()
+    experiment.begin(ASKED, folder)
+    experiment.perform(ASKED, folder, 1, Output(as_json=True))  # nothing is left to be run
+    result = experiment.judge(folder, 1)
+    assert result["sessions"] == "1 of 1"
+    points = points_of_session(session)
+    (of_place,) = [row for row in result["rows"] if row["level"] == "A"]
+    spread_mm = 3e3 * points["error_m"].std(axis=0, ddof=1)
+    assert of_place["three_sigma_mm"] == pytest.approx(spread_mm)
+    assert json.loads((folder / "result.json").read_text())["reached"] == result["reached"]
+    assert all(Path(picture).exists() for picture in result["pictures"])
+    with pytest.raises(BadInputError, match="other options"):
+        experiment.begin(replace(ASKED, seed=2), folder)
+
+
+def cdpr(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tools.cli", "teleop", "experiment", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_the_operator_alone_as_one_line_of_json() -> None:
+    done = cdpr("--perfect-robot", "--places", "A", "--scales", "2:1", "--repeats", 1, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert [row["level"] for row in told["rows"]] == ["0 ms", "350 ms", "730 ms", "2:1", "A"]
+    assert all(row["reached"] for row in told["rows"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--places", "A,X"], "allowed: A, B, C"),
+        (["--scales", "none"], "--scale none"),
+        (["--round-trips", "-1"], "--round-trips -1: allowed: 0 to 10000 ms"),
+        (["--operator", "mood=2"], "--operator mood=2: allowed: NAME=VALUE, reaction_s"),
+        (["--operator", "tolerance_m=0"], "allowed: a number above 0"),
+        (["--again"], "--again: needs --out"),
+        (["--again", "--out", "no-such-folder"], "not of an experiment"),
+        (["--plant", "no-such-plant.toml"], "no-such-plant.toml"),
+        (["winch-mpp0923d", "--perfect-robot"], "has no platform in a plane"),
+    ],
+)
+def test_bad_input_is_one_message(arguments: list[str], message: str, tmp_path: Path) -> None:
+    from typer.testing import CliRunner  # noqa: PLC0415
+
+    from tools.commands.teleop import app  # noqa: PLC0415
+    from tools.commands.teleop_experiment import add  # noqa: PLC0415
+
+    if not app.registered_commands or all(
+        command.name != "experiment" for command in app.registered_commands
+    ):
+        add(app)
+    where = [] if "--out" in arguments or "--again" in arguments else ["--out", str(tmp_path / "x")]
+    result = CliRunner().invoke(app, ["experiment", *arguments, *where])
+    assert message in str(result.exception)
+    assert getattr(result.exception, "exit_status", None) == 2
+    assert not (tmp_path / "x").exists()
