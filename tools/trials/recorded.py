@@ -27,8 +27,10 @@ FIELDS: Final = (
     "torque_sent_Nm",
     "compensation_Nm",
 )
-_LAGS: Final = (-1, 0, 1)
-_CLEARLY: Final = 1.1
+_OLDEST_S: Final = 0.01
+"""Age of an angle that a simulated drive may have at most."""
+_MISFIT_rad: Final = 0.005
+_STANDING: Final = 1e-12
 
 
 class Recorded:
@@ -94,14 +96,19 @@ class Recorded:
     def _require_alignment(self) -> None:
         """Raise WorkFailedError where the motors' angles are not those that were true then.
 
-        While motors turn, records that are off by cycles agree less; by half a cycle is the same.
+        A drive's angle is a little old when SYNC latches it, and never from the future: what
+        angles lack in proportion to speed is that age.
         """
-        measured = np.diff(self.cycles["position_rad"], axis=0)
-        true = np.diff(self.truth["motor_rad"], axis=0)
-        misfit = [
-            np.mean((measured[1:-1] - np.roll(true, lag, axis=0)[1:-1]) ** 2) for lag in _LAGS
-        ]
-        if not np.isfinite(misfit).all() or misfit[1] > _CLEARLY * min(misfit):
+        measured, true = self.cycles["position_rad"], self.truth["motor_rad"]
+        speed = np.gradient(true, self.period_s, axis=0)
+        speed -= speed.mean(axis=0)
+        off = (true - measured) - (true - measured).mean(axis=0)
+        moved = max(float(np.sum(speed**2)), _STANDING)
+        age_s = float(np.sum(speed * off)) / moved
+        rest = float(np.sqrt(np.mean((off - age_s * speed) ** 2)))
+        uncertain_s = 0.25 * self.period_s + 5.0 * rest / np.sqrt(moved)
+        old = -uncertain_s <= age_s <= _OLDEST_S + uncertain_s
+        if not old or not rest < _MISFIT_rad:
             raise WorkFailedError(
                 f"{self.folder}: recording and {TRUTH} do not belong together: the motors' angles "
                 "are not those of the same SYNCs"

@@ -69,7 +69,7 @@ def test_it_can_be_judged_again(trial, capsys):
         robot_trial.trial("planar-3", Kind.LINE, out_dir=folder, again=True)
 
 
-@pytest.mark.parametrize("by", [-1, 1])
+@pytest.mark.parametrize("by", [1, -30])
 def test_a_log_of_other_syncs_is_noticed(trial, tmp_path, by):
     folder, _ = trial
     part = tmp_path / "run"
