@@ -162,6 +162,21 @@ class Compensation:
         """Fade in anew and forget the deviation from the set-point."""
         self._state[:] = 0.0
 
+    def cogging_Nm(self, position_rad: FloatArray, feedback: AxisFeedback) -> FloatArray:
+        """Return what cogging takes up of motors that stand at these angles, (n,).
+
+        The mean of both directions' tables; 0 where there is no profile or no index is known.
+        """
+        angle = np.where(feedback.index_known, position_rad - feedback.index_rad, 0.0)
+        size = self._tables.shape[2]
+        place = angle / TWO_PI % 1.0 * size
+        low = place.astype(int) % size
+        axes = np.arange(low.size)
+        mean = self._tables.mean(axis=1)
+        here, there = mean[axes, low], mean[axes, (low + 1) % size]
+        cogging = here + (place - np.floor(place)) * (there - here)
+        return np.where(self.available & feedback.index_known, cogging, 0.0)
+
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""
         _torque(

@@ -51,6 +51,21 @@ def test_hand_over_at_standstill_is_continuous():
     assert middle == pytest.approx(0.5 * (low + high))
 
 
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(angle=st.floats(-50, 50), index=st.floats(-10, 10))
+def test_cogging_without_friction_is_what_is_compensated_at_a_standstill(angle, index):
+    feedback, setpoint = at(n=3, angle=angle, index=index, velocity=0.0)
+    feedback.index_known[2] = False
+    rubbing = FrictionFeedforward(coulomb_forward_Nm=0.3, coulomb_backward_Nm=0.3)
+    axes = [AxisCompensation(TABLE, rubbing), None, AxisCompensation(TABLE)]
+    compensation, out = Compensation(axes, 1e-3), np.zeros(3)
+    for _ in range(300):
+        compensation.torque(feedback, setpoint, out)
+    got = compensation.cogging_Nm(feedback.position_rad, feedback)
+    assert got == pytest.approx(out, abs=1e-9)
+    assert got[1] == got[2] == 0.0
+
+
 @pytest.mark.parametrize("observer_s", [0.0, 0.003])
 def test_angle_is_the_one_when_the_torque_acts(observer_s):
     axis = AxisCompensation(TABLE, look_ahead_s=0.002, observer_s=observer_s)

@@ -62,6 +62,8 @@ class TightenProgram(PlatformProgram):
         self._reel = Reel(inertia, cable_m, parts.period_s)
         self._reel.paying_out_m_s[:] = -REEL_m_s
         self._begun, self._here, self._up = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._stood = np.full(3, np.nan)
+        """Angles at which lengths were taken at home, until cogging has been taken out of them."""
         self._stage = 0
         self._share = 0.0
         self._still = self._cycles = 0
@@ -179,10 +181,12 @@ class TightenProgram(PlatformProgram):
 
     def _lengths(self, feedback: AxisFeedback) -> FloatArray:
         """Return the cables' lengths, (3,), as they are now."""
+        self._stood[:] = np.nan
         if self._source == "last" and self._last is not None:
             return self._last.at(feedback.position_rad, self._cable)
         if self._source == "lengths":
             return self._parts.estimator.estimate.cable_length_m
+        self._stood[:] = 0.5 * (feedback.position_rad + self._up)
         hysteresis = 0.5 * self._cable * (feedback.position_rad - self._up)
         return self._control.lengths_at_home(self._full_N) + hysteresis
 
@@ -224,6 +228,8 @@ class TightenProgram(PlatformProgram):
         if self._way:
             self._target[:] = self._way[0]
             self._speed[:] = np.minimum(INDEX_m_s, parts.speed_m_s)
+        else:
+            self._take_cogging_out()
 
     @property
     def _settled(self) -> bool:
@@ -249,8 +255,25 @@ class TightenProgram(PlatformProgram):
             if not found and not self._way:
                 self._why = "a motor has not passed its index"
             if found:
+                self._take_cogging_out()
                 self._why = self._compare_indices()
         return False
+
+    def _take_cogging_out(self) -> None:
+        """Correct lengths that were taken at home, with torques that had cogging in them.
+
+        It is known now how much of the torque pulled at the cables, and how far these stretched.
+        """
+        parts, control, known = self._parts, self._control, self._parts.compensation
+        if known is None or np.isnan(self._stood).any():
+            return
+        more_N = known.cogging_Nm(self._stood, self._feedback) / self._cable
+        more_m = control.lengths_at_home(self._full_N + more_N)
+        more_m -= control.lengths_at_home(self._full_N)
+        self._stood[:] = np.nan
+        length_m = parts.estimator.estimate.cable_length_m + more_m
+        parts.estimator.set_lengths(self._feedback.position_rad, length_m)
+        control.take_lengths(length_m, self._feedback)
 
     def _compare_indices(self) -> str:
         """Return which index is not where the last stop's lengths have it, or an empty text."""
