@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-_TEXT, _VALUE = 52, 10
+_TEXT, _VALUE = 68, 10
 
 
 @dataclass(frozen=True)

@@ -40,10 +40,10 @@ def drive(run: TrialRun, _seconds: float) -> None:
 
 
 def path_errors(recorded: Recorded) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return of each line: the way along it in m, and two errors in mm, (k,) each.
+    """Return of each line: the way along it in m (k,), and two errors in mm, (k,) and (k, 2).
 
     The first error is the true distance from the line, with its sign; the second that from the
-    set-point of the same cycle.
+    set-point of the same cycle, in x and y.
     """
     found = []
     for mark, end in zip(recorded.marked("line"), recorded.marked("line end"), strict=True):
@@ -52,44 +52,43 @@ def path_errors(recorded: Recorded) -> list[tuple[FloatArray, FloatArray, FloatA
         along = (stop - start) / np.linalg.norm(stop - start)
         across = np.array([-along[1], along[0]])
         true = recorded.true_m[rows]
-        off = np.linalg.norm(true - recorded.setpoint_m[rows], axis=1)
+        off = true - recorded.setpoint_m[rows]
         found.append(((true - start) @ along, 1e3 * (true - start) @ across, 1e3 * off))
     return found
 
 
-def rms_mm(recorded: Recorded) -> tuple[float, float]:
-    """Return the root mean square over all lines: of the distance from them, from the set-point."""
+def rms_mm(recorded: Recorded, less_mean: bool = False) -> tuple[float, float]:
+    """Return the root mean square over all lines: of the distance from them, from the set-point.
+
+    With `less_mean` that of what is left of each line's errors without their mean, which does not
+    tell how a motor runs but how well the start is known.
+    """
     found = path_errors(recorded)
-    across = np.concatenate([one[1] for one in found])
-    off = np.concatenate([one[2] for one in found])
-    return float(np.sqrt(np.mean(across**2))), float(np.sqrt(np.mean(off**2)))
+    errors = [(one[1][:, None], one[2]) for one in found]
+    if less_mean:
+        errors = [(a - a.mean(axis=0), b - b.mean(axis=0)) for a, b in errors]
+    across, off = (np.concatenate([one[k] for one in errors]) for k in range(2))
+    return _rms(across), _rms(off)
+
+
+def _rms(errors: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
 
 
 def judge(parts: dict[str, Recorded]) -> list[Figure]:
     """Return the errors of each part, and what compensation has made of them."""
     names = {WITH: "with compensation", WITHOUT: "without"}
-    rms = {part: rms_mm(recorded) for part, recorded in parts.items()}
-    figures = []
-    for part, (across, off) in rms.items():
-        figures += [
-            Figure(f"path_{part}_mm", f"RMS distance from the line, {names[part]}", across, "mm"),
-            Figure(
-                f"setpoint_{part}_mm", f"RMS distance from the set-point, {names[part]}", off, "mm"
-            ),
-        ]
-    for part, recorded in parts.items():
-        text = f"of it, about its mean on each line, {names[part]}"
-        figures.append(Figure(f"ripple_{part}_mm", text, _ripple_mm(recorded), "mm"))
-    if len(rms) == len(names):
-        texts = ("path_ratio", "line"), ("setpoint_ratio", "set-point")
-        for i, (key, what) in enumerate(texts):
-            ratio = rms[WITHOUT][i] / rms[WITH][i]
-            text = f"distance from the {what}, without over with"
-            figures.append(Figure(key, text, ratio, "", RATIO, at_least=True))
-    return figures
-
-
-def _ripple_mm(recorded: Recorded) -> float:
-    """Return the root mean square of the distance from the lines less its mean on each."""
-    rest = [across - across.mean() for _, across, _ in path_errors(recorded)]
-    return float(np.sqrt(np.mean(np.concatenate(rest) ** 2)))
+    figures, ratios = [], []
+    for less_mean in (False, True):
+        key, less = ("_less_mean", ", less its mean") if less_mean else ("", "")
+        rms = {part: rms_mm(recorded, less_mean) for part, recorded in parts.items()}
+        for i, (what, text) in enumerate((("path", "line"), ("setpoint", "set-point"))):
+            for part, values in rms.items():
+                told = f"RMS distance from the {text}{less}, {names[part]}"
+                figures.append(Figure(f"{what}_{part}{key}_mm", told, values[i], "mm"))
+            if len(rms) == len(names):
+                ratio = rms[WITHOUT][i] / rms[WITH][i]
+                told = f"distance from the {text}{less}, without over with"
+                limit = None if less_mean else RATIO
+                ratios.append(Figure(f"{what}{key}_ratio", told, ratio, "", limit, True))
+    return [*figures, *ratios]
