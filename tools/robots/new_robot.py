@@ -63,7 +63,7 @@ def _answer(question: Question, told: Answers, given: Mapping[str, str], ask: As
 def proposed_box(told: Answers) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the largest box of targets that the cables can hold, to the cm, or one to begin with.
 
-    It is about the middle between the exit points; a tenth of it is left below for the stand.
+    A tenth of it is left below for the stand.
     """
     exits = np.array([told[f"exit_{i + 1}_m"] for i in range(CABLES)])
     middle, size = 0.5 * (exits.min(axis=0) + exits.max(axis=0)), np.ptp(exits, axis=0)

@@ -19,6 +19,7 @@ from profiles.platform import Platform
 CABLES = 3
 _NEWTON_STEPS = 30
 _MARGIN = 0.1
+_FINE = 45
 
 
 @dataclass(frozen=True)
@@ -140,31 +141,22 @@ class PlanarStatics:
         return np.where(stable & (np.abs(angle) < 0.5 * np.pi), angle, np.nan)
 
     def largest_box(self, inside: Box) -> Box | None:
-        """Return the largest box within `inside`, about its middle, all of targets, or None.
+        """Return the largest box within `inside` that is all of targets, None where there is none.
 
-        Its lower and upper edges are free, its sides are as far from the middle of `inside`.
+        It is as exact as a grid of 45 by 45 points.
         """
-        columns, rows = 31, 45
-        points = inside.grid(columns, rows)
+        points = inside.grid(_FINE, _FINE)
         good = self.is_target(points)
-        good &= good[:, ::-1]
-        half = columns // 2
-        # how many columns from the middle on hold, in each row
-        wide = np.logical_and.accumulate(good[:, half:], axis=1).sum(axis=1)
-        best, found = 0.0, None
-        for first in range(rows):
-            width = half + 1
-            for last in range(first, rows):
-                width = min(width, int(wide[last]))
-                if width < 2:
-                    break
-                area = (width - 1) * (last - first)
-                if area > best:
-                    best, found = area, (width - 1, first, last)
-        if found is None:
-            return None
-        k, first, last = found
-        return Box(_pair(points[first, half - k]), _pair(points[last, half + k]))
+        best, found = 0, None
+        for first in range(_FINE):
+            columns = np.ones(_FINE, bool)
+            for last in range(first, _FINE):
+                columns &= good[last]
+                left, right = _longest_run(columns)
+                if (right - left) * (last - first) > best:
+                    best = (right - left) * (last - first)
+                    found = points[first, left], points[last, right]
+        return None if found is None else Box(_pair(found[0]), _pair(found[1]))
 
     def _force_N(self, acceleration_m_s2: FloatArray) -> FloatArray:
         """Return what the cables must exert on the platform, (2,)."""
@@ -214,6 +206,20 @@ class PlanarStatics:
         way = way / np.linalg.norm(way, axis=-1, keepdims=True)
         turning = arm[..., 0] * way[..., 1] - arm[..., 1] * way[..., 0]
         return np.asarray((t * turning).sum(axis=-1))
+
+
+def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the first and the last place of the longest run of True, 0 and 0 where there is none.
+
+    Of runs as long as each other, the one nearest to the middle.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
+    if not edges.size:
+        return 0, 0
+    first, last = edges[::2], edges[1::2] - 1
+    aside = np.abs(first + last - (good.size - 1)) / (4.0 * good.size)
+    best = int((last - first - aside).argmax())
+    return int(first[best]), int(last[best])
 
 
 def _pair(values: FloatArray | tuple[float, ...]) -> tuple[float, float]:
