@@ -193,8 +193,7 @@ class TightenProgram(PlatformProgram):
     def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         parts, control = self._parts, self._control
         parts.estimator.set_lengths(feedback.position_rad, control.free_lengths_m)
-        control.position_m[:] = control.estimated_m
-        control.velocity_m_s[:] = control.acceleration_m_s2[:] = 0.0
+        control.stand_still()
         parts.loop.take_over(feedback, torque_Nm)
         parts.cycle = feedback.cycle
         parts.tight = True
