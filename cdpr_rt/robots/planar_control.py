@@ -44,6 +44,7 @@ _STUCK_m_s = 0.002
 _SETTLING_STEPS = 60
 _ITERATIONS = 3
 _LIFT_S = 0.05
+_SHAPING_S = 0.06
 _LATENCY_s = 2.3e-3
 
 
@@ -75,6 +76,12 @@ class PlanarControl:
         self.position_m = np.array(platform.home_m, float)
         self.velocity_m_s = np.zeros(2)
         self.acceleration_m_s2 = np.zeros(2)
+        self._past = np.zeros((max(1, round(_SHAPING_S / period_s)), 3, 2))
+        self._shaped = np.zeros((3, 2))
+        self._place = 0
+        self.shaped_m: FloatArray = self._shaped[0]
+        """The set-point's position as the control follows it: shaped, some cycles later, (2,)."""
+        self._shape_anew()
         self.tension_N = np.array(self.tensions.low)
         self.outcome, self.outside_N, self.share = 0, 0.0, 1.0
         self.effort_Nm, self.compensation_Nm = np.zeros(3), np.zeros(3)
@@ -141,7 +148,15 @@ class PlanarControl:
         """Write torques and the axes' set-points for the platform's present set-point."""
         self.observe(feedback)
         robot, state, cables = self._robot, self._state, self._cables
-        motion = self.position_m, self.velocity_m_s, self.acceleration_m_s2
+        motion = self.shaped_m, self._shaped[1], self._shaped[2]
+        self._place = kernel.shape(
+            self._past,
+            self._place,
+            self.position_m,
+            self.velocity_m_s,
+            self.acceleration_m_s2,
+            self._shaped,
+        )
         kernel.refer(
             cables,
             *motion,
@@ -190,6 +205,16 @@ class PlanarControl:
         self._state["position"][0] = self._home
         for _ in range(_SETTLING_STEPS):
             self.observe(feedback)
+
+    def stand_still(self) -> None:
+        """Have the set-point stand where the platform is."""
+        self.position_m[:] = self.estimated_m
+        self.velocity_m_s[:] = self.acceleration_m_s2[:] = 0.0
+        self._shape_anew()
+
+    def _shape_anew(self) -> None:
+        self._past[:] = self._shaped[:] = 0.0
+        self._past[:, 0] = self._shaped[0] = self.position_m
 
     def observe(self, feedback: AxisFeedback) -> None:
         """Bring the estimate of the platform's position up to date, by one cycle."""

@@ -193,6 +193,41 @@ def estimate(robot: Any, state: Any, cables: Any, position: FloatArray, iteratio
 
 
 @jit
+def shape(
+    past: FloatArray,
+    place: int,
+    wanted: FloatArray,
+    speed: FloatArray,
+    slope: FloatArray,
+    shaped: FloatArray,
+) -> int:
+    """Average the set-point over the last cycles, so that its acceleration does not step.
+
+    `past` (k, 3, 2) are the last k positions, velocities and accelerations (2,), as `shaped`
+    (3, 2) is their mean; `place` is where the oldest is. What swings k cycles a period is not
+    set swinging; bounds, straight ways and the place of rest stay as they were. Returns the place
+    of what is the oldest next.
+    """
+    k = past.shape[0]
+    for i in range(2):
+        shaped[0, i] += (wanted[i] - past[place, 0, i]) / k
+        shaped[1, i] += (speed[i] - past[place, 1, i]) / k
+        shaped[2, i] += (slope[i] - past[place, 2, i]) / k
+        past[place, 0, i], past[place, 1, i], past[place, 2, i] = wanted[i], speed[i], slope[i]
+    place += 1
+    if place < k:
+        return place
+    # a sum that goes on for days is begun anew before rounding shows
+    for j in range(3):
+        for i in range(2):
+            total = 0.0
+            for n in range(k):
+                total += past[n, j, i] - past[0, j, i]
+            shaped[j, i] = past[0, j, i] + total / k
+    return 0
+
+
+@jit
 def refer(
     cables: Any,
     wanted: FloatArray,

@@ -126,8 +126,7 @@ class PlatformProgram:
             if parts.known:
                 control.take_lengths(parts.estimator.estimate.cable_length_m, feedback)
             control.begin(feedback)
-            control.position_m[:] = control.estimated_m
-            control.velocity_m_s[:] = control.acceleration_m_s2[:] = 0.0
+            control.stand_still()
             self._loop.take_over(feedback, torque_Nm)
         self._target[:] = self._resting_place()
         self._speed[:] = parts.speed_m_s
@@ -184,7 +183,7 @@ class PlatformProgram:
         """Return where the platform is to be, (7,)."""
         if not self._parts.known:
             return None
-        self._seen[:2] = self._control.position_m
+        self._seen[:2] = self._control.shaped_m
         self._seen[3] = 1.0
         return self._seen
 
