@@ -187,6 +187,7 @@ class Estimator:
         for i, length in enumerate(length_m):
             if math.isfinite(length) and self._winch[0, i] != 0.0:
                 self._past["length_at_zero"][i] = length - self._winch[0, i] * position_rad[i]
+                self.estimate.cable_length_m[i] = length
         np.isfinite(self._past["length_at_zero"], out=self.estimate.length_known)
 
     def forget_lengths(self) -> None:
