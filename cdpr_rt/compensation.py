@@ -162,10 +162,11 @@ class Compensation:
         """Fade in anew and forget the deviation from the set-point."""
         self._state[:] = 0.0
 
-    def cogging_Nm(self, position_rad: FloatArray, feedback: AxisFeedback) -> FloatArray:
-        """Return what cogging takes up of motors that stand at these angles, (n,).
+    def standing_Nm(self, position_rad: FloatArray, feedback: AxisFeedback) -> FloatArray:
+        """Return what motors at these angles take up of a torque, (n,), mean of both directions.
 
-        The mean of both directions' tables; 0 where there is no profile or no index is known.
+        That is cogging, and half of what friction differs by. 0 where there is no profile or no
+        index is known.
         """
         angle = np.where(feedback.index_known, position_rad - feedback.index_rad, 0.0)
         size = self._tables.shape[2]
@@ -175,7 +176,11 @@ class Compensation:
         mean = self._tables.mean(axis=1)
         here, there = mean[axes, low], mean[axes, (low + 1) % size]
         cogging = here + (place - np.floor(place)) * (there - here)
-        return np.where(self.available & feedback.index_known, cogging, 0.0)
+        p = self._parameters
+        forward = p[:, _COULOMB_FORWARD] + p[:, _STRIBECK_FORWARD]
+        backward = p[:, _COULOMB_BACKWARD] + p[:, _STRIBECK_BACKWARD]
+        known = self.available & feedback.index_known
+        return np.where(known, cogging + 0.5 * (forward - backward), 0.0)
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""

@@ -53,15 +53,15 @@ def test_hand_over_at_standstill_is_continuous():
 
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(angle=st.floats(-50, 50), index=st.floats(-10, 10))
-def test_cogging_without_friction_is_what_is_compensated_at_a_standstill(angle, index):
+def test_what_motors_take_up_standing_is_what_is_compensated_then(angle, index):
     feedback, setpoint = at(n=3, angle=angle, index=index, velocity=0.0)
     feedback.index_known[2] = False
-    rubbing = FrictionFeedforward(coulomb_forward_Nm=0.3, coulomb_backward_Nm=0.3)
+    rubbing = FrictionFeedforward(coulomb_forward_Nm=0.3, stribeck_backward_Nm=0.1)
     axes = [AxisCompensation(TABLE, rubbing), None, AxisCompensation(TABLE)]
     compensation, out = Compensation(axes, 1e-3), np.zeros(3)
     for _ in range(300):
         compensation.torque(feedback, setpoint, out)
-    got = compensation.cogging_Nm(feedback.position_rad, feedback)
+    got = compensation.standing_Nm(feedback.position_rad, feedback)
     assert got == pytest.approx(out, abs=1e-9)
     assert got[1] == got[2] == 0.0
 

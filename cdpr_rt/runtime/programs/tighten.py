@@ -63,7 +63,7 @@ class TightenProgram(PlatformProgram):
         self._reel.paying_out_m_s[:] = -REEL_m_s
         self._begun, self._here, self._up = np.zeros(3), np.zeros(3), np.zeros(3)
         self._stood = np.full(3, np.nan)
-        """Angles at which lengths were taken at home, until cogging has been taken out of them."""
+        """Angles at which lengths were taken at home, until what the motors took up was told."""
         self._stage = 0
         self._share = 0.0
         self._still = self._cycles = 0
@@ -228,7 +228,7 @@ class TightenProgram(PlatformProgram):
             self._target[:] = self._way[0]
             self._speed[:] = np.minimum(INDEX_m_s, parts.speed_m_s)
         else:
-            self._take_cogging_out()
+            self._take_motors_out()
 
     @property
     def _settled(self) -> bool:
@@ -254,19 +254,19 @@ class TightenProgram(PlatformProgram):
             if not found and not self._way:
                 self._why = "a motor has not passed its index"
             if found:
-                self._take_cogging_out()
+                self._take_motors_out()
                 self._why = self._compare_indices()
         return False
 
-    def _take_cogging_out(self) -> None:
-        """Correct lengths that were taken at home, with torques that had cogging in them.
+    def _take_motors_out(self) -> None:
+        """Correct lengths taken at home, with torques of which the motors took up a part.
 
-        It is known now how much of the torque pulled at the cables, and how far these stretched.
+        It is known now how much pulled at the cables, and how far these stretched.
         """
         parts, control, known = self._parts, self._control, self._parts.compensation
         if known is None or np.isnan(self._stood).any():
             return
-        more_N = known.cogging_Nm(self._stood, self._feedback) / self._cable
+        more_N = known.standing_Nm(self._stood, self._feedback) / self._cable
         more_m = control.lengths_at_home(self._full_N + more_N)
         more_m -= control.lengths_at_home(self._full_N)
         self._stood[:] = np.nan
