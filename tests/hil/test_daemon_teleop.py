@@ -187,6 +187,7 @@ def test_what_cannot_be_led_is_told(daemon: RealDaemon, folder: Path) -> None:
         ((*plays, "--scale", "1000:1"), 2, "--scale 1000:1: allowed: 0.001 to 100"),
         (("--device", "script"), 2, "--script: allowed: together with --device script"),
         ((*plays, "--via", "nowhere"), 2, "--via nowhere: allowed: HOST:PORT"),
+        ((*plays, "--via", "a..b:7710"), 2, "set-points to a..b:7710: is no name of a host"),
         ((*plays, "--via", "127.0.0.1:9"), 1, "the robot has not answered for 3 s"),
     ):
         error = CliRunner().invoke(app, [str(daemon.robot), *daemon.at, *options]).exception

@@ -111,7 +111,7 @@ def robot(
     from tools.teleop.leading import Wish, lead  # noqa: PLC0415  # slow to load
 
     factor = parse_scale(scale)
-    lines = () if script is None else read_script(script)
+    lines = () if script is None else read_script(script, factor)
     if (device is Device.SCRIPT) != (script is not None):
         raise BadInputError("--script: allowed: together with --device script, and needed there")
 

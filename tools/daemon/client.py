@@ -29,7 +29,7 @@ UrlOption = Annotated[
 KeyFileOption = Annotated[
     Path | None, typer.Option("--key-file", help="File with the key for --url.")
 ]
-_TIMEOUT = httpx.Timeout(5.0, read=70.0)
+_CONNECT_S, _ANSWER_S = 5.0, 70.0
 _BAD_INPUT: Final = frozenset({400, 401, 403, 404, 405, 413, 422})
 _LEASE_S = 2.0
 # what leads on from a state in which something was refused
@@ -148,12 +148,18 @@ class Control:
 
 @contextmanager
 def open_daemon(
-    robot: str | None, unix: Path | None, url: str | None, key_file: Path | None
+    robot: str | None,
+    unix: Path | None,
+    url: str | None,
+    key_file: Path | None,
+    answer_s: float = _ANSWER_S,
 ) -> Iterator[Daemon]:
     """Yield the daemon that the options name, the only one there is where they name none.
 
+    It is to answer each request within `answer_s`.
     Raises BadInputError and NoDaemonError.
     """
+    timeout = httpx.Timeout(_CONNECT_S, read=answer_s)
     if url is not None:
         if robot is not None or unix is not None:
             raise BadInputError("--url: not together with --robot or --socket")
@@ -161,7 +167,7 @@ def open_daemon(
         if key_file is not None:
             headers["Authorization"] = f"Bearer {read_key(key_file).decode()}"
         try:
-            http = httpx.Client(base_url=url, headers=headers, timeout=_TIMEOUT, trust_env=False)
+            http = httpx.Client(base_url=url, headers=headers, timeout=timeout, trust_env=False)
         except (httpx.InvalidURL, ValueError) as error:
             raise BadInputError(f"--url {url}: {error}") from None
         if http.base_url.scheme != "http":
@@ -171,7 +177,7 @@ def open_daemon(
         return
     path = unix or _only_socket(robot)
     transport = httpx.HTTPTransport(uds=str(path))
-    with httpx.Client(transport=transport, base_url="http://daemon", timeout=_TIMEOUT) as http:
+    with httpx.Client(transport=transport, base_url="http://daemon", timeout=timeout) as http:
         yield Daemon(http, str(path))
 
 

@@ -12,6 +12,8 @@ from tools.teleop.stick import AxisRange, Stick, StickMap
 
 _EV_SYN, _EV_KEY, _EV_ABS = 0, 1, 3
 _SYN_DROPPED = 3
+_REPEATED = 2
+"""A key's value while the kernel repeats it: no press."""
 _SEEK_S: Final = 1.0
 _LONGEST_S: Final = 0.1
 _EVERY_DEVICE: Final = Path("/dev/input")
@@ -59,6 +61,7 @@ class Gamepad:
         self._stick = Stick(stick_map, scale)
         self._device: InputDevice | None = None
         self._sought_s = 0.0
+        self._first = True
         self._take_up(device)
 
     def read(self, now_s: float) -> Hand:
@@ -68,6 +71,9 @@ class Gamepad:
             self._seek(now_s)
         if self._device is not None:
             self._drain(self._device)
+        if self._first:
+            self._first = False
+            stick.disregard()  # what was pressed before anybody listened
         stick.advance(now_s, _LONGEST_S)
         trouble = "" if self._device is not None else "the gamepad is gone: plug it in again"
         return Hand(stick.position_m, not stick.held, stick.confirmed, trouble)
@@ -112,7 +118,8 @@ class Gamepad:
         if kind == _EV_ABS:
             self._stick.move_axis(code, value)
         elif kind == _EV_KEY:
-            self._stick.press(code, value != 0)
+            if value != _REPEATED:
+                self._stick.press(code, value != 0)
         elif kind == _EV_SYN and code == _SYN_DROPPED:
             # events were lost, perhaps the one that let go
             self._stick.let_go()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import re
 import select
@@ -33,6 +34,7 @@ class Keys:
     """
 
     def __init__(self, scale: float) -> None:
+        self._scale = scale
         self._hand = LimitedHand(scale)
         self._step = _FIRST_STEP
         self._left = ""
@@ -71,6 +73,13 @@ class Keys:
             elif name is not None:
                 self._command(name)
 
+    def disregard(self) -> None:
+        """Take back what keys have done so far, but for the wish to end."""
+        self._hand = LimitedHand(self._scale)
+        self._step = _FIRST_STEP
+        self.clutch = False
+        self.confirmed = 0
+
     def _command(self, key: str) -> None:
         if key == " ":
             self.clutch = not self.clutch
@@ -94,7 +103,7 @@ class Keyboard:
         self._fd = fd
         self._keys = Keys(scale)
         self._gone = ""
-        self._read_s = 0.0
+        self._read_s = math.nan
         try:
             self._before = termios.tcgetattr(fd)
             tty.setcbreak(fd, termios.TCSANOW)
@@ -113,11 +122,16 @@ class Keyboard:
         )
 
     def read(self, now_s: float) -> Hand:
-        """Return where the hand is; it has ended where the terminal is gone."""
-        keys = self._keys
-        passed_s, self._read_s = now_s - self._read_s, now_s
+        """Return where the hand is; it has ended where the terminal is gone.
+
+        What was typed before it is first asked has led nobody, and does not afterwards.
+        """
+        keys, first = self._keys, math.isnan(self._read_s)
+        passed_s, self._read_s = (0.0 if first else now_s - self._read_s), now_s
         if not self._gone:
             self._take(passed_s)
+        if first:
+            keys.disregard()
         end = End("ended by key q") if keys.quit else None
         if self._gone:
             end = End(self._gone, failed=True)

@@ -26,6 +26,7 @@ from tools.teleop.session import Session
 from tools.teleop.view import View
 
 _STATUS_S: Final = 0.3
+_ANSWER_S: Final = 10.0
 _PICTURES_Hz: Final = 10.0
 _EVERYWHERE: Final = frozenset({"0.0.0.0", "::", ""})
 
@@ -52,7 +53,8 @@ def lead(wish: Wish, out: Output) -> None:
     """
     name = Path(wish.robot).stem
     known = wish.url is None and wish.socket is None
-    with open_daemon(name if known else None, wish.socket, wish.url, wish.key_file) as daemon:
+    at = (name if known else None, wish.socket, wish.url, wish.key_file)
+    with open_daemon(*at, answer_s=_ANSWER_S) as daemon:
         status = daemon.get("/status")
         description = daemon.get("/description")
         if name not in (status["robot"], description.get("robot"), description.get("reference")):
@@ -60,31 +62,61 @@ def lead(wish: Wish, out: Output) -> None:
         host, port = stream_address(status, wish)
         program, wanted = _program_of(description)
         key = None if wish.key_file is None else read_key(wish.key_file)
-        with closing(wish.take_up()) as device, daemon.control() as control:
+        with (
+            _ended_by_signals() as ended,
+            closing(wish.take_up()) as device,
+            daemon.control() as control,
+            _stream(host, port, key, control.token) as stream,
+        ):
             control.post("/program", {"program": program, "wanted": wanted})
-            with StreamClient(host, port, key, control.token) as stream:
-                number = description["programs"].index(program)
-                session = Session(stream, device, wish.scale, number)
-                out.note(f"{program} by {host}:{port}; {device.hint}")
-                end = _shown(session, View(session, description), daemon, out)
-            with suppress(CommandError) if end.failed else nullcontext():  # it tells why itself
-                control.hold()
-        _tell(session, end, daemon, out)
+            number = description["programs"].index(program)
+            session = Session(stream, device, wish.scale, number)
+            out.note(f"{program} by {host}:{port}; {device.hint}")
+            try:
+                end = _shown(
+                    session, View(session, description, status["reason"]), daemon, out, ended
+                )
+                with suppress(CommandError) if end.failed else nullcontext():  # it tells why itself
+                    control.hold()
+            finally:
+                _tell_figures(session, out)
+        _tell(session, end, daemon, status["reason"], out)
 
 
-def _shown(session: Session, view: View, daemon: Daemon, out: Output) -> End:
+def _stream(host: str, port: int, key: bytes | None, token: str) -> StreamClient:
+    try:
+        return StreamClient(host, port, key, token)
+    except (OSError, UnicodeError) as error:
+        why = getattr(error, "strerror", None) or "is no name of a host"
+        raise BadInputError(f"set-points to {host}:{port}: {why}") from None
+
+
+def _shown(
+    session: Session, view: View, daemon: Daemon, out: Output, ended: Callable[[], bool]
+) -> End:
     """Lead, and show it where there is a terminal."""
+    if not out.notes.is_terminal:
+        return session.lead(ended)
     live = Live(
         get_renderable=lambda: view,
         console=out.notes,
         refresh_per_second=_PICTURES_Hz,
         transient=True,
     )
-    with stop_on_signals() as stop_requested, _hang_up() as hung_up, _watched(view, daemon):
-        if not out.notes.is_terminal:
-            return session.lead(lambda: stop_requested() or hung_up())
-        with live:
-            return session.lead(lambda: stop_requested() or hung_up())
+    with _watched(view, daemon):
+        live.start()
+        try:
+            return session.lead(ended)
+        finally:
+            with suppress(OSError):  # the terminal is gone
+                live.stop()
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[Callable[[], bool]]:
+    """Yield what tells whether the user wants an end, or has closed the terminal."""
+    with stop_on_signals() as stop_requested, _hang_up() as hung_up:
+        yield lambda: stop_requested() or hung_up()
 
 
 @contextmanager
@@ -110,7 +142,7 @@ def _watched(view: View, daemon: Daemon) -> Iterator[None]:
     def watch() -> None:
         while not over.wait(_STATUS_S):
             try:
-                view.status = daemon.get("/status")
+                view.tell(daemon.get("/status"))
             except CommandError:
                 continue  # the stream itself tells when nobody answers any more
 
@@ -120,7 +152,7 @@ def _watched(view: View, daemon: Daemon) -> Iterator[None]:
         yield
     finally:
         over.set()
-        thread.join()
+        thread.join(_STATUS_S)  # no longer for one who does not answer
 
 
 def stream_address(status: dict[str, Any], wish: Wish) -> tuple[str, int]:
@@ -150,31 +182,45 @@ def _program_of(description: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     raise WorkFailedError("the daemon does not know its robot yet; `cdpr status` says why")
 
 
-def _tell(session: Session, end: End, daemon: Daemon, out: Output) -> None:
-    """Say how it ended and what was confirmed; raises WorkFailedError where it failed."""
-    figures, status = session.figures(), daemon.get("/status")
-    for one in session.confirmations:
-        x, y = (1e3 * value for value in one.pose_m)
-        where = f": platform {x:+.2f} {y:+.2f} mm" if math.isfinite(x) else ""
-        out.say(f"confirmed {one.number} at {one.time_s:.2f} s{where}")
+def _tell_figures(session: Session, out: Output) -> None:
+    """Say what was confirmed, and what became of what was sent."""
+    figures = session.figures()
     trip = figures["round_trip_ms"]
     told = f"; round trip {trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
-    out.say(
-        f"{figures['sent']} set-points sent, {figures['answered']} answered"
-        f"{told if figures['answered'] else ''}"
-    )
+    with suppress(OSError):  # nobody reads it any more
+        for one in session.confirmations:
+            x, y = (1e3 * value for value in one.pose_m)
+            where = f": platform {x:+.2f} {y:+.2f} mm" if math.isfinite(x) else ""
+            out.say(f"confirmed {one.number} at {one.time_s:.2f} s{where}")
+        out.say(
+            f"{figures['sent']} set-points sent, {figures['answered']} answered"
+            f"{told if figures['answered'] else ''}"
+        )
+
+
+def _tell(session: Session, end: End, daemon: Daemon, before: str, out: Output) -> None:
+    """Say how it ended; raises WorkFailedError where it failed.
+
+    `before` is the robot's reason from before it was led.
+    """
+    try:
+        status = daemon.get("/status")
+    except CommandError as error:
+        raise WorkFailedError(f"{end.text}; {error}") from None
     if end.failed:
-        reason = f" ({status['reason']})" if status["reason"] else ""
-        raise WorkFailedError(f"{end.text}{reason}; {status['state']}, {status['program']}")
-    out.say(f"{end.text}; {status['state']}, {status['program']}")
-    out.result(
-        {
-            "ok": True,
-            "robot": status["robot"],
-            "scale": session.scale,
-            "ended": end.text,
-            "state": status["state"],
-            "program": status["program"],
-            **figures,
-        }
-    )
+        reason = status["reason"] if status["reason"] != before else ""
+        why = f" ({reason})" if reason else ""
+        raise WorkFailedError(f"{end.text}{why}; {status['state']}, {status['program']}")
+    with suppress(OSError):
+        out.say(f"{end.text}; {status['state']}, {status['program']}")
+        out.result(
+            {
+                "ok": True,
+                "robot": status["robot"],
+                "scale": session.scale,
+                "ended": end.text,
+                "state": status["state"],
+                "program": status["program"],
+                **session.figures(),
+            }
+        )

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from cdpr_rt.service.stream_packet import REACH_M
 from tools.errors import BadInputError
 from tools.teleop.hand import End, Hand
 
@@ -26,10 +27,11 @@ class ScriptLine:
     """Pressed once, at this time."""
 
 
-def read_script(path: Path) -> tuple[ScriptLine, ...]:
+def read_script(path: Path, scale: float = 1.0) -> tuple[ScriptLine, ...]:
     """Return the lines of a script; raises BadInputError, which names file and line.
 
-    `#` begins a comment. Between two lines the hand moves straight and at constant speed.
+    `#` begins a comment. Between two lines the hand moves straight and at constant speed. No line
+    leads a robot further than set-points may at `scale`.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -47,6 +49,15 @@ def read_script(path: Path) -> tuple[ScriptLine, ...]:
                     f"{lines[-1].time_s:g} s, the time of the line before"
                 )
             lines.append(line)
+            way_m, most_m = (
+                math.dist(line.position_m, lines[0].position_m),
+                REACH_M / max(scale, 1.0),
+            )
+            if way_m > most_m:
+                raise BadInputError(
+                    f"--script {path}, line {number}: {way_m:g} m from the first line's place; "
+                    f"allowed: {most_m:g} m at this scale"
+                )
     if not lines:
         raise BadInputError(f"--script {path}: no lines; allowed: {_SHAPE}")
     return tuple(lines)

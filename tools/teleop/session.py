@@ -65,12 +65,17 @@ class Session:
         self.round_trips_s: deque[float] = deque(maxlen=_MOST_KEPT)
         """Of the newest answers, the last one's at the end."""
         self._program = program
-        self._begin_s = self._heard_s = self._fine_s = 0.0
+        self._begin_s = self._heard_s = self._fine_s = time.monotonic()
 
     @property
     def answer(self) -> StreamAnswer | None:
         """Return the robot's newest answer."""
         return self.stream.state
+
+    @property
+    def silent_s(self) -> float:
+        """Return for how long no answer has come."""
+        return time.monotonic() - self._heard_s
 
     @property
     def pose_m(self) -> tuple[float, float]:
@@ -98,9 +103,7 @@ class Session:
                 return End("ended on request")
             next_s = max(next_s + 1.0 / RATE_Hz, time.monotonic())
             self._listen(next_s)
-        if end.arrive:
-            self._arrive(stop_requested)
-        return end
+        return self._arrive(end, stop_requested) if end.arrive else end
 
     def figures(self) -> dict[str, Any]:
         """Return what was sent and answered, delays there and back, and the confirmations."""
@@ -118,8 +121,8 @@ class Session:
             self.leading = self._runs()
         if self.leading:
             before, self.hand = self.hand, self.device.read(now_s)
-            if self.hand.confirmed > before.confirmed:
-                self._confirm(now_s)
+            for number in range(before.confirmed + 1, self.hand.confirmed + 1):
+                self._confirm(number, now_s)
         self._send()
         return self._lost(now_s) or self.hand.end
 
@@ -160,10 +163,10 @@ class Session:
             return End(why or "the robot does not follow the stream any more", failed=True)
         return None
 
-    def _confirm(self, now_s: float) -> None:
+    def _confirm(self, number: int, now_s: float) -> None:
         self.confirmations.append(
             Confirmation(
-                self.hand.confirmed,
+                number,
                 now_s - self._begin_s,
                 self.hand.position_m,
                 self.pose_m,
@@ -172,8 +175,11 @@ class Session:
             )
         )
 
-    def _arrive(self, stop_requested: Callable[[], bool]) -> None:
-        """Keep the hand where it is until the robot has come to where it was led."""
+    def _arrive(self, end: End, stop_requested: Callable[[], bool]) -> End:
+        """Keep the hand where it is until the robot has come to where it was led.
+
+        Returns `end`, or what has ended it before that.
+        """
         begin_s = since_s = time.monotonic()
         place = self.setpoint_m
         while not stop_requested():
@@ -182,12 +188,16 @@ class Session:
             self._listen(now_s + 1.0 / RATE_Hz)
             if not math.dist(place, self.setpoint_m) < _STILL_m:
                 since_s, place = now_s, self.setpoint_m
+            lost = self._lost(now_s)
+            if lost is not None:
+                return lost
             known = math.isfinite(place[0])
-            waited_s = now_s - begin_s
-            if (known and now_s - since_s > _STILL_S) or self._lost(now_s) is not None:
-                return
-            if waited_s > (_ARRIVE_S if known else _UNSEEN_S):
-                return
+            rests = now_s - since_s > _STILL_S if known else now_s - begin_s > _UNSEEN_S
+            if rests and self._runs():
+                return end
+            if now_s - begin_s > _ARRIVE_S:
+                return End(f"the robot has not come to rest within {_ARRIVE_S:g} s", failed=True)
+        return End("ended on request")
 
 
 def _place(pose: tuple[float, ...] | None) -> tuple[float, float]:

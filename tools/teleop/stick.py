@@ -66,6 +66,10 @@ class Stick:
         for axis, value in values.items():
             self.move_axis(axis, value)
 
+    def disregard(self) -> None:
+        """Take back what was confirmed so far."""
+        self.confirmed = 0
+
     def let_go(self) -> None:
         """Take the hand off: the device is gone, or what it did is not known."""
         self.held = False

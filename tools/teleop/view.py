@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any, Final
 
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -17,20 +18,36 @@ _WRAPPED = 3
 """Lines that may be needed where texts are wider than the terminal."""
 _MARGIN_m = 0.1
 _SHOWN_TRIPS = 120
+_SILENT_S: Final = 0.5
+"""Longer than a round trip takes that one can lead with; what is shown is old by then."""
+_STALE_S: Final = 2.0
 _MARKS: Final = {"target": ("+", "bold cyan"), "platform": ("o", "bold green")}
 
 Point = tuple[float, float]
 
 
 class View:
-    """Draws a session again whenever it is asked to; `status` is what the daemon told last."""
+    """Draws a session again whenever it is asked to.
 
-    def __init__(self, session: Session, description: dict[str, Any]) -> None:
+    `reason` is why the robot was held or stopped before, which is no news.
+    """
+
+    def __init__(self, session: Session, description: dict[str, Any], reason: str = "") -> None:
         self._session = session
         platform = description.get("platform") or {}
         self._platform = platform if len(platform.get("home_m", ())) == 2 else None
         self._axes = [str(axis.get("name")) for axis in description.get("axes", [])]
-        self.status: dict[str, Any] = {}
+        self._reason = reason
+        self._told: tuple[float, dict[str, Any]] = -math.inf, {}
+
+    def tell(self, status: dict[str, Any]) -> None:
+        """Have it show the daemon's status, until that is too old to be true."""
+        self._told = time.monotonic(), status
+
+    @property
+    def _status(self) -> dict[str, Any]:
+        told_s, status = self._told
+        return status if time.monotonic() - told_s < _STALE_S else {}
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Yield the picture, where the plane is known and there is room, and the figures."""
@@ -74,7 +91,7 @@ class View:
         return Text("\n", no_wrap=True).join(rows)
 
     def _target(self) -> Point:
-        told = self.status.get("program_progress", {}).get("target_m")
+        told = self._status.get("program_progress", {}).get("target_m")
         return self._session.setpoint_m if told is None else _point(told)
 
     def _lines(self) -> list[Text]:
@@ -88,14 +105,14 @@ class View:
                 )
             )
         lines.append(Text(f"hand {_mm(hand.position_m)} times {session.scale:g}; {self._link()}"))
-        tensions = [axis.get("tension_N") for axis in self.status.get("axes", [])]
+        tensions = [axis.get("tension_N") for axis in self._status.get("axes", [])]
         if any(value is not None for value in tensions):
             named = zip(self._axes, tensions, strict=False)
             told = [f"{name} {'-' if t is None else f'{t:.0f}'}" for name, t in named]
             lines.append(Text(f"tensions in N: {', '.join(told)}"))
-        refused = self.status.get("program_progress", {}).get("refused")
-        for text in (hand.trouble, refused, self.status.get("reason")):
-            if text:
+        refused = self._status.get("program_progress", {}).get("refused")
+        for text in (hand.trouble, refused, self._status.get("reason")):
+            if text and text != self._reason:
                 lines.append(Text(str(text), style="yellow"))
         lines.append(Text(session.device.hint, style="dim"))
         return lines
@@ -106,6 +123,8 @@ class View:
         state = "no answer yet" if answer is None else LoopState(answer.state).label
         if not session.leading:
             return Text(f"waiting for the robot to follow: {state}", style="yellow")
+        if session.silent_s > _SILENT_S:
+            return Text(f"NO ANSWER for {session.silent_s:.1f} s", style="bold red")
         leads = "HOLDS" if hand.clutch or hand.trouble else "LEADS"
         count = f", {hand.confirmed} confirmed" if hand.confirmed else ""
         return Text.assemble(
@@ -119,7 +138,7 @@ class View:
             return "no answer yet"
         missing = max(session.stream.sent - session.stream.answered, 0)
         share = 100.0 * missing / max(session.stream.sent, 1)
-        stream = self.status.get("program_progress", {}).get("stream", "")
+        stream = self._status.get("program_progress", {}).get("stream", "")
         return (
             f"round trip {1e3 * recent[-1]:.1f} ms (at most {1e3 * max(recent):.1f} in 2 s), "
             f"{share:.0f} % unanswered{f', stream {stream}' if stream else ''}"

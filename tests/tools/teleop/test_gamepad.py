@@ -143,11 +143,18 @@ def test_each_press_confirms_once() -> None:
     rig = Rig(StandIn())
     for _ in range(3):
         rig.key(ecodes.BTN_SOUTH, True)
+        rig.pad.put(ecodes.EV_KEY, ecodes.BTN_SOUTH, 2)  # the kernel repeats it
         rig.pad.put(ecodes.EV_KEY, ecodes.BTN_EAST, 1)
         rig.run(0.05)
         rig.key(ecodes.BTN_SOUTH, False)
     rig.run(0.05)
     assert rig.hand.confirmed == 3
+
+
+def test_nothing_was_confirmed_before_it_was_asked() -> None:
+    pad = StandIn()
+    pad.put(ecodes.EV_KEY, ecodes.BTN_SOUTH, 1)
+    assert Rig(pad).hand.confirmed == 0
 
 
 def test_unplugged_it_holds_and_waits_to_be_pressed_anew() -> None:

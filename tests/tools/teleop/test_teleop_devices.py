@@ -85,6 +85,13 @@ def test_a_script_that_cannot_be_played_is_refused(tmp_path: Path, text: str, to
     assert str(path) in str(refused.value)
 
 
+def test_no_script_leads_further_than_its_packets_may_say(tmp_path: Path) -> None:
+    path = script(tmp_path, "0 -1000 0\n1 1400 0\n2 1600 0")
+    assert len(read_script(path, 1.0)) == 3
+    with pytest.raises(BadInputError, match=r"line 3: 2\.6 m .*allowed: 2\.5 m at this scale"):
+        read_script(path, 8.0)
+
+
 def test_what_is_no_script_is_refused(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     for name in ("binary", "missing", "."):
@@ -162,6 +169,9 @@ def test_a_terminal_leads_and_is_given_back_as_it_was() -> None:
     during = termios.tcgetattr(its)
     assert not during[3] & (termios.ECHO | termios.ICANON)
     assert during[3] & termios.ISIG  # Ctrl-C stays what it is
+    os.write(ours, RIGHT.encode() + b" \n")  # before anybody listens
+    time.sleep(0.05)
+    assert device.read(time.monotonic()) == Hand(clutch=False)
     os.write(ours, RIGHT.encode())
     time.sleep(0.05)
     os.write(ours, b"\n")

@@ -135,6 +135,12 @@ def test_a_right_that_is_gone_ends_it(robot: Robot) -> None:
     assert end.failed and end.text.startswith("the right to move has ended")
 
 
+def test_a_robot_lost_on_its_way_to_the_end_of_a_script_is_told(robot: Robot) -> None:
+    done = ScriptHand((ScriptLine(0.0, (0.0, 0.0)),))
+    _, end = lead(robot, done, (0.3, lambda: robot.run(IDLE)))
+    assert end.failed and end.text == "the robot does not follow the stream any more"
+
+
 def test_silence_ends_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_module, "_SILENCE_S", 0.3)
     _, end = lead(robot, Still(), (0.3, robot.stream.stop))

@@ -11,6 +11,7 @@ from rich.console import Console
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import UNKNOWN_POSE, Standing, StreamAnswer
+from tools.teleop import view as view_module
 from tools.teleop.canvas import Canvas
 from tools.teleop.hand import Hand
 from tools.teleop.script import ScriptHand, ScriptLine
@@ -32,6 +33,8 @@ def seen(
     status: dict[str, Any],
     platform: dict[str, Any] | None = PLATFORM,
     height: int = 40,
+    before: str = "",
+    silent_s: float = 0.0,
 ) -> list[str]:
     """Return the lines shown of a robot that has answered once."""
     with StreamClient("127.0.0.1", 9) as stream:
@@ -42,8 +45,9 @@ def seen(
         session.leading = True
         session.hand = Hand((0.01, 0.0), clutch=False, confirmed=2)
         session.round_trips_s.extend((0.35, 0.73))
-        view = View(session, {"axes": AXES, "platform": platform})
-        view.status = status
+        session._heard_s -= silent_s
+        view = View(session, {"axes": AXES, "platform": platform}, before)
+        view.tell(status)
         console = Console(width=120, height=height, color_system=None)
         with console.capture() as shown:
             console.print(view)
@@ -76,6 +80,18 @@ def test_the_robot_stands_where_it_is_told_and_its_target_too() -> None:
         "a script leads",
     ):
         assert told in text
+
+
+def test_what_is_old_is_not_shown_as_if_it_were_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    pose = (0.5, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0)
+    status = {"axes": [{"tension_N": 40.4}], "reason": "held long ago"}
+    text = "\n".join(seen(pose, status, before="held long ago"))
+    assert "left 40" in text and "held" not in text
+    assert "held long ago" in "\n".join(seen(pose, status, before="another"))
+    monkeypatch.setattr(view_module, "_STALE_S", 0.0)
+    assert "left 40" not in "\n".join(seen(pose, status))
+    lines = seen(pose, {}, silent_s=1.2, height=12)
+    assert lines[0].startswith("NO ANSWER for 1.2 s")
 
 
 def test_a_small_terminal_shows_the_figures_before_the_picture() -> None:
