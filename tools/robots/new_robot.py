@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -14,7 +15,6 @@ from profiles.platform import Platform
 from tools.errors import BadInputError
 from tools.robots.questions import (
     CABLES,
-    STAND_SHARE,
     AnswerError,
     Answers,
     Question,
@@ -26,6 +26,8 @@ from tools.robots.statics import Box, PlanarStatics
 
 Ask = Callable[[Question, str, str], str]
 """Takes a question, its default and what was wrong with the last answer; returns the answer."""
+_STAND_SHARE = 0.1
+"""Of the height in which targets could be taken, what is left between the stand and the box."""
 
 
 def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
@@ -35,13 +37,13 @@ def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
     """
     told: Answers = {}
     asked = questions(path.parent, path.stem)
-    known = [question.key for question in (*asked, *places((0.0, 0.0), (1.0, 1.0)))]
+    known = [q.key for q in (*asked, *places((0.0, 0.0), (1.0, 1.0), proposed_stand))]
     for key in given:
         if key not in known:
             raise BadInputError(f"--set {key}: no such question; allowed: {', '.join(known)}")
     for question in asked:
         told[question.key] = _answer(question, told, given, ask)
-    for question in places(*proposed_box(told)):
+    for question in places(*proposed_box(told), proposed_stand):
         told[question.key] = _answer(question, told, given, ask)
     return told
 
@@ -68,19 +70,40 @@ def proposed_box(told: Answers) -> tuple[tuple[float, float], tuple[float, float
     exits = np.array([told[f"exit_{i + 1}_m"] for i in range(CABLES)])
     middle, size = 0.5 * (exits.min(axis=0) + exits.max(axis=0)), np.ptp(exits, axis=0)
     around = Box(_pair(middle - 0.5 * size), _pair(middle + 0.5 * size))
-    low_N, high_N = told["tension_min_N"], told["tension_max_N"]
-    statics = PlanarStatics(_platform_of(told, around), np.full(3, low_N), np.full(3, high_N))
-    found = statics.largest_box(around)
+    found = _statics_of(told, around).largest_box(around)
     if found is not None:
         height = found.high_m[1] - found.low_m[1]
         low = (
-            np.ceil(100.0 * (np.array(found.low_m) + STAND_SHARE * np.array([0.0, height]))) / 100.0
+            np.ceil(100.0 * (np.array(found.low_m) + _STAND_SHARE * np.array([0.0, height])))
+            / 100.0
         )
         high = np.floor(100.0 * np.array(found.high_m)) / 100.0
         if (low < high).all():
             return _pair(low), _pair(high)
     aside = np.maximum(0.1 * size, 0.05)
     return _pair(middle - aside), _pair(middle + aside)
+
+
+def proposed_stand(told: Answers) -> tuple[float, float]:
+    """Return where under the box of targets the cables turn the platform least.
+
+    Where they turn it they might tip it on its stand, and lengths learnt there are wrong by that.
+    """
+    (left, bottom), (right, top) = told["low_m"], told["high_m"]
+    below = bottom - _STAND_SHARE / (1.0 - _STAND_SHARE) * (top - bottom)
+    xs = np.linspace(left, right, 41)
+    xs = xs[np.argsort(np.abs(xs - 0.5 * (left + right)), kind="stable")]
+    places = np.stack([xs, np.full(xs.size, math.ceil(100.0 * below) / 100.0)], axis=-1)
+    statics = _statics_of(told, Box(told["low_m"], told["high_m"]))
+    turned = np.where(statics.is_target(places), np.abs(statics.angle_rad(places)), math.inf)
+    turned = np.nan_to_num(turned, nan=math.inf)
+    # what differs by less than anybody sees is alike, and the first of them is in the middle
+    return _pair(places[int(np.round(turned, 2).argmin())])
+
+
+def _statics_of(told: Answers, box: Box) -> PlanarStatics:
+    low_N, high_N = told["tension_min_N"], told["tension_max_N"]
+    return PlanarStatics(_platform_of(told, box), np.full(3, low_N), np.full(3, high_N))
 
 
 def _platform_of(told: Answers, box: Box) -> Platform:

@@ -15,8 +15,6 @@ from profiles import ProfileError, Winch, load_winch
 Answers = dict[str, Any]
 """What was answered, by key, of the type that the key's question gives it; SI."""
 CABLES = 3
-STAND_SHARE = 0.1
-"""Of the height in which targets could be taken, what is left between the stand and the box."""
 _TORQUE_RESERVE = 0.85
 """Share of the torque that tensions may take; the rest is for friction and for control."""
 
@@ -81,8 +79,15 @@ def questions(folder: Path, name: str) -> list[Question]:
     ]
 
 
-def places(low_m: tuple[float, float], high_m: tuple[float, float]) -> list[Question]:
-    """Return the questions on the box of targets and the place of rest; the box is a proposal."""
+def places(
+    low_m: tuple[float, float],
+    high_m: tuple[float, float],
+    stand: Callable[[Answers], tuple[float, float]],
+) -> list[Question]:
+    """Return the questions on the box of targets and the place of rest.
+
+    The box is a proposal, `stand` makes one for the place of rest under the box that was answered.
+    """
     return [
         Question(
             "low_m",
@@ -96,7 +101,12 @@ def places(low_m: tuple[float, float], high_m: tuple[float, float]) -> list[Ques
             _upper_corner,
             lambda _: _text(high_m),
         ),
-        Question("home_m", "Where the platform stands at rest: x, y (m)", _home, _under_the_box),
+        Question(
+            "home_m",
+            "Where the platform stands at rest: x, y (m)",
+            _home,
+            lambda told: _text(stand(told), digits=2),
+        ),
     ]
 
 
@@ -224,12 +234,6 @@ def _home(text: str, told: Answers) -> tuple[float, float]:
     if not (left <= x <= right and y <= top):
         raise AnswerError(f"allowed: x from {left:g} to {right:g}, y up to {top:g}")
     return x, y
-
-
-def _under_the_box(told: Answers) -> str:
-    (left, bottom), (right, top) = told["low_m"], told["high_m"]
-    below = STAND_SHARE / (1.0 - STAND_SHARE) * (top - bottom)
-    return _text(((left + right) / 2, math.ceil(100.0 * (bottom - below)) / 100.0))
 
 
 def _text(point_m: tuple[float, float], digits: int = 3) -> str:
