@@ -166,7 +166,7 @@ class LowerProgram(PlatformProgram):
             reel.high_N[:] = reel.low_N
             self._at_rest = not reel.low_N.any()
             return
-        light = bool((reel.tension_N <= _LIGHT * self._keeping).all())
+        light = bool((reel.tension_N <= _LIGHT * _KEEPING_SHARE * self._least).all())
         paid_out_m = float((self._cable * (feedback.position_rad - self._here)).max())
         if not light or paid_out_m > _STILL_m:
             self._here[:] = feedback.position_rad
