@@ -27,6 +27,7 @@ way, and what it does to the angles on the way up and down cancels out."""
 INDEX_m_s = 0.1
 """How fast the platform is lifted while indices are looked for."""
 _STANDING = 0.85
+_HIGHEST = 0.9
 _SETTLING_S = 0.5
 _HANGING = 0.5
 _RISE_1_s = 1.0
@@ -301,7 +302,7 @@ def standing_tensions(parts: PlatformParts) -> FloatArray:
     J = parts.geometry.jacobian(np.array(parts.platform.home_m))
     weight = np.array([0.0, parts.platform.mass_kg * G_m_s2])
     control = parts.control
-    most = np.maximum(parts.most_N / BEYOND, 1.1 * control.least_N)
+    most = np.maximum(_HIGHEST * parts.most_N / BEYOND, 1.1 * control.least_N)
     for least in (np.minimum(control.tensions.low, 0.9 * most), control.least_N):
         pressed, missing = PlanarTensions(least, most).distribute(J, weight)
         if not missing:
