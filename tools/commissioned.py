@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError, DriveIdentity
+from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError
 from cdpr_rt.compensation import AxisCompensation
 from drivers.boot import BootReport
 from profiles import Robot, RobotAxis
 from tools.commissioning import Paths
 from tools.errors import BadInputError
+from tools.session import identity_of
 
 CoggingProfiles = tuple[CoggingProfile | None, ...]
 """One for each axis of a robot, None where its motor has not been commissioned."""
@@ -84,17 +85,6 @@ def compensation_of(
 ) -> tuple[AxisCompensation | None, ...]:
     """Return what the control compensates of each motor: the harmonic model and its friction."""
     return tuple(None if p is None else p.better.compensation() for p in profiles)
-
-
-def identity_of(report: BootReport) -> DriveIdentity:
-    """Return what a cogging profile is bound to, besides the motor."""
-    return DriveIdentity(
-        vendor_id=report.vendor_id,
-        product_code=report.product_code,
-        revision=report.revision,
-        serial=report.serial,
-        encoder_counts_per_turn=report.counts_per_turn,
-    )
 
 
 def refuse_strangers(

@@ -99,14 +99,7 @@ class WinchSession:
     @property
     def drive_identity(self) -> DriveIdentity:
         """What a cogging profile is bound to, besides the motor."""
-        boot = self.boot
-        return DriveIdentity(
-            vendor_id=boot.vendor_id,
-            product_code=boot.product_code,
-            revision=boot.revision,
-            serial=boot.serial,
-            encoder_counts_per_turn=boot.counts_per_turn,
-        )
+        return identity_of(self.boot)
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -173,6 +166,17 @@ class WinchSession:
     def bus_status(self) -> dict[str, Any]:
         """Return what a simulated bus tells of itself, an empty table on others."""
         return query_status(self.url.channel) if self.url.is_simulated else {}
+
+
+def identity_of(report: BootReport) -> DriveIdentity:
+    """Return what a cogging profile is bound to, besides the motor, of a drive that has booted."""
+    return DriveIdentity(
+        vendor_id=report.vendor_id,
+        product_code=report.product_code,
+        revision=report.revision,
+        serial=report.serial,
+        encoder_counts_per_turn=report.counts_per_turn,
+    )
 
 
 def latency_s(winch: Winch) -> float:
