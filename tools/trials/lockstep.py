@@ -28,6 +28,7 @@ from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording import Recorder
 from drivers.bus import query_status
 from profiles import Robot, load_robot
+from profiles.robot import watched_by_heartbeat
 from tools.commissioned import with_commissioned, without_commissioned
 from tools.daemon.loop_process import description, loop_parts
 from tools.daemon.machine import RobotMachine
@@ -43,6 +44,7 @@ RING_S: Final = 30.0
 _PATIENCE_S: Final = 60.0
 """Time by the clock in which no cycle runs at all, as while drives boot."""
 _LOOK_CYCLES: Final = 512
+_WATCH_S: Final = 0.4
 _names = count()
 
 
@@ -73,7 +75,7 @@ class LockstepRobot:
         commissioned: Path | None = None,
         compensated: bool = True,
     ) -> None:
-        self.robot: Robot = with_commissioned(load_robot(robot), commissioned)
+        self.robot = _patient(with_commissioned(load_robot(robot), commissioned))
         if not compensated:
             self.robot = without_commissioned(self.robot)
         self.period_s = self.robot.sync_period_s
@@ -335,6 +337,12 @@ class LockstepRobot:
     def recordings(self) -> Sequence[Path]:
         """Return the files recorded so far, in their order."""
         return [] if self._record is None else sorted(self._record.glob("*.mcap"))
+
+
+def _patient(robot: Robot) -> Robot:
+    """Return `robot` with drives that bear a busy machine until cycles, and bus time, begin."""
+    axes = (replace(axis, winch=watched_by_heartbeat(axis.winch, _WATCH_S)) for axis in robot.axes)
+    return replace(robot, axes=tuple(axes))
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from cdpr_rt.exchange import FloatArray
 from profiles import Robot, load_robot
 from profiles.platform import Platform
 from tools.errors import BadInputError, WorkFailedError
+from tools.robots.statics import can_be_computed
 from tools.trials.lockstep import LockstepRobot, OrderRefusedError
 from tools.trials.recorded import TRUTH
 
@@ -109,12 +110,12 @@ class TrialRun:
 
 
 def platform_of(robot: Robot) -> Platform:
-    """Return a robot's platform; raises BadInputError for a robot that has none in a plane."""
+    """Return a robot's platform; raises BadInputError for a robot whose platform is not moved."""
     platform = robot.platform
-    if platform is None or not platform.is_planar:
+    if platform is None or not can_be_computed(robot):
         raise BadInputError(
-            f"{robot.path}: has no platform in a plane; allowed: [platform] of two "
-            "coordinates, such as planar-3 has"
+            f"{robot.path}: has no platform in a plane on three cables; allowed: [platform] of two "
+            "coordinates and three axes, such as planar-3 has"
         )
     return platform
 
