@@ -16,7 +16,7 @@ import numpy as np
 from profiles import load_robot
 from tools.errors import BadInputError, WorkFailedError
 from tools.experiment import figures
-from tools.experiment.path import centre_m
+from tools.experiment.path import centre_m, targets_m
 from tools.experiment.points import Points, points_of_perfect_robot, points_of_session
 from tools.experiment.report import lines
 from tools.experiment.session import Asked, run_session
@@ -162,6 +162,15 @@ def operator_alone(asked: Asked) -> dict[str, Any]:
     return result | {"lines": lines(result)}
 
 
+def _drawn(asked: Asked, points: Points, alone: Points, session: Path, folder: Path) -> list[Path]:
+    """Draw all pictures, the path with the way of one of the session's runs."""
+    ticks = min(session.glob("*.npy"))
+    targets = targets_m(centre_m(load_robot(asked.robot), session.name.split("-")[0]))
+    path = folder / "figure-2.8.png"
+    figures.path(targets, np.load(ticks)["truth_m"]).savefig(path)
+    return [path, *figures.draw(points, alone, folder)]
+
+
 def judge(folder: Path, jobs: int) -> dict[str, Any]:
     """Compute tables and analysis of the sessions that have ended, and draw them.
 
@@ -182,7 +191,7 @@ def judge(folder: Path, jobs: int) -> dict[str, Any]:
         "operator_alone": rows(alone),
         "variance_analysis": variance_analysis(points),
         "reached": bool(compared) and all(compared),
-        "pictures": [str(path) for path in figures.draw(points, alone, folder)],
+        "pictures": [str(path) for path in _drawn(asked, points, alone, sessions[0], folder)],
     }
     np.save(folder / "points.npy", points)
     (folder / RESULT).write_text(to_json(result, indent=1), encoding="utf-8")

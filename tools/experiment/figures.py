@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cdpr_rt.exchange import FloatArray
 from tools.experiment import thesis
-from tools.experiment.path import targets_m
 from tools.experiment.points import Points
 from tools.experiment.statistics import PARTS, levels, spread_mm, thesis_row
 from tools.report.style import canvas, legend_above
@@ -25,9 +25,9 @@ _PICTURES: Final = {
     "figure-2.12.png": (thesis.PLACE, "Error by place"),
 }
 _SHARES: Final = {
-    "judged_m": "what the operator was content with",
-    "hand_m": "the hand, from then on",
-    "robot_m": "the robot, from then on",
+    "judged_m": "judged",
+    "hand_m": "hand, since",
+    "robot_m": "robot, since",
 }
 
 
@@ -52,11 +52,12 @@ def errors(points: Points, variable: str, title: str) -> Figure:
     reach = 1.1 * max(1e3 * float(np.abs(points["error_m"]).max()), 1.0)
     cloud.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="x (mm)", ylabel="y (mm)")
     cloud.set_aspect("equal")
-    cloud.set_title("each target")
+    cloud.set_title(title)
     for axis, ax in enumerate((bars_x, bars_y)):
         _bars(ax, axis, variable, found)
-    bars_y.sharey(bars_x)
-    figure.suptitle(title, fontsize=10)
+    ends = [end for bars in (bars_x, bars_y) for end in bars.get_ylim()]
+    for bars in (bars_x, bars_y):
+        bars.set_ylim(min(ends), max(ends))
     legend_above(figure, cloud, bars_x)
     return figure
 
@@ -73,12 +74,12 @@ def _bars(ax: Axes, axis: int, variable: str, found: list[tuple[str, object, Poi
             ax.errorbar(
                 k + 0.15, beside.mean_mm[axis], beside.three_sigma_mm[axis],
                 fmt="s", ms=4, capsize=4, color=_THESIS,
-                label="thesis (bars: 3 sigma)" if k == 0 else None,
+                label="thesis" if k == 0 else None,
             )  # fmt: skip
     ax.axhline(0.0, color="black", lw=0.5)
     ax.set_xticks(range(len(found)), [name for name, _, _ in found])
     ax.set_xlim(-0.6, len(found) - 0.4)
-    ax.set_title(f"{'xy'[axis]}: mean and 3 sigma (mm)")
+    ax.set_title(f"{'xy'[axis]} (mm), 3 sigma")
 
 
 def parts(points: Points, alone: Points) -> Figure:
@@ -97,11 +98,11 @@ def parts(points: Points, alone: Points) -> Figure:
             left += share
         for k, inside in enumerate(_in_turn(points)):
             total = np.var(1e3 * inside["error_m"][:, axis], ddof=1)
-            label = "all together" if k == 0 else None
+            label = "total" if k == 0 else None
             ax.plot(total, k, "k|", ms=11, mew=2, label=label)
         for k, inside in enumerate(_in_turn(alone)):
             total = np.var(1e3 * inside["error_m"][:, axis], ddof=1)
-            label = "same operator, perfect robot" if k == 0 else None
+            label = "total with a perfect robot" if k == 0 else None
             ax.plot(total, k, "D", ms=4, color="#222222", mfc="none", label=label)
         ax.set_yticks(range(len(names)), names)
         ax.set(xlabel=f"variance in {'xy'[axis]} (mm²)")
@@ -120,16 +121,19 @@ def _in_turn(points: Points) -> Iterator[Points]:
             yield inside
 
 
-def path(centre_m: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Figure:
-    """Draw the targets in their order (Tremblay, figure 2.8)."""
+def path(targets: FloatArray, track: FloatArray) -> Figure:
+    """Draw the targets (k, 2) in their order, from where it ends, and one run's true way (n, 2)."""
     figure, (ax,) = canvas(height=4.0)
-    way = 1e3 * np.vstack([centre_m, targets_m(centre_m)])
-    ax.plot(*way.T, color="#bbbbbb", lw=0.8)
+    way = 1e3 * np.vstack([targets[-1], targets])
+    half = len(targets) // 2
     for k, (begin, end) in enumerate(pairwise(way)):
-        ax.annotate("", end, begin, arrowprops={"arrowstyle": "->", "color": _OURS[k >= 5]})
-        ax.annotate(str(k + 1), end, (6, 5), textcoords="offset points")
-    ax.plot(*way[0], "o", ms=12, mfc="none", mew=2, color="#3b8f5a")
+        arrow = {"arrowstyle": "->", "color": _OURS[k >= half], "lw": 1.5}
+        ax.annotate("", end, begin, arrowprops=arrow)
+        ax.annotate(str(k + 1), end, (6, 6 if k < half else -13), textcoords="offset points")
+    ax.plot(*(1e3 * track.T), color=_THESIS, lw=0.8, label="the platform's true way in one run")
+    ax.plot(*way[0], "o", ms=12, mfc="none", mew=2, color=_OURS[2], label="begin and end")
     ax.set(xlabel="x (mm)", ylabel="y (mm)")
     ax.set_aspect("equal")
     ax.margins(0.12)
+    legend_above(figure, ax)
     return figure
