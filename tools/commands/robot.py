@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from profiles import Robot, load_robot
+from profiles.platform import Platform
 from tools.commands import robot_trial
 from tools.commands.options import JsonOption
 from tools.errors import BAD_INPUT, BadInputError
@@ -48,11 +49,13 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
             f"{profile.path}: platform: this robot has none, its winches have nothing in common; "
             f"`cdpr profiles show` tells what else there is"
         )
+    if png is not None and not platform.is_planar:
+        raise BadInputError(f"--png: {profile.path} is no planar robot; only these are drawn")
     told = summary.figures(profile, platform)
     for line in summary.lines(profile, platform, told):
         out.say(line)
     if png is not None:
-        _draw(profile, png, out)
+        _draw(profile, platform, png, out)
     found = checks.findings(profile)
     out.say("")
     _say_findings(out, found)
@@ -130,13 +133,11 @@ def _say_findings(out: Output, found: list[checks.Finding]) -> None:
         out.say(f"{kind}: {finding.key}: {finding.text}")
 
 
-def _draw(profile: Robot, path: Path, out: Output) -> None:
+def _draw(profile: Robot, platform: Platform, path: Path, out: Output) -> None:
     from tools.robots.picture import draw_robot  # noqa: PLC0415  # slow to load
 
-    if profile.platform is None or not profile.platform.is_planar:
-        raise BadInputError(f"--png: {profile.path} is no planar robot, the others are not drawn")
     try:
-        draw_robot(profile, profile.platform, path)
+        draw_robot(profile, platform, path)
     except OSError as error:
         raise BadInputError(f"--png {path}: {error.strerror}") from None
     out.say(f"\npicture: {path}")

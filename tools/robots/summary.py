@@ -96,12 +96,14 @@ def _tension_lines(told: dict[str, Any]) -> list[str]:
 
 
 def _table(axes: Sequence[dict[str, Any]]) -> list[str]:
-    rows = [f"{'axis':16}{'exit point, m':>18}{'anchor point, m':>20}"]
+    coordinates = len(axes[0]["exit_point_m"])
+    a, b = 9 * coordinates, 10 * coordinates
+    rows = [f"{'axis':16}{'exit point, m':>{a}}{'anchor point, m':>{b}}"]
     if "tension_N" in axes[0]:
         rows[0] += f"{'cable, m':>16}{'tension, N':>14}{'torque, Nm':>16}"
     for axis in axes:
-        row = f"{axis['name']:16}{_point(axis['exit_point_m']):>18}"
-        row += f"{_point(axis['anchor_point_m'], 3):>20}"
+        row = f"{axis['name']:16}{_point(axis['exit_point_m']):>{a}}"
+        row += f"{_point(axis['anchor_point_m'], 3):>{b}}"
         if "tension_N" in axis:
             cable = "{:.2f} to {:.2f}".format(*axis["cable_m"])
             tension = "{:g} to {:g}".format(*axis["tension_N"])
