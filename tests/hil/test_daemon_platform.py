@@ -1,0 +1,89 @@
+"""The commands that move a platform, on a real daemon with a simulated planar robot."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from daemon_lab import PATIENT
+from daemon_rig import RealDaemon, cdpr, until
+
+import profiles
+
+PERIOD_S = 0.004
+SHIPPED = Path(profiles.__file__).parent / "robots" / "planar-3.toml"
+
+
+@pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
+    """The shipped robot in cycles slow enough for a machine on which other tests run."""
+    folder = tmp_path_factory.mktemp("platform")
+    robot = folder / "planar.toml"
+    text = SHIPPED.read_text().replace(
+        "sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}\nmaster_heartbeat_s = 2.0"
+    )
+    robot.write_text(text.replace("[limits]", f"[limits]{PATIENT}"))
+    one = RealDaemon(folder, "--no-record", robot=robot, env={"XDG_STATE_HOME": str(folder)})
+    try:
+        assert cdpr("enable", *one.at).returncode == 0, one.errors()
+        yield one
+    finally:
+        assert one.end() == 0, one.errors()
+
+
+def told(daemon: RealDaemon, *command: str) -> dict[str, object]:
+    """Return what a command that succeeds tells as JSON."""
+    done = cdpr(*command, *daemon.at, "--json")
+    assert done.returncode == 0, f"{done.stderr}{daemon.errors()}"
+    figures: dict[str, object] = json.loads(done.stdout.splitlines()[-1])
+    return figures
+
+
+def refused(daemon: RealDaemon, *command: str) -> tuple[int, str]:
+    done = cdpr(*command, *daemon.at)
+    assert "Traceback" not in done.stderr
+    return done.returncode, done.stderr
+
+
+def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
+    status, why = refused(daemon, "move", "--to", "0", "1600")
+    assert (status, "run tighten first" in why) == (1, True)
+    assert told(daemon, "tighten")["position_m"] == pytest.approx([0.0, 1.3], abs=0.005)
+
+    assert told(daemon, "move", "--to", "100", "1600")["position_m"] == pytest.approx(
+        [0.1, 1.6], abs=0.005
+    )
+    moved = told(daemon, "move", "--to", "-50", "20", "--relative", "--speed", "200")
+    assert moved["position_m"] == pytest.approx([0.05, 1.62], abs=0.005)
+    shown = cdpr("status", *daemon.at).stdout
+    assert re.search(r"platform at \d+\.\d, 16\d\d\.\d mm; target 50\.0, 1620\.0 mm", shown)
+
+    for command, named in (
+        (("move", "--to", "0", "9000"), "allowed: 1.4 to 2.4, the workspace"),
+        (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
+        (("tighten", "--from", "last"), "no lengths of the last stop"),
+        (("controller", "idle"), "lower it first"),
+    ):
+        status, why = refused(daemon, *command)
+        assert status in (1, 2)
+        assert named in why
+
+    command = [sys.executable, "-m", "tools.cli", "move", "--to", "-300", "1900", "--speed", "100"]
+    with subprocess.Popen([*command, *daemon.at], stderr=subprocess.PIPE, text=True) as going:
+        target = pytest.approx([-0.3, 1.9])
+        until(lambda: daemon.status()["program_progress"].get("target_m") == target)
+        paused = told(daemon, "pause")
+        assert paused["program"] == "hold"
+        assert paused["position_m"] != pytest.approx([-0.3, 1.9], abs=0.05)
+        assert "pose was ended" in going.communicate()[1]
+    assert going.returncode == 1
+    assert told(daemon, "resume")["position_m"] == pytest.approx([-0.3, 1.9], abs=0.005)
+
+    lowered = told(daemon, "lower")
+    assert lowered["program"] == "hold"
+    assert until(lambda: daemon.status()["program_progress"].get("tight") is False)
