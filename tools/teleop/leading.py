@@ -25,7 +25,7 @@ from tools.teleop.hand import End, HandDevice
 from tools.teleop.session import Session
 from tools.teleop.view import View
 
-_STATUS_S: Final = 0.3
+_STATUS_S: Final = 0.1
 _ANSWER_S: Final = 10.0
 _PICTURES_Hz: Final = 10.0
 _EVERYWHERE: Final = frozenset({"0.0.0.0", "::", ""})
