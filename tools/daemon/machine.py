@@ -93,7 +93,7 @@ class RobotMachine:
             stack.callback(device.close)
             # the supervisor judges silence before the device does
             device.tolerate_silence(self._robot.limits.missed_cycles + 1)
-            self._seek_indices(device)
+            unsought = self._seek_indices(device)
             # the collector keeps every thread waiting: it looks at what stays now, and never again
             gc.collect()
             gc.freeze()
@@ -102,20 +102,29 @@ class RobotMachine:
             self._stack = stack.pop_all()
         self._networks = networks
         notices = [*boot_notes(self._robot, booted, absent), self._tensions.missing(self._robot)]
+        notices += unsought
         self.notices = [notice for notice in notices if notice]
         self.watches = () if self._safety is None else (self._safety.io,)
         self._device = device
 
-    def _seek_indices(self, device: AxisBuses) -> None:
+    def _seek_indices(self, device: AxisBuses) -> list[str]:
         """Have each drive latch its encoder's index in whatever motion comes (touch probe).
 
-        Axes of a platform are all sought, since an index tells of a motor that was turned while
-        nobody looked; others where a cogging profile counts from it.
+        It must, where a cogging profile counts from it. Those of a platform's other axes are sought
+        as well, since an index tells of a motor that was turned while nobody looked; returns why
+        one of them is not.
         """
-        for i, profile in enumerate(self._profiles):
+        notes = []
+        for i, (axis, profile) in enumerate(zip(self._robot.axes, self._profiles, strict=True)):
             group, place = device.part_of(i)
-            if profile is not None or (self._robot.platform and group.tells_probe(place)):
+            if profile is not None:
                 touch_probe.arm(group, place)
+            elif self._robot.platform and group.tells_probe(place):
+                try:
+                    touch_probe.arm(group, place)
+                except DriverError as error:
+                    notes.append(f"{axis.name}: its encoder's index is not sought: {error}")
+        return notes
 
     def _open_safety(self, stack: ExitStack) -> SessionSafety | None:
         if self._reference is None:
