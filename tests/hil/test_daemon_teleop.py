@@ -67,6 +67,7 @@ def start_up(daemon: RealDaemon) -> None:
         answer = daemon.http.post(path, json={**wish, **more}, headers=headers)
         assert answer.status_code == 200, answer.text
     until(lambda: daemon.status()["program_progress"].get("tight"))
+    assert daemon.http.post("/hold", json=wish).status_code == 200
     assert daemon.http.delete("/control", headers=headers).status_code == 200
 
 
@@ -142,6 +143,7 @@ def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) 
     assert (status["state"], status["program"], status["control"]["held"]) == (
         "active", "hold", False
     )  # fmt: skip
+    assert status["reason"] == ""  # it was asked to hold before the right to move went
 
 
 def test_nan_and_steps_of_a_metre_carry_nothing_away(daemon: RealDaemon, folder: Path) -> None:
