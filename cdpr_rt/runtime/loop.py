@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,44 +15,20 @@ from cdpr_rt.exchange import FloatArray, Setpoint
 from cdpr_rt.limits import BLINDING, MISLEADING, Limit
 from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_rows import CycleRows
-from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.job import Job
-from cdpr_rt.runtime.last_lengths import LastLengths
 from cdpr_rt.runtime.lifecycle import Lifecycle
+from cdpr_rt.runtime.loop_parts import LoopParts
 from cdpr_rt.runtime.machine import Machine
 from cdpr_rt.runtime.orders import Orders
-from cdpr_rt.runtime.programs.base import Program
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.runtime.states import LoopState, Reaction
 from cdpr_rt.runtime.status import StatusPage
-from cdpr_rt.supervisor import Supervisor
 
 IDLE, HOLD, LOWER = "idle", "hold", "lower"
 _TURN_S = 0.005
 _AT_ONCE_AFTER_S = 1.0
 """A second request to end, so long after the first, takes the power at once."""
 _NOBODY_LEADS = "nobody holds the right to move any more"
-
-
-@dataclass(frozen=True)
-class LoopParts:
-    """What the loop runs besides the machine; all made for its n axes."""
-
-    programs: Mapping[str, Program]
-    """By name, in the order of their numbers; `idle` and `hold` are among them.
-
-    One that is called `lower` lets a platform down before the power goes.
-    """
-    supervisor: Supervisor
-    estimator: Estimator
-    lengths_disagree_m: Callable[[], float] = float
-    """Returns by how much the cables' lengths contradict each other, 0 where nobody knows."""
-    last: LastLengths | None = None
-    """Keeps the cables' lengths of the last stop, where a start can make use of them."""
-    punctual: Callable[[], Sequence[str]] = tuple
-    """Called once before the first paced cycle; returns what was not allowed, for people."""
-    cores: frozenset[int] = field(default_factory=lambda: frozenset(os.sched_getaffinity(0)))
-    """Where slow work beside the cycle may run."""
 
 
 class ControlLoop:

@@ -16,7 +16,8 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import AxisFeedback, Setpoint
 from cdpr_rt.realtime import settle_memory, stay_punctual
 from cdpr_rt.runtime.estimate import Estimator
-from cdpr_rt.runtime.loop import ControlLoop, LoopParts
+from cdpr_rt.runtime.loop import ControlLoop
+from cdpr_rt.runtime.loop_parts import LoopParts
 from cdpr_rt.runtime.programs.model import model_of
 from cdpr_rt.runtime.programs.registry import (
     build_programs,

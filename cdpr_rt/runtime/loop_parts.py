@@ -1,0 +1,33 @@
+"""What a control loop is made of, besides the machine that it runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from cdpr_rt.runtime.estimate import Estimator
+from cdpr_rt.runtime.last_lengths import LastLengths
+from cdpr_rt.runtime.programs.base import Program
+from cdpr_rt.supervisor import Supervisor
+
+
+@dataclass(frozen=True)
+class LoopParts:
+    """What the loop runs besides the machine; all made for its n axes."""
+
+    programs: Mapping[str, Program]
+    """By name, in the order of their numbers; `idle` and `hold` are among them.
+
+    One that is called `lower` lets a platform down before the power goes.
+    """
+    supervisor: Supervisor
+    estimator: Estimator
+    lengths_disagree_m: Callable[[], float] = float
+    """Returns by how much the cables' lengths contradict each other, 0 where nobody knows."""
+    last: LastLengths | None = None
+    """Keeps the cables' lengths of the last stop, where a start can make use of them."""
+    punctual: Callable[[], Sequence[str]] = tuple
+    """Called once before the first paced cycle; returns what was not allowed, for people."""
+    cores: frozenset[int] = field(default_factory=lambda: frozenset(os.sched_getaffinity(0)))
+    """Where slow work beside the cycle may run."""
