@@ -125,8 +125,8 @@ def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) 
     begin = place(daemon)  # on the stand, under the box of targets
     script = (
         # still where the clutch opens and closes: a set-point that is lost tells that too late
-        "0 0 0\n0.2 0 0\n1.2 40 30\n1.4 40 30 confirm\n1.6 40 30 clutch\n1.8 40 30 clutch\n"
-        "2.0 0 0 clutch\n2.2 0 0\n2.4 0 0\n2.8 0 20 confirm"
+        "0 0 0\n0.2 0 0\n1.2 40 30\n1.8 40 30 confirm\n2.0 40 30 clutch\n2.2 40 30 clutch\n"
+        "2.4 0 0 clutch\n2.6 0 0\n2.8 0 0\n3.2 0 20 confirm"
     )
     with hostile(port_of(daemon), seed=3) as proxy:
         via = f"127.0.0.1:{proxy.port}"
