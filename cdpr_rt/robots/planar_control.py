@@ -1,8 +1,8 @@
 """Control of a planar robot with three cables: where it is, and the torques that move it.
 
-Tremblay (thesis), section 2.4, with what the thesis leaves to a velocity loop divided in two: each
-motor has a loop of its own that may not unwind its cable, and what stays as an error of position
-is the platform's, in two directions, so that the motors never pull against each other.
+Tremblay (thesis), section 2.4, with the velocity loop of each motor replaced by one of the
+platform, in two directions: what it asks for is a force that the tensions exert within their
+bounds, so that no cable is unwound and the motors never pull against each other.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _SETTLING_STEPS = 60
 _ITERATIONS = 3
 _LIFT_S = 0.05
 _SHAPING_S = 0.06
-_LATENCY_s = 2.3e-3
+_LATENCY_s, _LATENCY_CYCLES = 0.8e-3, 1.5
 
 
 class PlanarControl:
@@ -109,7 +109,7 @@ class PlanarControl:
         rotor_kg = inertia / cable**2
         mass = platform.mass_kg + 1.5 * rotor_kg
         observer = 2.0 * math.pi * _OBSERVER_Hz
-        late_s = _LATENCY_s + 2.0 / observer
+        late_s = _LATENCY_s + _LATENCY_CYCLES * period_s + 2.0 / observer
         quick = _ROTOR_SHARE * rotor_kg / late_s
         damping = min(quick / (1.0 - _SMOOTH_SHARE), _LOAD_SHARE * mass / late_s)
         row["mass"], row["period"], row["inertia"] = platform.mass_kg, period_s, inertia
@@ -235,6 +235,33 @@ class PlanarControl:
         cables = self._cables
         at_zero = length_m - cables["m_per_rad"] * feedback.position_rad
         cables["length_at_zero"] = np.where(np.isfinite(at_zero), at_zero, cables["length_at_zero"])
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """What a cycle goes by besides the geometry, by name: `planar_kernel.ROBOT`, and more."""
+        row = self._robot[0]
+        told = {name: float(row[name]) for name in kernel.ROBOT.names or ()}
+        return {**told, "reserve_N": self._reserve_N, "pace": self._pace}
+
+    @property
+    def shaping_cycles(self) -> int:
+        """Over how many cycles the set-point is averaged."""
+        return len(self._past)
+
+    @property
+    def angle_rad(self) -> float:
+        """By how much the platform is turned."""
+        return float(self._state["angle"][0])
+
+    @property
+    def stretching_N(self) -> FloatArray:
+        """Tensions with which the cables are taken to be stretched, (3,), a view."""
+        return np.asarray(self._cables["tension"])
+
+    @property
+    def free_lengths_at_zero_m(self) -> FloatArray:
+        """Lengths of the cables without tension at the motors' zeros, (3,), a view."""
+        return np.asarray(self._cables["length_at_zero"])
 
     @property
     def inertia_kg_m2(self) -> float:

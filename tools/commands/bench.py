@@ -8,7 +8,7 @@ import typer
 
 from tools.bench import cycle as cycle_bench
 from tools.bench import profile_loading
-from tools.commands import bench_bus, bench_latency, bench_loop, bench_soak
+from tools.commands import bench_bus, bench_latency, bench_loop, bench_planar, bench_soak
 from tools.output import Output
 
 app = typer.Typer(help="Measure this project's own cost on this machine.", no_args_is_help=True)
@@ -26,6 +26,7 @@ def register(parent: typer.Typer) -> None:
     bench_bus.add(app)
     bench_latency.add(app)
     bench_loop.add(app)
+    bench_planar.add(app)
     bench_soak.add(app)
     parent.add_typer(app, name="bench")
 
