@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import can
-import pytest
-
-from tools.cli import main
 
 WINCH = "winch-mpp0923d"
 Result = subprocess.CompletedProcess[str]
@@ -26,21 +20,6 @@ PROBE = can.Message(arbitration_id=0x7FF, data=[1], is_extended_id=False)
 
 def command(*arguments: str | Path) -> list[str]:
     return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
-
-
-def cdpr(*arguments: str | Path, stdin: str = "") -> Result:
-    """Run a command in this process, which spares it the second that its libraries take to load."""
-    argv = ["cdpr", *map(str, arguments)]
-    out, errors = io.StringIO(), io.StringIO()
-    with (
-        mock.patch.multiple(sys, argv=argv, stdin=io.StringIO(stdin)),
-        redirect_stdout(out),
-        redirect_stderr(errors),
-        pytest.raises(SystemExit) as ended,
-    ):
-        main()
-    assert isinstance(ended.value.code, int)
-    return Result(argv, ended.value.code, out.getvalue(), errors.getvalue())
 
 
 def begin(*arguments: str | Path) -> Process:

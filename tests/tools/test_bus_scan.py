@@ -11,7 +11,8 @@ from typing import Any
 import can
 import canopen
 import pytest
-from bus_lab import WINCH, Lab, cdpr, last_json
+from bus_lab import WINCH, Lab, last_json
+from cdpr_here import cdpr_here
 
 from profiles import load_winch
 from tools.commands import bus_scan
@@ -55,7 +56,7 @@ def stranger(lab: Lab, node_id: int, **objects: int) -> Iterator[canopen.LocalNo
 
 
 def scan(lab: Lab, *arguments: str) -> dict[int, dict[str, Any]]:
-    result = cdpr("bus", "scan", "--bus", lab.bus, *arguments, "--json")
+    result = cdpr_here("bus", "scan", "--bus", lab.bus, *arguments, "--json")
     assert result.returncode == 0, result.stderr
     (bus,) = last_json(result.stdout)["buses"]
     return {node["node_id"]: node for node in bus["nodes"]} | {0: bus}
@@ -93,7 +94,7 @@ def test_scan_tells_who_is_there(lab: Lab) -> None:
 def test_a_name_that_is_an_escape_to_the_terminal(lab: Lab) -> None:
     with stranger(lab, 20, x1000=0x20192, x6502=0xFFFFFFFF, x6041=0xFFFF, x1001=0xFF) as node:
         node.set_data(0x1008, 0, b"\x1b[2JEvil\nnode\xff")
-        result = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "20")
+        result = cdpr_here("bus", "scan", "--bus", lab.bus, "--nodes", "20")
     assert result.returncode == 0, result.stderr
     assert "\x1b" not in result.stdout
     assert "?[2JEvil?node" in result.stdout.splitlines()[2]
@@ -116,7 +117,7 @@ def test_scan_disturbs_nobody(lab: Lab) -> None:
 
 @hastily
 def test_scan_for_people(lab: Lab) -> None:
-    result = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "2,9")
+    result = cdpr_here("bus", "scan", "--bus", lab.bus, "--nodes", "2,9")
     assert result.returncode == 0
     title, heads, row, identity, doing = result.stdout.splitlines()
     assert title == f"{lab.bus}: 1 node"
@@ -183,7 +184,7 @@ def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
         reading = can.Message(arbitration_id=0x601, data=bytes.fromhex("4018100100000000"))
         reading.is_extended_id = False
         task = bus.send_periodic(reading, 0.05)
-        refused = cdpr("bus", "scan", "--bus", lab.bus, "--nodes", "1")
+        refused = cdpr_here("bus", "scan", "--bus", lab.bus, "--nodes", "1")
         assert refused.returncode == 1
         assert "SDO requests to node 1" in refused.stderr
         assert "--force" in refused.stderr
@@ -197,7 +198,9 @@ def test_a_master_in_its_transfers_is_not_disturbed(lab: Lab) -> None:
 @hastily
 def test_scan_of_two_buses(labs: tuple[Lab, Lab]) -> None:
     lab, other = labs
-    result = cdpr("bus", "scan", "--bus", lab.bus, "--bus", other.bus, "--nodes", "2-9", "--json")
+    result = cdpr_here(
+        "bus", "scan", "--bus", lab.bus, "--bus", other.bus, "--nodes", "2-9", "--json"
+    )
     assert result.returncode == 0
     buses = last_json(result.stdout)["buses"]
     assert [(bus["bus"], len(bus["nodes"])) for bus in buses] == [(lab.bus, 1), (other.bus, 0)]

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import can
 import pytest
-from bus_lab import PROBE, WINCH, Lab, begin, cdpr, command, last_json
+from bus_lab import PROBE, WINCH, Lab, begin, command, last_json
+from cdpr_here import cdpr_here
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ class Session:
             wait_for_log(self.log, ear)
             ear.send(PROBE)
             jog = ("drive", "jog", WINCH, "--bus", lab.bus, "--speed-deg-s", "90")
-            assert cdpr(*jog, "--seconds", "0.5").returncode == 0
+            assert cdpr_here(*jog, "--seconds", "0.5").returncode == 0
             self.heard = lab.passed(ear)
             time.sleep(0.3)
             monitor.send_signal(signal.SIGINT)
@@ -115,7 +116,7 @@ def test_the_log_is_what_others_have_heard(session: Session) -> None:
 
 
 def test_replay_shows_the_same_lines(session: Session) -> None:
-    result = cdpr("bus", "replay", session.log, "--winch", WINCH)
+    result = cdpr_here("bus", "replay", session.log, "--winch", WINCH)
     assert result.returncode == 0, result.stderr
     assert result.stdout.splitlines() == session.lines
     logged = len(session.log.read_text().splitlines())
@@ -128,7 +129,7 @@ def test_replay_of_a_log_of_python_can(session: Session, tmp_path: Path) -> None
         with can.Logger(tmp_path / name) as logger:
             for message in can.CanutilsLogReader(session.log):
                 logger(message)
-        result = cdpr("bus", "replay", tmp_path / name, "--winch", WINCH)
+        result = cdpr_here("bus", "replay", tmp_path / name, "--winch", WINCH)
         assert result.returncode == 0, result.stderr
         told = result.stdout.splitlines()
         assert [line[15:] for line in told] == [line[15:] for line in session.lines], name
@@ -137,13 +138,13 @@ def test_replay_of_a_log_of_python_can(session: Session, tmp_path: Path) -> None
 
 
 def test_raw_lines_are_a_log_again(session: Session) -> None:
-    raw = cdpr("bus", "replay", session.log, "--raw", "--ids", "181,700-7FD").stdout
+    raw = cdpr_here("bus", "replay", session.log, "--raw", "--ids", "181,700-7FD").stdout
     frames = [
         line for line in session.log.read_text().splitlines() if re.search(" (181|7..)#", line)
     ]
     frames = [line for line in frames if not re.search(" 7F[EF]#", line)]
     assert raw.splitlines() == frames
-    again = cdpr("bus", "replay", "-", "--raw", stdin=raw)
+    again = cdpr_here("bus", "replay", "-", "--raw", stdin=raw)
     assert again.stdout == raw
 
 
@@ -167,7 +168,7 @@ def test_replay_sends_to_a_bus(lab: Lab, tmp_path: Path) -> None:
     log.write_text("\n".join([*lines, "(0.3) can0 20000004#0001000000000000"]) + "\n")
     with lab.join() as ear:
         begun = time.monotonic()
-        result = cdpr("bus", "replay", log, "--to", lab.bus, "--speed", "0.2", "--json")
+        result = cdpr_here("bus", "replay", log, "--to", lab.bus, "--speed", "0.2", "--json")
         assert result.returncode == 0, result.stderr
         assert time.monotonic() - begun > 0.9  # 0.18 s recorded, five times as slow
         sent = [(m.arbitration_id, bytes(m.data)) for m in lab.passed(ear)]
@@ -246,7 +247,7 @@ def test_a_bus_that_goes_away(labs: tuple[Lab, Lab], tmp_path: Path) -> None:
     assert errors.splitlines()[-1].startswith(f"cdpr: {lab.bus}: the bus has gone away")
     assert "7FF" in errors  # the summary is told all the same
     assert "bus load" not in errors  # but nobody can say any more what bus time it took
-    assert cdpr("bus", "replay", log).returncode == 0
+    assert cdpr_here("bus", "replay", log).returncode == 0
 
 
 def test_a_log_that_cannot_be_written_on(lab: Lab) -> None:
@@ -296,7 +297,7 @@ def test_a_reader_that_has_seen_enough(lab: Lab, session: Session) -> None:
 
 
 def complaint(*arguments: str | Path, status: int = 2, stdin: str = "") -> str:
-    result = cdpr("bus", *arguments, stdin=stdin)
+    result = cdpr_here("bus", *arguments, stdin=stdin)
     assert result.returncode == status, result.stderr
     assert "Traceback" not in result.stderr
     (line,) = [one for one in result.stderr.splitlines() if "cdpr: " in one]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
@@ -11,16 +10,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import can
 import pytest
+from cdpr_here import cdpr_here
 
 from profiles.catalogue import KINDS
-from tools.cli import main
 
 WINCH = "winch-mpp0923d"
 OWN = ("--bus", "simbus:")
@@ -30,21 +27,6 @@ Result = subprocess.CompletedProcess[str]
 def cdpr(*arguments: str | Path) -> Result:
     command = [sys.executable, "-m", "tools.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-
-
-def cdpr_here(*arguments: str | Path, stdin: str = "") -> Result:
-    """Run a command in this process, which spares it the second that its libraries take to load."""
-    argv = ["cdpr", *map(str, arguments)]
-    out, errors = io.StringIO(), io.StringIO()
-    with (
-        mock.patch.multiple(sys, argv=argv, stdin=io.StringIO(stdin)),
-        redirect_stdout(out),
-        redirect_stderr(errors),
-        pytest.raises(SystemExit) as ended,
-    ):
-        main()
-    assert isinstance(ended.value.code, int)
-    return Result(argv, ended.value.code, out.getvalue(), errors.getvalue())
 
 
 def done(*arguments: str | Path) -> dict[str, Any]:

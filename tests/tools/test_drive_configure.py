@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from cdpr_here import cdpr_here
 
 from tools.simulator import OwnSimulator
 
@@ -26,8 +25,7 @@ def bus() -> Iterator[str]:
 
 
 def _cdpr(*words: str) -> tuple[int, dict[str, Any], str]:
-    command = [sys.executable, "-m", "tools.cli", *words, "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = cdpr_here(*words, "--json")
     last = (done.stdout.strip().splitlines() or ["{}"])[-1]
     return done.returncode, json.loads(last), done.stderr
 

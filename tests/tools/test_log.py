@@ -1,18 +1,16 @@
 """`cdpr log` on recordings made up of rows that are known."""
 
-import io
 import json
 import shutil
 import sys
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
+from cdpr_here import cdpr_here
 from matplotlib.image import imread
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cdpr_rt" / "service"))
@@ -23,23 +21,13 @@ from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.shared_block import RowWriter
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording import Recorder
-from tools.cli import main
 from tools.report.style import thinned
 
 
 def _log(*arguments: str | Path) -> tuple[int, str, str]:
-    """Run `cdpr log` here; return its exit status and what it wrote."""
-    argv = ["cdpr", "log", *map(str, arguments)]
-    out, errors = io.StringIO(), io.StringIO()
-    with (
-        mock.patch.object(sys, "argv", argv),
-        redirect_stdout(out),
-        redirect_stderr(errors),
-        pytest.raises(SystemExit) as ended,
-    ):
-        main()
-    assert isinstance(ended.value.code, int)
-    return ended.value.code, out.getvalue(), errors.getvalue()
+    """Run `cdpr log`; return its exit status and what it wrote."""
+    ended = cdpr_here("log", *arguments)
+    return ended.returncode, ended.stdout, ended.stderr
 
 
 def _done(*arguments: str | Path) -> dict[str, Any]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from robot_rig import ROOT, Simulator, robot_file, unique
+from cdpr_here import cdpr_here
+from robot_rig import Simulator, robot_file, unique
 
 from drivers.bus import query_status
 from profiles import Robot, load_robot
@@ -81,14 +80,7 @@ def test_one_simulator_opens_all_buses_of_a_robot():
 
 
 def refused(*arguments: str) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "tools.cli", "sim", "up", *arguments],
-        capture_output=True,
-        check=False,
-        text=True,
-        timeout=60,
-        cwd=ROOT,
-    )
+    done = cdpr_here("sim", "up", *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert "Traceback" not in done.stderr
     return done.stderr

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import matplotlib.image
 import numpy as np
 import pytest
+from cdpr_here import cdpr_here
 
 from cdpr_rt.robots.planar_control import RESERVE
 from profiles import load_robot
@@ -25,15 +24,9 @@ from tools.robots.statics import statics_of
 PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
 
 
-def cdpr(
-    *arguments: str | Path, answers: str = "", cwd: Path | None = None
-) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tools.cli", *map(str, arguments)]
-    environment = os.environ | {"COLUMNS": "100", "PYTHONPATH": str(SHIPPED.parents[0])}
-    return subprocess.run(
-        command, input=answers, capture_output=True, text=True, timeout=120, cwd=cwd,
-        env=environment, check=False,
-    )  # fmt: skip
+@pytest.fixture(autouse=True)
+def _wide(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
 
 
 def as_json(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
@@ -47,7 +40,7 @@ def as_json(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
 
 def test_the_planar_robot_is_told_sketched_and_drawn(tmp_path: Path) -> None:
     picture = tmp_path / "planar.png"
-    shown = cdpr("robot", "show", "planar-3", "--png", picture, "--json")
+    shown = cdpr_here("robot", "show", "planar-3", "--png", picture, "--json")
     assert shown.returncode == 0, shown.stderr
     told = as_json(shown)
     assert told["ok"] is True and told["findings"] == []
@@ -71,7 +64,7 @@ def test_the_planar_robot_is_told_sketched_and_drawn(tmp_path: Path) -> None:
 def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) -> None:
     path = tmp_path / "heavy.toml"
     path.write_text(PLANAR.replace("mass_kg = 2.0", "mass_kg = 20.0"))
-    shown = cdpr("robot", "show", path, "--json")
+    shown = cdpr_here("robot", "show", path, "--json")
     assert shown.returncode == 2
     assert "impossible: platform.home_m: at (0.00, 1.30) m the cables would need" in shown.stderr
     assert re.search(r"a platform of up to 1\d\.\d kg is possible there", shown.stderr)
@@ -79,7 +72,7 @@ def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) 
     told = as_json(shown)
     assert told["ok"] is False and told["held_share"] == 0.0
     # and it is not run either
-    run = cdpr("run", path, "--bus", "simbus:", "--json")
+    run = cdpr_here("run", path, "--bus", "simbus:", "--json")
     assert run.returncode == 2
     assert f"{path}: platform.home_m: at (0.00, 1.30) m" in run.stderr
     assert "Traceback" not in run.stderr
@@ -94,7 +87,7 @@ def test_what_cannot_be_held_is_marked_and_ends_with_its_reason(tmp_path: Path) 
     ],
 )
 def test_what_cannot_be_shown_is_one_clear_line(arguments: list[str], problem: str) -> None:
-    shown = cdpr("robot", "show", *arguments)
+    shown = cdpr_here("robot", "show", *arguments)
     assert shown.returncode == 2
     (line,) = shown.stderr.strip().splitlines()
     assert line.startswith("cdpr: ") and problem in line
@@ -105,7 +98,7 @@ def test_what_cannot_be_shown_is_one_clear_line(arguments: list[str], problem: s
 
 def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    done = cdpr("robot", "new", path, "--yes", "--json")
+    done = cdpr_here("robot", "new", path, "--yes", "--json")
     assert done.returncode == 0, done.stderr
     assert as_json(done) == {"ok": True, "file": str(path)}
     robot = load_robot(path)
@@ -119,7 +112,7 @@ def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
     spare = RESERVE * (statics.high_N - statics.low_N).min()
     points = statics.box.grid(21, 21)
     assert statics.reserve_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
-    again = cdpr("robot", "new", path, "--yes")
+    again = cdpr_here("robot", "new", path, "--yes")
     assert again.returncode == 2 and "not there yet" in again.stderr
     assert load_robot(path) == robot
 
@@ -147,7 +140,7 @@ def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
     answers += ["", "", "here", "0.1, 0.1", "-1", "0.2", "", "", "", "1.5", "400", "4", "15"]
     answers += ["10", "140", "", "", "", "-5, 0", "0.3, 1.9", "9, 9", ""]
     path = tmp_path / "wall.toml"
-    done = cdpr("robot", "new", path, answers="\n".join(answers) + "\n")
+    done = cdpr_here("robot", "new", path, stdin="\n".join(answers) + "\n")
     assert done.returncode == 0, done.stderr
     for problem in (
         "did you mean 'winch-mpp0923d'?",
@@ -173,7 +166,7 @@ def test_answers_are_asked_again_until_they_can_be(tmp_path: Path) -> None:
 
 def test_questions_nobody_answers_write_nothing(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    done = cdpr("robot", "new", path, answers="Mine\n\n")
+    done = cdpr_here("robot", "new", path, stdin="Mine\n\n")
     assert done.returncode == 2
     assert "no answer to 'bus' (--yes takes the defaults); nothing was written" in done.stderr
     assert "Traceback" not in done.stderr and not path.exists()
@@ -203,13 +196,13 @@ def test_wrong_answers_beforehand_are_refused(
 def test_what_cannot_work_is_written_and_told(tmp_path: Path) -> None:
     path = tmp_path / "point.toml"
     line = ["exit_1_m=-1,2", "exit_2_m=0,2", "exit_3_m=1,2", "side_m=0", 'name=A "line" é']
-    done = cdpr("robot", "new", path, "--yes", *(p for text in line for p in ("--set", text)))
+    done = cdpr_here("robot", "new", path, "--yes", *(p for text in line for p in ("--set", text)))
     assert done.returncode == 2
     assert "\nimpossible: platform." in done.stdout and "cdpr run" not in done.stdout
     assert load_robot(path).name == 'A "line" é'
 
 
 def test_a_file_can_only_be_new_toml_in_a_folder(tmp_path: Path) -> None:
-    done = cdpr("robot", "new", tmp_path / "nowhere" / "mine.toml", "--yes")
+    done = cdpr_here("robot", "new", tmp_path / "nowhere" / "mine.toml", "--yes")
     assert done.returncode == 2
     assert "allowed: NAME.toml, not there yet, in a folder that is there" in done.stderr

@@ -1,12 +1,10 @@
 """The bus budget against frames stuffed bit by bit, against the simulated bus, and as a command."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from cdpr_here import cdpr_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -151,14 +149,7 @@ def test_a_machine_that_does_not_fit_is_refused_with_the_figure():
 
 
 def run(*arguments: str) -> tuple[int, dict[str, object], str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "tools.cli", "bus", "budget", *arguments, "--json"],
-        capture_output=True,
-        check=False,
-        text=True,
-        timeout=60,
-        cwd=Path(__file__).parents[3],
-    )
+    done = cdpr_here("bus", "budget", *arguments, "--json")
     return done.returncode, json.loads(done.stdout.splitlines()[-1]), done.stderr
 
 

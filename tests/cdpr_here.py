@@ -1,0 +1,35 @@
+"""Commands run in the test's own process, which has loaded their libraries already."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from pathlib import Path
+from unittest import mock
+
+import pytest
+
+from tools.cli import main
+
+
+def cdpr_here(
+    *arguments: str | Path, stdin: str = "", cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run one command line as its process would, sparing the second that its start takes.
+
+    Not for commands that run cycles: these change how the operating system treats their process.
+    """
+    argv = ["cdpr", *map(str, arguments)]
+    out, errors = io.StringIO(), io.StringIO()
+    with (
+        mock.patch.multiple(sys, argv=argv, stdin=io.StringIO(stdin)),
+        chdir(cwd or Path.cwd()),
+        redirect_stdout(out),
+        redirect_stderr(errors),
+        pytest.raises(SystemExit) as ended,
+    ):
+        main()
+    assert isinstance(ended.value.code, int)
+    return subprocess.CompletedProcess(argv, ended.value.code, out.getvalue(), errors.getvalue())
