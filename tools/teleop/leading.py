@@ -27,6 +27,7 @@ from tools.teleop.view import View
 
 _STATUS_S: Final = 0.1
 _ANSWER_S: Final = 10.0
+_UNHEARD_S: Final = 1.0
 _PICTURES_Hz: Final = 10.0
 _EVERYWHERE: Final = frozenset({"0.0.0.0", "::", ""})
 
@@ -76,6 +77,8 @@ def lead(wish: Wish, out: Output) -> None:
                 end = _shown(
                     session, View(session, description, status["reason"]), daemon, out, ended
                 )
+                if session.silent_s > _UNHEARD_S:  # the next answer may take as long
+                    out.note(f"{end.text}; it is asked to hold, and holds by itself")
                 with suppress(CommandError) if end.failed else nullcontext():  # it tells why itself
                     control.hold()
             finally:
