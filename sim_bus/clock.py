@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 HOLD_S = 0.5
-"""In lockstep, wall time without SYNC after which bus time runs with the wall again."""
+"""In lockstep, wall time without SYNC after which bus time usually runs with the wall again."""
 
 
 class ClockMode(Enum):
@@ -22,6 +22,8 @@ class BusClock:
 
     def __init__(self, mode: ClockMode, wall_s: float) -> None:
         self.mode = mode
+        self.hold_s = HOLD_S
+        """Wall time without SYNC that a held clock waits for."""
         self.held = False
         """Whether bus time stands still until the next SYNC."""
         self._lockstep = mode is ClockMode.LOCKSTEP
@@ -53,7 +55,7 @@ class BusClock:
         # while held, the wall time kept is that from which bus time would run again
         before = self._base_s if self.held and wall_s < self._base_wall_s else self.now(wall_s)
         self._base_s = self._last_s = before + period_s
-        self._base_wall_s = wall_s + HOLD_S
+        self._base_wall_s = wall_s + self.hold_s
         self.held = True
         return self._base_s
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from sim_bus.clock import ClockMode
+from sim_bus.clock import HOLD_S, ClockMode
 from sim_bus.control import status
 from sim_bus.hub import Hub
 from sim_bus.node_protocol import LocalNode
@@ -82,12 +82,14 @@ def serve_fleet(
     buses: Sequence[FleetBus],
     *,
     mode: ClockMode = ClockMode.LOCKSTEP,
+    hold_s: float = HOLD_S,
     until_stdin_ends: bool = False,
 ) -> None:
     """Run the nodes of all `buses` until SIGTERM or SIGINT, then close them.
 
     When all is up, one line of JSON goes to standard output: {"ready": {"robot", "pid", "buses":
-    {name: {"bus", and the bus status}}}}. With `until_stdin_ends` the end of standard input stops
+    {name: {"bus", and the bus status}}}}. In lockstep bus time stands for `hold_s` of wall time
+    without SYNC at the most. With `until_stdin_ends` the end of standard input stops
     it too. Raises BusSetupError for a bus that cannot be opened, SimulatorError for a real
     interface that went away.
     """
@@ -96,6 +98,8 @@ def serve_fleet(
             bus.name: open_hub(stack, bus.nodes, bus.url, mode=mode, bitrate=bus.bitrate_bit_s)
             for bus in buses
         }
+        for hub in hubs.values():
+            hub.clock.hold_s = hold_s
         fleet = Fleet(list(hubs.values()))
         stack.callback(fleet.close)
         told = {bus.name: {"bus": bus.url, **status(hubs[bus.name])} for bus in buses}

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from sim_bus.bus_load import BusLoad
 from sim_bus.client import PACKET_BYTES, Client, listening_socket
-from sim_bus.clock import HOLD_S, BusClock, ClockMode
+from sim_bus.clock import BusClock, ClockMode
 from sim_bus.contention import Contention
 from sim_bus.control import handle
 from sim_bus.errors import SimulatorError
@@ -169,7 +169,7 @@ class Hub:
         if self._leftover or self._waiting:
             return 0.0
         if self._just_synced:
-            return HOLD_S
+            return self.clock.hold_s
         event_s = min((node.next_event() for node in self.nodes), default=math.inf)
         wait_s = self.clock.wall_wait(time.monotonic(), event_s)
         return None if wait_s == math.inf else wait_s

@@ -16,15 +16,13 @@ from axis_rig import Rig, open_network, open_rig
 
 from drivers.network import CanNetwork
 
-_SIMULATOR = "from sim_bus import clock; clock.HOLD_S = 0.1; from tools.cli import main; main()"
-
 
 @pytest.fixture(scope="module")
 def simulated_bus() -> Iterator[str]:
     """A bus with the drives 1 and 2, whose time stands for a short while only after a SYNC."""
     bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
-    command = [sys.executable, "-c", _SIMULATOR, "sim", "up", "winch-mpp0923d", "--bus", bus]
-    command += ["--nodes", "2", "--exit-with-stdin"]
+    command = [sys.executable, "-m", "tools.cli", "sim", "up", "winch-mpp0923d", "--bus", bus]
+    command += ["--nodes", "2", "--exit-with-stdin", "--hold", "0.1"]
     simulator = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert simulator.stdout is not None
     assert b"ready" in simulator.stdout.readline()

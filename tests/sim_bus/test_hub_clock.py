@@ -185,3 +185,11 @@ def test_paced_timers_keep_wall_time(start_bus: Callable[..., object], stub_node
     for _ in range(40):
         assert member.recv_id() == 0x703
     assert time.monotonic() - started == pytest.approx(0.15, abs=0.08)
+
+
+def test_a_held_clock_waits_as_long_as_it_is_told():
+    clock = BusClock(ClockMode.LOCKSTEP, 0.0)
+    clock.hold_s = 3.0
+    held = clock.sync(10.0, 0.001)
+    assert clock.now(12.9) == pytest.approx(held)
+    assert clock.now(13.5) == pytest.approx(held + 0.5)

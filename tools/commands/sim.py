@@ -16,7 +16,7 @@ from drivers.errors import BusError
 from profiles import Robot, Winch, load_machine
 from sim_bus.canopen.lss import UNCONFIGURED
 from sim_bus.canopen.store import StoreError
-from sim_bus.clock import ClockMode
+from sim_bus.clock import HOLD_S, ClockMode
 from sim_bus.drive import SimDrive
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
@@ -65,6 +65,16 @@ def up(
             "--lockstep/--paced", help="Bus time moves with each SYNC, or with the clock."
         ),
     ] = True,
+    hold_s: Annotated[
+        float,
+        typer.Option(
+            "--hold",
+            metavar="SECONDS",
+            min=0.01,
+            max=3600.0,
+            help="In lockstep: without SYNC for so long bus time goes on by the clock.",
+        ),
+    ] = HOLD_S,
     nodes: Annotated[
         int, typer.Option(min=1, max=16, help="So many drives, node ids counted up.")
     ] = 1,
@@ -107,7 +117,12 @@ def up(
         if nodes > 1 or unconfigured or slcan or socketcand is not None:
             raise BadInputError("--nodes, --unconfigured, --slcan, --socketcand: for a winch only")
         stores = partial(_store_file, store)
-        sim_robot.up(profile, bus, plant, mode, stores, board, exit_with_stdin, truth_log, detached)
+        sim_robot.up(
+            *(profile, bus, plant, mode, stores, board, exit_with_stdin),
+            truth_log=truth_log,
+            detached=detached,
+            hold_s=hold_s,
+        )
         return
     if detached:
         raise BadInputError("--detached: for a robot; a winch's plant file says what it pulls")
@@ -128,6 +143,7 @@ def up(
             bitrate=profile.bitrate_bit_s,
             truth_log=str(truth_log) if truth_log else None,
             until_stdin_ends=exit_with_stdin,
+            hold_s=hold_s,
             slcan=slcan,
             socketcand_port=socketcand,
         )

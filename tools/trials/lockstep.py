@@ -43,6 +43,8 @@ from tools.trials.stream import StreamInBusTime
 RING_S: Final = 30.0
 _PATIENCE_S: Final = 60.0
 """Time by the clock in which no cycle runs at all, as while drives boot."""
+_HELD_UP_S: Final = 5.0
+"""For so long a busy machine may hold up the loop without drives that miss their master."""
 _LOOK_CYCLES: Final = 512
 _WATCH_S: Final = 0.4
 _names = count()
@@ -115,7 +117,9 @@ class LockstepRobot:
         if self._truth_path is None and robot.platform is not None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-"))
             self._truth_path = Path(folder) / "truth.log"
-        simulator = OwnSimulator(self._reference, bus, self._plant, self._truth_path)
+        simulator = OwnSimulator(
+            self._reference, bus, self._plant, self._truth_path, hold_s=_HELD_UP_S
+        )
         stack.callback(simulator.stop)
         self.simulator = simulator
         self.block = block = SharedBlock.create(n, RING_S, 1.0 / self.period_s)
