@@ -64,7 +64,7 @@ def platform_text(status: dict[str, Any]) -> str:
             words.append(f"{word} {', '.join(f'{1e3 * x:.1f}' for x in progress[key])} mm")
     if progress.get("stage"):
         words.append(str(progress["stage"]))
-    words += [progress[key] for key in ("missing", "refused", "trouble") if progress.get(key)]
+    words += [progress[key] for key in ("missing", "held_back", "trouble") if progress.get(key)]
     return "; ".join(words)
 
 

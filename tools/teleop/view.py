@@ -110,7 +110,7 @@ class View:
             named = zip(self._axes, tensions, strict=False)
             told = [f"{name} {'-' if t is None else f'{t:.0f}'}" for name, t in named]
             lines.append(Text(f"tensions in N: {', '.join(told)}"))
-        refused = self._status.get("program_progress", {}).get("refused")
+        refused = self._status.get("program_progress", {}).get("held_back")
         for text in (hand.trouble, refused, self._status.get("reason")):
             if text and text != self._reason:
                 lines.append(Text(str(text), style="yellow"))

@@ -83,6 +83,7 @@ class PoseProgram(PlatformProgram):
         self._held = _FREE
         self._clutched = False
         self._aim: FloatArray | None = None
+        self._aiming = False
         self._inside = False
         self._before = np.zeros((3, 2))
 
@@ -90,7 +91,7 @@ class PoseProgram(PlatformProgram):
         """Go on from the present set-point and torque; brakes until a position is wanted."""
         super().start(feedback, setpoint, torque_Nm)
         self._acceleration[:] = self._parts.acceleration_m_s2
-        self._following = False
+        self._following = self._aiming = False
         self._held = _FREE
 
     def stop(self) -> None:
@@ -110,13 +111,13 @@ class PoseProgram(PlatformProgram):
 
     def progress(self) -> dict[str, Any]:
         """Return where the platform is, where it goes, and what the stream is worth."""
-        told = {**super().progress(), "refused": self._refused()}
+        told = {**super().progress(), "held_back": self._held_back()}
         told["left_m"] = None if self._aim is None else self._aim.tolist()
         if self._following:
             told |= {"stream": self.stream.state.name.lower(), **self.stream.counts()}
         return told
 
-    def _refused(self) -> str:
+    def _held_back(self) -> str:
         """Return why the target does not follow the hand, an empty text where it does."""
         if not self._following:
             return ""
@@ -127,24 +128,22 @@ class PoseProgram(PlatformProgram):
 
     # -- what is wanted
 
-    def _parsed(self, wanted: Mapping[str, Any]) -> tuple[FloatArray | None, float]:
+    def _parsed(self, wanted: Mapping[str, Any]) -> tuple[str, FloatArray | None, float]:
         keys = Wanted(self.name, wanted, ("position_m", "stream", "resume", "speed_m_s"))
         most = float(self._parts.speed_m_s[0])
         speed = keys.number("speed_m_s", _SLOWEST_m_s, most, most)
         if not self._parts.tight:
             raise ProgramError("pose: the cables are not tight; run tighten first")
         if not wanted:
-            return self._resting_place().copy(), speed
+            return "stay", None, speed
         what = keys.one_of("position_m", "stream", "resume")
         if what == "position_m":
-            return self._position(keys), speed
+            return what, self._position(keys), speed
         if wanted[what] is not True:
             raise ProgramError(f"pose: {what}: value {wanted[what]!r}; allowed: true")
-        if what == "stream":
-            return None, speed
-        if self._aim is None:
+        if what == "resume" and self._aim is None:
             raise ProgramError("pose: resume: no target has been left; allowed: position_m")
-        return self._aim, speed
+        return what, self._aim, speed
 
     def _position(self, keys: Wanted) -> FloatArray:
         position = keys.axes("position_m", np.full(2, _ANYWHERE_m))
@@ -164,16 +163,18 @@ class PoseProgram(PlatformProgram):
             )
         return position
 
-    def _take(self, parsed: tuple[FloatArray | None, float]) -> None:
-        position, speed = parsed
+    def _take(self, parsed: tuple[str, FloatArray | None, float]) -> None:
+        what, position, speed = parsed
         self._speed[:] = speed
         self._acceleration[:] = self._parts.acceleration_m_s2
-        self._following = position is None
-        if position is None:
+        self._following = what == "stream"
+        self._aiming = what in ("position_m", "resume")
+        if self._following:
             self.stream.reset()
             self._aim = None
-            self._target[:] = self._resting_place()
             self._awake = 0.0
+        if not self._aiming or position is None:
+            self._target[:] = self._resting_place()
             return
         self._target[:] = position
         self._aim = np.array(position)
@@ -196,7 +197,7 @@ class PoseProgram(PlatformProgram):
             self._follow()
             return False
         at_rest = self._advance(self._target)
-        if at_rest:
+        if at_rest and self._aiming:
             self._aim = None
         return at_rest
 

@@ -58,7 +58,7 @@ def test_the_robot_stands_where_it_is_told_and_its_target_too() -> None:
     turn = math.radians(1.5)
     pose = (0.5, 0.5, 0.0, math.cos(turn), 0.0, 0.0, math.sin(turn))
     axes = [{"tension_N": 40.4}, {"tension_N": None}, {"tension_N": 20.0}]
-    progress = {"target_m": [-0.5, 0.5], "refused": "left: 12 N are missing", "stream": "fresh"}
+    progress = {"target_m": [-0.5, 0.5], "held_back": "left: 12 N are missing", "stream": "fresh"}
     lines = seen(pose, {"axes": axes, "program_progress": progress, "reason": "a reason"})
     text = "\n".join(lines)
     picture = lines[:22]
