@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.approach import approach, change_pace
+from cdpr_rt.approach import approach, attend, change_pace, place_to_rest
 
 PERIOD_S = 1e-3
 pairs = st.lists(st.floats(-20, 20), min_size=2, max_size=2).map(np.array)
@@ -102,3 +102,44 @@ def test_a_pace_is_reached_within_the_acceleration(
     assert not change_pace(np.ones(2), np.full(2, 1e6), PERIOD_S, *state)
     assert not change_pace(np.zeros(2), np.full(2, 1e6), PERIOD_S, *state)
     assert change_pace(np.zeros(2), np.full(2, 1e6), PERIOD_S, *state)
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(pairs, pairs, st.floats(0.0, 1.0))
+def test_a_goal_lies_on_the_way_to_its_target(
+    target: np.ndarray, position: np.ndarray, awake: float
+) -> None:
+    goal = np.zeros(2)
+    share = attend(target, position, awake, 1e-4, goal)
+    assert 0.0 <= share <= 1.0
+    np.testing.assert_allclose(goal, position + share * (target - position), atol=1e-12)
+    if np.linalg.norm(target - position) > 2e-4:
+        assert share > 0.999
+
+
+def test_what_sleeps_takes_more_to_wake_than_what_is_awake_to_fall_asleep() -> None:
+    goal = np.zeros(1)
+    shares = {
+        (awake, size): attend(np.array([size]), np.zeros(1), awake, 1e-4, goal)
+        for awake in (0.0, 1.0)
+        for size in (5e-6, 3e-5, 2e-4)
+    }
+    assert shares[0.0, 5e-6] < 0.01
+    assert shares[0.0, 3e-5] < 0.01, "asleep it stays"
+    assert shares[1.0, 3e-5] > 0.99, "awake it goes on"
+    assert shares[1.0, 5e-6] < 0.1
+    assert shares[0.0, 2e-4] > 0.99
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(pairs, bounds, bounds)
+def test_what_is_braked_stops_at_the_place_to_rest(
+    pace: np.ndarray, speed: np.ndarray, acceleration: np.ndarray
+) -> None:
+    velocity = np.clip(pace, -speed, speed)
+    position, slope, rest, still = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
+    place_to_rest(position, velocity, acceleration, rest)
+    most = np.abs(velocity).max() * PERIOD_S
+    while not change_pace(still, acceleration, PERIOD_S, position, velocity, slope):
+        pass
+    np.testing.assert_allclose(position, rest, atol=most + 1e-12)

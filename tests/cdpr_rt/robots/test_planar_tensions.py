@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from cdpr_rt.robots.planar_kinematics import GeometryError, PlanarGeometry
-from cdpr_rt.robots.planar_tensions import PlanarTensions
+from cdpr_rt.robots.planar_tensions import PlanarTensions, carry
 
 ROBOT = PlanarGeometry(
     np.array([[-2.0, 3.0], [2.0, 3.0], [0.0, 0.0]]),
@@ -90,3 +90,61 @@ def test_cables_that_cannot_hold_say_so() -> None:
 def test_bounds_that_bound_nothing_are_refused(low: tuple[int, ...], high: tuple[int, ...]) -> None:
     with pytest.raises(GeometryError, match="tension bounds"):
         PlanarTensions(np.array(low), np.array(high))
+
+
+def carried_by(
+    p: np.ndarray, wrench: np.ndarray, force: np.ndarray, lift: float, pace: float = 0.02
+) -> tuple[np.ndarray, np.ndarray, tuple[int, float, float, float]]:
+    """Return tensions, those that carry the wrench alone, and what `carry` tells of them."""
+    t, alone, u, room = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((4, 3))
+    low, high = LOW + RESERVE_N, HIGH - RESERVE_N
+    told = carry(
+        ROBOT.jacobian(p), wrench, force, low, high, RESERVE_N, pace, lift, t, alone, u, room
+    )
+    return t, alone, told
+
+
+RESERVE_N = 10.0
+forces = st.lists(st.floats(-60, 60), min_size=2, max_size=2).map(np.array)
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(anywhere, wrenches, forces, st.floats(0.0, 30.0))
+def test_a_loop_s_force_is_exerted_as_far_as_the_reserve_goes(
+    p: np.ndarray, wrench: np.ndarray, force: np.ndarray, lift: float
+) -> None:
+    J = ROBOT.jacobian(p)
+    asked = force.copy()
+    t, alone, (outcome, outside, share, lifted) = carried_by(p, wrench, force, lift)
+    assert (force == asked).all()
+    low, high = LOW + RESERVE_N, HIGH - RESERVE_N
+    feasible = PlanarTensions(low, high).distribute(J, wrench)[1] == ""
+    assert (outcome == 0) == feasible
+    # whatever is asked for, nothing leaves the true bounds
+    assert (t >= LOW - 1e-6).all()
+    assert (t <= HIGH + 1e-6).all()
+    if not feasible:
+        assert outside > 0.0
+        return
+    assert -J.T @ alone == pytest.approx(-wrench, abs=1e-6)
+    assert (alone >= low - 1e-6).all()
+    assert (alone <= high + 1e-6).all()
+    assert 0.0 <= share <= 1.0
+    assert -J.T @ t == pytest.approx(share * asked - wrench, abs=1e-6)
+    assert lifted >= 0.0
+
+
+def test_tensions_rise_slowly_where_a_force_needs_them() -> None:
+    p, weight = np.array([0.0, 1.5]), np.array([0.0, -20.0])
+    up = np.array([0.0, 40.0])
+    lift, shares, least = 0.0, [], []
+    for _ in range(400):
+        t, _, (_, _, share, lift) = carried_by(p, weight, up, lift)
+        shares.append(share)
+        least.append(t.min())
+    assert shares[0] < 0.9, "there is not so much room at once"
+    assert shares[-1] == pytest.approx(1.0)
+    assert np.abs(np.diff(least)).max() < 1.0
+    for _ in range(400):
+        lift = carried_by(p, weight, np.zeros(2), lift)[2][3]
+    assert lift < 0.1, "least tension is least friction"
