@@ -15,6 +15,8 @@ from tools.trials.recorded import Recorded
 from tools.trials.run import TrialRun, platform_of
 
 OVERSHOOT_mm: Final = 2.0
+SMOOTHED_S: Final = 0.06
+"""Over which a controller may average its set-point."""
 _FINISHED_SHARE: Final = 0.7
 _REST_S: Final = (0.0, 1.0)
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
@@ -67,17 +69,20 @@ class Leg:
 def legs(recorded: Recorded, acceleration_m_s2: float) -> list[Leg]:
     """Return all legs of a trial.
 
-    Where a target was changed half-way the platform still moves: `stop_m` is the nearest place
-    where its set-point can stop, in each direction, which may lie beyond the new target.
+    Where a target was changed half-way the set-point still moves: `stop_m` is where it turns, in
+    each direction, which may lie beyond the new target; but no farther than where the acceleration
+    stops a set-point that smoothing lets run on for a moment.
     """
     marks = recorded.marked("leg")
     first = [recorded.row(mark["cycle"]) for mark in marks]
     last = [*first[1:], len(recorded.truth)]
     found = []
     for mark, begin, end in zip(marks, first, last, strict=True):
-        setpoint = recorded.setpoint_m[max(begin - 1, 0) : begin + 1]
-        speed = (setpoint[-1] - setpoint[0]) / recorded.period_s
-        stop = setpoint[-1] + speed * np.abs(speed) / (2.0 * acceleration_m_s2)
+        setpoint = recorded.setpoint_m[max(begin - 1, 0) : end]
+        now, speed = setpoint[1], (setpoint[1] - setpoint[0]) / recorded.period_s
+        runs_on = np.abs(speed) * (SMOOTHED_S + np.abs(speed) / (2.0 * acceleration_m_s2))
+        turn = np.where(speed > 0.0, setpoint.max(axis=0), setpoint.min(axis=0))
+        stop = now + np.clip(turn - now, -runs_on, runs_on)
         target = np.array(mark["target_m"])
         found.append(Leg(slice(begin, end), recorded.true_m[begin], target, stop))
     return found
