@@ -130,8 +130,8 @@ def measured(sessions: Iterable[Path], jobs: int) -> Points:
         return np.concatenate(pool.map(points_of_session, list(sessions)))
 
 
-def without_robot(asked: Asked) -> Points:
-    """Return what the same operator reaches with a perfect robot."""
+def without_robot(asked: Asked, sessions: Iterable[str]) -> Points:
+    """Return what the same operator reaches with a perfect robot in sessions of these names."""
     robot = load_robot(asked.robot)
     platform = platform_of(robot)
     return np.concatenate(
@@ -144,15 +144,15 @@ def without_robot(asked: Asked) -> Points:
                 asked.station,
                 asked.seed,
             )
-            for conditions in asked.sessions().values()
-            for condition in conditions
+            for name in sessions
+            for condition in asked.sessions()[name]
         ]
     )
 
 
 def operator_alone(asked: Asked) -> dict[str, Any]:
     """Return the tables of the same operator with a perfect robot, with `lines` for people."""
-    points = without_robot(asked)
+    points = without_robot(asked, asked.sessions())
     table = rows(points)
     result: dict[str, Any] = {
         **asked.as_dict(),
@@ -181,7 +181,8 @@ def judge(folder: Path, jobs: int) -> dict[str, Any]:
     sessions = finished(asked, folder)
     if not sessions:
         raise BadInputError(f"{folder}: no session has ended")
-    points, alone = measured(sessions, jobs), without_robot(asked)
+    points = measured(sessions, jobs)
+    alone = without_robot(asked, [session.name for session in sessions])
     table = rows(points)
     compared = [row["reached"] for row in table if "reached" in row]
     result: dict[str, Any] = {

@@ -72,7 +72,7 @@ def _parts(rows: list[dict[str, Any]], alone: list[dict[str, Any]]) -> Iterator[
         f"{'':29}{'judged':>13}{'hand':>16}{'robot':>16}{'total':>16}{'perfect robot':>20}"
         f"{'off set-point':>16}"
     )
-    for row, ideal in zip(rows, alone, strict=False):
+    for row, ideal in zip(rows, alone, strict=True):
         parts = row["parts_three_sigma_mm"]
         yield (
             _head(row)
