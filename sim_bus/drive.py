@@ -135,7 +135,7 @@ class SimDrive(SlaveApplication):
         serial: int | None = None,
         robot: RobotMember | None = None,
     ) -> Self:
-        """Build the drive that a winch's profile describes."""
+        """Build the drive that a winch's profile describes, with what `plant` left out."""
         motor = winch.motor
         ratings = MotorRatings(
             rated_torque_Nm=motor.rated_torque_Nm,
@@ -148,7 +148,7 @@ class SimDrive(SlaveApplication):
         return cls(
             winch.drive.eds,
             winch.node_id,
-            plant,
+            plant.of(winch),
             ratings,
             truth_log=truth_log,
             store=store,

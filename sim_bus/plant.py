@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from profiles.reader import Profile, read_toml_model
+from profiles.winch import Winch
 
 MAX_COGGING_TERMS = 32
+_RATED_Nm, _PEAK_Arms = 3.00, 22.8
+"""Of the MPP0923D, whose figures the defaults are."""
+_Section = TypeVar("_Section", bound=Profile)
 
 
 class MotorPlant(Profile):
@@ -170,6 +174,12 @@ class LimitsPlant(Profile):
         return self
 
 
+def _filled(section: _Section, values: dict[str, float]) -> _Section:
+    """Return a section with those values of its keys that it was not given."""
+    left_out = {k: v for k, v in values.items() if k not in section.model_fields_set}
+    return section.model_copy(update=left_out)
+
+
 class Plant(Profile):
     """All sections of a plant file; every key has a default."""
 
@@ -192,6 +202,43 @@ class Plant(Profile):
         Raises profiles.errors.ProfileError naming file, key, value and what is allowed.
         """
         return read_toml_model(Path(path), cls)
+
+    def of(self, winch: Winch) -> Plant:
+        """Return this plant with what was left out as a winch's motor and encoder have it.
+
+        Inertia, counts and the current that trips are the profile's; cogging and friction grow
+        with the rated torque. What was said, and what this has filled in once, stays.
+        """
+        motor = winch.motor
+        size = motor.rated_torque_Nm / _RATED_Nm
+        current = motor.peak_current_Arms / _PEAK_Arms
+        rubbing = ("coulomb_Nm", "breakaway_Nm", "viscous_Nms_rad", "sigma0_Nm_rad")
+        friction = _filled(
+            self.friction,
+            {k: size * getattr(self.friction, k) for k in (*rubbing, "sigma1_Nms_rad")},
+        )
+        if friction.breakaway_Nm < friction.coulomb_Nm:  # one of them was said
+            friction = friction.model_copy(update={"coulomb_Nm": friction.breakaway_Nm})
+        filled: dict[str, object] = {
+            "motor": _filled(
+                self.motor,
+                {
+                    "inertia_kg_m2": motor.rotor_inertia_kg_m2,
+                    "brake_torque_Nm": size * self.motor.brake_torque_Nm,
+                },
+            ),
+            "friction": friction,
+            "encoder": _filled(self.encoder, {"counts_per_turn": winch.encoder_counts_per_turn}),
+            "drive": _filled(
+                self.drive, {"overcurrent_Arms": current * self.drive.overcurrent_Arms}
+            ),
+        }
+        if "cogging" not in self.model_fields_set:
+            filled["cogging"] = tuple(
+                term.model_copy(update={"amplitude_Nm": size * term.amplitude_Nm})
+                for term in self.cogging
+            )
+        return self.model_copy(update=filled)
 
     @property
     def inertia_kg_m2(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from profiles.reader import Profile, read_toml_model
+from profiles.winch import Winch
 from sim_bus.plant import CoggingTerm, LoadPlant, Plant
 
 Vector = tuple[float, ...]
@@ -150,15 +152,18 @@ class RobotPlant(Profile):
                 where = f"motors[{i}].load" if self.motors else "motor.load"
                 raise ValueError(f"{where}: allowed: inertia_kg_m2; the platform is the load")
 
-    def motor_plants(self, n: int) -> list[Plant]:
-        """Return the plant of each of n motors."""
+    def motor_plants(self, n: int, winches: Sequence[Winch] = ()) -> list[Plant]:
+        """Return the plant of each of n motors; `winches`, where given, are theirs."""
+        plants = list(self.motors) or [self.motor] * n
+        if winches:
+            plants = [plant.of(winch) for plant, winch in zip(plants, winches, strict=True)]
         if self.motors:
-            return list(self.motors)
+            return plants
         chance = np.random.default_rng(self.seed)
-        return [self._one_of_them(i, chance) for i in range(n)]
+        return [self._one_of_them(i, base, chance) for i, base in enumerate(plants)]
 
-    def _one_of_them(self, i: int, chance: np.random.Generator) -> Plant:
-        base, by = self.motor, self.variation
+    def _one_of_them(self, i: int, base: Plant, chance: np.random.Generator) -> Plant:
+        by = self.variation
 
         def about(share: float) -> float:
             return 1.0 + share * chance.uniform(-1.0, 1.0)

@@ -94,7 +94,7 @@ def _physics(
     whole = RobotPlant() if plant is None else RobotPlant.load_file(plant)
     try:
         whole.require_fit(n, len(platform.home_m))
-        motors = whole.motor_plants(n)
+        motors = whole.motor_plants(n, [axis.winch for axis in robot.axes])
         if detached:
             return None, motors
         return CableRobot(_shape(robot, platform), whole, _transmissions(robot)), motors

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from profiles import load_winch
 from profiles.errors import ProfileError
+from sim_bus.plant import Plant
 from sim_bus.robot_plant import RobotPlant
 
 
@@ -64,3 +67,24 @@ def test_the_page_shows_the_defaults_and_a_plant_that_works(tmp_path: Path) -> N
     worse.require_fit(3, 2)
     assert worse.geometry.anchor_errors_m[2] == (0.001, 0.001)
     assert [term.order for term in worse.motor_plants(3)[0].cogging] == [4, 24]
+
+
+def test_what_is_left_out_follows_the_winch() -> None:
+    winch = load_winch("winch-mpp0923d")
+    assert RobotPlant().motor_plants(3, [winch] * 3) == RobotPlant().motor_plants(3)
+    assert Plant().of(winch) == Plant()
+    motor = winch.motor.model_copy(
+        update={"rated_torque_Nm": 0.6, "rotor_inertia_kg_m2": 2e-5, "peak_current_Arms": 11.4}
+    )
+    small = replace(winch, motor=motor, encoder_counts_per_turn=10_000)
+    said = Plant.model_validate({"friction": {"coulomb_Nm": 0.05}})
+    of_it = said.of(small)
+    assert of_it.inertia_kg_m2 == 2e-5 and of_it.encoder.counts_per_turn == 10_000
+    assert of_it.cogging[0].amplitude_Nm == pytest.approx(0.2 * 0.06)
+    assert of_it.friction.coulomb_Nm == 0.05 and of_it.friction.breakaway_Nm == 0.0625
+    assert of_it.friction.sigma0_Nm_rad == pytest.approx(4.0)
+    assert of_it.drive.overcurrent_Arms == pytest.approx(15.0)
+    assert of_it.of(small) == of_it
+    one, other, _ = RobotPlant().motor_plants(3, [small, winch, winch])
+    assert one.friction.coulomb_Nm < 0.3 * other.friction.coulomb_Nm
+    assert one.of(small) == one
