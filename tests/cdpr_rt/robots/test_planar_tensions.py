@@ -29,7 +29,9 @@ def stranger(J: np.ndarray, wrench: np.ndarray) -> tuple[float, float]:
         np.hstack([W, np.zeros((2, 1))]), -wrench, [(None, None)] * 4,
     )  # fmt: skip
     inside = linprog([1, 1, 1], None, None, W, -wrench, list(zip(LOW, HIGH, strict=True)))
-    return float(least.x[3]), float(inside.fun) if inside.success else np.inf
+    assert least.x is not None
+    total = inside.fun if inside.success else None
+    return float(least.x[3]), np.inf if total is None else float(total)
 
 
 @settings(derandomize=True, deadline=None, max_examples=300)
