@@ -118,7 +118,7 @@ TEXTS: Final[dict[Limit, tuple[str, float, str]]] = {
     Limit.MISSED_IN_WINDOW: ("{:.0f} answers missed in a window, {:.0f} allowed", 1.0, ""),
     Limit.LATE: ("the loop was held up for {:.0f} ms, {:.0f} ms allowed", 1e3, "s"),
     Limit.LENGTHS: (
-        "the cables' lengths disagree by {:.1f} mm, {:.1f} mm allowed: a cable or an encoder failed",
+        "the cables' lengths disagree by {:.1f} mm, {:.1f} mm allowed: cable or encoder failed",
         1e3,
         "m",
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -32,8 +33,11 @@ class PlatformParts:
         period_s: float,
         most_N: FloatArray,
         compensation: Compensation | None = None,
+        lengths_disagree_m: float = math.inf,
     ) -> None:
         self.platform = platform
+        self.lengths_allowed_m = min(platform.home_tolerance_m, lengths_disagree_m)
+        """By how much its cables' lengths may contradict each other."""
         self.most_N = most_N
         """What each cable may be pulled with."""
         self.geometry = PlanarGeometry(
@@ -66,11 +70,6 @@ class PlatformParts:
     def known(self) -> bool:
         """Whether it is known where the platform is."""
         return bool(self.estimator.estimate.length_known.all())
-
-    @property
-    def home_tolerance_m(self) -> float:
-        """How far from where it is taken to be the platform may stand."""
-        return self.platform.home_tolerance_m
 
     def wants_index(self, feedback: AxisFeedback) -> bool:
         """Whether a motor's cogging is known, but not yet its index."""

@@ -51,7 +51,9 @@ def platform_parts(
     control = PlanarControl(
         platform, list(robot.axes), low, high, model.torque_Nm, model.period_s, known
     )
-    return PlatformParts(platform, control, estimator, model.period_s, high, known)
+    return PlatformParts(
+        platform, control, estimator, model.period_s, high, known, limits.lengths_disagree_m
+    )
 
 
 def build_programs(

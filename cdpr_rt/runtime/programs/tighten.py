@@ -171,7 +171,7 @@ class TightenProgram(PlatformProgram):
         self._last = last if self._source == "last" else None
         self._control.take_lengths(self._lengths(feedback), feedback)
         self._control.begin(feedback)
-        allowed_m = self._parts.home_tolerance_m
+        allowed_m = self._parts.lengths_allowed_m
         if self._control.residual_m > allowed_m:
             self._give_up_if(
                 f"the cables' lengths disagree by {1e3 * self._control.residual_m:.0f} mm, "
@@ -283,7 +283,7 @@ class TightenProgram(PlatformProgram):
         length_m = self._parts.estimator.estimate.cable_length_m
         off = np.abs(off_index_m(last, length_m, self._feedback, self._cable))
         off[np.isnan(off)] = 0.0
-        worst, allowed_m = int(off.argmax()), self._parts.home_tolerance_m
+        worst, allowed_m = int(off.argmax()), self._parts.lengths_allowed_m
         if off[worst] <= allowed_m:
             return ""
         return (
