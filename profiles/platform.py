@@ -4,11 +4,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from profiles.reader import Profile
 
-_Coordinate = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+_FURTHEST_m = 1000.0
+
+
+def _in_metres(value: float) -> float:
+    if abs(value) > _FURTHEST_m:
+        raise ValueError(
+            f"value {value:g}; allowed: -{_FURTHEST_m:g} to {_FURTHEST_m:g}, in metres"
+        )
+    return value
+
+
+_Coordinate = Annotated[float, AfterValidator(_in_metres)]
 Point = Annotated[tuple[_Coordinate, ...], Field(min_length=2, max_length=3)]
 _FEWEST = {2: 3, 3: 6}
 
@@ -93,6 +104,7 @@ def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
         if not low < high:
             yield f"platform.workspace_max_m[{i}]", f"value {high:g}; allowed: above {low:g}"
         elif i == size - 1 and home > high:
-            yield f"platform.home_m[{i}]", f"value {home:g}; allowed: up to {high:g}"
+            problem = f"value {home:g}; allowed: up to {high:g} (the last coordinate is upward)"
+            yield f"platform.home_m[{i}]", problem
         elif i < size - 1 and not low <= home <= high:
             yield f"platform.home_m[{i}]", f"value {home:g}; allowed: {low:g} to {high:g}"

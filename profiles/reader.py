@@ -110,9 +110,19 @@ def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tupl
             yield dotted(error["loc"]), "this key is required and missing"
         elif error["type"] == "value_error":
             yield dotted(error["loc"]), error["msg"].removeprefix("Value error, ")
+        elif error["type"] == "too_long":
+            yield dotted(error["loc"]), _count_fault(error, "up to {max_length}")
+        elif error["type"] == "too_short":
+            # entries that are refused were not counted: what is wrong with them is told as well
+            if len(error["input"]) < error["ctx"]["min_length"]:
+                yield dotted(error["loc"]), _count_fault(error, "{min_length} or more")
         elif error["type"] not in ("missing", "extra_forbidden"):
             allowed = error["msg"].removeprefix("Input should be ")
             yield dotted(error["loc"]), f"value {_shown(error['input'])}; allowed: {allowed}"
+
+
+def _count_fault(error: ErrorDetails, allowed: str) -> str:
+    return f"value {_shown(error['input'])}; allowed: {allowed.format(**error['ctx'])} entries"
 
 
 def dotted(loc: Iterable[int | str]) -> str:

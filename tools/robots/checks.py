@@ -15,7 +15,10 @@ from profiles.platform import Platform
 from tools.robots.statics import CABLES, PlanarStatics, can_be_computed, statics_of
 
 _GRID = 25
-_SHARES = np.linspace(0.99, 0.03, 97)
+_SHARES = np.concatenate([np.linspace(0.99, 0.03, 97), np.geomspace(0.0295, 1e-5, 120)])
+_TIMES = np.geomspace(1.02, 20.0, 150)
+_LONGEST_PERIOD_s = 0.005
+"""Of a cycle, with which the platform's control is still stiff enough to overcome friction."""
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
@@ -45,7 +48,7 @@ def findings(robot: Robot) -> list[Finding]:
         )
         return [Finding("axes", text, impossible=False)]
     statics = statics_of(robot)
-    found = list(_shape(robot, statics))
+    found = [*_cycle(robot), *_shape(robot, statics)]
     if not any(finding.impossible for finding in found):
         # with points that cannot be meant, tensions and torques only repeat it
         found += [*_tensions(statics), *_motors(robot, statics), *_turning(statics)]
@@ -64,6 +67,15 @@ def refuse_impossible(robot: Robot) -> list[str]:
         further = "".join(f"\n{robot.path}: {f.key}: {f.text}" for f in wrong[1:])
         raise ProfileError(robot.path, wrong[0].key, wrong[0].text + further)
     return [f"{robot.path}: {finding.key}: {finding.text}" for finding in found]
+
+
+def _cycle(robot: Robot) -> Iterator[Finding]:
+    if robot.sync_period_s > _LONGEST_PERIOD_s:
+        text = (
+            f"value {robot.sync_period_s:g}; allowed: up to {_LONGEST_PERIOD_s:g} for a platform, "
+            "whose control would be too soft to overcome its winches' friction"
+        )
+        yield Finding("sync_period_s", text, impossible=True)
 
 
 def _shape(robot: Robot, statics: PlanarStatics) -> Iterator[Finding]:
@@ -146,6 +158,9 @@ def _what_helps(statics: PlanarStatics, position_m: FloatArray) -> str:
     for share in _SHARES:
         if helps(platform, share * low_N):
             return f"tension_min_N up to {share * low_N.min():.3g} is possible there"
+    for times in _TIMES:
+        if helps(replace(platform, mass_kg=times * mass_kg), low_N):
+            return f"a platform of {times * mass_kg:.3g} kg and more is possible there"
     return "only a place further inside the exit points helps"
 
 

@@ -96,7 +96,7 @@ def proposed_stand(told: Answers) -> tuple[float, float]:
     places = np.stack([xs, np.full(xs.size, math.ceil(100.0 * below) / 100.0)], axis=-1)
     statics = _statics_of(told, Box(told["low_m"], told["high_m"]))
     turned = np.where(statics.is_target(places), np.abs(statics.angle_rad(places)), math.inf)
-    turned = np.nan_to_num(turned, nan=math.inf)
+    turned = np.where(np.isnan(turned), math.inf, turned)
     # what differs by less than anybody sees is alike, and the first of them is in the middle
     return _pair(places[int(np.round(turned, 2).argmin())])
 
