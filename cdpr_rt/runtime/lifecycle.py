@@ -17,7 +17,7 @@ class RefusedError(ControlError):
 
 
 class Lifecycle:
-    """The state, and the reason that stays until it is acknowledged or power is asked for anew."""
+    """The state, and the reason, which stays until it is acknowledged or something new is done."""
 
     def __init__(self) -> None:
         self.state = LoopState.UNCONFIGURED

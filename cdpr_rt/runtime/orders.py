@@ -142,6 +142,8 @@ class Orders:
         name = self._known(order.get("program"))
         self._require_lease("program")
         self._run(name, self._wanted(order))
+        if name != "hold":
+            self._loop.life.forget()  # why the last motion was held
 
     def _set(self, order: Order) -> None:
         self._require_running("set")

@@ -187,6 +187,11 @@ def test_a_master_that_disappears_in_motion_leaves_the_platform_held(
     assert np.linalg.norm(records["velocity_m_s"], axis=1).max() < 0.01
     assert records["tension_N"].min() > 10.0  # of the 20 N that are planned
     assert healthy.progress["tight"]
+    # somebody who leads it again is not told the old reason for ever
+    healthy.run(4.0)
+    healthy.right.take("trial")
+    healthy.carry_out("pose", 30.0, position_m=list(HIGH))
+    assert healthy.loop.life.reason == ""
 
 
 def test_what_was_paused_goes_on_to_where_it_was_going(healthy: LockstepRobot) -> None:
