@@ -25,6 +25,8 @@ class LoopParts:
     estimator: Estimator
     lengths_disagree_m: Callable[[], float] = float
     """Returns by how much the cables' lengths contradict each other, 0 where nobody knows."""
+    lowering_s: float = 0.0
+    """The longest that letting a platform down may take."""
     last: LastLengths | None = None
     """Keeps the cables' lengths of the last stop, where a start can make use of them."""
     punctual: Callable[[], Sequence[str]] = tuple

@@ -28,8 +28,6 @@ _LOOKS: Final = 4
 _MODE_S: Final = 2.0
 _POWER_ON_S: Final = 4.0
 _REST_S: Final = 5.0
-LOWERING_S: Final = 50.0
-"""How long a platform may take to come to rest on what it stands on."""
 _SETTLE_S: Final = 1.0
 _STILL_RAD_S: Final = 0.3
 _BRAKES_S: Final = 2.0
@@ -218,7 +216,7 @@ def _brake(loop: ControlLoop) -> Iterator[None]:
         yield from _up_to(loop, _REST_S, lambda: loop.program.at_rest)
         loop.switch("lower" if loop.lowers else "hold")
     if loop.lowers:
-        yield from _up_to(loop, LOWERING_S, lambda: loop.program.at_rest)
+        yield from _up_to(loop, loop.parts.lowering_s, lambda: loop.program.at_rest)
     else:
         yield from _up_to(loop, _SETTLE_S, lambda: bool(np.max(np.abs(velocity)) < _STILL_RAD_S))
     machine.set_brakes(False)

@@ -26,8 +26,8 @@ DEAD: Final = "dead"
 """The state that is told of a loop that has died; no state of a loop that lives."""
 
 _TURN_S = 0.2
-# a controlled stop from full speed, and brakes that follow, take less
-_LOOP_STOP_S = 70.0
+# a controlled stop from full speed, and brakes that follow, take less, besides a lowering
+_LOOP_STOP_S = 30.0
 # the recording is closed in this time
 _SERVICE_STOP_S = 10.0
 # the loop turns at every cycle, or some ten times a second where no cycles run
@@ -276,13 +276,19 @@ class Launcher:
 
     def _stop_loop(self) -> str:
         """End the loop; return why it did not end well, empty when it did."""
-        patience_s = _LOOP_STALLED_S if self._stalled else _LOOP_STOP_S
+        patience_s = _LOOP_STALLED_S if self._stalled else _LOOP_STOP_S + self._lowering_s()
         if not self._loop.stop(patience_s):
             return f"the loop did not stop within {patience_s:g} s and was killed"
         code = self._loop.process.returncode
         # one that is asked while it loads has opened nothing yet
         loading = code == -signal.SIGTERM and not self._block.counters["loop_alive_ns"][0]
         return "" if code == DONE or loading else f"the loop {self._loop.end}"
+
+    def _lowering_s(self) -> float:
+        try:
+            return float(self._block.description().get("lowering_s", 0.0))
+        except SharedBlockError:  # the loop died in the middle of it
+            return 0.0
 
     def _silence_s(self, counter: str) -> float:
         alive = int(self._block.counters[counter][0])

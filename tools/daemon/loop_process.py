@@ -18,6 +18,7 @@ from cdpr_rt.realtime import settle_memory, stay_punctual
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.loop import ControlLoop
 from cdpr_rt.runtime.loop_parts import LoopParts
+from cdpr_rt.runtime.programs.lower import lowering_s
 from cdpr_rt.runtime.programs.model import model_of
 from cdpr_rt.runtime.programs.registry import (
     build_programs,
@@ -90,6 +91,7 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
         supervisor=Supervisor(supervised(limits, robot), n, period_s, names),
         estimator=estimator,
         lengths_disagree_m=float if platform is None else platform.lengths_disagree_m,
+        lowering_s=0.0 if platform is None else lowering_s(platform.platform),
         last=None if platform is None else platform.last,
         punctual=stay_punctual,
     )
@@ -131,6 +133,7 @@ def description(robot: Robot, parts: LoopParts) -> dict[str, Any]:
         ],
         "limits": described(limits_of(robot), len(robot.axes)),
         "programs": list(parts.programs),
+        "lowering_s": parts.lowering_s,
         "platform": None if robot.platform is None else asdict(robot.platform),
         "notes": list(robot.notes),
     }

@@ -8,8 +8,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from cdpr_rt.runtime.programs.lower import lowering_s
+from cdpr_rt.runtime.robot_arrays import can_lower
 from drivers.bus import BusUrl
 from profiles import Robot
+
+_STOP_S = 60.0
+"""What the launcher takes to end the loop and the recording, besides a lowering."""
 
 _UNIT = """\
 # Written by `cdpr service-unit`. The robot comes up ready, without power: enabling is a separate
@@ -28,7 +33,7 @@ User={user}
 # the launcher ends the loop first, the recording last
 KillMode=mixed
 TimeoutStartSec=300
-TimeoutStopSec=100
+TimeoutStopSec={stop_s:.0f}
 # bad input does not mend itself by another start
 Restart=on-failure
 RestartSec=2
@@ -83,6 +88,7 @@ def service_unit(robot: Robot, urls: Sequence[BusUrl], options: Sequence[str], u
         for url in urls
         if url.interface == "socketcan"
     ]
+    lowers = robot.platform if can_lower(robot) else None
     words = [_program(), "run", robot.reference, "--yes", *options]
     return _UNIT.format(
         robot=_one_line(robot.name),
@@ -90,6 +96,7 @@ def service_unit(robot: Robot, urls: Sequence[BusUrl], options: Sequence[str], u
         wants=f"Wants={' '.join(devices)}\n" if devices else "",
         command=" ".join(_quoted(word) for word in words),
         user=user,
+        stop_s=_STOP_S + (0.0 if lowers is None else lowering_s(lowers)),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,6 +15,7 @@ from cdpr_rt.runtime.programs.base import ProgramError
 from cdpr_rt.runtime.programs.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.runtime.programs.reel import HANGING_1_s, Reel, STANDING_1_s
 from cdpr_rt.runtime.programs.wanted import Wanted
+from profiles.platform import Platform
 
 HOME_SPEED_m_s = 0.25
 """At which the platform goes to where it can stand."""
@@ -30,7 +32,27 @@ _LIGHT = 1.2
 _STILL_m = 0.001
 _STILL_S = 1.0
 _FADE_S = 0.2
-_MOST_S = 40.0
+_MOST_S = 30.0
+"""For the last bit, besides the time for a way down at the speed of `BLIND_m_s`."""
+
+
+def lowering_s(platform: Platform) -> float:
+    """Return the longest that `lower` may take, from anywhere in the box of targets."""
+    speed_m_s = min(platform.speed_m_s, HOME_SPEED_m_s)
+    braking_s = platform.speed_m_s / platform.acceleration_m_s2
+    home_s = _reach_m(platform) / speed_m_s + 2.0 * braking_s + _ARRIVING_S
+    return home_s + _down_s(platform) + _STILL_S + _FADE_S
+
+
+def _down_s(platform: Platform) -> float:
+    return _MOST_S + _reach_m(platform) / BLIND_m_s
+
+
+def _reach_m(platform: Platform) -> float:
+    """Return how far from home a target may be, at the most."""
+    box = platform.workspace_min_m, platform.home_m, platform.workspace_max_m
+    sides = [max(home - low, high - home) for low, home, high in zip(*box, strict=True)]
+    return math.hypot(*sides)
 
 
 class LowerProgram(PlatformProgram):
@@ -59,6 +81,7 @@ class LowerProgram(PlatformProgram):
         self._weight = np.array([0.0, -parts.platform.mass_kg * G_m_s2])
         self._high = np.minimum(parts.most_N, torque_Nm / np.abs(cable_m))
         self._least = np.array(control.least_N)
+        self._down_s = _down_s(parts.platform)
         self._keeping = np.zeros(3)
         self._cable = np.array(cable_m)
         self._here = np.zeros(3)
@@ -172,5 +195,5 @@ class LowerProgram(PlatformProgram):
             self._here[:] = feedback.position_rad
             self._still = 0
         self._still += 1
-        if self._still * period_s > _STILL_S or self._cycles * period_s > _MOST_S:
+        if self._still * period_s > _STILL_S or self._cycles * period_s > self._down_s:
             self._stage = "fade"
