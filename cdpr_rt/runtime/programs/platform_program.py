@@ -21,6 +21,9 @@ from cdpr_rt.runtime.programs.handover import Handover
 from cdpr_rt.runtime.programs.wanted import Wanted
 from profiles.platform import Platform
 
+_LAGS_m, _WAITS_m = 0.02, 0.05
+_LEAST_PACE = 1e-3
+
 
 class PlatformParts:
     """What the programs of one platform share."""
@@ -114,7 +117,7 @@ class PlatformProgram:
         self._stopping = False
         self._at_rest = True
         self._seen = np.zeros(7)
-        self._rest = np.zeros(2)
+        self._rest, self._paced = np.zeros(2), np.zeros(2)
 
     def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; the platform brakes and stays."""
@@ -194,8 +197,16 @@ class PlatformProgram:
             "target_m": self._target.tolist(),
             "tension_N": control.tension_N.tolist(),
             "missing": control.missing(),
+            "held_back": self._held_back(),
             "done": float(self._at_rest),
         }
+
+    def _held_back(self) -> str:
+        """Return why the set-point does not go on, an empty text where it does."""
+        lag_m = self._lag_m()
+        if lag_m < _WAITS_m or not self._parts.known:
+            return ""
+        return f"the platform is {1e3 * lag_m:.0f} mm behind: friction, or something in its way"
 
     def _parsed(self, wanted: Mapping[str, Any]) -> Any:
         """Return what `_take` takes; raises ProgramError."""
@@ -208,11 +219,28 @@ class PlatformProgram:
         """Move the platform's set-point; return whether nothing is left to do."""
         return self._approach()
 
+    def _lag_m(self) -> float:
+        """Return how far the platform is from its set-point."""
+        control = self._control
+        wanted, there = control.shaped_m, control.estimated_m
+        return math.hypot(wanted[0] - there[0], wanted[1] - there[1])
+
+    def _pace(self) -> FloatArray:
+        """Return the speed, (2,), less of it the further the platform lags; overwritten.
+
+        A set-point that ran on from a platform which sticks would end in a following error.
+        """
+        share = 1.0
+        if not self._stopping:
+            share = (_WAITS_m - self._lag_m()) / (_WAITS_m - _LAGS_m)
+        np.multiply(self._speed, min(max(share, _LEAST_PACE), 1.0), out=self._paced)
+        return self._paced
+
     def _approach(self) -> bool:
         control, parts = self._control, self._parts
         return approach(
             self._target,
-            self._speed,
+            self._pace(),
             parts.acceleration_m_s2,
             parts.period_s,
             control.position_m,

@@ -111,16 +111,17 @@ class PoseProgram(PlatformProgram):
 
     def progress(self) -> dict[str, Any]:
         """Return where the platform is, where it goes, and what the stream is worth."""
-        told = {**super().progress(), "held_back": self._held_back()}
+        told = super().progress()
         told["left_m"] = None if self._aim is None else self._aim.tolist()
         if self._following:
             told |= {"stream": self.stream.state.name.lower(), **self.stream.counts()}
         return told
 
     def _held_back(self) -> str:
-        """Return why the target does not follow the hand, an empty text where it does."""
-        if not self._following:
-            return ""
+        """Return why set-point or target do not go on, an empty text where they do."""
+        lags = super()._held_back()
+        if lags or not self._following:
+            return lags
         missing = self._control.feasible(self._seen_goal)
         if missing:
             return f"{self._seen_goal[0]:.3f}, {self._seen_goal[1]:.3f} m: {missing}"
@@ -259,7 +260,7 @@ class PoseProgram(PlatformProgram):
         control = self._control
         return approach(
             goal,
-            self._speed,
+            self._pace(),
             self._acceleration,
             self._parts.period_s,
             control.position_m,

@@ -233,3 +233,18 @@ def test_every_motor_turns_once_on_the_way_to_its_index():
     assert len(way) == 3
     assert {float(np.sign(point[0])) for point in way[1:]} == {-1.0, 1.0}
     assert all(point[1] < 1.5 for point in way)
+
+
+def test_a_set_point_waits_for_a_platform_that_does_not_come(robot: Standing) -> None:
+    tightened(robot)
+    robot.switch("pose", {"position_m": [0.0, 1.8]})
+    robot.run(1.0)
+    told = robot.program.progress()
+    assert not told["done"] and "behind" in told["held_back"]
+    went_m = robot.parts.control.shaped_m - HOME_m
+    assert 0.02 < went_m[1] < 0.1
+    robot.run(0.5)
+    assert robot.parts.control.shaped_m[1] - HOME_m[1] - went_m[1] < 0.005
+    robot.program.stop()
+    robot.run(0.2)
+    assert robot.program.at_rest
