@@ -53,6 +53,8 @@ def refused(daemon: RealDaemon, *command: str) -> tuple[int, str]:
 def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
     status, why = refused(daemon, "move", "--to", "0", "1600")
     assert (status, "run tighten first" in why) == (1, True)
+    status, why = refused(daemon, "tighten", "--from", "last")
+    assert (status, "no lengths of the last stop" in why) == (1, True)
     assert told(daemon, "tighten")["position_m"] == pytest.approx([0.0, 1.3], abs=0.005)
 
     assert told(daemon, "move", "--to", "100", "1600")["position_m"] == pytest.approx(
@@ -66,7 +68,6 @@ def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
     for command, named in (
         (("move", "--to", "0", "9000"), "allowed: 1.4 to 2.4, the workspace"),
         (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
-        (("tighten", "--from", "last"), "no lengths of the last stop"),
         (("controller", "idle"), "lower it first"),
     ):
         status, why = refused(daemon, *command)
