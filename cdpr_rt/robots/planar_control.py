@@ -29,7 +29,7 @@ RESERVE = 0.12
 """Share of the span of tensions that is left to what no plan knows: loops, friction, swinging."""
 _OBSERVER_Hz = 400.0
 _SMOOTHER_Hz = 25.0
-_DAMPING_RATIO = 0.55
+_DAMPING_RATIO = 0.52
 _ROTOR_SHARE = 0.75
 _SMOOTH_SHARE = 0.55
 _LOAD_SHARE = 0.28
@@ -105,9 +105,13 @@ class PlanarControl:
     ) -> np.ndarray[tuple[int], np.dtype[np.void]]:
         row = np.zeros(1, kernel.ROBOT)
         inertia = max(axis.winch.motor.rotor_inertia_kg_m2 for axis in axes)
-        cable = min(abs(axis.winch.cable_m_per_motor_rad) for axis in axes)
-        rotor_kg = inertia / cable**2
-        mass = platform.mass_kg + 1.5 * rotor_kg
+        rotors_kg = [
+            axis.winch.motor.rotor_inertia_kg_m2 / axis.winch.cable_m_per_motor_rad**2
+            for axis in axes
+        ]
+        # the lightest is what quick damping sets swinging first
+        rotor_kg = min(rotors_kg)
+        mass = platform.mass_kg + 0.5 * sum(rotors_kg)
         observer = 2.0 * math.pi * _OBSERVER_Hz
         late_s = _LATENCY_s + _LATENCY_CYCLES * period_s + 2.0 / observer
         quick = _ROTOR_SHARE * rotor_kg / late_s
