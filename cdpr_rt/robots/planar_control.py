@@ -29,7 +29,7 @@ RESERVE = 0.12
 """Share of the span of tensions that is left to what no plan knows: loops, friction, swinging."""
 _OBSERVER_Hz = 400.0
 _SMOOTHER_Hz = 25.0
-_DAMPING_RATIO = 0.52
+_DAMPING_RATIO = 0.55
 _ROTOR_SHARE = 0.75
 _SMOOTH_SHARE = 0.55
 _LOAD_SHARE = 0.28

@@ -198,7 +198,7 @@ def test_a_heavier_platform_gets_a_slower_loop_that_is_as_well_damped() -> None:
         s = control.settings
         moving = mass + 1.5 * s["inertia"] / 0.026**2
         ratio = s["damping"] / (2.0 * math.sqrt(s["stiffness"] * moving))
-        assert ratio == pytest.approx(0.52)
+        assert ratio == pytest.approx(0.55)
         # Routh and Hurwitz: the integral part leaves the loop stable, with a wide margin
         assert s["integral"] < 0.3 * s["stiffness"] * s["damping"] / moving
         settings.append(s)
