@@ -66,7 +66,7 @@ def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
     assert re.search(r"platform at \d+\.\d, 16\d\d\.\d mm; target 50\.0, 1620\.0 mm", shown)
 
     for command, named in (
-        (("move", "--to", "0", "9000"), "allowed: 1.4 to 2.4, the workspace"),
+        (("move", "--to", "0", "9000"), "allowed: 1.4 to 2.4 m, the workspace"),
         (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
         (("controller", "idle"), "lower it first"),
     ):

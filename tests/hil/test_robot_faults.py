@@ -127,9 +127,9 @@ def test_a_target_out_of_the_workspace_is_refused_and_nothing_moves(
 ) -> None:
     truth = Truth(healthy)
     for position, named in (
-        ([0.0, 5.0], r"position_m\[1\]: value 5; allowed: 1.4 to 2.4, the workspace"),
+        ([0.0, 5.0], r"position_m\[1\]: value 5 m; allowed: 1.4 to 2.4 m, the workspace"),
         ([math.nan, 1.8], r"position_m\[0\]: value nan"),
-        ([-0.7, 1.8], r"position_m\[0\]: value -0.7; allowed: -0.6 to 0.6"),
+        ([-0.7, 1.8], r"position_m\[0\]: value -0.7 m; allowed: -0.6 to 0.6 m"),
     ):
         with pytest.raises(WorkFailedError, match=named):
             healthy.program("pose", position_m=position)

@@ -151,8 +151,8 @@ class PoseProgram(PlatformProgram):
         for i, (low, high) in enumerate(zip(self._low, self._high, strict=True)):
             if not low <= position[i] <= high:
                 raise ProgramError(
-                    f"pose: position_m[{i}]: value {position[i]:g}; allowed: {low:g} to {high:g}, "
-                    "the workspace"
+                    f"pose: position_m[{i}]: value {position[i]:g} m; allowed: {low:g} to "
+                    f"{high:g} m, the workspace"
                 )
         missing = self._control.feasible(position)
         if missing:

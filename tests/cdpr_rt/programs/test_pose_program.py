@@ -155,7 +155,7 @@ def test_a_target_that_changes_in_motion_does_not_step(robot: Ideal) -> None:
 @pytest.mark.parametrize(
     ("wanted", "told"),
     [
-        ({"position_m": [0.7, 1.9]}, r"position_m\[0\].*-0.6 to 0.6, the workspace"),
+        ({"position_m": [0.7, 1.9]}, r"position_m\[0\].*-0.6 to 0.6 m, the workspace"),
         ({"position_m": [float("nan"), 1.9]}, r"position_m\[0\]"),
         ({"position_m": [0.0, 1.9, 0.0]}, "a list of 2"),
         ({"position_m": [0.0, 1.9], "stream": True}, "one of"),
