@@ -21,7 +21,12 @@ CoggingProfiles = tuple[CoggingProfile | None, ...]
 
 def folder_of(axis: RobotAxis) -> str:
     """Return the name of the folder of an axis in that of its robot's commissioning."""
-    return re.sub(r"[^a-z0-9]+", "-", axis.name.lower()).strip("-") or f"node-{axis.node_id}"
+    return folder_called(axis.name, axis.node_id)
+
+
+def folder_called(name: str, node_id: int) -> str:
+    """Return the name of the folder of an axis with this name at this node."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or f"node-{node_id}"
 
 
 def with_commissioned(robot: Robot, folder: Path | None) -> Robot:

@@ -86,8 +86,10 @@ def new(
     a file. Ends with status 2 where the robot that was described cannot work.
     """
     out = Output(as_json)
-    if path.suffix != ".toml" or path.exists() or not path.parent.is_dir():
-        raise BadInputError(f"{path}: allowed: NAME.toml, not there yet, in a folder that is there")
+    if path.exists():
+        raise BadInputError(f"{path}: is never written over; allowed: a file that is not there yet")
+    if path.suffix != ".toml" or not path.parent.is_dir():
+        raise BadInputError(f"{path}: allowed: NAME.toml in a folder that is there")
     given = dict(_key_and_value(text) for text in answers or ())
     told = new_robot.answers_of(path, given, _default if yes else _ask)
     profile = new_robot.write_robot(told, path)

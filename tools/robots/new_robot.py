@@ -12,6 +12,7 @@ import numpy as np
 from cdpr_rt.exchange import FloatArray
 from profiles import ProfileError, Robot, load_robot
 from profiles.platform import Platform
+from tools.commissioned import folder_called
 from tools.errors import BadInputError
 from tools.robots.questions import (
     CABLES,
@@ -155,6 +156,7 @@ def text_of(told: Answers) -> str:
             name=_quoted(names[i]),
             winch=_quoted(winch),
             node=told["nodes"][i],
+            commissioned=_quoted(f"motors/{folder_called(names[i], told['nodes'][i])}"),
             exit=_array(told[f"exit_{i + 1}_m"]),
             anchor=_array(told[f"anchor_{i + 1}_m"]),
         )
@@ -229,5 +231,5 @@ node_id = {node}
 exit_point_m = {exit}  # where its cable leaves the frame
 anchor_point_m = {anchor}  # where it ends, from the platform's middle
 # cable_sign = 1  # 1: a positive motor angle pays out; -1: it winds in
-# commissioned = "motors/1"  # what `cdpr commission` learnt of this motor
+# commissioned = {commissioned}  # what `cdpr commission` learnt of this motor
 """
