@@ -40,7 +40,7 @@ def connect(name: str) -> socket.socket:
         sock.close()
         raise BusError(
             f"simbus:{name}: no simulated bus of that name is running ({error.strerror}); "
-            f"start one with: cdpr sim up winch-mpp0923d --bus simbus:{name}"
+            f"`cdpr sim up` starts one"
         ) from None
     return sock
 

@@ -40,7 +40,7 @@ _HOW = {
     Fault.CUT_CABLE: _How(12, 1, 1, 1, ""),
     Fault.SLIP: _How(13, 100, 1, 0xFFFF, "mm"),
     Fault.ENCODER_JUMP: _How(11, 500, -(2**31), 2**31 - 1, "counts"),
-    Fault.DRIVE_FAULT: _How(1, 0x7305, 1, 0xFFFF, "(603Fh)"),
+    Fault.DRIVE_FAULT: _How(1, 0x7305, 1, 0xFFFF, ""),
     Fault.SILENCE: _How(6, 0xFFFF, 1, 0xFFFF, "ms"),
 }
 
@@ -87,7 +87,13 @@ def fault(
         raise WorkFailedError(f"axis {chosen.name!r}: {error}") from error
     finally:
         network.close()
-    typer.echo(" ".join(f"{chosen.name}: {what} {amount} {how.unit}".split()))
+    typer.echo(f"{chosen.name}: {what}{_told(what, amount, how)}")
+
+
+def _told(what: Fault, amount: int, how: _How) -> str:
+    if what is Fault.CUT_CABLE:
+        return ""
+    return f" {amount:#06x}" if what is Fault.DRIVE_FAULT else f" {amount} {how.unit}"
 
 
 def _amount(what: Fault, how: _How, text: str | None) -> int:

@@ -61,7 +61,7 @@ def platform_text(status: dict[str, Any]) -> str:
     words = []
     for key, word in (("position_m", "platform at"), ("target_m", "target")):
         if progress.get(key):
-            words.append(f"{word} {', '.join(f'{1e3 * x:.1f}' for x in progress[key])} mm")
+            words.append(f"{word} {', '.join(f'{1e3 * x:z.1f}' for x in progress[key])} mm")
     if progress.get("stage"):
         words.append(str(progress["stage"]))
     words += [progress[key] for key in ("missing", "held_back", "trouble") if progress.get(key)]
