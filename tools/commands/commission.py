@@ -91,7 +91,7 @@ def commission(
         bool, typer.Option("--overwrite", help="Replace an earlier commissioning in --out.")
     ] = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A rough look in a tenth of the time.")
+        bool, typer.Option("--quick", help="A rough look in a fifth of the time.")
     ] = False,
     index: IndexOption = "homing",
     safety_io: SafetyIoOption = None,
