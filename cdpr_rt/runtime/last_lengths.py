@@ -42,6 +42,8 @@ class LastLengths:
         self.lengths: StoppedLengths | None = None
         self.why = "the robot has not been stopped with known lengths yet"
         """Why there are none, where there are none."""
+        self.displaced = False
+        """Whether the platform has been let go since, other than at home."""
 
     def load(self, n: int) -> None:
         """Read the file of a robot with n axes; one that is damaged leaves none."""

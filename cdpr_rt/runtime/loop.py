@@ -66,11 +66,9 @@ class ControlLoop:
         """Why cycles cannot go on, as a bus has gone away."""
         self.exchange_s = 0.0
         """From the last SYNC to its last answer."""
-        self._stop_requests = 0
-        self._stopping_since_s = 0.0
+        self._stop_requests, self._stopping_since_s = 0, 0.0
         self._job: Job[Any] | None = None
-        self._program_error = ""
-        self._punctual = False
+        self._program_error, self._punctual = "", False
         self._rows = CycleRows(block)
         self._asked: FloatArray = np.zeros(block.n)
         self._alive = block.counters["loop_alive_ns"]
@@ -152,6 +150,7 @@ class ControlLoop:
             self._elapsed_s(cycle),
             program.controller.compensation_Nm,
         )
+        self._program_error = ""
         try:
             program.update(feedback, self.setpoint, torque)
         except Exception as error:  # whatever a program does wrong: its drives are stopped
@@ -229,9 +228,15 @@ class ControlLoop:
             return  # in a fault it is known already; while the bus is checked the check sees it
         if self.lost_bus:
             reaction = max(reaction, Reaction.QUICK_STOP)  # nobody can be led to a standstill
+        if self.lowering_blind and supervisor.limit is Limit.NOT_FINITE:
+            reaction = max(reaction, Reaction.QUICK_STOP)  # what lets the platform down has failed
+        # what is let down blind may be fast without anything wrong with its lengths
+        doubtful = supervisor.limit in ({Limit.ENCODER_JUMP} if self.lowering_blind else MISLEADING)
+        if reaction > Reaction.HOLD and doubtful and LOWER in self.parts.programs:
+            self.parts.estimator.forget_lengths()
         if reaction <= self.reacting and not self._misleads_lowering():
             return
-        reason, self._program_error = self._program_error or supervisor.reason(), ""
+        reason = self._program_error or supervisor.reason()
         if reaction is Reaction.HOLD:
             if self.program.name != HOLD and self.driving:
                 self.life.blame(reason, supervisor.details())
@@ -247,8 +252,8 @@ class ControlLoop:
 
     def _misleads_lowering(self) -> bool:
         """Whether a platform that is being taken home is not to be led there any more."""
-        on_its_way = self.driving and self.lowers and not self.lowering_blind
-        return on_its_way and self.parts.supervisor.limit in BLINDING
+        goes_home = self.driving and self.lowers and not self.lowering_blind
+        return goes_home and self.parts.supervisor.limit in BLINDING
 
     def stop(self, reaction: Reaction, then: LoopState, torque: FloatArray | None = None) -> None:
         """End the motion as `reaction` says and go to state `then`."""
@@ -292,8 +297,6 @@ class ControlLoop:
         """Let the platform down by the winches that are left, whatever is known of its pose."""
         if not self.lowering_blind:
             self.lowering_blind = True
-            if self.parts.supervisor.limit in MISLEADING:
-                self.parts.estimator.forget_lengths()
             self.switch(LOWER, {"blind": True})
 
     # -- programs

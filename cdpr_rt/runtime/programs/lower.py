@@ -28,6 +28,9 @@ _KEEPING_SHARE = 0.25
 """Of the least tension: what keeps cables on their drums."""
 _ARRIVED_m = 0.01
 _ARRIVING_S = 2.0
+_LATE = 1.5
+"""A platform that takes so many times longer to come home than it should does not."""
+_FASTEST = 1.5
 _LIGHT = 1.2
 _STILL_m = 0.001
 _STILL_S = 1.0
@@ -38,10 +41,13 @@ _MOST_S = 30.0
 
 def lowering_s(platform: Platform) -> float:
     """Return the longest that `lower` may take, from anywhere in the box of targets."""
+    return _home_s(platform) + _down_s(platform) + _STILL_S + _FADE_S
+
+
+def _home_s(platform: Platform) -> float:
     speed_m_s = min(platform.speed_m_s, HOME_SPEED_m_s)
     braking_s = platform.speed_m_s / platform.acceleration_m_s2
-    home_s = _reach_m(platform) / speed_m_s + 2.0 * braking_s + _ARRIVING_S
-    return home_s + _down_s(platform) + _STILL_S + _FADE_S
+    return _LATE * (_reach_m(platform) / speed_m_s + 2.0 * braking_s) + _ARRIVING_S
 
 
 def _down_s(platform: Platform) -> float:
@@ -81,7 +87,7 @@ class LowerProgram(PlatformProgram):
         self._weight = np.array([0.0, -parts.platform.mass_kg * G_m_s2])
         self._high = np.minimum(parts.most_N, torque_Nm / np.abs(cable_m))
         self._least = np.array(control.least_N)
-        self._down_s = _down_s(parts.platform)
+        self._home_s, self._down_s = _home_s(parts.platform), _down_s(parts.platform)
         self._keeping = np.zeros(3)
         self._cable = np.array(cable_m)
         self._here = np.zeros(3)
@@ -111,9 +117,12 @@ class LowerProgram(PlatformProgram):
             self._at_rest = False
             if self._is_home():
                 self._let_go(feedback, torque_Nm, SETTLING_m_s, STANDING_1_s)
+            elif self._cycles * self._parts.period_s > self._home_s:
+                self._blind = True  # something keeps it from coming home
             return
         if self._stage == "home":
             if self._parts.tight:
+                self._parts.last.displaced = True
                 self._carry_weight(torque_Nm)
             self._let_go(feedback, torque_Nm, BLIND_m_s, HANGING_1_s)
         setpoint.position_rad[:] = feedback.position_rad
@@ -178,7 +187,10 @@ class LowerProgram(PlatformProgram):
         reel.paying_out_m_s[:] = speed_m_s
         reel.most_in_m_s = _MOST_IN_m_s
         reel.integral_rate_1_s = rate_1_s
-        reel.begin(feedback, self._velocity, torque_Nm)
+        # what no platform of its has at its limits is an encoder's jump
+        fastest = _FASTEST * np.linalg.norm(self._parts.speed_m_s) / np.abs(self._cable)
+        plausible = np.abs(self._velocity) < fastest
+        reel.begin(feedback, np.where(plausible, self._velocity, 0.0), torque_Nm)
         self._control.compensation_Nm[:] = 0.0
 
     def _watch_rest(self, feedback: AxisFeedback) -> None:

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.robots.planar_kernel import G_m_s2
 from cdpr_rt.runtime.programs.axis_program import AxisProgram, Loop
 from cdpr_rt.runtime.programs.base import Program, ProgramError
 from cdpr_rt.runtime.programs.idle import IdleProgram
 from cdpr_rt.runtime.programs.jog import JogProgram
 from cdpr_rt.runtime.programs.model import RobotModel
 from cdpr_rt.runtime.programs.platform_program import PlatformParts, PlatformProgram
+
+_HANGING = 0.8
+"""Of the weight: cables that pull with less, all together, do not carry it."""
 
 
 class PlatformHold:
@@ -88,7 +94,7 @@ class PlatformIdle(IdleProgram):
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; cables are not tight any more."""
-        self._parts.tight = False
+        self._parts.slacken()
         super().start(feedback, setpoint, torque_Nm)
 
     def check(self, wanted: Mapping[str, Any]) -> None:
@@ -96,6 +102,12 @@ class PlatformIdle(IdleProgram):
         super().check(wanted)
         if self._parts.tight:
             raise ProgramError("idle: the platform hangs on its cables; lower it first")
+        carried_N = float(np.nansum(self._parts.estimator.estimate.tension_N))
+        if carried_N > _HANGING * self._parts.platform.mass_kg * G_m_s2:
+            raise ProgramError(
+                f"idle: its cables pull with {carried_N:.0f} N, the platform may hang on them; "
+                "lower it first"
+            )
 
 
 class PlatformJog(JogProgram):
@@ -105,8 +117,14 @@ class PlatformJog(JogProgram):
         super().__init__(model, loop)
         self._parts = parts
 
+    def check(self, wanted: Mapping[str, Any]) -> None:
+        """Raise ProgramError where `command` would, or where the platform hangs on its cables."""
+        super().check(wanted)
+        if self._parts.tight:
+            raise ProgramError("jog: the platform hangs on its cables; lower it first")
+
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until speeds are wanted."""
-        self._parts.tight = False
+        self._parts.slacken()
         self._parts.last.take()
         super().start(feedback, setpoint, torque_Nm)

@@ -91,9 +91,14 @@ class PlatformParts:
         self.estimator.set_lengths(feedback.position_rad, self.control.free_lengths_m)
         self.tight = True
 
-    def forget(self) -> None:
-        """Forget where the platform is."""
+    def slacken(self) -> None:
+        """Take the cables to be tight no more, wherever the platform is."""
+        self.last.displaced = self.last.displaced or self.tight
         self.tight = False
+
+    def forget(self) -> None:
+        """Forget where the platform is, as if it stood at home."""
+        self.tight = self.last.displaced = False
         self.estimator.forget_lengths()
         self.control.reset()
 

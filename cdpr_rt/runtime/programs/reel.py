@@ -9,6 +9,7 @@ from cdpr_rt.jit import jit
 
 _BANDWIDTH_rad_s = 100.0
 _FILTER_S = 0.005
+_FASTEST_m_s = 5.0
 STANDING_1_s = 60.0
 """Of the integral part, where the cables' ends stand still."""
 HANGING_1_s = 4.0
@@ -35,8 +36,11 @@ def _reel(
     torque: FloatArray,
 ) -> None:
     for i in range(position.size):
-        speed[i] += weight * ((position[i] - last[i]) / period - speed[i])
+        pace = (position[i] - last[i]) / period
         last[i] = position[i]
+        # an encoder that jumps tells no speed
+        if abs(cable[i] * pace) < _FASTEST_m_s:
+            speed[i] += weight * (pace - speed[i])
         out = cable[i] * speed[i]
         # a cable that has come loose is not to be wound up ever faster
         least = low[i] * min(max(1.0 + out / most_in, 0.0), 1.0)

@@ -35,7 +35,7 @@ _FALL_S = 0.2
 _STILL_m = 0.0003
 _STILL_S = 0.3
 _PULLED = 0.95
-_MOST_m = 1.0
+_MOST_m, _ONCE_TIGHT_m = 1.0, 0.05
 _MOST_S = 60.0
 
 _STAGES = (("slack", GENTLE), ("pull", 1.0), ("beyond", BEYOND), ("lengths", 1.0))
@@ -62,6 +62,9 @@ class TightenProgram(PlatformProgram):
         inertia = np.full(3, parts.control.inertia_kg_m2)
         self._reel = Reel(inertia, cable_m, parts.period_s)
         self._reel.paying_out_m_s[:] = -REEL_m_s
+        tight_m = parts.control.lengths_at_home(BEYOND * self._full_N)
+        stretch_m = parts.control.lengths_at_home(np.zeros(3)) - tight_m
+        self._once_tight_m = _ONCE_TIGHT_m + float(stretch_m.max())
         self._begun, self._here, self._up = np.zeros(3), np.zeros(3), np.zeros(3)
         self._stood = np.full(3, np.nan)
         """Angles at which lengths were taken at home, until what the motors took up was told."""
@@ -129,10 +132,17 @@ class TightenProgram(PlatformProgram):
 
     def _parsed(self, wanted: Mapping[str, Any]) -> str:
         Wanted(self.name, wanted, ("from",))
+        if wanted and self._parts.tight:
+            raise ProgramError("tighten: from: the cables are tight already; lower it first")
         source, last = wanted.get("from", self._usual_source()), self._parts.last
         if source not in _SOURCES:
             allowed = ", ".join(_SOURCES)
             raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
+        if source == "home" and last.displaced and not wanted:
+            raise ProgramError(
+                "tighten: from: the platform was let go elsewhere, and where it stands is not "
+                "known; stand it at home, then say from: home"
+            )
         if source == "lengths" and not self._parts.known:
             raise ProgramError("tighten: from: the cables' lengths are not known; allowed: home")
         if source == "last" and last.lengths is None:
@@ -162,6 +172,8 @@ class TightenProgram(PlatformProgram):
         self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
     ) -> None:
         self._still = 0
+        if self._stage == 0:
+            self._begun[:] = feedback.position_rad
         if _STAGES[self._stage][0] == "pull":
             self._up[:] = feedback.position_rad
         if self._stage + 1 < len(_STAGES):
@@ -197,7 +209,7 @@ class TightenProgram(PlatformProgram):
         control.stand_still()
         parts.loop.take_over(feedback, torque_Nm)
         parts.cycle = feedback.cycle
-        parts.tight = True
+        parts.tight, parts.last.displaced = True, False
         self._cycles = 0
         super().start(feedback, setpoint, torque_Nm)
         self._look_for_indices()
@@ -205,8 +217,12 @@ class TightenProgram(PlatformProgram):
     def _trouble(self, feedback: AxisFeedback) -> str:
         way = np.abs((feedback.position_rad - self._begun) * self._cable)
         most = int(way.argmax())
-        if way[most] > _MOST_m:
-            return f"cable {most}: {way[most]:.2f} m reeled in and not tight, {_MOST_m:g} m allowed"
+        # what stands at home does not move once its cables are tight
+        firm = self._stage > 0 and self._source == "home"
+        allowed_m = self._once_tight_m if firm else _MOST_m
+        if way[most] > allowed_m:
+            told = f"{way[most]:.2f} m reeled in and not tight, {allowed_m:.2g} m allowed"
+            return f"cable {most}: {told}"
         if self._cycles * self._parts.period_s > _MOST_S:
             return f"not tight within {_MOST_S:g} s"
         return ""

@@ -52,6 +52,7 @@ class Standing:
     def loosen(self, slack_m: tuple[float, float, float]) -> None:
         """Begin anew without torque, with so much slack."""
         self.parts.forget()
+        self.estimator.reset()
         self.speed[:] = self.torque[:] = self.tension_N[:] = 0.0
         self.slack_m[:] = np.array(slack_m) - self.cable_m * self.angle
         self.switch("idle")
@@ -159,6 +160,46 @@ def test_only_a_tight_robot_takes_positions_and_only_a_loose_one_rests(robot: St
     pose.check({"position_m": [0.0, 1.6]})
     with pytest.raises(ProgramError, match="hangs on its cables; lower it first"):
         idle.check({})
+    with pytest.raises(ProgramError, match="hangs on its cables; lower it first"):
+        robot.programs["jog"].check({"velocity_rad_s": [0.0, 0.0, 0.0]})
+    robot.parts.slacken()
+    robot.switch("hold")
+    robot.run(0.1)  # each axis keeps its cable by itself now, as after brakes have held it
+    with pytest.raises(ProgramError, match="may hang on them; lower it first"):
+        idle.check({})
+
+
+def test_a_tight_robot_is_not_told_anew_where_it_is(robot: Standing):
+    tightened(robot)
+    with pytest.raises(ProgramError, match="the cables are tight already; lower it first"):
+        robot.programs["tighten"].check({"from": "home"})
+    robot.programs["tighten"].check({})
+
+
+def test_a_platform_let_go_elsewhere_is_not_taken_to_stand_at_home(robot: Standing):
+    tightened(robot)
+    robot.switch("lower", {"blind": True})
+    robot.run(2.0)
+    tighten = robot.programs["tighten"]
+    tighten.check({})  # its cables' lengths tell where it is
+    robot.estimator.forget_lengths()
+    with pytest.raises(ProgramError, match="stand it at home, then say from: home"):
+        tighten.check({})
+    robot.switch("tighten", {"from": "home"})
+    robot.until_done(20.0)
+    assert not robot.parts.last.displaced
+
+
+def test_a_platform_that_cannot_come_home_is_let_down_where_it_is(robot: Standing):
+    tightened(robot)
+    robot.switch("lower")
+    stuck = robot.programs["lower"]._approach
+    robot.programs["lower"]._approach = lambda: False  # type: ignore[attr-defined]
+    try:
+        robot.run(30.0)
+    finally:
+        robot.programs["lower"]._approach = stuck  # type: ignore[attr-defined]
+    assert robot.program.progress()["blind"]
 
 
 def test_holding_keeps_axes_before_and_the_platform_after(robot: Standing):
