@@ -23,7 +23,9 @@ _ASLEEP_m = 5e-5
 _LEAST_SHARE = 1e-6
 _ANYWHERE_m = 1e3
 # what keeps a hand's target from following it
-_FREE, _EDGE = 0, 1
+_FREE, _EDGE, _STANDS = 0, 1, 2
+_HELD = ("", "at the edge of the workspace", "below the workspace, as on its stand: up first")
+_BELOW_m = 1e-3
 
 
 @jit
@@ -40,10 +42,15 @@ def _lead(
     goal: FloatArray,
 ) -> int:
     """Write where the target is to go when the hand has moved, within the box and within reach."""
-    edge = _FREE
+    edge, up = _FREE, goal.size - 1
+    stands = position[up] < low[up] - _BELOW_m
     for i in range(goal.size):
         moved = scale * (pose[i] - last[i])
         last[i] = pose[i]
+        # what may touch its stand is not dragged along it
+        if stands and i != up:
+            edge = _STANDS if moved != 0.0 else edge
+            moved = 0.0
         goal[i] = target[i] + (moved if math.isfinite(moved) else 0.0)
         # a platform that is slower than the hand is not to run on after the hand has stopped
         reach = speed[i] * (0.5 * speed[i] / acceleration[i] + _LEAD_S)
@@ -51,7 +58,7 @@ def _lead(
         # what stands outside the box, as the stand may, is not pulled into it
         least, most = min(low[i], target[i]), max(high[i], target[i])
         if goal[i] < least or goal[i] > most:
-            edge = _EDGE
+            edge = max(edge, _EDGE)
             goal[i] = min(max(goal[i], least), most)
     return edge
 
@@ -125,7 +132,7 @@ class PoseProgram(PlatformProgram):
         missing = self._control.feasible(self._seen_goal)
         if missing:
             return f"{self._seen_goal[0]:.3f}, {self._seen_goal[1]:.3f} m: {missing}"
-        return "at the edge of the workspace" if self._held == _EDGE else ""
+        return _HELD[self._held]
 
     # -- what is wanted
 

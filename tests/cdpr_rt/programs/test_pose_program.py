@@ -47,10 +47,11 @@ class Ideal:
         self.sample["quaternion"], self.sample["session"] = (1.0, 0.0, 0.0, 0.0), 1
         self.restart()
 
-    def restart(self) -> None:
-        """Begin anew, standing in the middle of the box."""
+    def restart(self, at_home: bool = False) -> None:
+        """Begin anew, in the middle of the box or on the stand."""
         assert self.platform is not None
         middle = 0.5 * np.add(self.platform.workspace_min_m, self.platform.workspace_max_m)
+        middle = np.array(self.platform.home_m) if at_home else middle
         ways = middle + np.array(self.platform.anchor_points_m) - self.platform.exit_points_m
         self.feedback.position_rad[:] = 0.0
         self.parts.estimator.set_lengths(np.zeros(3), np.linalg.norm(ways, axis=1))
@@ -218,6 +219,21 @@ def test_a_hand_leads_by_its_scale(robot: Ideal) -> None:
     robot.lead(np.full((30, 2), (0.34, 0.08)), scale=4.0)
     robot.check_motion()
     assert robot.control.position_m - start == pytest.approx([0.16, -0.08], abs=2e-5)
+
+
+def test_a_hand_lifts_a_platform_off_its_stand_before_it_leads_it_sideways(robot: Ideal) -> None:
+    robot.restart(at_home=True)
+    robot.program.command({"stream": True})
+    start = robot.control.position_m.copy()
+    robot.lead(np.outer(np.ones(20), (0.0, 0.0)))
+    robot.lead(np.outer(np.linspace(0.0, 0.2, 40), (1.0, 0.1)))
+    assert robot.control.position_m[0] == start[0]
+    assert robot.control.position_m[1] == pytest.approx(start[1] + 0.02, abs=2e-3)
+    assert "up first" in robot.program.progress()["held_back"]
+    robot.lead(np.column_stack((np.full(40, 0.2), np.linspace(0.02, 0.2, 40))))
+    robot.lead(np.column_stack((np.linspace(0.2, 0.4, 60), np.full(60, 0.2))))
+    robot.lead(np.outer(np.ones(20), (0.4, 0.2)))
+    assert robot.control.position_m[0] == pytest.approx(start[0] + 0.2, abs=5e-3)
 
 
 def test_the_clutch_lets_the_hand_move_without_leading(robot: Ideal) -> None:
