@@ -289,7 +289,9 @@ def correct(
     if not moving:
         pace = (s.velocity[0] ** 2 + s.velocity[1] ** 2) / r.stuck_m_s**2
         gain *= 1.0 + r.breaking * math.exp(-min(pace, 50.0))
-    limited = share < 1.0 or much > 1.0
+    # beyond its bounds nothing is integrated, except against what keeps it from moving at all
+    sticks = s.velocity[0] ** 2 + s.velocity[1] ** 2 < (5.0 * r.stuck_m_s) ** 2
+    limited = share < 1.0 or (much > 1.0 and not sticks)
     for k in range(2):
         step = gain * (ex if k == 0 else ey)
         if not limited or step * s.integral[k] < 0.0:
