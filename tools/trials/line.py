@@ -89,6 +89,6 @@ def judge(parts: dict[str, Recorded]) -> list[Figure]:
             if len(rms) == len(names):
                 ratio = rms[WITHOUT][i] / rms[WITH][i]
                 told = f"distance from the {text}{less}, without over with"
-                limit = None if less_mean else RATIO
+                limit = RATIO if what == "setpoint" and not less_mean else None
                 ratios.append(Figure(f"{what}{key}_ratio", told, ratio, "", limit, True))
     return [*figures, *ratios]

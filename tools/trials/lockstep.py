@@ -10,8 +10,8 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -347,11 +347,3 @@ def _patient(robot: Robot) -> Robot:
     """Return `robot` with drives that bear a busy machine until cycles, and bus time, begin."""
     axes = (replace(axis, winch=watched_by_heartbeat(axis.winch, _WATCH_S)) for axis in robot.axes)
     return replace(robot, axes=tuple(axes))
-
-
-@contextmanager
-def opened(robot: str | Path, **options: Any) -> Iterator[LockstepRobot]:
-    """Open a robot whose drives have power and hold."""
-    with LockstepRobot(robot, **options) as opened_robot:
-        opened_robot.enable()
-        yield opened_robot

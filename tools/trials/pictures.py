@@ -80,7 +80,7 @@ def of_limits(recorded: Recorded, robot: Robot) -> Figure:
     beyond = [leg.overshoot_m(recorded.true_m) for leg in limits.legs(recorded, acceleration)]
     over.hist(1e3 * np.array(beyond), bins=30, color=_AXES[:2], label=["in x", "in y"])
     over.axvline(limits.OVERSHOOT_mm, color=_BOUND, lw=1.0)
-    over.set(xlabel="mm", ylabel="legs", title="overshoot of each leg")
+    over.set(xlabel="mm", ylabel="legs", yscale="log", title="overshoot of each leg")
     way.plot(*recorded.true_m[::20].T, color=_TRUE, lw=0.3)
     _workspace(way, robot)
     way.set(xlabel="x (m)", ylabel="y (m)", title="way of the platform")

@@ -16,16 +16,10 @@ TRUTH: Final = "truth.log"
 FIELDS: Final = (
     "cycle",
     "time_s",
-    "state",
-    "program",
     "stream_buttons",
-    "pose",
     "pose_setpoint",
     "position_rad",
-    "tension_N",
-    "torque_actual_Nm",
     "torque_sent_Nm",
-    "compensation_Nm",
 )
 _OLDEST_S: Final = 0.01
 """Age of an angle that a simulated drive may have at most."""

@@ -59,10 +59,11 @@ def test_a_line_s_error_is_the_distance_from_it():
     assert found["path_with_mm"].value == pytest.approx(1.0 / np.sqrt(2.0), rel=0.01)
     assert found["path_without_mm"].value == pytest.approx(4.0 / np.sqrt(2.0), rel=0.01)
     assert found["path_ratio"].value == pytest.approx(4.0, rel=0.01)
-    assert found["path_ratio"].reached
     expected = np.sqrt((8.0 + 1.0) / (0.5 + 1.0))  # the lag is in both
     assert found["setpoint_ratio"].value == pytest.approx(expected, rel=0.01)
     assert not found["setpoint_ratio"].reached
+    expected = np.sqrt(8.0 / 0.5)
+    assert found["setpoint_less_mean_ratio"].value == pytest.approx(expected, rel=0.01)
     assert "path_ratio" not in figures_of(line.judge({line.WITHOUT: parts[line.WITHOUT]}))
 
 
