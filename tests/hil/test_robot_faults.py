@@ -107,6 +107,8 @@ def test_the_winches_that_are_left_let_the_platform_down(
     assert hanging.state is LoopState.FAULT
     for text in told:
         assert text in hanging.loop.life.reason
+    # how far its cables are out is not known any more, but after the fault of a drive
+    assert hanging.loop.parts.estimator.estimate.length_known.all() == (told == ("7305h",))
     records = truth.read()
     down_m_s = -records["velocity_m_s"][:, 1].min()
     if carries:
@@ -120,6 +122,22 @@ def test_the_winches_that_are_left_let_the_platform_down(
     assert np.abs(records["velocity_m_s"][-1]).max() < 0.02
     assert height_m(records) > 0.25
     assert records["tension_N"][-1].max() < 8.0
+
+
+def test_a_lowering_that_fails_does_not_leave_motors_with_power(hanging: LockstepRobot) -> None:
+    def mistaken(*_: object) -> None:
+        raise ValueError("a mistake")
+
+    lower = hanging.loop.parts.programs["lower"]
+    lower.update = mistaken  # type: ignore[method-assign]
+    begun_s = hanging.now_s
+    with pytest.raises(WorkFailedError):
+        hanging.order("disable")
+    hanging._turn_until(lambda: not hanging.loop.busy, 10.0, "the power off")
+    assert hanging.now_s - begun_s < 5.0
+    assert hanging.state is LoopState.FAULT
+    assert hanging.loop.life.reason.startswith("program lower: ValueError: a mistake")
+    assert hanging.machine.unpowered()
 
 
 def test_a_target_out_of_the_workspace_is_refused_and_nothing_moves(

@@ -14,6 +14,7 @@ from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.programs.base import Program, ProgramError
 from cdpr_rt.runtime.programs.index_way import index_way
 from cdpr_rt.runtime.programs.model import model_of
+from cdpr_rt.runtime.programs.reel import Reel
 from cdpr_rt.runtime.programs.registry import build_programs, platform_parts, rehearse_programs
 from cdpr_rt.runtime.programs.tighten import standing_tensions
 from cdpr_rt.runtime.robot_arrays import limits_of, winches_of
@@ -21,6 +22,7 @@ from cdpr_rt.runtime.shared_block import SharedBlock
 from profiles import load_robot
 
 PERIOD_S = 1e-3
+CABLE_m = np.full(3, -0.026)
 COULOMB_Nm = 0.08
 STIFFNESS_N_m = 1e4
 ROBOT = load_robot("planar-3")
@@ -167,6 +169,19 @@ def test_only_a_tight_robot_takes_positions_and_only_a_loose_one_rests(robot: St
     robot.run(0.1)  # each axis keeps its cable by itself now, as after brakes have held it
     with pytest.raises(ProgramError, match="may hang on them; lower it first"):
         idle.check({})
+
+
+def test_a_winch_that_pays_out_does_not_answer_an_encoder_that_jumps():
+    reel, feedback, torque = Reel(np.full(3, 1e-4), CABLE_m, PERIOD_S), AxisFeedback(3), np.zeros(3)
+    reel.high_N[:] = 100.0
+    torque[:] = -20.0 * CABLE_m
+    reel.begin(feedback, np.zeros(3), torque)
+    reel.update(feedback, torque)
+    for jump in (1.5, -1.5):
+        feedback.position_rad[1] += jump
+        for _ in range(30):
+            reel.update(feedback, torque)
+            assert reel.tension_N == pytest.approx(20.0)
 
 
 def test_a_tight_robot_is_not_told_anew_where_it_is(robot: Standing):
