@@ -184,6 +184,18 @@ def test_a_winch_that_pays_out_does_not_answer_an_encoder_that_jumps():
             assert reel.tension_N == pytest.approx(20.0)
 
 
+def test_a_cable_that_gives_way_while_they_are_tightened_ends_it(robot: Standing):
+    robot.switch("tighten")
+    for _ in range(400):
+        robot.run(0.05)
+        if robot.program.progress()["stage"] == "pull":
+            break
+    robot.slack_m[0] += 5.0
+    told = robot.until_done(20.0)
+    assert told["trouble"].startswith("cable 0: 0.0")
+    assert "reeled in and not tight" in told["trouble"]
+
+
 def test_a_tight_robot_is_not_told_anew_where_it_is(robot: Standing):
     tightened(robot)
     with pytest.raises(ProgramError, match="the cables are tight already; lower it first"):

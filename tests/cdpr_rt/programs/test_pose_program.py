@@ -196,6 +196,20 @@ def test_a_place_in_the_box_that_tensions_cannot_hold_is_refused_with_the_reason
     assert robot.control.position_m[0] < 0.5 * max(place[0] for place in robot.path)
 
 
+def test_what_no_tensions_hold_is_not_entered_on_the_way_either() -> None:
+    assert ROBOT.platform is not None
+    wide = dataclasses.replace(
+        ROBOT.platform, workspace_min_m=(-1.8, 0.7), workspace_max_m=(1.8, 2.9)
+    )
+    robot = Ideal(wide)
+    robot.program.command({"position_m": [0.5, 1.8]})
+    robot.program._target[:] = 1.7, 0.8  # as if nobody had looked before
+    robot.run(6.0)
+    assert all(robot.control.stands(place) for place in robot.path)
+    assert robot.control.velocity_m_s == pytest.approx(np.zeros(2), abs=0.01)
+    robot.check_motion()
+
+
 def test_resume_goes_on_to_the_target_that_was_left(robot: Ideal) -> None:
     robot.program.command({"position_m": [0.5, 2.2]})
     robot.run(0.3)
