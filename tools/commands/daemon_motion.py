@@ -112,6 +112,11 @@ def _to_angles(
     """Return what the program `pid` is to do; raises BadInputError."""
     if not axes:
         raise BadInputError("nothing to move; allowed: AXIS=ANGLE..., or --to X Y for a platform")
+    if "pid" not in daemon.get("/description").get("programs", ["pid"]):
+        raise BadInputError(
+            f"{axes[0]}: the platform is moved as a whole; allowed: --to X Y, or `cdpr jog` for "
+            "a single winch"
+        )
     n, goals = _given(daemon, axes, "mm" if cable else "deg")
     factor = 1e-3 if cable else math.radians(1.0)
     key = "cable_m" if cable else "distance_rad" if relative else "position_rad"

@@ -53,7 +53,7 @@ def _at_rest(axis: dict[str, Any]) -> bool:
 def finish(daemon: Daemon, out: Output, stopped: bool, **figures: Any) -> None:
     """Say where the axes are once they have settled, or after a while where they have not.
 
-    Raises WorkFailedError where the user has stopped it, or the loop has gone to fault.
+    Raises WorkFailedError where the user has stopped it, or a fault has ended it or is about to.
     """
     deadline = time.monotonic() + _SETTLE_S
     status = daemon.get("/status")
@@ -69,6 +69,8 @@ def finish(daemon: Daemon, out: Output, stopped: bool, **figures: Any) -> None:
     out.say(f"{status['state']}, {status['program']}")
     if status["state"] != "active":
         raise WorkFailedError(f"{status['reason'] or 'the power was taken'} ({status['state']})")
+    if status.get("reacting", "none") != "none":
+        raise WorkFailedError(f"{status['reason']} ({status['reacting']} under way)")
     if stopped:
         raise WorkFailedError("stopped on request; the axes hold where they are")
     angles = {axis["name"]: axis.get("position_rad") for axis in status["axes"]}
