@@ -1,0 +1,44 @@
+"""Nothing is compiled once a robot has power: the loop would stand still meanwhile."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+SCRIPT = """
+import sys
+from numba.core.registry import CPUDispatcher
+from tools.trials.lockstep import LockstepRobot
+
+def compiled():
+    return {
+        (module.__name__, name): len(kernel.signatures)
+        for module in list(sys.modules.values())
+        if getattr(module, "__name__", "").startswith(("cdpr_rt", "drivers", "tools"))
+        for name, kernel in vars(module).items()
+        if isinstance(kernel, CPUDispatcher)
+    }
+
+with LockstepRobot("planar-3") as robot:
+    before = compiled()
+    robot.enable()
+    robot.carry_out("tighten", 30.0)
+    robot.carry_out("pose", 30.0, position_m=[0.1, 1.5])
+    robot.misbehave(1, 1, 0x7305)
+    robot._turn_until(lambda: robot.loop.busy, 3.0, "a reaction")
+    robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
+    assert "7305h" in robot.loop.life.reason
+    late = {name for name, count in compiled().items() if count != before.get(name)}
+print(sum(before.values()), sorted(late))
+"""
+
+
+def test_from_the_first_power_to_a_fault_nothing_is_compiled():
+    """In a process of its own, since what other tests have compiled stays compiled."""
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    kernels, _, late = done.stdout.strip().partition(" ")
+    assert int(kernels) > 10
+    assert late == "[]"
