@@ -17,7 +17,7 @@ from tools.commissioning import Paths
 from tools.errors import BadInputError
 from tools.output import Output
 from tools.robot_buses import asks_for_own_simulator, robot_urls
-from tools.simulator import HELD_UP_S, OwnSimulator
+from tools.simulator import OwnSimulator
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def free_motors(
         if asks_for_own_simulator(buses):
             name = f"simbus:own-{os.getpid()}"
             out.note(f"starting simulated drives without cables: {len(robot.axes)} ...")
-            simulator = OwnSimulator(robot.reference, name, plant, detached=True, hold_s=HELD_UP_S)
+            simulator = OwnSimulator(robot.reference, name, plant, detached=True)
             stack.callback(simulator.stop)
             stack.enter_context(one_core(simulator.process.pid))
             buses = [name]

@@ -31,7 +31,7 @@ from tools.robot_boot import boot_notes, boot_robot, device_of, faults_text, ope
 from tools.robot_buses import asks_for_own_simulator, robot_urls
 from tools.safety import SessionSafety, open_safety
 from tools.signals import stop_on_signals
-from tools.simulator import HELD_UP_S, OwnSimulator
+from tools.simulator import OwnSimulator
 
 _SPEED_SHARE = 0.2
 # a bare rotor may swing by turns without doing harm; its speed is what is limited
@@ -232,7 +232,7 @@ def _own_simulator(
 ) -> tuple[int, str]:
     name = f"simbus:own-{os.getpid()}"
     out.note(f"starting simulated drives: {len(robot.axes)} ...")
-    simulator = OwnSimulator(robot.reference, name, plant, hold_s=HELD_UP_S)
+    simulator = OwnSimulator(robot.reference, name, plant)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return simulator.process.pid, name

@@ -34,7 +34,7 @@ from tools.errors import BadInputError
 from tools.output import Output
 from tools.safety import SessionSafety, open_safety
 from tools.signals import stop_on_signals
-from tools.simulator import HELD_UP_S, OwnSimulator
+from tools.simulator import OwnSimulator
 
 _SPEED_SHARE = 0.2
 # a bare rotor may swing by turns without doing harm; its speed is what is limited
@@ -333,7 +333,7 @@ def _own_simulator(
 ) -> BusUrl:
     url = open_bus(f"simbus:own-{os.getpid()}")
     out.note("starting the simulated drive ...")
-    simulator = OwnSimulator(winch.reference, str(url), plant, truth_log, hold_s=HELD_UP_S)
+    simulator = OwnSimulator(winch.reference, str(url), plant, truth_log)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return url

@@ -16,8 +16,6 @@ from tools.errors import BadInputError, WorkFailedError
 # the first start on a machine compiles the physics
 _START_TIMEOUT_S = 180.0
 _STOP_TIMEOUT_S = 5.0
-HELD_UP_S = 5.0
-"""For so long a busy machine may hold up a command whose simulator waits for it in lockstep."""
 
 
 class OwnSimulator:

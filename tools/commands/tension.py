@@ -32,7 +32,7 @@ from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
 from tools.session import confirm_motion, open_bus, open_winch
 from tools.signals import stop_on_signals
-from tools.simulator import HELD_UP_S, OwnSimulator
+from tools.simulator import OwnSimulator
 from tools.tension import calibration
 from tools.tension import watch as watching
 from tools.tension.anchor import AnchorPlan, measure_anchored, plan_anchor
@@ -353,7 +353,7 @@ def _hands(
         plant.write_text(_MASS_PLANT)
     url = open_bus(f"simbus:own-{os.getpid()}")
     out.note("starting the simulated drive ...")
-    simulator = OwnSimulator(winch.reference, str(url), plant, board=board, hold_s=HELD_UP_S)
+    simulator = OwnSimulator(winch.reference, str(url), plant, board=board)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return url, on_board(board)

@@ -35,7 +35,7 @@ from tools.daemon.machine import RobotMachine
 from tools.daemon.settings import RunSettings
 from tools.errors import WorkFailedError
 from tools.robot_buses import robot_urls
-from tools.simulator import HELD_UP_S, OwnSimulator
+from tools.simulator import OwnSimulator
 from tools.trials.pose_log import PoseLogTail
 from tools.trials.right import RightInBusTime
 from tools.trials.stream import StreamInBusTime
@@ -43,6 +43,8 @@ from tools.trials.stream import StreamInBusTime
 RING_S: Final = 30.0
 _PATIENCE_S: Final = 60.0
 """Time by the clock in which no cycle runs at all, as while drives boot."""
+_HELD_UP_S: Final = 5.0
+"""For so long a busy machine may hold up the loop without drives that miss their master."""
 _LOOK_CYCLES: Final = 512
 _WATCH_S: Final = 0.4
 _names = count()
@@ -116,7 +118,7 @@ class LockstepRobot:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-"))
             self._truth_path = Path(folder) / "truth.log"
         simulator = OwnSimulator(
-            self._reference, bus, self._plant, self._truth_path, hold_s=HELD_UP_S
+            self._reference, bus, self._plant, self._truth_path, hold_s=_HELD_UP_S
         )
         stack.callback(simulator.stop)
         self.simulator = simulator
