@@ -11,6 +11,8 @@ from cdpr_rt.exchange import AxisDevice
 
 _LATE_SHARE = 0.1
 _TOO_LATE_SHARE = 0.25
+# held up for longer, a bus in lockstep has moved on without us
+_STANDS_S = 0.4
 
 
 class Watch(Protocol):
@@ -51,6 +53,9 @@ class Cycle:
         """How far this cycle began behind its deadline, 0 in lockstep."""
         self.began_ns = 0
         """CLOCK_MONOTONIC when this cycle's SYNC went out."""
+        self.elapsed_s = device.period_s
+        """From the last SYNC to this one; one period where cycles begin, or run in lockstep."""
+        self._first = True
         self._deadline_s = 0.0
         self._fresh = True
         self._open = False
@@ -58,13 +63,13 @@ class Cycle:
 
     def begin(self) -> None:
         """Tell that no cycles have run for a while: the next one is not late by it."""
-        self._fresh = True
+        self._fresh = self._first = True
 
     def exchange(self) -> int:
         """Wait for the deadline, send SYNC, take in the answers; return how many axes answered."""
         if not self.device.lockstep:
             self._await_deadline()
-        self.began_ns = time.monotonic_ns()
+        self._take_time()
         self._open, self._released = True, False
         self.device.sync()
         return self.device.receive()
@@ -103,6 +108,13 @@ class Cycle:
             if reason:
                 return reason
         return ""
+
+    def _take_time(self) -> None:
+        device, now_ns = self.device, time.monotonic_ns()
+        since_s = (now_ns - self.began_ns) * 1e-9
+        steady = self._first or (device.lockstep and since_s < _STANDS_S)
+        self.elapsed_s = device.period_s if steady else since_s
+        self.began_ns, self._first = now_ns, False
 
     def _await_deadline(self) -> None:
         period = self.device.period_s

@@ -130,7 +130,7 @@ class Executive:
             self._look_for_alarm()
             motion.fill(k * period, setpoint)
             controller.update(feedback, setpoint, command.torque_Nm)
-            estimator.update(feedback)
+            estimator.update(feedback, elapsed_s=self._cycle.elapsed_s)
             supervisor = self.supervisor
             supervisor.check(feedback, estimator.estimate, setpoint, command.torque_Nm)
             if supervisor.reaction > Reaction.CLAMP:

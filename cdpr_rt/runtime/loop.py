@@ -73,7 +73,6 @@ class ControlLoop:
         self._asked: FloatArray = np.zeros(block.n)
         self._alive = block.counters["loop_alive_ns"]
         self._lease = block.counters["lease_ns"]
-        self._last_ns = 0
         self._orders = Orders(self)
         self.status = StatusPage(self)
         self._procedure: Iterator[None] | None = None
@@ -121,7 +120,6 @@ class ControlLoop:
             self.parts.estimator.forget_lengths()  # drives that have booted count from anywhere
         self.cycle.begin()
         self.parts.estimator.reset()
-        self._last_ns = 0
         self.lost_bus = ""
         self.cycling = True
         self.switch(IDLE)
@@ -147,7 +145,7 @@ class ControlLoop:
         estimator.update(
             feedback,
             machine.read_tension(),
-            self._elapsed_s(cycle),
+            cycle.elapsed_s,
             program.controller.compensation_Nm,
         )
         self._program_error = ""
@@ -184,13 +182,6 @@ class ControlLoop:
             supervisor.axis if limit else -1,
             answered,
         )
-
-    def _elapsed_s(self, cycle: Cycle) -> float:
-        """Return the time since the last SYNC, 0 where it was one period."""
-        last_ns, self._last_ns = self._last_ns, cycle.began_ns
-        if cycle.device.lockstep or last_ns == 0:
-            return 0.0
-        return (cycle.began_ns - last_ns) * 1e-9
 
     # -- judging
 

@@ -350,4 +350,4 @@ def alone() -> Iterator[tuple[Robot, socket.socket, Iterator[int]]]:
         sender.connect(("127.0.0.1", there.port))
         sender.send(StreamSetpoint(1, 1, 1, (0.0, 0.0, 0.0)).pack())
         yield there, sender, itertools.count(2)
-        assert there.posted > 100  # some of it was good
+        assert there.posted > 30  # some of it was good
