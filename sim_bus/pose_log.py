@@ -1,14 +1,11 @@
 """Log of a robot's true pose and tensions, one record at every SYNC; for reports and tests alone.
 
-The file begins with one line of JSON, padded with spaces to HEADER_BYTES, newline included; then
-follow records of the little-endian layout named in it. Each record is written at once, whole, so
-that the last one can be read while the robot runs.
+Records have the little-endian layout named in the header of their `RecordFile`. Each is written at
+once, whole, so that the last one can be read while the robot runs.
 """
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +13,7 @@ import numpy as np
 
 from sim_bus.cable_robot import CableRobot
 from sim_bus.jit import jit
-
-HEADER_BYTES = 1024
+from sim_bus.record_file import RecordFile
 
 
 class PoseLog:
@@ -39,13 +35,12 @@ class PoseLog:
         ]
         self._row = np.zeros(1, np.dtype(fields))
         self._bytes = self._row.view(np.uint8).data
-        self._file = path.open("wb", buffering=0)
         header = {
             "format": "cdpr-rt pose log 1",
             "record_bytes": self._row.itemsize,
             "fields": fields,
         }
-        self._write(json.dumps(header).encode().ljust(HEADER_BYTES - 1) + b"\n")
+        self._file = RecordFile(path, header)
         describe(self._row, robot.platform, robot.motors)
 
     def append(self, sync_index: int, time_s: float, _truth: tuple[float, ...]) -> None:
@@ -53,7 +48,7 @@ class PoseLog:
         row = self._row[0]
         row["sync_index"], row["time_s"] = sync_index, time_s
         describe(self._row, self._robot.platform, self._robot.motors)
-        self._write(self._bytes)
+        self._file.write(self._bytes)
 
     def flush(self) -> None:
         """Do nothing: records do not wait."""
@@ -61,16 +56,6 @@ class PoseLog:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def _write(self, data: bytes | memoryview) -> None:
-        if self._file.closed:
-            return
-        try:
-            while data:
-                data = data[self._file.write(data) :]
-        except OSError as error:
-            print(f"pose log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
-            self._file.close()
 
 
 @jit

@@ -1,17 +1,15 @@
 """Log of the true motion, one record at every SYNC; written for the report alone.
 
-The file begins with one line of JSON, padded with spaces to HEADER_BYTES, newline included; then
-follow records of the little-endian layout named in it.
+Records have the little-endian layout named in the header of their `RecordFile`.
 """
 
 from __future__ import annotations
 
-import json
 import struct
-import sys
 from pathlib import Path
 
-HEADER_BYTES = 1024
+from sim_bus.record_file import RecordFile
+
 FIELDS = (
     ("sync_index", "<u4"),
     ("time_s", "<f8"),
@@ -33,7 +31,6 @@ class TruthLog:
 
     def __init__(self, path: Path, node_id: int, index_rad: float, start_rad: float) -> None:
         """Create the file; `index_rad`, `start_rad` are mechanical angles. Raises OSError."""
-        self._file = path.open("wb", buffering=0)
         self._index_rad = index_rad
         self._start_rad = start_rad
         self._buffer = bytearray(_BUFFERED * _RECORD.size)
@@ -46,7 +43,7 @@ class TruthLog:
             "record_bytes": _RECORD.size,
             "fields": FIELDS,
         }
-        self._write(json.dumps(header).encode().ljust(HEADER_BYTES - 1) + b"\n")
+        self._file = RecordFile(path, header)
 
     def append(self, sync_index: int, time_s: float, truth: tuple[float, ...]) -> None:
         """Append the true figures that a `motor.Sample` ends with."""
@@ -71,20 +68,10 @@ class TruthLog:
     def flush(self) -> None:
         """Write what is buffered."""
         if self._used:
-            self._write(memoryview(self._buffer)[: self._used])
+            self._file.write(memoryview(self._buffer)[: self._used])
             self._used = 0
 
     def close(self) -> None:
         """Flush and close the file."""
         self.flush()
         self._file.close()
-
-    def _write(self, data: bytes | memoryview) -> None:
-        if self._file.closed:
-            return
-        try:
-            while data:
-                data = data[self._file.write(data) :]
-        except OSError as error:
-            print(f"truth log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
-            self._file.close()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from robot_rig import Simulator, simulated, unique
 
-from sim_bus.pose_log import HEADER_BYTES
+from sim_bus.record_file import HEADER_BYTES
 from tools.commands.sim_fault import Fault, fault
 from tools.errors import BadInputError, WorkFailedError
 
