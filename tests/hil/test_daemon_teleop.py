@@ -124,9 +124,10 @@ def hold_key(terminal: int, key: bytes, seconds: float) -> None:
 def test_a_script_leads_through_a_bad_network(daemon: RealDaemon, folder: Path) -> None:
     begin = place(daemon)  # on the stand, under the box of targets
     script = (
-        # still where the clutch opens and closes: a set-point that is lost tells that too late
-        "0 0 0\n0.2 0 0\n1.2 40 30\n1.8 40 30 confirm\n2.0 40 30 clutch\n2.2 40 30 clutch\n"
-        "2.4 0 0 clutch\n2.6 0 0\n2.8 0 0\n3.2 0 20 confirm"
+        # off the stand first: nobody leads it sideways there; and still where the clutch opens
+        # and closes: a set-point that is lost tells that too late
+        "0 0 0\n0.2 0 0\n1 0 30\n1.5 0 30\n2.2 40 30\n2.8 40 30 confirm\n3 40 30 clutch\n"
+        "3.2 40 30 clutch\n3.4 0 0 clutch\n3.6 0 0\n3.8 0 0\n4.2 0 20 confirm"
     )
     with hostile(port_of(daemon), seed=3) as proxy:
         via = f"127.0.0.1:{proxy.port}"
