@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim_bus import servo
+from sim_bus.motor import sample_of
 from sim_bus.motor_state import LOAD_KINDS, MOTOR_DTYPE, MotorArray, Transmission
 from sim_bus.platform import MOST_CABLES, MOST_FEET, PLATFORM_DTYPE, PlatformArray
-from sim_bus.robot_motion import run_together, sample_of
+from sim_bus.robot_motion import run_together
 from sim_bus.robot_plant import RobotPlant
 
 _LONGEST_STEP_S = 1e-3

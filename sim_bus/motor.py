@@ -39,6 +39,26 @@ class Sample(NamedTuple):
 
 
 @jit
+def sample_of(
+    motor: Any, flags: int
+) -> tuple[int, int, int, int, float, float, float, float, float, float]:
+    """Return the `Sample` of a motor as it is now, with the flags of its last steps."""
+    m = motor[0]
+    return (
+        flags | servo.switches(m),
+        rotor.read_counter(m, rotor.delayed_angle(m)),
+        math.floor(m.sensed / m.torque_unit + 0.5),
+        math.floor(m.displayed_velocity + 0.5),
+        m.angle,
+        m.velocity,
+        m.torque_gain * m.sensed,
+        m.cogging_Nm,
+        m.friction_Nm,
+        m.rise,
+    )
+
+
+@jit
 def run(
     motor: Any, until: float, kind: int, target: float
 ) -> tuple[int, int, int, int, float, float, float, float, float, float]:
@@ -62,19 +82,7 @@ def run(
             servo.observe(m, rotor.read_counter(m, m.angle), h)
         m.time = until
         flags |= servo.watch(m, kind, target, dt)
-    flags |= servo.switches(m)
-    return (
-        flags,
-        rotor.read_counter(m, rotor.delayed_angle(m)),
-        math.floor(m.sensed / m.torque_unit + 0.5),
-        math.floor(m.displayed_velocity + 0.5),
-        m.angle,
-        m.velocity,
-        m.torque_gain * m.sensed,
-        m.cogging_Nm,
-        m.friction_Nm,
-        m.rise,
-    )
+    return sample_of(motor, flags)
 
 
 class Motor:

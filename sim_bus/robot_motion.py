@@ -69,23 +69,3 @@ def run_together(
     for i in range(p.cables):
         motors[i].time = until
         flags[i] |= servo.watch(motors[i], kinds[i], targets[i], dt)
-
-
-@jit
-def sample_of(
-    motor: Any, flags: int
-) -> tuple[int, int, int, int, float, float, float, float, float, float]:
-    """Return the `motor.Sample` of a motor as it is now, with the flags of its last steps."""
-    m = motor[0]
-    return (
-        flags | servo.switches(m),
-        rotor.read_counter(m, rotor.delayed_angle(m)),
-        math.floor(m.sensed / m.torque_unit + 0.5),
-        math.floor(m.displayed_velocity + 0.5),
-        m.angle,
-        m.velocity,
-        m.torque_gain * m.sensed,
-        m.cogging_Nm,
-        m.friction_Nm,
-        m.rise,
-    )
