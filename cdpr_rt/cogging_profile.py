@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-import json
+import math
+from collections.abc import Iterator
 from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from cdpr_rt.compensation import AxisCompensation, FrictionFeedforward
 from cdpr_rt.errors import ControlError
 from cdpr_rt.identification import BetterResult, ThesisResult
+from profiles.drive import Unsigned32
+from profiles.errors import ProfileError
+from profiles.motor_bounds import MotorBounds
+from profiles.reader import read_json_model
 
 Method = Literal["thesis", "better"]
+
+_MOST_SAMPLES = 1 << 16
+_LONGEST_s = 0.5
+_Text = Annotated[str, Field(max_length=100)]
+_Share = Annotated[float, Field(ge=0.0, le=1.0)]
+_Row = Annotated[list[float], Field(min_length=2, max_length=_MOST_SAMPLES)]
 
 
 class CoggingProfileError(ControlError):
@@ -29,11 +40,11 @@ class _Part(BaseModel):
 class DriveIdentity(_Part):
     """Which drive and encoder a profile belongs to (CANopen object 1018h)."""
 
-    vendor_id: int
-    product_code: int
-    revision: int
-    serial: int
-    encoder_counts_per_turn: Annotated[int, Field(gt=0)]
+    vendor_id: Unsigned32
+    product_code: Unsigned32
+    revision: Unsigned32
+    serial: Unsigned32
+    encoder_counts_per_turn: Annotated[Unsigned32, Field(gt=0)]
 
 
 class StoredFriction(_Part):
@@ -45,6 +56,21 @@ class StoredFriction(_Part):
     stribeck_backward_Nm: float
     stribeck_speed_rad_s: Annotated[float, Field(gt=0.0)]
     viscous_Nms_rad: float
+
+    @property
+    def biases_Nm(self) -> tuple[float, float]:
+        """By how much more it takes forward than backward, halved: fast, and at standstill."""
+        coulomb = 0.5 * (self.coulomb_forward_Nm - self.coulomb_backward_Nm)
+        stribeck = 0.5 * (self.stribeck_forward_Nm - self.stribeck_backward_Nm)
+        return coulomb, coulomb + stribeck
+
+    @property
+    def dry_Nm(self) -> float:
+        """The most that it is without its viscous part."""
+        return max(
+            abs(self.coulomb_forward_Nm) + abs(self.stribeck_forward_Nm),
+            abs(self.coulomb_backward_Nm) + abs(self.stribeck_backward_Nm),
+        )
 
 
 class StoredHarmonic(_Part):
@@ -62,15 +88,36 @@ class StoredHarmonic(_Part):
 class StoredMethod(_Part):
     """Tables over the turn from the index, rows: increasing angle, decreasing angle."""
 
-    table_Nm: tuple[list[float], list[float]]
+    table_Nm: tuple[_Row, _Row]
     friction: StoredFriction
-    look_ahead_s: Annotated[float, Field(ge=0.0)]
-    observer_s: Annotated[float, Field(ge=0.0)]
+    look_ahead_s: Annotated[float, Field(ge=0.0, le=_LONGEST_s)]
+    observer_s: Annotated[float, Field(ge=0.0, le=_LONGEST_s)]
 
-    def compensation(self) -> AxisCompensation:
+    def faults(self, bounds: MotorBounds) -> Iterator[tuple[str, str]]:
+        """Yield (key, problem) for what cannot be true of a motor with these bounds."""
+        forward, backward = (max(map(abs, row)) for row in self.table_Nm)
+        for i, peak in enumerate((forward, backward)):
+            yield from bounds.compensation(f"table_Nm[{i}]", peak)
+        friction = self.friction
+        yield from bounds.compensation("friction", friction.dry_Nm)
+        yield from bounds.compensation(
+            "table_Nm and friction together", max(forward, backward) + friction.dry_Nm
+        )
+        of_table = math.fsum(map(math.fsum, self.table_Nm)) / (2 * len(self.table_Nm[0]))
+        for of_friction in friction.biases_Nm:
+            yield from bounds.bias(
+                "mean of table_Nm and friction over both directions", of_table + of_friction
+            )
+        yield from bounds.viscous("friction.viscous_Nms_rad", friction.viscous_Nms_rad)
+        yield from bounds.stribeck_speed(
+            "friction.stribeck_speed_rad_s", friction.stribeck_speed_rad_s
+        )
+
+    def compensation(self, bounds: MotorBounds) -> AxisCompensation:
         """Return what an axis' compensation needs."""
         return AxisCompensation(
             table_Nm=np.array(self.table_Nm, float),
+            most_Nm=bounds.compensation_Nm,
             friction=FrictionFeedforward(**self.friction.model_dump()),
             look_ahead_s=self.look_ahead_s,
             observer_s=self.observer_s,
@@ -81,17 +128,17 @@ class CoggingProfile(_Part):
     """All that was learnt about one motor, and whose it is."""
 
     format: Literal[1] = 1
-    motor: str
-    drive: str
+    motor: _Text
+    drive: _Text
     identity: DriveIdentity
-    temperature_C: float | None = None
+    temperature_C: Annotated[float, Field(ge=-60.0, le=200.0)] | None = None
     created: datetime
     raw_data: list[str]
     inertia_kg_m2: Annotated[float, Field(gt=0.0)]
     harmonics: list[StoredHarmonic]
-    residual_rms_Nm: float
-    repaired_fraction: float
-    coverage: float
+    residual_rms_Nm: Annotated[float, Field(ge=0.0)]
+    repaired_fraction: _Share
+    coverage: _Share
     thesis: StoredMethod
     better: StoredMethod
 
@@ -108,46 +155,52 @@ class CoggingProfile(_Part):
         Raises CoggingProfileError naming file, key and value for anything but a sound profile.
         """
         try:
-            text = path.read_text(encoding="utf-8")
-            json.loads(text)
-        except OSError as error:
-            raise CoggingProfileError(f"{path}: cannot be read: {error.strerror}") from error
-        except ValueError as error:
-            raise CoggingProfileError(f"{path}: is not a cogging profile: {error}") from error
-        try:
-            profile = cls.model_validate_json(text)
-        except ValidationError as error:
-            first = error.errors()[0]
-            key = ".".join(str(k) for k in first["loc"])
-            raise CoggingProfileError(
-                f"{path}: {key} = {str(first['input'])[:60]}: {first['msg']}"
-            ) from error
+            profile = read_json_model(path, cls)
+        except ProfileError as error:
+            raise CoggingProfileError(str(error)) from None
         for name, method in (("thesis", profile.thesis), ("better", profile.better)):
             forward, backward = method.table_Nm
-            if len(forward) != len(backward) or len(forward) < 2:
+            if len(forward) != len(backward):
                 raise CoggingProfileError(
-                    f"{path}: {name}.table_Nm has rows of {len(forward)} and {len(backward)} "
-                    "values; both must have the same number, at least 2"
+                    f"{path}: {name}.table_Nm: rows of {len(forward)} and {len(backward)} values; "
+                    "allowed: of the same number"
                 )
         return profile
+
+    def require_true_of(self, bounds: MotorBounds) -> None:
+        """Raise CoggingProfileError where it is of another motor, or cannot be true of this one.
+
+        The message names key, value and what is allowed.
+        """
+        motor = bounds.motor.model
+        if motor != self.motor:
+            raise CoggingProfileError(f"motor: value {self.motor!r}; allowed: {motor}")
+        for key, problem in self._faults(bounds):
+            raise CoggingProfileError(f"{key}: {problem}")
+
+    def _faults(self, bounds: MotorBounds) -> Iterator[tuple[str, str]]:
+        yield from bounds.inertia("inertia_kg_m2", self.inertia_kg_m2)
+        total = math.fsum(abs(harmonic.amplitude_Nm) for harmonic in self.harmonics)
+        yield from bounds.compensation("harmonics: sum of amplitude_Nm", total)
+        for name, method in (("better", self.better), ("thesis", self.thesis)):
+            for key, problem in method.faults(bounds):
+                yield f"{name}.{key}", problem
 
     def compensation(
         self,
         method: Method,
         identity: DriveIdentity,
-        motor: str,
+        bounds: MotorBounds,
         *,
         index_will_be_seen: bool = True,
     ) -> AxisCompensation:
         """Return what the axis' compensation needs.
 
-        Raises CoggingProfileError where motor or drive is another one than at commissioning, or
-        where no index will tell the angle (`index_will_be_seen` False).
+        Raises CoggingProfileError where motor or drive is another one than at commissioning, where
+        it cannot be true of the motor, or where no index will tell the angle
+        (`index_will_be_seen` False).
         """
-        if motor != self.motor:
-            raise CoggingProfileError(
-                f"the cogging profile is of motor {self.motor}, this axis has {motor}"
-            )
+        self.require_true_of(bounds)
         for key, mine in self.identity.model_dump().items():
             other = getattr(identity, key)
             if other != mine:
@@ -160,7 +213,7 @@ class CoggingProfile(_Part):
                 "the encoder index of this axis is not known: home it, or latch the index with the "
                 "touch probe, before its cogging profile can be applied"
             )
-        return (self.thesis if method == "thesis" else self.better).compensation()
+        return (self.thesis if method == "thesis" else self.better).compensation(bounds)
 
 
 TABLE_SAMPLES = 4096

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,8 +15,8 @@ TWO_PI = 2.0 * math.pi
 # columns of the parameter array of one axis
 _LOOK_AHEAD, _OBSERVER_POLE, _BLEND = 0, 1, 2
 _COULOMB_FORWARD, _COULOMB_BACKWARD, _STRIBECK_FORWARD, _STRIBECK_BACKWARD = 3, 4, 5, 6
-_STRIBECK_SPEED, _VISCOUS, _AVAILABLE = 7, 8, 9
-_COLUMNS = 10
+_STRIBECK_SPEED, _VISCOUS, _AVAILABLE, _MOST = 7, 8, 9, 10
+_COLUMNS = 11
 # columns of the state of one axis
 _FADE, _STARTED, _DEVIATION, _DRIFT = 0, 1, 2, 3
 _STATES = 4
@@ -49,6 +49,8 @@ class AxisCompensation:
     """
 
     table_Nm: FloatArray
+    most_Nm: float = field(kw_only=True)
+    """What is added is never more than this, whatever table and friction say."""
     friction: FrictionFeedforward = FrictionFeedforward()
     look_ahead_s: float = 0.0
     observer_s: float = 0.0
@@ -110,6 +112,12 @@ def _torque(
         backward -= parameters[i, _COULOMB_BACKWARD] + parameters[i, _STRIBECK_BACKWARD] * stribeck
         total = 0.5 * (1.0 + side) * forward + 0.5 * (1.0 - side) * backward
         total += parameters[i, _VISCOUS] * moving
+        most = parameters[i, _MOST]
+        # written so that what is not a number stays none: the supervisor looks for it
+        if total > most:
+            total = most
+        elif total < -most:
+            total = -most
         out[i] = state[i, _FADE] * total
 
 
@@ -126,6 +134,7 @@ def _row(axis: AxisCompensation, period_s: float) -> list[float]:
         f.stribeck_speed_rad_s,
         f.viscous_Nms_rad,
         1.0,
+        axis.most_Nm,
     ]
 
 
@@ -180,7 +189,8 @@ class Compensation:
         forward = p[:, _COULOMB_FORWARD] + p[:, _STRIBECK_FORWARD]
         backward = p[:, _COULOMB_BACKWARD] + p[:, _STRIBECK_BACKWARD]
         known = self.available & feedback.index_known
-        return np.where(known, cogging + 0.5 * (forward - backward), 0.0)
+        most = p[:, _MOST]
+        return np.where(known, np.clip(cogging + 0.5 * (forward - backward), -most, most), 0.0)
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""

@@ -11,8 +11,6 @@ from cdpr_rt.exchange import AxisDevice
 
 _LATE_SHARE = 0.1
 _TOO_LATE_SHARE = 0.25
-# held up for longer, a bus in lockstep has moved on without us
-_STANDS_S = 0.4
 
 
 class Watch(Protocol):
@@ -111,18 +109,17 @@ class Cycle:
 
     def _take_time(self) -> None:
         device, now_ns = self.device, time.monotonic_ns()
-        since_s = (now_ns - self.began_ns) * 1e-9
-        steady = self._first or (device.lockstep and since_s < _STANDS_S)
-        self.elapsed_s = device.period_s if steady else since_s
+        steady = self._first or device.lockstep
+        self.elapsed_s = device.period_s if steady else (now_ns - self.began_ns) * 1e-9
         self.began_ns, self._first = now_ns, False
 
     def _await_deadline(self) -> None:
-        period = self.device.period_s
+        period, clock = self.device.period_s, self.device.clock
         self._deadline_s += period
-        now = time.monotonic()
+        now = clock.now_s
         if now < self._deadline_s:
-            time.sleep(self._deadline_s - now)
-            now = time.monotonic()
+            clock.stand_until(self._deadline_s)
+            now = clock.now_s
         elif self._fresh:
             self._deadline_s = now
         self._fresh = False

@@ -7,6 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_rt.clock import Clock
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 WordArray = NDArray[np.uint16]
@@ -65,8 +67,13 @@ class AxisDevice(Protocol):
     n: int
     period_s: float
     lockstep: bool
+    """Whether the next SYNC goes out as soon as the last one has been answered."""
     feedback: AxisFeedback
     command: AxisCommand
+
+    @property
+    def clock(self) -> Clock:
+        """The robot's time."""
 
     def sync(self) -> None:
         """Send the SYNC that opens the cycle."""

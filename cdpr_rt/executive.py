@@ -108,6 +108,7 @@ class Executive:
             self._idle.update(self.device.feedback, self.setpoint, self.device.command.torque_Nm)
             done = each_cycle()
             self._cycle.transmit()
+            self.device.clock.turn()
             if done:
                 return
             self._refuse_when_stopped(what)
@@ -137,6 +138,7 @@ class Executive:
                 self._trip(supervisor.reason())
             self._cycle.transmit()
             recorder.append(feedback, setpoint, command, controller)
+            device.clock.turn()
             if recorder.pending() >= _DRAIN_ROWS:
                 self._drain()
                 if self.on_progress is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -131,6 +131,8 @@ def recording(log: RawLog, axis: int = 0) -> Recording:
         setpoint_rad=log.column("setpoint_rad", axis)[answered] - index,
         setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s", axis)[answered],
     )
+    if not all(np.isfinite(getattr(sweep, field.name)).all() for field in fields(sweep)):
+        raise RawLogError(f"{log.path}: holds numbers that are not finite")
     return Recording(
         sweep=sweep,
         effort_Nm=log.column("effort_Nm", axis)[answered],

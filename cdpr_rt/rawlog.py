@@ -15,10 +15,13 @@ import numpy as np
 
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.exchange import FloatArray
+from profiles.bounded_input import parse_json, read_bytes
+from profiles.errors import ProfileError, brief
 
 _FORMAT = "cdpr-rt raw log"
 _VERSION = 1
 _HEADER_BYTES = 4096
+_MOST_BYTES = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,8 @@ class RawLog:
         names: list[str] = self.header["columns"]
         wanted = name if name in names else f"{name}[{axis}]"
         if wanted not in names:
-            raise RawLogError(f"{self.path}: no column {name!r} for axis {axis}; it has {names}")
+            there = brief(", ".join(names))
+            raise RawLogError(f"{self.path}: no column {name!r} for axis {axis}; it has {there}")
         return self.rows[:, names.index(wanted)]
 
 
@@ -93,16 +97,17 @@ def read_raw_log(path: Path) -> RawLog:
     Raises RawLogError when the file is missing, is not a raw log, or holds no whole row.
     """
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RawLogError(f"{path}: cannot be read: {error.strerror or error}") from error
+        data = read_bytes(path, _MOST_BYTES)
+    except ProfileError as error:
+        raise RawLogError(str(error)) from None
     try:
-        header = json.loads(data[:_HEADER_BYTES])
+        header = parse_json(data[:_HEADER_BYTES], path)
         columns = header["columns"]
         known = header["format"] == _FORMAT and header["version"] == _VERSION
-    except (ValueError, KeyError, TypeError):
+        known = known and isinstance(columns, list) and all(isinstance(c, str) for c in columns)
+    except (ProfileError, KeyError, TypeError):
         known, columns = False, []
-    if not known or len(data) < _HEADER_BYTES:
+    if not known or not columns or len(data) < _HEADER_BYTES:
         raise RawLogError(f"{path}: not a raw log of version {_VERSION}, or cut within its header")
     samples = (len(data) - _HEADER_BYTES) // (8 * len(columns))
     if samples == 0:

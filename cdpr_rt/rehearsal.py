@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_rt.clock import LockstepClock
 from cdpr_rt.compensation import Compensation
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.controllers.pid import Pid, PidGains
@@ -24,6 +25,7 @@ class _StandIn:
     def __init__(self, n: int, period_s: float) -> None:
         self.n = n
         self.period_s = period_s
+        self.clock = LockstepClock()
         self.feedback = AxisFeedback(n)
         self.command = AxisCommand(n)
 

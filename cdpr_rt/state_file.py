@@ -10,6 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.private_files import FILE_MODE, make_private_folder
+from profiles.bounded_input import read_json
+from profiles.errors import FileMissingError, ProfileError
+
+_MOST_BYTES = 1 << 16
 
 
 class StateFileError(ControlError):
@@ -30,13 +35,11 @@ def state_path(kind: str, name: str) -> Path:
 def read_state(path: Path) -> dict[str, Any] | None:
     """Return what the file holds, None where there is none; raises StateFileError."""
     try:
-        held = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+        held = read_json(path, _MOST_BYTES)
+    except FileMissingError:
         return None
-    except OSError as error:
-        raise StateFileError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:  # neither JSON nor UTF-8
-        raise StateFileError(f"{path}: is damaged: {error}") from error
+    except ProfileError as error:
+        raise StateFileError(f"{path}: is damaged: {error.problem}") from None
     if not isinstance(held, dict):
         raise StateFileError(f"{path}: is damaged: it does not hold one JSON object")
     return held
@@ -49,8 +52,10 @@ def write_state(path: Path, state: dict[str, Any]) -> None:
     """
     fresh = path.with_name(f"{path.name}.{os.getpid()}.new")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with fresh.open("w", encoding="utf-8") as file:
+        make_private_folder(path.parent)
+        fresh.unlink(missing_ok=True)
+        fd = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, FILE_MODE)
+        with os.fdopen(fd, "w", encoding="utf-8") as file:
             file.write(json.dumps(state, indent=1) + "\n")
             file.flush()
             os.fsync(file.fileno())

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.exchange import BoolArray, FloatArray
-
-_TENSION, _TIME, _FAULT = range(3)
 
 
 class TensionFault(IntEnum):
@@ -35,7 +33,7 @@ class TensionFault(IntEnum):
 class TensionFeedback:
     """Tensions of n cables as last measured; overwritten in place by `TensionExchange.update`.
 
-    Shapes are (n,). Times are those of the host's monotonic clock, whatever the bus time.
+    Shapes are (n,). Times are those of the robot's clock.
     """
 
     def __init__(self, n: int) -> None:
@@ -49,49 +47,30 @@ class TensionFeedback:
 
 
 class TensionExchange:
-    """Hands readings from the thread that samples to the cycle, without a lock.
+    """Hands readings from the task that samples to the cycle, which may come in between."""
 
-    One thread calls `publish`, one calls `update`. The writer fills the half that is not being
-    read and then turns over; `update` copies again if that happened meanwhile.
-    """
-
-    def __init__(
-        self,
-        cables: Sequence[str],
-        stale_after_s: float,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, cables: Sequence[str], stale_after_s: float, clock: Clock) -> None:
         n = len(cables)
         self.n = n
         self.cables = tuple(cables)
         self.stale_after_s = stale_after_s
         self.feedback = TensionFeedback(n)
         self._clock = clock
-        self._halves = np.zeros((2, 3, n))
-        self._halves[:, _TIME] = -np.inf
-        self._halves[:, _FAULT] = TensionFault.NO_READING
-        self._turns = 0
-        self._copy = np.empty((3, n))
+        self._fault = self.feedback.fault.copy()
         self._stale: BoolArray = np.zeros(n, np.bool_)
 
     def publish(self, cable: int, tension_N: float, time_s: float, fault: TensionFault) -> None:
         """Store one reading; a reading with a fault keeps its value for who wants to look."""
-        writing = self._halves[(self._turns + 1) & 1]
-        np.copyto(writing, self._halves[self._turns & 1])
-        writing[:, cable] = tension_N, time_s, fault
-        self._turns += 1
+        told = self.feedback
+        told.tension_N[cable] = tension_N
+        told.time_s[cable] = time_s
+        self._fault[cable] = fault
 
     def update(self) -> None:
-        """Bring `feedback` up to date; for the cycle: no lock, no array made."""
-        copied = -1
-        while copied != self._turns:
-            copied = self._turns
-            np.copyto(self._copy, self._halves[copied & 1])
+        """Bring `feedback` up to date; for the cycle: no array made."""
         told = self.feedback
-        np.copyto(told.tension_N, self._copy[_TENSION])
-        np.copyto(told.time_s, self._copy[_TIME])
-        np.subtract(self._clock(), told.time_s, out=told.age_s)
-        np.copyto(told.fault, self._copy[_FAULT], casting="unsafe")
+        np.subtract(self._clock.now_s, told.time_s, out=told.age_s)
+        np.copyto(told.fault, self._fault)
         np.greater(told.age_s, self.stale_after_s, out=self._stale)
         # before the first reading the fault says so, and age is without end
         np.logical_and(self._stale, np.isfinite(told.age_s, out=told.valid), out=self._stale)

@@ -11,6 +11,7 @@ import scipy
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import FloatArray
+from profiles.motor_bounds import FARTHEST_FROM_NOMINAL
 
 CONFIDENCE = 0.95
 MOST_UNCERTAINTY = 0.05
@@ -19,8 +20,6 @@ LEAST_LEVELS = 3
 """Different tensions that are needed each way."""
 LEAST_SPAN = 2.0
 """Highest tension over the lowest."""
-FARTHEST_FROM_NOMINAL = 0.5
-"""Relative."""
 
 
 class CalibrationRefusedError(ControlError):

@@ -31,8 +31,6 @@ class BusAxes:
     network: CanNetwork
     axes: Sequence[AxisConfig]
     places: Sequence[int]
-    heartbeat_s: float
-    """How often the cycle sends the master's heartbeat."""
 
 
 class AxisBuses:
@@ -43,13 +41,14 @@ class AxisBuses:
     keeps none of the others from being exchanged, or from being switched off at the end. As a
     context manager it leaves the drives without power, however the block ends.
 
-    Raises BusError when a bus cannot be opened, or when some keep time in lockstep and some do
-    not, and DriverError for a PDO map that does not serve torque control.
+    Raises BusError when some buses keep time in lockstep and some do not, and DriverError for a PDO
+    map that does not serve torque control.
     """
 
-    def __init__(self, buses: Sequence[BusAxes], period_s: float, master_node_id: int) -> None:
+    def __init__(self, buses: Sequence[BusAxes], period_s: float) -> None:
         self.buses = tuple(buses)
         self.period_s = period_s
+        self.clock = buses[0].network.clock
         order = [place for bus in buses for place in bus.places]
         self.n = len(order)
         room = StateArrays(self.n)
@@ -59,10 +58,7 @@ class AxisBuses:
             first = 0
             for bus in buses:
                 part = room.part(first, first + len(bus.axes))
-                url, network = bus.network.url, bus.network
-                group = AxisGroup(
-                    url, network, bus.axes, period_s, master_node_id, bus.heartbeat_s, part
-                )
+                group = AxisGroup(bus.network, bus.axes, period_s, part)
                 self.groups.append(group)
                 self._where |= {place: (group, i) for i, place in enumerate(bus.places)}
                 first += group.n
@@ -269,15 +265,15 @@ class AxisBuses:
         live = list(self.groups)
         for group in live:
             group.request(State.SWITCH_ON_DISABLED)
-        until = time.monotonic() + _STOP_TIMEOUT_S
-        while live and time.monotonic() < until:
+        until_s = self.clock.now_s + _STOP_TIMEOUT_S
+        while live and self.clock.now_s < until_s:
             self.command.torque_Nm[:] = 0.0
             for step in (AxisGroup.sync, AxisGroup.receive, _transmit_zero):
                 live = [group for group in live if _lives(group, step)]
             if not any(_has_power(group) for group in live):
                 return
             if not self.lockstep:
-                time.sleep(self.period_s)
+                self.clock.sleep(self.period_s)
 
     def __enter__(self) -> Self:
         return self

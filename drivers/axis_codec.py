@@ -125,21 +125,26 @@ def decode(
     floats: FloatArray,
     words: WordArray,
     flags: BoolArray,
+    others: Ints,
 ) -> int:
-    """Take frames `first` up to `last` of `frames` (k, 16) into the state of n axes.
+    """Take frames `first` up to `last` of `frames` (k, 16 or more) into the state of n axes.
 
     `slots` (2048, 2) and `fields` (n, 8, 5) are those of `GroupLayout`; `state_table` (128,) gives
     the state by statusword; `ints`, `floats` and `flags` have the rows named above, `words` (1, n)
-    is the statusword. Returns how many more axes have answered.
+    is the statusword. Returns how many more axes have answered. Those which are no TPDOs of these
+    axes are named in `others` (k + 1,): how many, then which.
     """
-    answered = 0
+    answered = others[0] = 0
     for f in range(first, last):
         frame = frames[f]
         # byte 3 holds the flags of extended, remote and error frames
         identifier = np.int64(frame[0]) | np.int64(frame[1]) << 8
-        if identifier > 0x7FF or frame[2] or frame[3]:
-            continue
-        i, kind = slots[identifier, 0], slots[identifier, 1]
+        known = identifier <= 0x7FF and not frame[2] and not frame[3]
+        slot = identifier if known else 0  # which is nobody's
+        i, kind = slots[slot, 0], slots[slot, 1]
+        if i < 0 or kind >= EMCY:
+            others[0] += 1
+            others[others[0]] = f
         if i < 0:
             continue
         ints[FRAMES, i] += 1

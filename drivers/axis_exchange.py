@@ -7,42 +7,35 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers import axis_codec as codec
 from drivers.axis_alarms import alarm_text
 from drivers.axis_layout import AxisConfig, GroupLayout
 from drivers.axis_state import GroupState, StateArrays
-from drivers.bus import BusUrl, FrameBuffer, open_port
+from drivers.bus.leading import LedBus
 from drivers.bus.packed import FRAME
 from drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE
 from drivers.network import CanNetwork
 
-_SYNC_ID, _HEARTBEAT_ID = 0x080, 0x700
-_OPERATIONAL_STATE = 5
-# lockstep: for all axes, as their simulator may be held up; for one that is alone in not answering,
-# less than bus time stands still; and for one that has not answered last time
+_SYNC_ID = 0x080
+# lockstep that another one leads: for all axes, as their simulator may be held up; for one that is
+# alone in not answering, less than bus time stands still; and for one that did not last time
 _PATIENCE_S, _PATIENCE_WITH_ONE_S, _SHORT_PATIENCE_S = 2.0, 0.4, 0.02
 _PACED_SHARE = 0.75
-_FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
-_LATE_PASSES = 8
 
 
 class AxisExchange:
     """What happens every cycle; nothing here allocates, waits for a lock or logs.
 
     `room` is where the state lies when these axes are part of a larger device.
-    Raises BusError when the bus cannot be opened or goes away.
+    Raises BusError when the bus goes away.
     """
 
     def __init__(
         self,
-        url: BusUrl,
         network: CanNetwork,
         axes: Sequence[AxisConfig],
         period_s: float,
-        master_node_id: int,
-        heartbeat_s: float,
         room: StateArrays | None = None,
     ) -> None:
         self.axes = tuple(axes)
@@ -50,25 +43,19 @@ class AxisExchange:
         self.period_s = period_s
         self.paced_wait_s = _PACED_SHARE * period_s
         self.network = network
+        self.clock = network.clock
+        self.lockstep = network.lockstep
         self._layout = GroupLayout(self.axes)
-        self._tx_bytes = _as_bytes(self._layout.rpdos)
-        self._rx = FrameBuffer(_FRAMES_PER_AXIS * self.n + _SPARE_FRAMES)
-        self._rx_bytes = _as_bytes(self._rx)
+        self._intake = network.intake
+        self._port = self._intake.port
+        self._others = np.zeros(len(self._intake.frames.rows) + 1, np.int64)
         self._sync_frame = FRAME.pack(_SYNC_ID, 0, bytes(8))
-        operational = bytes([_OPERATIONAL_STATE]) + bytes(7)
-        self._heartbeat_frame = FRAME.pack(_HEARTBEAT_ID + master_node_id, 1, operational)
         # by the clock of the bus: cycles that are held up are fewer, not slower heartbeats
-        self._heartbeat_every_s = heartbeat_s - 0.5 * period_s
+        self._heartbeat_every_s = network.heartbeat_s - 0.5 * period_s
         self._heartbeat_at_s = 0.0
-        filters = [(i, 0x7FF) for i in self._layout.identifiers]
-        self._port = open_port(url, filters, network.health)
-        self.lockstep = url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
-        waiting = select.poll()
-        waiting.register(self._port, select.POLLIN)
-        self._waiting = waiting.poll
-        self._port.settimeout(0.0)
-        self._be_patient(True)
         self._cycling = self._closed = False
+        self._missing = 0
+        """Axes that have not answered the last SYNC yet."""
         self._late = False
         self.waits = 0
         """How often a frame was waited for, in paced cycles."""
@@ -79,6 +66,7 @@ class AxisExchange:
         self.feedback, self.command = state.feedback, state.command
         self._valid = state.feedback.valid
         self._seen = state.ints[codec.SEEN]
+        network.hear(self._layout.identifiers)
         self._compile(None if room is None else room.spare())
 
     def _compile(self, room: StateArrays | None) -> None:
@@ -87,10 +75,10 @@ class AxisExchange:
         spare = GroupState(self.axes, self.period_s, self.lockstep, room)
         arrays = spare.ints, spare.floats
         codec.decode(
-            self._rx_bytes, 0, 0, layout.slots, layout.fields, STATE_TABLE,
-            *arrays, spare.words, spare.flags,
+            self._intake.frames.bytes, 0, 0, layout.slots, layout.fields, STATE_TABLE,
+            *arrays, spare.words, spare.flags, self._others,
         )  # fmt: skip
-        frames = np.zeros_like(self._tx_bytes)
+        frames = np.zeros_like(layout.rpdos.bytes)
         codec.end_answers(*arrays, spare.flags)
         codec.encode(frames, layout.answer, CONTROLWORD_TABLE, *arrays)
 
@@ -98,126 +86,65 @@ class AxisExchange:
         """Send the SYNC that opens the cycle."""
         if not self._cycling:
             self._begin_cycling()
-        if self._waiting(0):
-            self._take_late()
-        if self._late:
-            self._late = False
-            self._be_patient(False)
-        elif self._impatient:
-            self._be_patient(True)
+        if not self._intake.leads:
+            # what came after its cycle is not to be taken for the next one's answer
+            self._intake.settle()
         feedback = self.feedback
         feedback.cycle += 1
         feedback.time_s = feedback.cycle * self.period_s
         self._valid.fill(False)
         self._seen.fill(0)
+        self._missing = self.n
         try:
             self._port.send(self._sync_frame)
         except OSError as error:
-            raise self._port.lost(error) from error
+            raise self._intake.lost(error) from error
 
     def receive(self, deadline_s: float = 0.0) -> int:
         """Wait for the answers to this SYNC and decode them; return how many axes answered.
 
-        In lockstep an axis that falls silent is waited for up to 0.4 s of wall time, during which
-        bus time stands, and where none answers up to 2 s. Otherwise the wait ends at `deadline_s`
-        (monotonic), by default so that a share of the period is left for computing and sending.
+        On a bus that is led that is until the bus tells that all have answered. Otherwise the wait
+        ends at `deadline_s` (CLOCK_MONOTONIC), by default so that a share of the period is left
+        for computing and sending; in lockstep by another leader's time it ends later.
         """
-        if self.lockstep:
-            answered = self._receive_in_lockstep()
+        intake = self._intake
+        if isinstance(intake, LedBus):
+            before_s = intake.now_s
+            intake.take_answers()
+            if intake.now_s == before_s:  # no drive knows the period (1006h), as after a restart
+                intake.go(before_s + self.period_s)
+        elif self.lockstep:
+            now_s = time.monotonic()
+            some_s = now_s + (_SHORT_PATIENCE_S if self._late else _PATIENCE_WITH_ONE_S)
+            self._receive_until(some_s, some_s if self._late else now_s + _PATIENCE_S)
         else:
-            answered = self._receive_paced(deadline_s or time.monotonic() + self.paced_wait_s)
+            deadline_s = deadline_s or time.monotonic() + self.paced_wait_s
+            self._receive_until(deadline_s, deadline_s)
         self._alarms = codec.end_answers(self._ints, self._floats, self._flags)
-        return answered
+        return self.n - self._missing
 
-    def _receive_in_lockstep(self) -> int:
-        recv_into, rows = self._port.recv_into, self._rx.rows
-        missing, since_s = self.n, 0.0
-        while missing:
-            last, timed_out = 0, False
-            try:
-                for row in rows[:missing]:
-                    if not recv_into(row):
-                        raise self._port.lost()
-                    last += 1
-            except BlockingIOError:
-                timed_out = True
-            except OSError as error:
-                raise self._port.lost(error) from error
-            missing -= self._decode(0, last)
-            if missing:
-                # heartbeats go on when answers do not: each of them ends a wait of the port
-                now = time.monotonic()
-                since_s = since_s or now - timed_out * self._wait_s
-                some = missing < self.n
-                if now - since_s >= (self._wait_s if some else self._patience_s):
-                    self._late = True
-                    break
-        return self.n - missing
+    def _receive_until(self, until_s: float, silent_until_s: float) -> None:
+        """Take in what has come; wait for more only while an axis has not answered.
 
-    def _receive_paced(self, deadline: float) -> int:
-        """Take in what has come; wait for more only while an axis has not answered."""
-        recv_into, rows = self._port.recv_into, self._rx.rows
-        missing = self.n
-        while missing:
-            last = 0
-            try:
-                for row in rows:
-                    if not recv_into(row):
-                        raise self._port.lost()
-                    last += 1
-            except BlockingIOError:
-                pass
-            except OSError as error:
-                raise self._port.lost(error) from error
-            if last:
-                missing -= self._decode(0, last)
-            left = deadline - time.monotonic()
-            if left <= 0.0:
-                self._late = missing > 0
-                break
-            if missing:
-                self._wait(left)
-        return self.n - missing
-
-    def _wait(self, seconds: float) -> None:
-        """Wait for a frame; the kernel's own receive time-out is too coarse for a cycle."""
-        self.waits += 1
-        select.select([self._port], [], [], seconds)
-
-    def _take_late(self) -> None:
-        """Decode what came after its cycle, so that it is not taken for the next one's answer.
-
-        A flood is cut short: what is left of it is thrown away.
+        Up to `silent_until_s` while none has.
         """
-        recv_waiting, rows = self._port.recv_waiting, self._rx.rows
-        for _ in range(_LATE_PASSES):
-            last = 0
-            try:
-                for row in rows:
-                    if not recv_waiting(row):
-                        raise self._port.lost()
-                    last += 1
-            except BlockingIOError:
-                if last:
-                    self._decode(0, last)
+        while True:
+            self._intake.poll()
+            end_s = until_s if self._missing < self.n else silent_until_s
+            left_s = end_s - time.monotonic()
+            if not self._missing or left_s <= 0.0:
+                self._late = self._missing > 0
                 return
-            except OSError as error:
-                raise self._port.lost(error) from error
-            self._decode(0, last)
-        self._port.drain()
+            self.waits += 1
+            # the kernel's own receive time-out is too coarse for a cycle
+            select.select([self._port], [], [], left_s)
 
-    def _be_patient(self, patient: bool) -> None:
-        self._impatient = not patient
-        self._patience_s = _PATIENCE_S if patient else _SHORT_PATIENCE_S
-        self._wait_s = _PATIENCE_WITH_ONE_S if patient else _SHORT_PATIENCE_S
-        if self.lockstep:
-            self._port.settimeout(self._wait_s)
-
-    def _decode(self, first: int, last: int) -> int:
-        layout = self._layout
-        return codec.decode(
-            self._rx_bytes,
-            first,
+    def _take(self, last: int) -> None:
+        """Decode the first `last` frames of the intake; what is no PDO is the network's."""
+        layout, others = self._layout, self._others
+        self._missing -= codec.decode(
+            self._intake.frames.bytes,
+            0,
             last,
             layout.slots,
             layout.fields,
@@ -226,7 +153,12 @@ class AxisExchange:
             self._floats,
             self._words,
             self._flags,
+            others,
         )
+        if others[0]:
+            rows = self._intake.frames.rows
+            for k in others[1 : others[0] + 1]:
+                self.network.take_frame(rows[k])
 
     def transmit(self) -> None:
         """Send controlwords and torques, to act from the next SYNC on.
@@ -235,7 +167,7 @@ class AxisExchange:
         """
         layout = self._layout
         self._alarms = codec.encode(
-            self._tx_bytes,
+            layout.rpdos.bytes,
             layout.answer,
             CONTROLWORD_TABLE,
             self._ints,
@@ -248,9 +180,9 @@ class AxisExchange:
             now_s = self.feedback.time_s if self.lockstep else time.monotonic()
             if now_s >= self._heartbeat_at_s:
                 self._heartbeat_at_s = now_s + self._heartbeat_every_s
-                send(self._heartbeat_frame)
+                send(self.network.heartbeat_frame)
         except OSError as error:
-            raise self._port.lost(error) from error
+            raise self._intake.lost(error) from error
 
     def alarm(self) -> str:
         """Return why the drives must not go on being driven, or an empty text."""
@@ -280,7 +212,7 @@ class AxisExchange:
         for axis in self.axes:
             if has_deadline(axis):
                 self.network.start(axis.node_id, axis.drive.heartbeat_producer_s)
-        self._port.drain()
+        self._intake.settle()
         for i, axis in enumerate(self.axes):
             if axis.node_id in self.network.restarted:
                 # while no cycles ran, and for good: only a new boot makes it usable again
@@ -288,15 +220,18 @@ class AxisExchange:
                 self._ints[codec.ALARM, i] |= codec.RESTARTED
         self._ints[codec.HEARTBEAT_AGE] = 0
         self._forget_irregularities()
+        self._intake.take = self._take
         self._cycling = True
+
+    def _end_cycling(self) -> None:
+        """Leave what comes, and the master's heartbeat, to the network."""
+        self._intake.take = self.network.take
+        self._cycling = False
+        self.network.release_cycle()
 
     def _forget_irregularities(self) -> None:
         self._floats[codec.IRREGULAR] = 0.0
         self._ints[codec.FRAMES] = self._ints[codec.FLOOD] = self._ints[codec.EXTRA] = 0
-
-
-def _as_bytes(buffer: FrameBuffer) -> NDArray[np.uint8]:
-    return buffer.array.view(np.uint8).reshape(-1, 16)
 
 
 def has_deadline(axis: AxisConfig) -> bool:

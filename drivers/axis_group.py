@@ -28,8 +28,8 @@ class AxisGroup(AxisExchange):
     takes the request away and stays until `acknowledge_fault`. The arrays of `feedback` and
     `command` are overwritten in place and must not be exchanged for others.
 
-    Raises BusError when the bus cannot be opened or goes away, and DriverError for a PDO map that
-    does not serve torque control.
+    Raises BusError when the bus goes away, and DriverError for a PDO map that does not serve torque
+    control.
     """
 
     # -- between cycles
@@ -45,8 +45,7 @@ class AxisGroup(AxisExchange):
         for axis in self.axes:
             if self._cycling and has_deadline(axis):
                 self.network.stop_process_data(axis.node_id)
-        self._cycling = False
-        self.network.release_cycle()
+        self._end_cycling()
 
     def tolerate_silence(self, cycles: int) -> None:
         """Bridge so many consecutive cycles without an answer; in lockstep none is bridged."""
@@ -217,8 +216,7 @@ class AxisGroup(AxisExchange):
         try:
             return switch_off(self)
         finally:
-            self._port.close()
-            self.network.release_cycle()
+            self._end_cycling()
 
     def __enter__(self) -> Self:
         return self

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 from drivers.cia402 import DISABLE_VOLTAGE, POWER_OFF, State, state_of
@@ -45,9 +44,10 @@ def switch_off(group: AxisGroup) -> str:
 
 def _by_cycles(group: AxisGroup) -> bool:
     """Run cycles with zero torque until every drive reports that its power stage is off."""
-    until = time.monotonic() + _TIMEOUT_S
+    clock = group.clock
+    until_s = clock.now_s + _TIMEOUT_S
     group.request(State.SWITCH_ON_DISABLED)
-    while time.monotonic() < until:
+    while clock.now_s < until_s:
         group.command.torque_Nm[:] = 0.0
         group.sync()
         answered = group.receive()
@@ -55,7 +55,7 @@ def _by_cycles(group: AxisGroup) -> bool:
         if answered == group.n and all(state in POWER_OFF for state in group.states()):
             return True
         if not group.lockstep:
-            time.sleep(group.period_s)
+            clock.sleep(group.period_s)
     return False
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from drivers import sdo_abort
@@ -12,7 +11,6 @@ from drivers.cia402 import State, mode_bits, state_of
 from drivers.configuration import BootSettings, wanted_configuration
 from drivers.download import configure, store
 from drivers.errors import BootError, DriverError, SdoAbortError, SdoCancelledError, SdoError
-from drivers.foreign_sync import SyncEar
 from drivers.network import CanNetwork
 from profiles import DriveProfile
 
@@ -94,16 +92,23 @@ def boot_all(
     network.clear_alarm()
     reports: dict[int, BootReport] = {}
     errors: dict[int, BootError] = {}
-    with ThreadPoolExecutor(max_workers=len(drives)) as pool:
-        pending = {
-            node_id: pool.submit(_prepare, network, node_id, profile, want, store_configuration)
-            for node_id, (profile, want) in sorted(drives.items())
-        }
-    for node_id, job in pending.items():
-        _collect(node_id, job, reports, errors)
+
+    def prepare(
+        node_id: int, profile: DriveProfile, want: BootSettings
+    ) -> Callable[[], BootReport]:
+        return lambda: _prepare(network, node_id, profile, want, store_configuration)
+
+    nodes = sorted(drives)
+    tasks = network.clock.together([prepare(node_id, *drives[node_id]) for node_id in nodes])
+    for node_id, task in zip(nodes, tasks, strict=True):
+        try:
+            reports[node_id] = task.result()
+        except BootError as error:
+            errors[node_id] = error
     fatal = [error for node, error in errors.items() if drives[node][1].mandatory]
     if fatal:
-        flood = flood_text(network.url) if any(e.letter in _MAY_BE_A_FLOOD for e in fatal) else ""
+        babbled = any(error.letter in _MAY_BE_A_FLOOD for error in fatal)
+        flood = flood_text(network.url, network.clock) if babbled else ""
         for other in (*fatal[1:], flood):
             if other:
                 fatal[0].add_note(str(other))
@@ -113,28 +118,13 @@ def boot_all(
     return BootReports(reports, errors)
 
 
-def _collect(
-    node_id: int,
-    job: Future[BootReport],
-    reports: dict[int, BootReport],
-    errors: dict[int, BootError],
-) -> None:
-    try:
-        reports[node_id] = job.result()
-    except BootError as error:
-        errors[node_id] = error
-
-
 def _listen(network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]) -> None:
     waits_s = max(profile.heartbeat_consumer_s for profile, _ in drives.values())
-    listen_s = max(_LISTEN_LEAST_S, _LISTEN_SHARE * waits_s)
-    with SyncEar(network.url) as ear:
-        heartbeat = network.foreign_master.wait(listen_s)
-        if heartbeat or ear.heard():
-            what = "heartbeat" if heartbeat else "SYNC"
-            raise BootError(
-                "L", min(drives), f"another master's {what} is on the bus", "stop that master first"
-            )
+    what = network.hear_master(max(_LISTEN_LEAST_S, _LISTEN_SHARE * waits_s))
+    if what:
+        raise BootError(
+            "L", min(drives), f"another master's {what} is on the bus", "stop that master first"
+        )
 
 
 def _prepare(

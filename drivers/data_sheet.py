@@ -8,6 +8,7 @@ from pathlib import Path
 import canopen
 from canopen.objectdictionary import ObjectDictionary
 
+from profiles.eds_text import Remarks, decoded_eds
 from profiles.errors import ProfileError
 
 
@@ -20,16 +21,9 @@ class _Sheet(io.StringIO):
 def load_dictionary(eds: Path, node_id: int | None = None) -> ObjectDictionary:
     """Return the objects that an EDS describes, with their defaults for a node.
 
-    Makers write UTF-8 as well as Windows' Latin 1. Raises ProfileError for a file that is none.
+    Raises ProfileError for a file that is none.
     """
-    try:
-        data = eds.read_bytes()
-    except OSError as error:
-        raise ProfileError(eds, "", f"cannot be read: {error.strerror}") from error
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("cp1252", "replace")
+    text = decoded_eds(eds, Remarks())
     try:
         dictionary = canopen.import_od(_Sheet(text), node_id)
     except Exception as error:  # whatever the library makes of a broken file

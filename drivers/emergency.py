@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import time
 from collections import deque
 from dataclasses import dataclass
 
@@ -41,13 +40,13 @@ class Emergency:
     register: int
     vendor: bytes
     at_s: float
-    """Wall time of reception, monotonic."""
+    """When it came, by the robot's clock."""
 
     @classmethod
-    def from_frame(cls, node_id: int, data: bytes) -> Emergency:
-        """Return what the 8 bytes of an EMCY frame say, received now."""
+    def from_frame(cls, node_id: int, data: bytes, at_s: float) -> Emergency:
+        """Return what the 8 bytes of an EMCY frame say, received at `at_s`."""
         code, register, vendor = _LAYOUT.unpack(data)
-        return cls(node_id, code, register, vendor, time.monotonic())
+        return cls(node_id, code, register, vendor, at_s)
 
     @property
     def is_reset(self) -> bool:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable
+
+from cdpr_rt.clock import Clock
 
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0, 4, 5, 127
 STATE_NAMES = {
@@ -29,7 +29,8 @@ class _Node:
         self.heartbeat_s = 0.0
         """Period it is watched for between cycles, 0 for not."""
         self.nmt_state: int | None = None
-        self.expects_boot_up = False
+        self.expects_boot_up = True
+        """Whether its next boot-up is no news: it may just be switched on when we come, too."""
         self.started = False
         """Whether it has been seen operational since it was started."""
         self.starting = False
@@ -41,13 +42,13 @@ class ErrorControl:
     `slack_s` is added to the patience for heartbeats between cycles.
     """
 
-    def __init__(self, alarm: Callable[[str], None], slack_s: float) -> None:
+    def __init__(self, alarm: Callable[[str], None], clock: Clock, slack_s: float) -> None:
         self.restarted: set[int] = set()
         """Nodes that booted unasked: their configuration and encoder positions are void."""
         self._alarm = alarm
+        self._clock = clock
         self._slack_s = slack_s
         self._nodes: dict[int, _Node] = {}
-        self._news = threading.Condition()
 
     def add(self, node_id: int) -> None:
         """Follow a node."""
@@ -55,14 +56,10 @@ class ErrorControl:
 
     def take(self, node_id: int, state: int) -> None:
         """Take an error control message: an NMT state, 0 for a boot-up."""
-        with self._news:
-            self._take(self._nodes[node_id], state)
-            self._news.notify_all()
-
-    def _take(self, node: _Node, state: int) -> None:
+        node = self._nodes[node_id]
         name = f"node {node.node_id}"
         node.nmt_state = state
-        node.heard_s = time.monotonic()
+        node.heard_s = self._clock.now_s
         if state == BOOT_UP:
             node.boot_ups += 1
             if not node.expects_boot_up:
@@ -83,18 +80,17 @@ class ErrorControl:
     def expect_reset(self, node_id: int) -> None:
         """Take the next boot-up of a node for the answer to our reset."""
         node = self._nodes[node_id]
-        with self._news:
-            node.boot_ups_at_reset = node.boot_ups
-            node.expects_boot_up = True
-            node.started = node.starting = False
-            node.heartbeat_s = 0.0
-            self.restarted.discard(node_id)
+        node.boot_ups_at_reset = node.boot_ups
+        node.expects_boot_up = True
+        node.started = node.starting = False
+        node.heartbeat_s = 0.0
+        self.restarted.discard(node_id)
 
     def expect_start(self, node_id: int, heartbeat_s: float) -> None:
         """Watch from now on that a node becomes operational and stays so, and is heard."""
         node = self._nodes[node_id]
         node.starting = True
-        node.heard_s = time.monotonic()
+        node.heard_s = self._clock.now_s
         node.heartbeat_s = heartbeat_s
 
     def expect_stop(self, node_id: int) -> None:
@@ -112,16 +108,15 @@ class ErrorControl:
     def wait_for_boot_up(self, node_id: int, timeout_s: float) -> bool:
         """Return whether a node has booted since `expect_reset`, waiting for it."""
         node = self._nodes[node_id]
-        with self._news:
-            return self._news.wait_for(lambda: node.boot_ups > node.boot_ups_at_reset, timeout_s)
+        until_s = self._clock.now_s + timeout_s
+        return self._clock.wait(lambda: node.boot_ups > node.boot_ups_at_reset, until_s)
 
     def wait_for_heartbeat(self, node_id: int, timeout_s: float) -> int | None:
         """Return the NMT state of a node's next heartbeat, None when none came."""
         node = self._nodes[node_id]
-        with self._news:
-            before = node.heartbeats
-            came = self._news.wait_for(lambda: node.heartbeats > before, timeout_s)
-            return node.nmt_state if came else None
+        before, until_s = node.heartbeats, self._clock.now_s + timeout_s
+        came = self._clock.wait(lambda: node.heartbeats > before, until_s)
+        return node.nmt_state if came else None
 
     def boot_ups_since_reset(self, node_id: int) -> int:
         """Return how often a node has booted since it was last reset by us."""
@@ -139,8 +134,8 @@ class ErrorControl:
 
         To be called when no message waits, so that a busy master does not blame the nodes.
         """
-        now = time.monotonic()
-        for node in list(self._nodes.values()):  # another thread may add one
+        now = self._clock.now_s
+        for node in self._nodes.values():
             if not node.heartbeat_s:
                 continue
             silent_s = now - node.heard_s
@@ -153,6 +148,5 @@ class ErrorControl:
 
     def restart_watch(self) -> None:
         """Begin to count silences anew (cycles watched the heartbeats until now)."""
-        now = time.monotonic()
         for node in self._nodes.values():
-            node.heard_s = now
+            node.heard_s = self._clock.now_s

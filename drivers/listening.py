@@ -12,6 +12,7 @@ from typing import Self
 
 import numpy as np
 
+from cdpr_rt.clock import PacedClock
 from cdpr_rt.exchange import AxisCommand, AxisFeedback, BoolArray
 from drivers import axis_codec as codec
 from drivers.axis_alarms import alarm_text
@@ -70,9 +71,10 @@ class ListeningDevice:
     lockstep = True
     """The next cycle begins when the other master's does, not at a deadline of ours."""
 
-    def __init__(self, buses: Sequence[HeardBus], period_s: float) -> None:
+    def __init__(self, buses: Sequence[HeardBus], period_s: float, clock: PacedClock) -> None:
         self.buses = tuple(buses)
         self.period_s = period_s
+        self.clock = clock
         order = [place for bus in buses for place in bus.places]
         self.n = len(order)
         room = StateArrays(self.n)
@@ -100,7 +102,7 @@ class ListeningDevice:
     @property
     def silent_s(self) -> float:
         """Return for how long no SYNC has come."""
-        return time.monotonic() - self._heard_s
+        return self.clock.now_s - self._heard_s
 
     # -- one cycle
 
@@ -226,7 +228,7 @@ class _Ear:
         self.valid = state.feedback.valid
         self._seen = state.ints[codec.SEEN]
         self._rx = FrameBuffer(_FRAMES_PER_AXIS * len(self.axes) + _SPARE_FRAMES)
-        self._rx_bytes = self._rx.array.view(np.uint8).reshape(-1, 16)
+        self._others = np.zeros(len(self._rx.rows) + 1, np.int64)
         self._missing = 0
         self._sync_waits = False
         self._compile()
@@ -318,7 +320,7 @@ class _Ear:
     def _decode(self, first: int, last: int) -> int:
         layout = self._layout
         return codec.decode(
-            self._rx_bytes,
+            self._rx.bytes,
             first,
             last,
             layout.slots,
@@ -328,6 +330,7 @@ class _Ear:
             self._floats,
             self._words,
             self._flags,
+            self._others,
         )
 
     def end_cycle(self) -> None:

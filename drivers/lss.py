@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
+from cdpr_rt.clock import Clock
 from drivers.bus import BusUrl
 from drivers.errors import BusError
 from drivers.lss_link import LssError, LssLink
@@ -88,8 +89,8 @@ class LssMaster(LssLink):
     be opened, or is lost later.
     """
 
-    def __init__(self, url: BusUrl, timeout_s: float = 0.1) -> None:
-        super().__init__(url, timeout_s)
+    def __init__(self, url: BusUrl, clock: Clock, timeout_s: float = 0.1) -> None:
+        super().__init__(url, clock, timeout_s)
 
     def __enter__(self) -> Self:
         self.release()
@@ -107,7 +108,7 @@ class LssMaster(LssLink):
             if error is None:
                 raise
         finally:
-            self._bus.shutdown()
+            self.close()
 
     # -- finding
 

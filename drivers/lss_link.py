@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
+from collections import deque
 
-import can
-
-from drivers.bus import BusUrl, bus_gone, open_python_can
-from drivers.bus.packed import EFF_FLAG, RTR_FLAG
+from cdpr_rt.clock import Clock
+from drivers.bus import BusUrl
+from drivers.bus.member import BusMember
+from drivers.bus.packed import EFF_FLAG, FRAME, RTR_FLAG
 from drivers.errors import BusError, DriverError
 
 _MASTER, _SLAVE = 0x7E5, 0x7E4
@@ -18,24 +18,35 @@ _RESET_COMMUNICATION = 130
 _SETTLE_S = 0.005
 _SDO_PATIENCE = 3.0
 _LONGEST_DRAIN_S = 0.3
+_MOST_WAITING = 1024
 
 
 class LssError(DriverError):
     """A device refused a setting, or did not answer, over LSS; says which and why."""
 
 
-class LssLink:
+class LssLink(BusMember):
     """One bus as an LSS master sees it, and what it needs of the other nodes on it.
 
     Raises BusError when the bus cannot be opened, or is lost later.
     """
 
-    def __init__(self, url: BusUrl, timeout_s: float) -> None:
-        self.url = url
+    def __init__(self, url: BusUrl, clock: Clock, timeout_s: float) -> None:
         self.timeout_s = timeout_s
+        self._frames: deque[tuple[int, bytes]] = deque(maxlen=_MOST_WAITING)
+        self._lost: BusError | None = None
         heard = [(_SLAVE, _EXACT), (_SDO_ANSWER, _ANY_NODE), (_HEARTBEAT, _ANY_NODE)]
-        self._bus = open_python_can(url, heard)
+        super().__init__(url, clock, heard)
         self._settle_s = _SETTLE_S
+
+    def on_loss(self, error: BusError) -> None:
+        """Have whoever waits be told."""
+        self._lost = error
+
+    def take_frame(self, frame: memoryview) -> None:
+        """Keep a frame for who waits for one."""
+        identifier, length, data = FRAME.unpack_from(frame)
+        self._frames.append((identifier, data[:length]))
 
     # -- other nodes of the bus
 
@@ -43,7 +54,7 @@ class LssLink:
         """Return how a node shows that it has `node_id`, "" when nothing does."""
         if self._upload(node_id, 0x1000) is not None:
             return "it answers to SDO"
-        deadline = time.monotonic() + listen_s
+        deadline = self.clock.now_s + listen_s
         while (frame := self._receive(deadline)) is not None:
             if frame[0] == _HEARTBEAT + node_id:
                 return "its heartbeat is on the bus"
@@ -61,7 +72,7 @@ class LssLink:
         for _ in range(2):
             self._collect(0, 0.0)
             self._send(question, _SDO_REQUEST + node_id)
-            deadline = time.monotonic() + _SDO_PATIENCE * self.timeout_s
+            deadline = self.clock.now_s + _SDO_PATIENCE * self.timeout_s
             while (frame := self._receive(deadline)) is not None:
                 if frame[0] == _SDO_ANSWER + node_id and len(frame[1]) == 8:
                     return frame[1]
@@ -69,11 +80,11 @@ class LssLink:
 
     def reset_communication(self, node_id: int) -> None:
         """Restart a node's communication by NMT, so that its new node id counts."""
-        self._transmit(_NMT, bytes([_RESET_COMMUNICATION, node_id]))
+        self.send(_NMT, bytes([_RESET_COMMUNICATION, node_id]))
 
     def wait_for_boot_up(self, node_id: int, timeout_s: float = 2.0) -> bool:
         """Tell whether a node's boot-up message or heartbeat comes in time."""
-        deadline = time.monotonic() + timeout_s
+        deadline = self.clock.now_s + timeout_s
         while (frame := self._receive(deadline)) is not None:
             if frame[0] == _HEARTBEAT + node_id:
                 return True
@@ -97,7 +108,7 @@ class LssLink:
     def _ask(self, question: bytes, specifier: int) -> bytes | None:
         self._collect(specifier, 0.0)
         self._send(question)
-        deadline = time.monotonic() + self.timeout_s
+        deadline = self.clock.now_s + self.timeout_s
         while (frame := self._receive(deadline)) is not None:
             if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
                 return frame[1].ljust(8, b"\0")
@@ -105,7 +116,7 @@ class LssLink:
 
     def _collect(self, specifier: int, wait_s: float) -> list[bytes]:
         """Return the answers that come within `wait_s`; with 0.0 throw away what waits."""
-        deadline = time.monotonic() + wait_s
+        deadline = self.clock.now_s + wait_s
         answers = []
         while (frame := self._receive(deadline)) is not None:
             if frame[0] == _SLAVE and frame[1][:1] == bytes([specifier]):
@@ -114,24 +125,13 @@ class LssLink:
 
     def _receive(self, deadline: float) -> tuple[int, bytes] | None:
         """Return the next frame, also one that waits when the time is over; None without one."""
-        left_s = deadline - time.monotonic()
-        if left_s < -_LONGEST_DRAIN_S:
+        if deadline - self.clock.now_s < -_LONGEST_DRAIN_S:
             return None  # a babbling node would keep us for ever
-        try:
-            message = self._bus.recv(max(0.0, left_s))
-        except (can.CanError, OSError) as error:
-            raise bus_gone(self.url, error) from error
-        if message is None:
-            return None
-        if message.is_extended_id or message.is_remote_frame or message.is_error_frame:
-            return -1, b""
-        return message.arbitration_id, bytes(message.data)
+        self.poll()
+        self.clock.wait(lambda: self._frames or self._lost, deadline)
+        if self._lost is not None:
+            raise self._lost
+        return self._frames.popleft() if self._frames else None
 
     def _send(self, data: bytes, identifier: int = _MASTER) -> None:
-        self._transmit(identifier, data.ljust(8, b"\0"))
-
-    def _transmit(self, identifier: int, data: bytes) -> None:
-        try:
-            self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
-        except (can.CanError, OSError) as error:
-            raise BusError(f"{self.url}: cannot send: {error}") from error
+        self.send(identifier, data.ljust(8, b"\0"))

@@ -2,129 +2,150 @@
 
 from __future__ import annotations
 
-import threading
-import time
+import math
 from collections.abc import Iterable
 
-import can
 from canopen.objectdictionary import ObjectDictionary
 
+from cdpr_rt.clock import Clock
 from drivers import emergency as emcy
 from drivers import error_control as nmt
-from drivers.bus import BusUrl, bus_gone, open_python_can
-from drivers.bus.health import BusHealth, BusState
-from drivers.bus.packed import EFF_FLAG, RTR_FLAG
+from drivers.bus import BusUrl
+from drivers.bus.health import BusState
+from drivers.bus.member import BusMember
+from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG
 from drivers.cia402 import POWER_OFF, state_of
 from drivers.emergency import Emergency, EmergencyLog
 from drivers.error_control import ErrorControl
 from drivers.errors import BusError, DriverError
 from drivers.objects import SDO_ANSWER, ObjectAccess
 
-_EMCY, _HEARTBEAT = 0x080, 0x700
+_SYNC, _EMCY, _HEARTBEAT = 0x080, 0x080, 0x700
 _FUNCTION, _NODE = 0x780, 0x07F
 _EXACT = 0x7FF | EFF_FLAG | RTR_FLAG
 _RPDO_TIMEOUT = 0x8250
 _START, _ENTER_PRE_OPERATIONAL, _RESET_NODE, _RESET_COMMUNICATION = 1, 128, 129, 130
 _LOOK_S = 0.1
-"""How often the receiving thread looks for nodes that are lost, and whether it is to end."""
+"""How often is looked for nodes that are lost."""
 _HELD_CLOCK_S = 1.0
-"""Slack for heartbeats of a simulated bus, whose time may stand for half a second."""
+"""Slack for heartbeats of a bus in lockstep that somebody else leads: its time may stand."""
+_SOME_SYNCS = 2
+"""One SYNC may be the last of a master that has just ended."""
 _SOME_STRAYS = 3
 _MOST_TWINS = 4
+_OPERATIONAL_DATA = bytes([nmt.OPERATIONAL])
 _LATE_ANSWERS_S = 0.05
 """A second device may be slower than the first."""
 
 
-class CanNetwork(ObjectAccess):
-    """CANopen master's acyclic work on one bus.
+class CanNetwork(BusMember, ObjectAccess):
+    """CANopen master's acyclic work on one bus; all that waits does so by `clock`.
 
-    Its receive filters keep SYNC and PDOs away, so that cycles never wake its thread. While no
-    cycles run it produces the master's heartbeat and watches those of the nodes; `claim_cycle`
-    hands both duties to the cycle, so that a hung loop is silent and the drives stop. Raises
-    BusError when the bus cannot be opened.
+    While no cycles run it produces the master's heartbeat and watches those of the nodes, whenever
+    somebody waits; `claim_cycle` hands both duties to the cycle, so that a hung loop is silent and
+    the drives stop. It has the only port on the bus: a cycle uses `intake` as well. Raises BusError
+    when the bus cannot be opened.
     """
 
     def __init__(
-        self, url: BusUrl, node_ids: Iterable[int], master_node_id: int, heartbeat_s: float
+        self,
+        url: BusUrl,
+        clock: Clock,
+        node_ids: Iterable[int],
+        master_node_id: int,
+        heartbeat_s: float,
     ) -> None:
-        super().__init__(self.send)
-        self.url = url
-        self.health = BusHealth()
-        """What the controller's error frames tell of the wire."""
+        ids = list(node_ids)
+        self._filters = [(base + node, _EXACT) for node in ids for base in (_EMCY, SDO_ANSWER)]
+        self._filters += [(_HEARTBEAT + node, _EXACT) for node in (*ids, master_node_id)]
+        self._filters.append((_SYNC, _EXACT))
         self.log = EmergencyLog()
         self.emergencies = self.log.kept
         self.alarm_text = ""
         """Why the drives must not go on being driven; latched until `clear_alarm`."""
         self.cycling = False
-        self.foreign_master = threading.Event()
-        """Set when somebody else has produced the master's heartbeat, before our cycles ran."""
-        ids = list(node_ids)
-        filters = [(base + node, _EXACT) for node in ids for base in (_EMCY, SDO_ANSWER)]
-        filters += [(_HEARTBEAT + node, _EXACT) for node in (*ids, master_node_id)]
-        self._bus = open_python_can(url, filters, self.health)
-        self._send_lock = threading.Lock()
-        held = url.is_simulated or url.asks_for_lockstep
-        slack_s = _HELD_CLOCK_S if held else 0.0
-        self._errors = ErrorControl(self.raise_alarm, slack_s)
+        self.heartbeat_s = heartbeat_s
+        self.heartbeat_frame = FRAME.pack(_HEARTBEAT + master_node_id, 1, _OPERATIONAL_DATA)
+        self._master_node_id = master_node_id
+        self._foreign_heartbeats = self._foreign_syncs = 0
+        self._heartbeat_at_s = math.inf
+        self._look_at_s = 0.0
+        BusMember.__init__(self, url, clock, self._filters)
+        ObjectAccess.__init__(self, self.send, clock)
+        self.lockstep = self.intake.leads or (
+            url.asks_for_lockstep or self.intake.port.status.get("mode") == "lockstep"
+        )
+        """Whether the bus' time moves by SYNC, whoever leads it."""
+        held = self.lockstep and not self.intake.leads
+        self._errors = ErrorControl(self.raise_alarm, clock, _HELD_CLOCK_S if held else 0.0)
         self.restarted = self._errors.restarted
         """Nodes that booted unasked: their configuration and encoder positions are void."""
-        self._heartbeat_s = heartbeat_s
-        self._master_node_id = master_node_id
-        self._has_cycled = False
-        self._stop = threading.Event()
-        self._threads = [threading.Thread(target=self._receive, name="canopen", daemon=True)]
-        self._threads[0].start()
 
     def add_node(self, node_id: int, dictionary: ObjectDictionary) -> None:
         """Make a node known, with the object dictionary its EDS describes."""
         self._errors.add(node_id)
         super().add_node(node_id, dictionary)
 
-    # -- what comes in; one thread of its own, since python-can's prints the end of a bus
+    # -- as a source of the clock
 
-    def _receive(self) -> None:
-        look_at_s = 0.0
-        while not self._stop.is_set():
-            due = time.monotonic() >= look_at_s
-            try:
-                message = self._bus.recv(0.0 if due else _LOOK_S)
-            except (can.CanError, OSError) as error:
-                if not self._stop.is_set():
-                    gone = self._gone(error)
-                    self._fail_transfers(gone)
-                    self.raise_alarm(str(gone))
-                return
-            if message is not None:
-                self._dispatch(message)
-            elif due:
-                # nothing waits: who has not been heard by now has not said anything
-                look_at_s = time.monotonic() + _LOOK_S
-                if not self.cycling:
-                    self._errors.look_for_losses()
+    def tick(self, now_s: float) -> float:
+        """Send the master's heartbeat where it is due, and look for nodes that are lost."""
+        if self.cycling:
+            return math.inf
+        if now_s >= self._heartbeat_at_s:
+            self._send_heartbeat()
+        # who has not been heard although nothing waits has not said anything
+        if now_s >= self._look_at_s and not self.poll():
+            self._look_at_s = now_s + _LOOK_S
+            self._errors.look_for_losses()
+        return min(self._heartbeat_at_s, self._look_at_s)
 
-    def _dispatch(self, message: can.Message) -> None:
-        """Hand a frame on; one that no CANopen device sends is noise."""
-        if message.is_error_frame:
-            self._on_error_frame(message)
+    def on_loss(self, error: BusError) -> None:
+        """Have transfers end at once, and the alarm tell why."""
+        self._fail_transfers(error)
+        self.raise_alarm(str(error))
+
+    # -- what comes in
+
+    def hear(self, identifiers: Iterable[int]) -> None:
+        """Let these frames come in as well, in place of those of an earlier call; BusError."""
+        self.intake.set_filters([*self._filters, *((i, _EXACT) for i in identifiers)])
+
+    def take_frame(self, frame: memoryview) -> None:
+        """Take one frame; one that no CANopen device sends is noise."""
+        identifier, length, data = FRAME.unpack_from(frame)
+        if identifier & ERR_FLAG:
+            self._on_error_frame(identifier, data)
             return
-        if message.is_extended_id or message.is_remote_frame:
+        if identifier & (EFF_FLAG | RTR_FLAG):
             return
-        identifier, data = message.arbitration_id, bytes(message.data)
-        node_id = identifier & _NODE
-        if identifier == _HEARTBEAT + self._master_node_id:
-            if not self._has_cycled:  # the cycle's own heartbeats come back to us as well
-                self.foreign_master.set()
+        node_id, function = identifier & _NODE, identifier & _FUNCTION
+        if identifier == _SYNC:
+            self._foreign_syncs += 1
+        elif identifier == _HEARTBEAT + self._master_node_id:
+            self._foreign_heartbeats += 1
         elif node_id not in self.clients:
             return
-        elif identifier & _FUNCTION == SDO_ANSWER and len(data) == 8:
+        elif function == SDO_ANSWER and length == 8:
             self.clients[node_id].on_answer(data)
-        elif identifier & _FUNCTION == _EMCY and len(data) == emcy.LENGTH:
-            self._on_emergency(Emergency.from_frame(node_id, data))
-        elif identifier & _FUNCTION == _HEARTBEAT and len(data) == 1:
+        elif function == _EMCY and length == emcy.LENGTH:
+            self._on_emergency(Emergency.from_frame(node_id, data, self.clock.now_s))
+        elif function == _HEARTBEAT and length == 1:
             state = data[0] & 0x7F
             if state == nmt.BOOT_UP:
                 self.log.forget(node_id)
             self._errors.take(node_id, state)
+
+    def hear_master(self, seconds: float) -> str:
+        """Return what another master was heard to send within so many seconds, or an empty text."""
+        self._foreign_syncs = 0
+        self.clock.wait(self._heard, self.clock.now_s + seconds)
+        return self._heard()
+
+    def _heard(self) -> str:
+        if self._foreign_heartbeats:
+            return "heartbeat"
+        return "SYNC" if self._foreign_syncs >= _SOME_SYNCS else ""
 
     def _on_emergency(self, emergency: Emergency) -> None:
         flood = self.log.add(emergency)
@@ -135,8 +156,8 @@ class CanNetwork(ObjectAccess):
         if not emergency.is_reset:
             self.raise_alarm(f"emergency message: {emergency}")
 
-    def _on_error_frame(self, message: can.Message) -> None:
-        self.health.take_message(message)
+    def _on_error_frame(self, identifier: int, data: bytes) -> None:
+        self.health.take_error(identifier, data)
         if not self.health.usable:
             self.raise_alarm(self._bus_off())
 
@@ -156,18 +177,6 @@ class CanNetwork(ObjectAccess):
         self.alarm_text = "" if self.health.state < BusState.BUS_OFF else self._bus_off()
 
     # -- what goes out
-
-    def send(self, identifier: int, data: bytes) -> None:
-        """Send one frame; raises BusError."""
-        message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
-        try:
-            with self._send_lock:
-                self._bus.send(message)
-        except (can.CanError, OSError) as error:
-            raise self._gone(error) from error
-
-    def _gone(self, error: Exception) -> BusError:
-        return bus_gone(self.url, error)
 
     def reset_communication(self, node_id: int, timeout_s: float) -> bool:
         """Reset the node's communication; return whether its boot-up message came in time.
@@ -260,7 +269,7 @@ class CanNetwork(ObjectAccess):
 
     def claim_cycle(self) -> None:
         """Hand the master's heartbeat to the cycle: from now on a hung cycle is a silent master."""
-        self.cycling = self._has_cycled = True
+        self.cycling = True
 
     def release_cycle(self) -> None:
         """Take the master's heartbeat back from the cycle, and the watch on the nodes'."""
@@ -272,28 +281,11 @@ class CanNetwork(ObjectAccess):
     def start_heartbeat(self) -> None:
         """Begin to produce the master's heartbeat; the drives watch it from the first one on."""
         self._send_heartbeat()
-        thread = threading.Thread(target=self._produce, name="heartbeat", daemon=True)
-        self._threads.append(thread)
-        thread.start()
-
-    def _produce(self) -> None:
-        # twice as often as promised: this thread has to wait for the interpreter at times
-        while not self._stop.wait(0.5 * self._heartbeat_s):
-            if not self.cycling:
-                self._send_heartbeat()
 
     def _send_heartbeat(self) -> None:
+        # twice as often as promised: who computes for a while does not wait
+        self._heartbeat_at_s = self.clock.now_s + 0.5 * self.heartbeat_s
         try:
-            self.send(_HEARTBEAT + self._master_node_id, bytes([nmt.OPERATIONAL]))
+            self.send_frame(self.heartbeat_frame)
         except BusError:
             return  # should the bus not come back, the drives stop by themselves
-
-    def close(self) -> None:
-        """Leave the bus; a bus that is lost is no error here."""
-        self._stop.set()
-        for thread in self._threads:
-            thread.join()
-        try:
-            self._bus.shutdown()
-        except (can.CanError, OSError):
-            return

@@ -1,4 +1,4 @@
-"""Objects of the nodes of one bus, read and written by SDO from any thread."""
+"""Objects of the nodes of one bus, read and written by SDO."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, ODVariable
 
+from cdpr_rt.clock import Clock
 from drivers import sdo_abort
 from drivers.emergency import ErrorRecord
 from drivers.errors import BusError, SdoAbortError, SdoCancelledError, SdoError, SdoTimeoutError
@@ -23,13 +24,14 @@ Send = Callable[[int, bytes], None]
 
 
 class ObjectAccess:
-    """SDO access to several nodes; transfers to different nodes run at the same time.
+    """SDO access to several nodes; in tasks transfers to different nodes run side by side.
 
     Errors name node, object and reason. A request without an answer is repeated up to `attempts`
     in all; `timeout_s` is that of one answer.
     """
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: Send, clock: Clock) -> None:
+        self.clock = clock
         self._send = send
         self._clients: dict[int, SdoClient] = {}
         self._dictionaries: dict[int, ObjectDictionary] = {}
@@ -37,7 +39,11 @@ class ObjectAccess:
     def add_node(self, node_id: int, dictionary: ObjectDictionary) -> None:
         """Make a node known, with the object dictionary its EDS describes."""
         self._dictionaries[node_id] = dictionary
-        self._clients[node_id] = SdoClient(lambda data: self._send(SDO_REQUEST + node_id, data))
+
+        def send(data: bytes) -> None:
+            self._send(SDO_REQUEST + node_id, data)
+
+        self._clients[node_id] = SdoClient(send, self.clock)
 
     def dictionary(self, node_id: int) -> ObjectDictionary:
         """Return the node's object dictionary."""
@@ -111,9 +117,9 @@ class ObjectAccess:
         )
 
     def cancel(self, node_id: int) -> bool:
-        """Have the transfer with a node that another thread runs end; return whether one ran.
+        """Have the transfer with a node that a task runs end; return whether one ran.
 
-        That thread gets SdoCancelledError, the node an abort (08000000h).
+        That task gets SdoCancelledError, the node an abort (08000000h).
         """
         return self._clients[node_id].cancel()
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import struct
-import time
 from collections.abc import Collection
 from typing import Final
 
+from cdpr_rt.clock import Clock
 from drivers.bus import BusUrl, open_port
+from drivers.bus.intake import Intake
 from drivers.bus.packed import FRAME
 from drivers.cia402 import POWER_OFF, state_of
 
@@ -19,7 +20,6 @@ _WAIT_S: Final = 0.2
 """How long answers are waited for after the last question."""
 _ASK_EVERY_S: Final = 0.25
 _SILENCE_S: Final = 2.0
-_MOST_ANSWERS: Final = 512
 
 
 class PowerWatch:
@@ -29,22 +29,24 @@ class PowerWatch:
     they are something else. Methods raise BusError.
     """
 
-    def __init__(self, url: BusUrl, but: Collection[int]) -> None:
+    def __init__(self, url: BusUrl, clock: Clock, but: Collection[int]) -> None:
         """Ask everybody, and wait for the answers."""
         self.url = url
+        self._clock = clock
         self._but = frozenset(but)
         self._heard_s: dict[int, float] = {}
         self._words: dict[int, int] = {}
-        self._buffer = bytearray(FRAME.size)
-        self._port = open_port(url, [(_ANSWER, _FUNCTION)])
+        self._intake = Intake(open_port(url, [(_ANSWER, _FUNCTION)]))
+        self._intake.take = self._take
         try:
             for _ in range(_ROUNDS):
                 self._ask([node for node in range(1, 128) if node not in but])
-                self._listen(_WAIT_S)
+                clock.sleep(_WAIT_S)
+                self._intake.settle()
         except BaseException:
-            self._port.close()
+            self._intake.close()
             raise
-        self._asked_at_s = time.monotonic()
+        self._asked_at_s = clock.now_s
 
     @property
     def nodes(self) -> list[int]:
@@ -53,48 +55,38 @@ class PowerWatch:
 
     def reason(self) -> str:
         """Return which drive has power, or has stopped answering, or an empty text; never waits."""
-        now = time.monotonic()
-        self._listen(0.0)
-        if now - self._asked_at_s > _ASK_EVERY_S:
-            self._asked_at_s = now
+        now_s = self._clock.now_s
+        self._intake.settle()
+        if now_s - self._asked_at_s > _ASK_EVERY_S:
+            self._asked_at_s = now_s
             self._ask(self.nodes)
         for node, word in sorted(self._words.items()):
             state = state_of(word)
             if state not in POWER_OFF:
                 return f"node {node} on {self.url} is {state.label}, which is with power"
-            if now - self._heard_s[node] > _SILENCE_S:
+            if now_s - self._heard_s[node] > _SILENCE_S:
                 return f"node {node} on {self.url} does not answer any more: has it power?"
         return ""
 
     def close(self) -> None:
         """Leave the bus."""
-        self._port.close()
+        self._intake.close()
 
     def _ask(self, nodes: Collection[int]) -> None:
-        self._port.settimeout(_WAIT_S)  # of a full transmit queue too
+        port = self._intake.port
         try:
             for node in nodes:
-                self._port.send(FRAME.pack(_REQUEST + node, 8, _UPLOAD))
+                port.send(FRAME.pack(_REQUEST + node, 8, _UPLOAD))
         except OSError as error:
-            raise self._port.lost(error) from error
+            raise port.lost(error) from error
 
-    def _listen(self, seconds: float) -> None:
-        """Take answers in: all that wait, and what comes in so many seconds."""
-        deadline = time.monotonic() + seconds
-        for _ in range(_MOST_ANSWERS):
-            self._port.settimeout(max(deadline - time.monotonic(), 0.0))
-            try:
-                if not self._port.recv_into(self._buffer):
-                    raise self._port.lost()
-            except BlockingIOError:
-                return
-            except OSError as error:
-                raise self._port.lost(error) from error
-            can_id, length, data = FRAME.unpack(self._buffer)
+    def _take(self, last: int) -> None:
+        for row in self._intake.frames.rows[:last]:
+            can_id, length, data = FRAME.unpack_from(row)
             node = can_id - _ANSWER
             if node in self._but:
                 continue  # they answer whoever drives them
             # an expedited answer with 6041h: anybody's other transfers are left aside
             if length == 8 and data[0] & 0xE2 == 0x42 and data[1:4] == _UPLOADED:
                 self._words[node] = int.from_bytes(data[4:6], "little")
-                self._heard_s[node] = time.monotonic()
+                self._heard_s[node] = self._clock.now_s

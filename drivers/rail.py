@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 from cdpr_rt.calibration_state import mark_not_calibrated
+from cdpr_rt.clock import Clock
 from drivers.errors import DriverError
 from profiles.rail import RailProfile
 
@@ -80,7 +80,7 @@ class Conditions:
     """Told the position in m."""
 
 
-def move(rail: RailProfile, axis: RailAxis, target_m: float, ask: Conditions) -> Move:
+def move(rail: RailProfile, axis: RailAxis, clock: Clock, target_m: float, ask: Conditions) -> Move:
     """Move the rail to `target_m`; however it ends, the axis is braked and without power.
 
     The robot is written down as not calibrated before the carriage moves. Raises RailError for
@@ -98,19 +98,19 @@ def move(rail: RailProfile, axis: RailAxis, target_m: float, ask: Conditions) ->
     start_m = axis.position_m()
     try:
         axis.set_brake(False)
-        pushed_m = _try_brake(rail, axis)
+        pushed_m = _try_brake(rail, axis, clock)
         mark_not_calibrated(rail.robot, f"{rail.name} was moved from {start_m:.4f} m")
         axis.enable()
         axis.set_brake(True)
         try:
             axis.start(target_m)
-            _follow(rail, axis, abs(target_m - start_m), ask)
+            _follow(rail, axis, clock, abs(target_m - start_m), ask)
         except BaseException:
             with contextlib.suppress(DriverError):
                 axis.halt()
             raise
     finally:
-        _hold(axis)
+        _hold(axis, clock)
     end_m = axis.position_m()
     if abs(end_m - target_m) > rail.tolerance_m:
         raise RailError(
@@ -129,19 +129,19 @@ def _refuse(rail: RailProfile, ask: Conditions) -> None:
         raise RailError(f"{rail.name}: not moved while a winch has power: {powered}")
 
 
-def _try_brake(rail: RailProfile, axis: RailAxis) -> float | None:
+def _try_brake(rail: RailProfile, axis: RailAxis, clock: Clock) -> float | None:
     """Push against the applied brake, both ways; return the movement, None where none can push."""
     check = rail.brake_check
     before, moved = axis.position_m(), 0.0
     for way in (1.0, -1.0):
         if not axis.push(way * check.torque_percent / 100.0):
             return None
-        deadline = time.monotonic() + check.seconds
-        while time.monotonic() < deadline:
+        deadline = clock.now_s + check.seconds
+        while clock.now_s < deadline:
             moved = max(moved, abs(axis.position_m() - before))
             if moved > check.allowed_m:
                 break
-            time.sleep(_LOOK_S)
+            clock.sleep(_LOOK_S)
     axis.push(0.0)
     if moved > check.allowed_m:
         mark_not_calibrated(rail.robot, f"{rail.name} slipped by {moved * 1e3:.2f} mm on its brake")
@@ -153,10 +153,12 @@ def _try_brake(rail: RailProfile, axis: RailAxis) -> float | None:
     return moved
 
 
-def _follow(rail: RailProfile, axis: RailAxis, distance_m: float, ask: Conditions) -> None:
+def _follow(
+    rail: RailProfile, axis: RailAxis, clock: Clock, distance_m: float, ask: Conditions
+) -> None:
     nominal_s = distance_m / rail.speed_m_s + rail.speed_m_s / rail.acceleration_m_s2
     allowed_s = 2.0 * nominal_s + _SPARE_S
-    began = time.monotonic()
+    began = clock.now_s
     while not axis.arrived():
         axis.check()
         ask.progress(axis.position_m())
@@ -170,15 +172,15 @@ def _follow(rail: RailProfile, axis: RailAxis, distance_m: float, ask: Condition
         powered = ask.powered()
         if powered:
             raise RailError(f"{rail.name}: stopped, for a winch may have power: {powered}")
-        if time.monotonic() - began > allowed_s:
+        if clock.now_s - began > allowed_s:
             raise RailError(f"{rail.name}: did not arrive within {allowed_s:.1f} s")
-        time.sleep(_LOOK_S)
+        clock.sleep(_LOOK_S)
 
 
-def _hold(axis: RailAxis) -> None:
+def _hold(axis: RailAxis, clock: Clock) -> None:
     """Apply the brake before the drive lets go; the power goes even if the brake does not."""
     try:
         axis.set_brake(False)
     finally:
         axis.disable()
-    time.sleep(_SETTLE_S)  # a brake that slips does so now
+    clock.sleep(_SETTLE_S)  # a brake that slips does so now

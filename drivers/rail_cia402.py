@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import Final
 
 from drivers.boot import BootReport
@@ -55,6 +54,7 @@ class Cia402RailAxis:
         self._m_per_count = sign * self._map.travel_per_turn_m / self._turn
         self._push_unit = torque_unit_Nm(drive, report.rated_torque_Nm)
         self._rated_Nm = report.rated_torque_Nm
+        self._clock = network.clock
         self._pushing = False
 
     def check(self) -> None:
@@ -124,13 +124,13 @@ class Cia402RailAxis:
     def halt(self) -> None:
         """Stop on the profile's ramp (605Dh) and wait until it stands, or has no power any more."""
         self._write(0x6040, _ENABLED | HALT)
-        deadline = time.monotonic() + _STOP_S
+        deadline = self._clock.now_s + _STOP_S
         while not (word := self._statusword()) & _TARGET_REACHED:
             if state_of(word) != State.OPERATION_ENABLED:
                 return
-            if time.monotonic() > deadline:
+            if self._clock.now_s > deadline:
                 raise self._wrong("does not stop")
-            time.sleep(_LOOK_S)
+            self._clock.sleep(_LOOK_S)
 
     def set_brake(self, released: bool) -> None:
         """Release or apply the brake at the safety I/O, and wait for its feedback."""
@@ -157,30 +157,30 @@ class Cia402RailAxis:
         if state_of(self._statusword()) not in POWER_OFF:
             self._lead_to(State.SWITCH_ON_DISABLED)
         self._write(0x6060, mode)
-        deadline = time.monotonic() + self._drive.mode_display_timeout_s
+        deadline = self._clock.now_s + self._drive.mode_display_timeout_s
         while (shown := self._network.read_int(self._node, 0x6061)) != mode:
-            if time.monotonic() > deadline:
+            if self._clock.now_s > deadline:
                 raise self._wrong(f"shows mode {shown} (6061h) and not {int(mode)}")
-            time.sleep(_LOOK_S)
+            self._clock.sleep(_LOOK_S)
 
     def _lead_to(self, target: State) -> None:
-        deadline = time.monotonic() + 4.0 * self._drive.state_timeout_s
+        deadline = self._clock.now_s + 4.0 * self._drive.state_timeout_s
         while True:
             state = state_of(self._statusword())
             if state == target:
                 return
-            if time.monotonic() > deadline or state == State.FAULT:
+            if self._clock.now_s > deadline or state == State.FAULT:
                 code = fault_text(self._network.read_int(self._node, 0x603F))
                 raise self._wrong(f"is {state.label}, not {target.label} ({code})")
             self._write(0x6040, int(CONTROLWORD_TABLE[target, state]))
-            time.sleep(_LOOK_S)
+            self._clock.sleep(_LOOK_S)
 
     def _await_bit(self, bit: int, wanted: bool, problem: str) -> None:
-        deadline = time.monotonic() + self._drive.state_timeout_s
+        deadline = self._clock.now_s + self._drive.state_timeout_s
         while bool(self._statusword() & bit) != wanted:
-            if time.monotonic() > deadline:
+            if self._clock.now_s > deadline:
                 raise self._wrong(problem)
-            time.sleep(_LOOK_S)
+            self._clock.sleep(_LOOK_S)
 
     def _statusword(self) -> int:
         return self._network.read_int(self._node, 0x6041)

@@ -1,16 +1,15 @@
-"""SDO client of one node (CiA 301): one transfer at a time, for any thread, to be cancelled."""
+"""SDO client of one node (CiA 301): one transfer at a time, which may be cancelled."""
 
 from __future__ import annotations
 
-import queue
 import struct
-import threading
-import time
 from binascii import crc_hqx
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import NoReturn
 
+from cdpr_rt.clock import Clock
 from drivers import sdo_abort
 from drivers.errors import BusError, SdoAbortError, SdoCancelledError, SdoTimeoutError
 
@@ -34,18 +33,19 @@ _UPLOAD, _DOWNLOAD, _BLOCK_UPLOAD = 2, 3, 6
 class SdoClient:
     """Transfers to and from one node; `send` puts a request of 8 bytes on the bus.
 
+    Of several tasks the next one begins when the one before has ended.
+
     An answer that belongs to no request (a duplicate, another client's, a second device's) is
     left aside and counted. Uploads and downloads raise SdoAbortError, SdoTimeoutError,
     SdoCancelledError and BusError, all without naming node and object.
     """
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: Send, clock: Clock) -> None:
         self.strays = 0
         """Answers that nobody had asked for, since it was set to 0 or an answer was late."""
         self._send = send
-        self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._lock = threading.Lock()
-        self._guard = threading.Lock()
+        self._clock = clock
+        self._answers: deque[bytes] = deque()
         self._busy = self._cancelled = False
         self._lost: BusError | None = None
         self._multiplexer = bytes(3)
@@ -53,36 +53,27 @@ class SdoClient:
 
     def on_answer(self, data: bytes) -> None:
         """Take an answer of 8 bytes from the bus."""
-        if self._answers.qsize() < _MOST_WAITING:
-            self._answers.put(data)
+        if len(self._answers) < _MOST_WAITING:
+            self._answers.append(data)
 
     def await_strays(self, seconds: float) -> int:
         """Return how many answers nobody had asked for, after waiting for more of them."""
-        with self._lock:
-            deadline = time.monotonic() + seconds
-            while (left_s := deadline - time.monotonic()) > 0.0:
-                try:
-                    self.strays += self._answers.get(timeout=left_s) is not None
-                except queue.Empty:
-                    break
+        with self._alone():
+            self._clock.wait(lambda: self._lost, self._clock.now_s + seconds)
+            self._leave_strays()
             return self.strays
 
     def cancel(self) -> bool:
         """Have the transfer that runs end with SdoCancelledError; return whether one runs.
 
-        The node gets an abort (08000000h). May be called from any thread.
+        The node gets an abort (08000000h).
         """
-        with self._guard:
-            if not self._busy:
-                return False
-            self._cancelled = True
-        self._answers.put(None)
-        return True
+        self._cancelled = self._busy
+        return self._busy
 
     def fail(self, error: BusError) -> None:
         """Have transfers end at once, now and later: the bus has gone away."""
         self._lost = error
-        self._answers.put(None)
 
     def upload(self, index: int, sub: int, timeout_s: float, *, block: bool = False) -> bytes:
         """Return the data of an object; `timeout_s` is that of each answer.
@@ -166,7 +157,7 @@ class SdoClient:
         """
         good = 0
         while True:
-            frame = self._next(time.monotonic() + self._timeout_s)
+            frame = self._next(self._clock.now_s + self._timeout_s)
             if frame is None:
                 if not good:
                     self._give_up()
@@ -183,17 +174,20 @@ class SdoClient:
     # -- requests and answers
 
     @contextmanager
+    def _alone(self) -> Iterator[None]:
+        self._clock.wait(lambda: not self._busy)
+        self._busy, self._cancelled = True, False
+        try:
+            yield
+        finally:
+            self._busy = False
+
+    @contextmanager
     def _transfer(self, index: int, sub: int, timeout_s: float) -> Iterator[None]:
-        with self._lock:
+        with self._alone():
             self._multiplexer = _MULTIPLEXER.pack(0, index, sub)[1:]
             self._timeout_s = timeout_s
-            with self._guard:
-                self._busy, self._cancelled = True, False
-            try:
-                yield
-            finally:
-                with self._guard:
-                    self._busy = False
+            yield
 
     def _initiate(
         self, command: int, index: int, sub: int, data: bytes, kinds: tuple[int, ...]
@@ -204,10 +198,10 @@ class SdoClient:
         return self._ask(_MULTIPLEXER.pack(command, index, sub) + data, accept)
 
     def _ask(self, request: bytes, accept: Accept) -> bytes:
-        for _ in range(self._answers.qsize()):
-            self.strays += self._answers.get() is not None
+        self._clock.look()
+        self._leave_strays()
         self._put(request)
-        deadline = time.monotonic() + self._timeout_s
+        deadline = self._clock.now_s + self._timeout_s
         others = 0
         while True:
             frame = self._next(deadline)
@@ -219,23 +213,24 @@ class SdoClient:
                 others += 1
                 self.strays += 1
 
+    def _leave_strays(self) -> None:
+        self.strays += len(self._answers)
+        self._answers.clear()
+
     def _put(self, request: bytes) -> None:
         self._look_for_end()
         self._send(request.ljust(8, b"\0"))
 
     def _next(self, deadline: float) -> bytes | None:
         """Return the next frame of the node, None when none came; raises what ends the transfer."""
-        while True:
-            try:
-                frame = self._answers.get(timeout=max(deadline - time.monotonic(), 0.0))
-            except queue.Empty:
-                return None
-            self._look_for_end()
-            if frame is None:
-                continue
-            if frame[0] == _ABORT and frame[1:4] in (self._multiplexer, bytes(3)):
-                raise SdoAbortError(int.from_bytes(frame[4:8], "little"))
-            return frame
+        self._clock.wait(lambda: self._answers or self._cancelled or self._lost, deadline)
+        self._look_for_end()
+        if not self._answers:
+            return None
+        frame = self._answers.popleft()
+        if frame[0] == _ABORT and frame[1:4] in (self._multiplexer, bytes(3)):
+            raise SdoAbortError(int.from_bytes(frame[4:8], "little"))
+        return frame
 
     def _look_for_end(self) -> None:
         if self._lost is not None:

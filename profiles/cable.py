@@ -26,10 +26,10 @@ class Cable(Profile):
     source: str = ""
     notes: tuple[str, ...] = ()
     diameter_m: float = Field(gt=0, le=0.1)
-    weight_per_length_N_m: Positive
-    elongation_percent_per_N: Positive
+    weight_per_length_N_m: float = Field(ge=1e-6, le=1e3)
+    elongation_percent_per_N: float = Field(ge=1e-9, le=10)
     elongation_measured_up_to_N: Positive | None = None
-    breaking_force_kgf: Positive
+    breaking_force_kgf: float = Field(ge=0.1, le=1e6)
     min_tension_N: float = Field(ge=0)
     data_sheet_code: str | None = None
 

@@ -7,13 +7,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal, TypeVar, get_args
 
+from profiles.bounded_input import is_file, path_of, read_toml, resolved
 from profiles.cable import Cable, CableSeries
 from profiles.drive import DriveProfile
 from profiles.errors import ProfileError
 from profiles.motor import Motor, MotorRatings, MotorSeries
+from profiles.motor_bounds import MOST_SPEED_RATIO
 from profiles.platform import Platform
 from profiles.rail import load_rail
-from profiles.reader import closest, read_toml, read_toml_model
+from profiles.reader import closest, read_toml_model
 from profiles.robot import (
     Robot,
     RobotAxis,
@@ -73,9 +75,9 @@ def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
     path = _require("drives", name, beside)
     drive = read_toml_model(path, DriveProfile)
     eds = path.parent / drive.eds
-    if not eds.is_file():
+    if not is_file(eds):
         raise ProfileError(path, "eds", f"value {str(drive.eds)!r}; allowed: a file beside this")
-    return drive.model_copy(update={"eds": eds.resolve()})
+    return drive.model_copy(update={"eds": resolved(eds)})
 
 
 def load_cable(name: str | Path, beside: Path | None = None) -> Cable:
@@ -98,7 +100,7 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
         )
     return Winch(
         profile=path.stem,
-        path=path.resolve(),
+        path=resolved(path),
         motor=_referred(path, "motor", load_motor, file.motor, folder),
         drive=_referred(path, "drive", load_drive, file.drive, folder),
         cable=_referred(path, "cable", load_cable, file.cable, folder),
@@ -123,7 +125,7 @@ def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
     _refuse(path, list(_too_strong(file, axes)))
     return Robot(
         profile=path.stem,
-        path=path.resolve(),
+        path=resolved(path),
         axes=tuple(axes),
         safety_io=_device(path, "safety_io", load_safety_io, file.safety_io),
         tension_sensors=_device(
@@ -185,10 +187,10 @@ def _calibration(robot: Path, axis: int, name: str | None, winch: Winch) -> Winc
     """Return the calibration that an axis names, a path from the robot's file."""
     if name is None:
         return None
-    found = load_winch_calibration(robot.parent / Path(name).expanduser())
-    if found.motor != winch.motor.model:
-        problem = f"is of a {found.motor}; allowed: one of a {winch.motor.model}"
-        raise ProfileError(robot, f"axes[{axis}].calibration", problem)
+    path = path_of(robot.parent, name)
+    found = load_winch_calibration(path)
+    for key, problem in found.faults(winch):
+        raise ProfileError(path, key, f"{problem} (axes[{axis}] of {robot.name})")
     return found
 
 
@@ -196,6 +198,7 @@ def _too_strong(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[st
     """Yield (key, problem) for limits that the motors or cables do not bear."""
     for key, bears, of in (
         ("torque_Nm", [a.winch.motor.peak_torque_Nm for a in axes], "the motor's peak torque"),
+        ("speed_rad_s", [_speed_rad_s(a) for a in axes], "twice the motor's rated speed"),
         ("tension_max_N", [a.winch.cable.breaking_force_N for a in axes], "the breaking force"),
     ):
         wanted = getattr(file.limits, key) or ()
@@ -203,6 +206,10 @@ def _too_strong(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[st
             most = bears[i] if len(wanted) > 1 else min(bears)
             if value > most:
                 yield f"limits.{key}[{i}]", f"value {value:g}; allowed: up to {of} ({most:.6g})"
+
+
+def _speed_rad_s(axis: RobotAxis) -> float:
+    return MOST_SPEED_RATIO * axis.winch.motor.rated_speed_rad_s
 
 
 def _device(robot: Path, key: str, load: Callable[[str], object], name: str | None) -> str | None:
@@ -229,7 +236,7 @@ def _beside(file: Path, name: str) -> str:
 
 def _path_from(file: Path, text: str) -> Path:
     """Return the path that a profile's file gives from its own folder."""
-    return (file.parent / Path(text).expanduser()).resolve()
+    return resolved(path_of(file.parent, text))
 
 
 def load_machine(name: str | Path) -> Winch | Robot:
@@ -318,11 +325,11 @@ def _find(kind: Kind, name: str | Path, beside: Path | None) -> Path | None:
     text = str(name)
     folder = beside if beside is not None else Path()
     if isinstance(name, Path) or "/" in text or text.endswith(".toml"):
-        return folder / Path(text).expanduser()
+        return path_of(folder, text)
     candidates = [SHIPPED / kind / f"{text}.toml"]
     if beside is not None:
         candidates.insert(0, beside / f"{text}.toml")
-    return next((path for path in candidates if path.is_file()), None)
+    return next((path for path in candidates if is_file(path)), None)
 
 
 def _require(kind: Kind, name: str | Path, beside: Path | None) -> Path:

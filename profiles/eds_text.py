@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from profiles.bounded_input import read_bytes
 from profiles.errors import ProfileError
 
-_MOST_BYTES = 16 << 20
+MOST_EDS_BYTES = 2 << 20
 _MOST_REMARKS = 200
 _SHOWN_CHARS = 60
 
@@ -101,7 +102,7 @@ def read_sections(path: Path, remarks: Remarks) -> dict[str, Section]:
     """Return the sections of a file by folded name; raises ProfileError for what is no EDS."""
     sections: dict[str, Section] = {}
     here = None
-    for line_number, raw in enumerate(_read_text(path, remarks).splitlines(), 1):
+    for line_number, raw in enumerate(decoded_eds(path, remarks).splitlines(), 1):
         line = raw.strip()
         if not line or line[0] in ";#":
             continue
@@ -118,15 +119,9 @@ def read_sections(path: Path, remarks: Remarks) -> dict[str, Section]:
     return sections
 
 
-def _read_text(path: Path, remarks: Remarks) -> str:
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ProfileError(path, "", f"cannot be read: {error.strerror}") from None
-    if len(content) > _MOST_BYTES:
-        raise ProfileError(
-            path, "", f"has {len(content) >> 20} MiB; allowed: up to {_MOST_BYTES >> 20}"
-        )
+def decoded_eds(path: Path, remarks: Remarks) -> str:
+    """Return the text of an EDS or DCF, as makers write them; raises ProfileError."""
+    content = read_bytes(path, MOST_EDS_BYTES)
     for mark, encoding in (
         (codecs.BOM_UTF8, "utf-8"),
         (codecs.BOM_UTF16_LE, "utf-16-le"),

@@ -2,6 +2,15 @@
 
 from pathlib import Path
 
+_MOST_CHARS = 200
+_MOST_LINE_CHARS = 1000
+
+
+def brief(text: str, most: int = _MOST_CHARS) -> str:
+    """Return a text as a message may repeat it: printable, and not too long."""
+    told = text if text.isprintable() else repr(text)[1:-1]
+    return told if len(told) <= most else told[: most - 3] + "..."
+
 
 class ProfileError(Exception):
     """A profile cannot be used; the text names the file, the key, the value and what is allowed.
@@ -12,6 +21,10 @@ class ProfileError(Exception):
     def __init__(self, file: Path | str, key: str, problem: str) -> None:
         self.file = str(file)
         self.key = key
-        self.problem = problem
+        self.problem = "\n".join(brief(line, _MOST_LINE_CHARS) for line in problem.split("\n"))
         where = f"{self.file}: {key}" if key else self.file
-        super().__init__(f"{where}: {problem}")
+        super().__init__(f"{where}: {self.problem}")
+
+
+class FileMissingError(ProfileError):
+    """There is no such file."""

@@ -9,7 +9,12 @@ from profiles.table import records, undashed
 from profiles.units import RAD_S_PER_RPM
 
 Positive = Annotated[float, Field(gt=0)]
+Plausible = Annotated[float, Field(ge=1e-9, le=1e6)]
+"""A figure that a motor can have, in its unit; what lies outside is a slip of the pen."""
 Dashed = Annotated[float, Field(gt=0)] | None
+
+_TORQUE_RATIO = 2.0
+"""By which the rated torque may differ from torque constant times rated current."""
 
 
 class Motor(Profile):
@@ -18,25 +23,25 @@ class Motor(Profile):
     Torques in Nm at the shaft; currents in A rms; resistance and inductance line to line.
     """
 
-    model: str = Field(min_length=1)
+    model: str = Field(min_length=1, max_length=64)
     manufacturer: str = ""
     source: str = ""
     notes: tuple[str, ...] = ()
-    poles: int = Field(ge=2, multiple_of=2)
-    torque_constant_Nm_per_Arms: Positive
-    rated_torque_Nm: Positive
-    stall_torque_Nm: Positive
-    peak_torque_Nm: Positive
-    rated_current_Arms: Positive
-    stall_current_Arms: Positive
-    peak_current_Arms: Positive
-    rated_speed_rpm: Positive
-    resistance_ohm: Positive
-    inductance_H: Positive
-    rotor_inertia_kg_m2: Positive
-    max_dc_bus_voltage_V: Positive | None = None
-    max_winding_temperature_degC: float | None = None
-    mass_kg: Positive | None = None
+    poles: int = Field(ge=2, le=1000, multiple_of=2)
+    torque_constant_Nm_per_Arms: Plausible
+    rated_torque_Nm: Plausible
+    stall_torque_Nm: Plausible
+    peak_torque_Nm: Plausible
+    rated_current_Arms: Plausible
+    stall_current_Arms: Plausible
+    peak_current_Arms: Plausible
+    rated_speed_rpm: Plausible
+    resistance_ohm: Plausible
+    inductance_H: Plausible
+    rotor_inertia_kg_m2: Plausible
+    max_dc_bus_voltage_V: Plausible | None = None
+    max_winding_temperature_degC: float | None = Field(default=None, ge=0, le=1000)
+    mass_kg: Plausible | None = None
 
     @property
     def pole_pairs(self) -> int:
@@ -65,6 +70,13 @@ class Motor(Profile):
                 raise ValueError(
                     f"peak_{what}: value {peak}; allowed: not below rated or stall ({rated})"
                 )
+        rated_Nm = self.torque_constant_Nm_per_Arms * self.rated_current_Arms
+        if not rated_Nm / _TORQUE_RATIO <= self.rated_torque_Nm <= rated_Nm * _TORQUE_RATIO:
+            raise ValueError(
+                f"rated_torque_Nm: value {self.rated_torque_Nm:g}; allowed: "
+                f"{rated_Nm / _TORQUE_RATIO:.4g} to {rated_Nm * _TORQUE_RATIO:.4g}, about "
+                "torque_constant_Nm_per_Arms times rated_current_Arms"
+            )
         return self
 
 

@@ -1,21 +1,22 @@
 """The platform of a cable robot and where its cables run: what makes winches a robot."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
 from profiles.reader import Profile
 
-_FURTHEST_m = 1000.0
+FURTHEST_m = 1000.0
+"""Beyond this no robot reaches."""
 
 
 def _in_metres(value: float) -> float:
-    if abs(value) > _FURTHEST_m:
-        raise ValueError(
-            f"value {value:g}; allowed: -{_FURTHEST_m:g} to {_FURTHEST_m:g}, in metres"
-        )
+    if abs(value) > FURTHEST_m:
+        raise ValueError(f"value {value:g}; allowed: -{FURTHEST_m:g} to {FURTHEST_m:g}, in metres")
     return value
 
 
@@ -65,6 +66,15 @@ class Platform:
     def is_planar(self) -> bool:
         """Whether it moves in a plane."""
         return len(self.home_m) == 2
+
+    @property
+    def longest_cable_m(self) -> float:
+        """The longest that a cable is with the platform at home or in its box, turned anyhow."""
+        corners = product(*zip(self.workspace_min_m, self.workspace_max_m, strict=True))
+        ways = product(self.exit_points_m, (*corners, self.home_m))
+        return max(math.dist(*way) for way in ways) + max(
+            math.hypot(*anchor) for anchor in self.anchor_points_m
+        )
 
 
 def platform_faults(

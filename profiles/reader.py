@@ -1,8 +1,8 @@
-"""Read a TOML file into a validated, frozen model."""
+"""Read a TOML or JSON file into a validated, frozen model."""
 
 import difflib
-import tomllib
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin
@@ -10,9 +10,11 @@ from typing import Any, TypeVar, Union, get_args, get_origin
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
-from profiles.errors import ProfileError
+from profiles.bounded_input import MOST_JSON_BYTES, parse_json, read_text, read_toml
+from profiles.errors import ProfileError, brief
 
 _SHOWN_VALUE_CHARS = 60
+_MOST_FAULTS = 10
 
 
 class Profile(BaseModel):
@@ -40,24 +42,6 @@ def one_of(*allowed: int) -> AfterValidator:
 _M = TypeVar("_M", bound=BaseModel)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file, its arrays as tuples.
-
-    Raises ProfileError when the file cannot be read or is not TOML (with line and column).
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ProfileError(path, "", f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise ProfileError(path, "", f"is not UTF-8 text (byte {error.start})") from None
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ProfileError(path, "", f"is not valid TOML: {error}") from None
-    return {key: _with_tuples(value) for key, value in table.items()}
-
-
 def read_toml_model(path: Path, model: type[_M]) -> _M:
     """Return the file as an instance of `model`.
 
@@ -67,15 +51,32 @@ def read_toml_model(path: Path, model: type[_M]) -> _M:
     return validated(path, read_toml(path), model)
 
 
+def read_json_model(path: Path, model: type[_M]) -> _M:
+    """Return a JSON file as an instance of `model`; raises ProfileError as `read_toml_model`."""
+    text = read_text(path, MOST_JSON_BYTES)
+    parse_json(text, path)
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        raise _refused(path, model, error) from None
+
+
 def validated(path: Path, table: Mapping[str, Any], model: type[_M]) -> _M:
     """Return `table`, which came from `path`, as an instance of `model`; raises ProfileError."""
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        faults = list(_faults(model, error.errors(include_url=False)))
-    key, problem = faults[0]
-    further = [f"\n{path}: {k}: {p}" if k else f"\n{path}: {p}" for k, p in faults[1:]]
-    raise ProfileError(path, key, problem + "".join(further)) from None
+        raise _refused(path, model, error) from None
+
+
+def _refused(path: Path, model: type[BaseModel], error: ValidationError) -> ProfileError:
+    """Return the first faults that were found as one error."""
+    found = list(islice(_faults(model, error.errors(include_url=False)), _MOST_FAULTS + 1))
+    key, problem = found[0]
+    further = [f"\n{path}: {k}: {p}" if k else f"\n{path}: {p}" for k, p in found[1:_MOST_FAULTS]]
+    if len(found) > _MOST_FAULTS:
+        further.append(f"\n{path}: there is more that is wrong")
+    return ProfileError(path, key, problem + "".join(further))
 
 
 def closest(name: str, known: Iterable[str]) -> str | None:
@@ -83,14 +84,6 @@ def closest(name: str, known: Iterable[str]) -> str | None:
     by_folded = {k.casefold(): k for k in known}
     found = difflib.get_close_matches(name.casefold(), by_folded, n=1, cutoff=0.6)
     return by_folded[found[0]] if found else None
-
-
-def _with_tuples(value: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(_with_tuples(v) for v in value)
-    if isinstance(value, dict):
-        return {k: _with_tuples(v) for k, v in value.items()}
-    return value
 
 
 def _faults(model: type[BaseModel], errors: list[ErrorDetails]) -> Iterable[tuple[str, str]]:
@@ -129,7 +122,8 @@ def dotted(loc: Iterable[int | str]) -> str:
     """Return a place in a file as a person would write it: `pdos[1].entries[0].bits`."""
     text = ""
     for part in loc:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+        name = brief(str(part))
+        text += f"[{part}]" if isinstance(part, int) else f".{name}" if text else name
     return text
 
 

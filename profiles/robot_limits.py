@@ -20,7 +20,7 @@ def _one_or_each(value: Any) -> Any:
     return value if isinstance(value, tuple) else (value,)
 
 
-_Positive = Annotated[float, Field(gt=0)]
+_Positive = Annotated[float, Field(gt=0, le=1e6)]
 PerAxis = Annotated[tuple[_Positive, ...], BeforeValidator(_one_or_each)]
 """One figure for every axis, or one for each; the file may have a bare number for the former."""
 

@@ -6,8 +6,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from profiles.bounded_input import is_file, path_of, read_toml
 from profiles.errors import ProfileError
-from profiles.reader import Profile, closest, read_toml, read_toml_model, validated
+from profiles.reader import Profile, closest, read_toml_model, validated
 
 Address = Annotated[int, Field(ge=0, le=0xFFFF)]
 # what one Modbus request may read or write; the same for both keeps every image one request
@@ -215,9 +216,9 @@ def find_shipped(folder: Path, name: str | Path) -> Path:
     """
     text = str(name)
     if isinstance(name, Path) or "/" in text or text.endswith(".toml"):
-        return Path(text).expanduser()
+        return path_of(Path(), text)
     path = folder / f"{text}.toml"
-    if path.is_file():
+    if is_file(path):
         return path
     known = sorted(p.stem for p in folder.glob("*.toml"))
     meant = closest(text, known)

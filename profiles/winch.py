@@ -23,8 +23,8 @@ class WinchFile(Profile):
     motor: str
     drive: str
     cable: str
-    gear_ratio: float = Field(gt=0, le=1000)
-    drum_radius_m: float = Field(gt=0, le=10)
+    gear_ratio: float = Field(ge=0.01, le=1000)
+    drum_radius_m: float = Field(ge=0.001, le=10)
     cable_sign: Annotated[int, one_of(-1, 1)] = 1
     encoder_counts_per_turn: int = Field(ge=4, le=2**24)
     node_id: int = Field(ge=1, le=127)

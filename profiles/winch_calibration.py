@@ -10,7 +10,9 @@ from typing import Literal
 from pydantic import Field
 
 from profiles.errors import ProfileError
+from profiles.motor_bounds import Faults, MotorBounds, within
 from profiles.reader import Profile, read_toml_model
+from profiles.winch import Winch
 
 
 class WinchCalibration(Profile):
@@ -41,6 +43,24 @@ class WinchCalibration(Profile):
     lowest_tension_N: float
     highest_tension_N: float
     raw_data: tuple[str, ...]
+
+    def faults(self, winch: Winch) -> Faults:
+        """Yield (key, problem) for what cannot be true of `winch`."""
+        bounds, nominal_m = MotorBounds(winch.motor), abs(winch.cable_m_per_motor_rad)
+        if self.motor != winch.motor.model:
+            yield "motor", f"value {self.motor!r}; allowed: {winch.motor.model}"
+        yield from bounds.tension_gain("gain_m", self.gain_m, nominal_m)
+        yield from bounds.winch_friction("bias_Nm", self.bias_Nm)
+        yield from bounds.winch_friction("friction_Nm", self.friction_Nm)
+        most = self.gain_m
+        yield from within("friction_per_N_m", self.friction_per_N_m, -most, most, "m, gain_m")
+        strength = winch.cable.breaking_force_N
+        of = "N, the cable's breaking force"
+        yield from within("highest_tension_N", self.highest_tension_N, 0.0, strength, of)
+        of = "N, highest_tension_N"
+        yield from within(
+            "lowest_tension_N", self.lowest_tension_N, 0.0, self.highest_tension_N, of
+        )
 
     def torque_Nm(self, tension_N: float) -> float:
         """Return the winding torque that balances a tension, without friction."""

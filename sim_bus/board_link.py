@@ -17,27 +17,38 @@ class BoardLink:
         self._board = board
         self._tension = axis.motor["tension"]
         self._brake_Nm = axis.plant.motor.brake_torque_Nm
-        self._released = True
+        self._released, self._power_on = True, False
+        self._obeyed_s = axis.time
         self._mass_kg = axis.read("mass")
         board.hung_mass_kg = self._mass_kg
         self.publish()
 
-    def obey(self) -> None:
-        """Take power, brake and mass as the board has them now."""
+    def obey(self, now_s: float) -> None:
+        """Take power, brake and mass as the board has them at bus time `now_s`."""
         board = self._board
-        if board.power_allowed != self._machine.power_allowed:
-            self._machine.allow_power(board.power_allowed)
-        if board.brake_released != self._released:
-            self._released = board.brake_released
+        self._obeyed_s = now_s
+        power, released = board.allows_power(now_s), board.releases_brake(now_s)
+        if power != self._machine.power_allowed:
+            self._machine.allow_power(power)
+        if released != self._released:
+            self._released = released
             self._axis.motor["brake"] = 0.0 if self._released else self._brake_Nm
         if board.hung_mass_kg != self._mass_kg:
             self._mass_kg = board.hung_mass_kg
             self._axis.motor["mass"] = self._mass_kg
 
+    def next_change_s(self) -> float:
+        """Return the next bus time at which there is something new to obey."""
+        return self._board.next_change_s(self._obeyed_s)
+
     def publish(self) -> None:
         """Write tension and motion as they are now."""
         axis = self._axis
         angle, speed = axis.sample[4], axis.sample[5]
-        self._board.publish(
-            axis.time, float(self._tension[0]), angle, speed, axis.kind != servo.OFF
-        )
+        self._power_on = axis.kind != servo.OFF
+        self._board.publish(axis.time, float(self._tension[0]), angle, speed, self._power_on)
+
+    def publish_power(self) -> None:
+        """Write them anew where power has come or gone: bus time may stand for long afterwards."""
+        if self._power_on != (self._axis.kind != servo.OFF):
+            self.publish()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,10 +18,13 @@ from sim_bus.robot_motion import run_together
 from sim_bus.robot_plant import RobotPlant
 
 _LONGEST_STEP_S = 1e-3
+_SAME_TIME_S = 1e-12
 _EVEN_m = 1e-6
 FloatArray = NDArray[np.float64]
 MotorSample = tuple[int, int, int, int, float, float, float, float, float, float]
 """A `motor.Sample` as the kernels return it."""
+MotorCommand = Callable[[], tuple[int, float]]
+"""Returns a kind of control, named in `servo`, and its target, as a power stage is set now."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +64,14 @@ class CableRobot:
         self._transmissions = list(transmissions)
         self._weights = list(shape.weights_N_m)
         self.platform = self._build_platform(shape)
-        self._adopted = 0
+        # have it compiled now, before the clock runs
+        run_together(self.motors, self.platform, 0.0, self.kinds, self.targets, self._flags)
+        self.commands: list[MotorCommand] = [_switched_off] * n
+        """What tells how each power stage is set."""
 
-    def adopt(self, i: int, motor: MotorArray) -> MotorArray:
+    def adopt(self, i: int, motor: MotorArray, command: MotorCommand) -> MotorArray:
         """Connect motor `i`, a record of shape (1,), to its cable; return the record to use."""
+        self.commands[i] = command
         self.motors[i] = motor[0]
         here = self.motors[i : i + 1]
         plant, transmission = self._plant.cables, self._transmissions[i]
@@ -88,14 +95,15 @@ class CableRobot:
         here["carriage_distance"] = winding.carriage_distance_m
         here["angle_start"] = here["angle"]
         here["cable_start"] = self.distance_m(i) + self._plant.start.slack_m
-        self._adopted += 1
         return here
 
-    def step(self, i: int, until: float, kind: int, target: float) -> MotorSample:
-        """Set motor `i` to a kind of control, advance all to `until`, return its `motor.Sample`."""
-        self.kinds[i], self.targets[i] = kind, target
+    def step(self, i: int, until: float) -> MotorSample:
+        """Advance all to `until`, return the `motor.Sample` of motor `i`."""
         now = float(self.motors["time"][i])
-        while until - now > 1e-12:
+        if until - now > _SAME_TIME_S:
+            for k, command in enumerate(self.commands):
+                self.kinds[k], self.targets[k] = command()
+        while until - now > _SAME_TIME_S:
             now = min(until, now + _LONGEST_STEP_S) if until - now > 1.5e-3 else until
             run_together(self.motors, self.platform, now, self.kinds, self.targets, self._flags)
         flags, self._flags[i] = int(self._flags[i]), 0
@@ -203,13 +211,13 @@ class RobotMember:
     robot: CableRobot
     number: int
 
-    def adopt(self, motor: MotorArray) -> MotorArray:
+    def adopt(self, motor: MotorArray, command: MotorCommand) -> MotorArray:
         """See `CableRobot.adopt`."""
-        return self.robot.adopt(self.number, motor)
+        return self.robot.adopt(self.number, motor, command)
 
-    def step(self, until: float, kind: int, target: float) -> MotorSample:
+    def step(self, until: float) -> MotorSample:
         """See `CableRobot.step`."""
-        return self.robot.step(self.number, until, kind, target)
+        return self.robot.step(self.number, until)
 
     def cut(self) -> None:
         """See `CableRobot.cut`."""
@@ -218,6 +226,10 @@ class RobotMember:
     def slip(self, metres: float) -> None:
         """See `CableRobot.slip`."""
         self.robot.slip(self.number, metres)
+
+
+def _switched_off() -> tuple[int, float]:
+    return servo.OFF, 0.0
 
 
 def _points(values: ArrayLike, n: int | None, what: str) -> FloatArray:

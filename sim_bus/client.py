@@ -34,7 +34,7 @@ class Client:
     whenever it is taken in.
     """
 
-    __slots__ = ("dropped", "essential", "filters", "receive", "send", "sent_s", "sock")
+    __slots__ = ("dropped", "essential", "filters", "receive", "send", "sent_s", "sock", "told")
 
     def __init__(
         self, sock: socket.socket, *, essential: bool = False, stamped: bool = False
@@ -47,6 +47,8 @@ class Client:
         self.filters: list[tuple[int, int]] | None = None
         """Pairs (identifier, mask) as for CAN_RAW_FILTER, None for everything."""
         self.dropped = 0
+        self.told = False
+        """Whether a frame was delivered since this was last cleared."""
         self.sent_s = 0.0
         """When the last packet was sent, in seconds of the monotonic clock, where stamped."""
         self.receive: Callable[[int], bytes] = sock.recv

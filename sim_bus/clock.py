@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 HOLD_S = 0.5
-"""In lockstep, wall time without SYNC after which bus time usually runs with the wall again."""
+"""Wall time without SYNC after which a bus that nobody leads runs with the wall again."""
 
 
 class ClockMode(Enum):
@@ -14,26 +14,28 @@ class ClockMode(Enum):
     PACED = "paced"
     """Bus time is wall time."""
     LOCKSTEP = "lockstep"
-    """Each SYNC moves bus time by one communication cycle period; between them it stands."""
+    """SYNC and the master that leads the bus move bus time; where nobody leads, the wall too."""
 
 
 class BusClock:
-    """Bus time in seconds since the bus was started; wall times are monotonic seconds."""
+    """Bus time in seconds since the bus was started; wall times are monotonic seconds.
+
+    A paced clock runs with the wall. One in lockstep stands at 0 at first.
+    """
 
     def __init__(self, mode: ClockMode, wall_s: float) -> None:
         self.mode = mode
-        self.hold_s = HOLD_S
-        """Wall time without SYNC that a held clock waits for."""
+        self.stands = mode is ClockMode.LOCKSTEP
+        """Whether bus time changes by `move` and `sync` only."""
         self.held = False
-        """Whether bus time stands still until the next SYNC."""
-        self._lockstep = mode is ClockMode.LOCKSTEP
+        """Whether bus time waits for the next SYNC, for `HOLD_S` of wall time at the most."""
         self._base_s = 0.0
         self._base_wall_s = wall_s
         self._last_s = 0.0
 
     def now(self, wall_s: float) -> float:
         """Return bus time at `wall_s`; never less than what was returned before."""
-        if self.held and wall_s < self._base_wall_s:
+        if self.stands or (self.held and wall_s < self._base_wall_s):
             return self._base_s
         self.held = False
         self._last_s = max(self._last_s, self._base_s + wall_s - self._base_wall_s)
@@ -41,21 +43,40 @@ class BusClock:
 
     def ask(self, wall_s: float) -> float:
         """Return bus time at `wall_s`, and let it be earlier the next time."""
-        if self.held and wall_s < self._base_wall_s:
+        if self.stands or (self.held and wall_s < self._base_wall_s):
             return self._base_s
         return max(self._last_s, self._base_s + wall_s - self._base_wall_s)
 
-    def sync(self, wall_s: float, period_s: float) -> float:
-        """Take a SYNC into account and return the bus time at which it stands.
+    def stand(self, wall_s: float) -> None:
+        """Stop at `wall_s`, to be moved by `move` and `sync` alone."""
+        self._base_s = self.now(wall_s)
+        self.stands, self.held = True, False
 
-        In lockstep, with `period_s` > 0, bus time moves by exactly `period_s` and is held.
+    def move(self, to_s: float) -> None:
+        """Set a clock that stands to bus time `to_s`, not less than now."""
+        self._base_s = self._last_s = to_s
+
+    def run(self, wall_s: float) -> None:
+        """Let a clock that stands go on with the wall from `wall_s`."""
+        if self.stands:
+            self._base_wall_s = wall_s
+            self.stands = False
+
+    def sync(self, wall_s: float, period_s: float) -> float:
+        """Take a SYNC into account and return the bus time of it.
+
+        In lockstep, with `period_s` > 0, bus time moves by exactly `period_s`; a clock that had
+        run with the wall is held then.
         """
-        if not self._lockstep or period_s <= 0.0:
+        if self.mode is ClockMode.PACED or period_s <= 0.0:
             return self.now(wall_s)
+        if self.stands:
+            self.move(self._base_s + period_s)
+            return self._base_s
         # while held, the wall time kept is that from which bus time would run again
         before = self._base_s if self.held and wall_s < self._base_wall_s else self.now(wall_s)
         self._base_s = self._last_s = before + period_s
-        self._base_wall_s = wall_s + self.hold_s
+        self._base_wall_s = wall_s + HOLD_S
         self.held = True
         return self._base_s
 

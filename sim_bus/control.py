@@ -6,13 +6,16 @@ import json
 import time
 from typing import TYPE_CHECKING, Any
 
+from profiles.bounded_input import parse_json
+from profiles.errors import ProfileError
 from sim_bus.client import PACKET_BYTES, Client
 from sim_bus.frame import FRAME_BYTES
+from sim_bus.lead import is_go
 
 if TYPE_CHECKING:
     from sim_bus.hub import Hub
 
-_KEYS = "filters, more_filters, status"
+_KEYS = "filters, lead, more_filters, status"
 
 
 def encode(message: dict[str, Any]) -> bytes:
@@ -23,23 +26,45 @@ def encode(message: dict[str, Any]) -> bytes:
 
 def handle(hub: Hub, client: Client, packet: bytes) -> bytes | None:
     """Obey one message of `client` and return the answer, None where there is none to give."""
-    if len(packet) == PACKET_BYTES:
-        return _refuse(f"a control message has less than {PACKET_BYTES} bytes; send several")
     try:
-        ((key, value),) = json.loads(packet).items()
-    except (ValueError, AttributeError):
-        return _refuse(
+        answer = _obey(hub, client, *_request(packet))
+    except _RefusedError as error:
+        answer = {"error": str(error)}
+    return None if answer is None else encode(answer)
+
+
+class _RefusedError(Exception):
+    """A request that the bus does not fulfil, and why."""
+
+
+def _request(packet: bytes) -> tuple[str, Any]:
+    """Return key and value of a message."""
+    if len(packet) == PACKET_BYTES:
+        raise _RefusedError(f"a control message has less than {PACKET_BYTES} bytes; send several")
+    if is_go(packet):
+        raise _RefusedError("go: only the client that leads the bus moves its time")
+    try:
+        ((key, value),) = parse_json(packet, "message").items()
+    except (ProfileError, ValueError, AttributeError):
+        raise _RefusedError(
             f"neither a frame of {FRAME_BYTES} bytes nor a JSON object with one key of: {_KEYS}"
-        )
+        ) from None
+    return key, value
+
+
+def _obey(hub: Hub, client: Client, key: str, value: Any) -> dict[str, Any] | None:
     if key == "status" and value is True:
-        return encode({"status": status(hub)})
+        return {"status": status(hub)}
+    if key == "lead" and isinstance(value, bool):
+        if value:
+            return hub.lead.take(client)
+        hub.lead.give_back(client)
+        return None
     if key in ("filters", "more_filters"):
-        filters = _filters(value)
-        if filters is None:
-            return _refuse(f"{key}: expected a list of [identifier, mask], 32-bit numbers each")
+        filters = _filters(key, value)
         client.filters = filters if key == "filters" else (client.filters or []) + filters
         return None
-    return _refuse(f"unknown request {key!r}; known: {_KEYS}")
+    raise _RefusedError(f"unknown request {key!r}; known: {_KEYS}")
 
 
 def status(hub: Hub) -> dict[str, Any]:
@@ -48,6 +73,7 @@ def status(hub: Hub) -> dict[str, Any]:
     return {
         "name": hub.name,
         "mode": hub.clock.mode.value,
+        "led": hub.lead.leader is not None,
         "bitrate": hub.load.bitrate,
         "bus_time_s": now_s,
         "sync_count": hub.sync_count,
@@ -62,18 +88,14 @@ def status(hub: Hub) -> dict[str, Any]:
     }
 
 
-def _refuse(reason: str) -> bytes:
-    return encode({"error": reason})
-
-
-def _filters(value: object) -> list[tuple[int, int]] | None:
-    if not isinstance(value, list):
-        return None
+def _filters(key: str, value: object) -> list[tuple[int, int]]:
     filters = []
-    for pair in value:
-        if not isinstance(pair, list) or len(pair) != 2:
-            return None
-        if not all(isinstance(word, int) and 0 <= word < 1 << 32 for word in pair):
-            return None
-        filters.append((pair[0], pair[1]))
+    for pair in value if isinstance(value, list) else [None]:
+        match pair:
+            case [int(identifier), int(mask)] if min(pair) >= 0 and max(pair) < 1 << 32:
+                filters.append((identifier, mask))
+            case _:
+                raise _RefusedError(
+                    f"{key}: expected a list of [identifier, mask], 32-bit numbers each"
+                )
     return filters

@@ -33,6 +33,7 @@ from sim_bus.cia402.words import ErrorCode
 from sim_bus.motor_state import MotorRatings, Transmission
 from sim_bus.physics_board import BoardAxis
 from sim_bus.plant import Plant
+from sim_bus.record_file import NO_SYNC
 from sim_bus.truth_log import TruthLog
 from sim_bus.twins import (
     IN_ACCELERATION_UNITS,
@@ -45,6 +46,8 @@ from sim_bus.twins import (
 TICK_S = 1e-3
 """Longest step between two looks of the state machine."""
 _ASLEEP_S = 0.1
+_LOG_STEP_S = 0.02
+"""Bus time without SYNC after which a record of what is true is due all the same."""
 _SYNC_ID = b"\x80\x00\x00\x00"
 _EDS_COUNTS_PER_TURN = 8192
 
@@ -61,11 +64,11 @@ _FIXED = (0x607E, 0x608F, 0x6091, 0x6092)
 _POSITIONS = ((0x6065, 0), (0x6067, 0), (0x6092, 1))
 
 
-class SyncLog(Protocol):
-    """What is told of every SYNC."""
+class MotionLog(Protocol):
+    """What is told of every SYNC, and now and then where none comes."""
 
     def append(self, sync_index: int, time_s: float, truth: tuple[float, ...]) -> None:
-        """Take the true figures that a `motor.Sample` ends with."""
+        """Take the true figures that a `motor.Sample` ends with; NO_SYNC where none was."""
 
     def flush(self) -> None:
         """Write what is buffered."""
@@ -115,11 +118,11 @@ class SimDrive(SlaveApplication):
         self.misbehaviour = Misbehaviour(od, self.machine, self.outbox)
         self._bind_configuration()
         motor = self.axis.motor
-        self._log: SyncLog | None = None
+        self._log: MotionLog | None = None
         if truth_log is not None:
             index = float(motor["index"][0]) / float(motor["counts_per_rad"][0])
             self._log = TruthLog(truth_log, node_id, index, float(motor["angle"][0]))
-        self._log_idle_at = math.inf
+        self._log_due_s = 0.0
         self._board: BoardLink | None = None
         self.sync_count = 0
         """SYNCs seen."""
@@ -158,8 +161,8 @@ class SimDrive(SlaveApplication):
             robot=robot,
         )
 
-    def record_with(self, log: SyncLog) -> None:
-        """Have `log` told of every SYNC, instead of a truth log; it is closed with the drive."""
+    def record_with(self, log: MotionLog) -> None:
+        """Have `log` told instead of a truth log; it is closed with the drive."""
         self._log = log
 
     def connect(self, board: BoardAxis) -> None:
@@ -187,7 +190,7 @@ class SimDrive(SlaveApplication):
         """Bring physics, state machine and communication timers to bus time `now`."""
         axis, machine = self.axis, self.machine
         if self._board is not None:
-            self._board.obey()
+            self._board.obey(now)
         while now - axis.time > 1e-9:
             ahead = now - axis.time
             flags = axis.step(now if ahead < 1.5 * TICK_S else axis.time + TICK_S)
@@ -197,9 +200,10 @@ class SimDrive(SlaveApplication):
                 machine.tick()
         if self._board is not None:
             self._board.publish()
-        if now > self._log_idle_at and self._log is not None:
+        if self._log is not None and now >= self._log_due_s:
+            self._log.append(NO_SYNC, now, axis.sample[4:])
             self._log.flush()
-            self._log_idle_at = math.inf
+            self._log_due_s = now + _LOG_STEP_S
         self._slave.advance(now)
         if self.misbehaviour.active:
             self.misbehaviour.spoil_outbox(now)
@@ -209,19 +213,27 @@ class SimDrive(SlaveApplication):
         if frame[:4] == _SYNC_ID:
             if self._log is not None:
                 self._log.append(self.sync_count, now, self.axis.sample[4:])
-                self._log_idle_at = now + _ASLEEP_S
+                self._log_due_s = now + _LOG_STEP_S
             self.sync_count += 1
         if not (self.misbehaviour.active and self.misbehaviour.deaf(now)):
             self._slave.receive(frame, now)
+        if self._board is not None:
+            self._board.publish_power()
         if self.misbehaviour.active:
             self.misbehaviour.spoil_outbox(now)
 
     def next_event(self) -> float:
         """Return the bus time at which `advance` is due at the latest."""
         axis = self.axis
-        resting = axis.kind == servo.OFF and abs(axis.sample[5]) < 1e-3
-        wait = _ASLEEP_S if resting and not self.machine.needs_tick(axis.flags) else TICK_S
-        return min(self._slave.next_event(), axis.time + wait)
+        active = axis.kind != servo.OFF or abs(axis.sample[5]) >= 1e-3
+        if active or self.machine.needs_tick(axis.flags):
+            look_s = axis.time + TICK_S
+        else:
+            look_s = axis.time + _ASLEEP_S
+        if self._board is not None:
+            look_s = min(look_s, self._board.next_change_s())
+        timer_s = self._slave.timers.next_due
+        return timer_s if timer_s < look_s else look_s
 
     def close(self) -> None:
         """Flush and close the truth log."""

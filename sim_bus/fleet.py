@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from sim_bus.clock import HOLD_S, ClockMode
+from sim_bus.clock import ClockMode
 from sim_bus.control import status
 from sim_bus.hub import Hub
 from sim_bus.node_protocol import LocalNode
@@ -32,6 +32,8 @@ class Fleet:
     def __init__(self, hubs: Sequence[Hub]) -> None:
         self._hubs = {hub.fileno(): hub for hub in hubs}
         self._first = hubs[0]
+        for hub in hubs:
+            hub.fellows = hubs
         self._poller = select.epoll()
         for descriptor in self._hubs:
             self._poller.register(descriptor, select.EPOLLIN)
@@ -61,11 +63,12 @@ class Fleet:
         least = min((wait for wait in waits.values() if wait is not None), default=None)
         if least and least < FINE_WAIT_S:
             select.select([self._poller], [], [], least)
-        ready = self._poller.poll(0.0 if least is not None and least < FINE_WAIT_S else least)
-        for descriptor, _ in ready:
-            hub = self._hubs[descriptor]
-            hub.turn(0.0)
-            waits.pop(hub)
+        ready = dict(self._poller.poll(0.0 if least is not None and least < FINE_WAIT_S else least))
+        # always in the same order, as the drives of all buses may share their physics
+        for descriptor, hub in self._hubs.items():
+            if descriptor in ready:
+                hub.turn(0.0)
+                waits.pop(hub)
         # with frames on one bus no time has passed on the others
         over = 0.0 if ready else least
         for hub, wait in waits.items():
@@ -82,14 +85,12 @@ def serve_fleet(
     buses: Sequence[FleetBus],
     *,
     mode: ClockMode = ClockMode.LOCKSTEP,
-    hold_s: float = HOLD_S,
     until_stdin_ends: bool = False,
 ) -> None:
     """Run the nodes of all `buses` until SIGTERM or SIGINT, then close them.
 
     When all is up, one line of JSON goes to standard output: {"ready": {"robot", "pid", "buses":
-    {name: {"bus", and the bus status}}}}. In lockstep bus time stands for `hold_s` of wall time
-    without SYNC at the most. With `until_stdin_ends` the end of standard input stops
+    {name: {"bus", and the bus status}}}}. With `until_stdin_ends` the end of standard input stops
     it too. Raises BusSetupError for a bus that cannot be opened, SimulatorError for a real
     interface that went away.
     """
@@ -98,8 +99,6 @@ def serve_fleet(
             bus.name: open_hub(stack, bus.nodes, bus.url, mode=mode, bitrate=bus.bitrate_bit_s)
             for bus in buses
         }
-        for hub in hubs.values():
-            hub.clock.hold_s = hold_s
         fleet = Fleet(list(hubs.values()))
         stack.callback(fleet.close)
         told = {bus.name: {"bus": bus.url, **status(hubs[bus.name])} for bus in buses}

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-import errno
 import functools
 import math
+import select
 import socket
 import time
 from collections.abc import Callable, Sequence
 
-from sim_bus.bus_load import BusLoad
-from sim_bus.client import PACKET_BYTES, Client, listening_socket
-from sim_bus.clock import BusClock, ClockMode
+from sim_bus.client import PACKET_BYTES, Client
+from sim_bus.clock import HOLD_S, BusClock, ClockMode
 from sim_bus.contention import Contention
 from sim_bus.control import handle
 from sim_bus.errors import SimulatorError
-from sim_bus.frame import FRAME_BYTES, HEADER, RTR_FLAG
+from sim_bus.frame import FRAME_BYTES, HEADER
+from sim_bus.lead import Lead, is_go
+from sim_bus.listener import Listener
 from sim_bus.node_protocol import LocalNode
 from sim_bus.route import Route
+from sim_bus.switch import Switch
 from sim_bus.watcher import Watcher
 
 _BURST = 64
-_MOST_ROUTES = 4096
+_FULL_S = 0.01
 
 
-class Hub:
-    """A CAN bus in one thread: routing, bus time, accounting, and the loop that drives them.
+class Hub(Switch):
+    """A CAN bus in one thread: its clients, bus time, and the loop that drives all.
 
     Frames that wait together are sent in the order of arbitration: those of the nodes after one
     SYNC, and those of several clients found waiting at the same moment.
@@ -40,28 +42,22 @@ class Hub:
         name: str = "",
         truth_log: str | None = None,
     ) -> None:
+        paced = mode is ClockMode.PACED
+        super().__init__(nodes, bitrate, paced=paced)
         self.name = name
         self.truth_log = truth_log
-        self.nodes = tuple(nodes)
         self.clock = BusClock(mode, time.monotonic())
-        self.load = BusLoad(bitrate, lockstep=mode is ClockMode.LOCKSTEP)
-        self.sync_count = 0
+        self.lead = Lead(self, self.clock)
         self.malformed = 0
-        self.dropped = 0
-        self._paced = mode is ClockMode.PACED
-        self._waiting = Contention(paced=self._paced, bitrate=bitrate)
-        self._clients: dict[int, Client] = {}
-        self._routes: dict[int, Route] = {}
-        self._accepts = [node.accepts for node in self.nodes]
-        self._now_s = 0.0
+        self.fellows: Sequence[Hub] = (self,)
+        """The buses of one robot, this one among them; their wall time begins together."""
+        self._waiting = Contention(paced=paced, bitrate=bitrate)
         self._just_synced = False
-        self._leftover = False
-        self._batch: list[tuple[int, int, int, Route, bytes, LocalNode]] = []
         self._watcher = Watcher()
         self.stopping = False
         """Whether the loop is to end."""
         self._failure: str | None = None
-        self._listener: socket.socket | None = None
+        self._listener: Listener | None = None
 
     # -- what the loop listens to
 
@@ -75,7 +71,7 @@ class Hub:
         Raises:
             BusSetupError: the name is malformed or in use.
         """
-        self._listener = listening_socket(self.name)
+        self._listener = Listener(self.name)
         self.watch(self._listener.fileno(), self._accept)
 
     def attach(self, sock: socket.socket, *, essential: bool = False) -> None:
@@ -85,15 +81,15 @@ class Hub:
         self._clients[descriptor] = client
         self._routes.clear()
         self.watch(descriptor, functools.partial(self._pump, client))
+        if essential:
+            # nobody can lead a real interface
+            self._begin()
 
     def _accept(self) -> None:
         assert self._listener is not None
-        try:
-            sock, _ = self._listener.accept()
-        except OSError:
-            # the peer has gone already
-            return
-        self.attach(sock)
+        sock = self._listener.accept()
+        if sock is not None:
+            self.attach(sock)
 
     def _remove(self, client: Client, reason: str) -> None:
         descriptor = client.sock.fileno()
@@ -102,6 +98,7 @@ class Hub:
         del self._clients[descriptor]
         self._watcher.remove(descriptor)
         self._waiting.discard(client)
+        self.lead.lose(client)
         client.sock.close()
         self._routes.clear()
         if client.essential:
@@ -138,6 +135,8 @@ class Hub:
         """Wait up to `wait_s` for something to do (None: for ever), then do it."""
         events = self._watcher.readable(wait_s, exactly=self._paced)
         self._just_synced = False
+        if self.lead.until_s is not None:
+            events = self._but_leader(events)
         if self._waiting or len(events) > 1:
             self._serve_all(events)
         elif events:
@@ -146,10 +145,10 @@ class Hub:
             # while frames wait time goes on with them, so that none comes too late
             if not events and not self._waiting:
                 self._tick(self.clock.now(self._watcher.looked_s))
-        elif not self.clock.held:
-            self._tick(self.clock.now(time.monotonic()))
-        elif not events:
-            self._advance(self.clock.now(time.monotonic()))
+        elif self.clock.stands:
+            self.lead.go_on()
+        elif not events or not self.clock.held:
+            self._follow(self.clock.now(time.monotonic()))
         if self._leftover:
             self._flush()
 
@@ -166,27 +165,50 @@ class Hub:
 
     def wait_s(self) -> float | None:
         """Return for how long the next turn may wait, None for ever."""
-        if self._leftover or self._waiting:
+        if self._leftover or self._waiting or self.lead.until_s is not None:
             return 0.0
         if self._just_synced:
-            return self.clock.hold_s
-        event_s = min((node.next_event() for node in self.nodes), default=math.inf)
-        wait_s = self.clock.wall_wait(time.monotonic(), event_s)
+            return HOLD_S
+        if self.clock.stands:
+            return _FULL_S if self.lead.owed else None
+        wait_s = self.clock.wall_wait(time.monotonic(), self.next_event_s())
         return None if wait_s == math.inf else wait_s
+
+    def _begin(self) -> None:
+        """Let bus time run with the wall: somebody speaks, and nobody leads."""
+        self.advance(self.clock.now(0.0))
+        wall_s = time.monotonic()
+        for hub in self.fellows:
+            if hub.lead.leader is None:
+                hub.clock.run(wall_s)
+
+    def _but_leader(self, events: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        """Leave out the leader, who waits for the end of its go, unless it has gone."""
+        leader = self.lead.leader
+        if leader is None:
+            return events
+        descriptor = leader.sock.fileno()
+        if any(at == descriptor and event & select.EPOLLHUP for at, event in events):
+            return events
+        return [event for event in events if event[0] != descriptor]
+
+    def _follow(self, now_s: float) -> None:
+        """Let the nodes' timers run, each at its time, until `now_s` or for a part of the way.
+
+        What the nodes do does not depend on when the wall's time is looked at.
+        """
+        for _ in range(_BURST):
+            event_s = self.next_event_s()
+            if event_s > now_s:
+                return
+            self.advance(max(event_s, self._now_s))
 
     def _tick(self, now_s: float) -> bool:
         """Let the nodes' timers run when one is due; return whether one was."""
         due = any(node.next_event() <= now_s for node in self.nodes)
         if due:
-            self._advance(now_s)
+            self.advance(now_s)
         return due
-
-    def _advance(self, now_s: float) -> None:
-        self._now_s = now_s
-        for node in self.nodes:
-            node.advance(now_s)
-        self._check_accepts()
-        self._flush()
 
     def _reach(self, now_s: float, route: Route) -> None:
         """Bring those nodes up to the time of a frame which it concerns, or all if one is due."""
@@ -194,12 +216,6 @@ class Hub:
             self._now_s = now_s
             for node in route.nodes:
                 node.advance(now_s)
-
-    def _check_accepts(self) -> None:
-        for i, node in enumerate(self.nodes):
-            if node.accepts is not self._accepts[i]:
-                self._accepts[i] = node.accepts
-                self._routes.clear()
 
     # -- frames from clients
 
@@ -257,9 +273,12 @@ class Hub:
             self._remove(client, f"lost: {error.strerror}")
 
     def _control(self, client: Client, packet: bytes) -> bool:
-        """Obey a control message; return False when the client has gone."""
+        """Obey a control message; return False when the client has gone, or waits for its go."""
         if not packet:
             self._remove(client, "lost: connection closed")
+            return False
+        if is_go(packet) and client is self.lead.leader:
+            self.lead.go(packet)
             return False
         answer = handle(self, client, packet)
         if answer is None:
@@ -270,6 +289,8 @@ class Hub:
 
     def _take(self, frame: bytes, source: Client) -> bool:
         """Carry one frame of a client; return whether it was a SYNC."""
+        if self.clock.stands and self.lead.leader is None:
+            self._begin()
         can_id, length = HEADER.unpack_from(frame)
         route = self._routes.get(can_id) or self._route(can_id)
         if length > route.longest:
@@ -291,24 +312,35 @@ class Hub:
                 load.occupy(now_s, route.bits[length])
         for peer in route.clients:
             if peer is not source:
+                peer.told = True
                 self._deliver(frame, peer)
         if route.nodes:
-            answered = False
-            for node in route.nodes:
-                node.receive(frame, now_s)
-                answered = answered or bool(node.outbox)
-            if route.configures:
-                self._check_accepts()
-            if answered:
-                self._flush()
+            self._give_nodes(frame, route, now_s)
         return False
 
+    def _give_nodes(self, frame: bytes, route: Route, now_s: float) -> None:
+        answered = False
+        for node in route.nodes:
+            node.receive(frame, now_s)
+            answered = answered or bool(node.outbox)
+        if route.configures:
+            self._check_accepts()
+        if answered:
+            self._flush()
+            if self._leftover and self.clock.stands:
+                self.settle()
+
     def _sync(self, frame: bytes, source: Client, route: Route, length: int) -> None:
-        """Move bus time, let the nodes come up to it, then let all see the SYNC."""
+        """Move bus time, let the nodes come up to it, then let all see the SYNC.
+
+        On a bus that is led only the leader's SYNC moves time.
+        """
         nodes = self.nodes
+        leader = self.lead.leader
         period_s = 0.0
-        for node in nodes:
-            period_s = max(period_s, node.sync_period_s)
+        if leader is None or leader is source:
+            for node in nodes:
+                period_s = max(period_s, node.sync_period_s)
         wall_s = source.sent_s if self._paced else time.monotonic()
         self._now_s = now_s = self.clock.sync(wall_s, period_s)
         self._just_synced = self.clock.held
@@ -319,80 +351,12 @@ class Hub:
         self._count_sync(now_s, route.bits[length])
         for peer in route.clients:
             if peer is not source:
+                peer.told = True
                 self._deliver(frame, peer)
         for node in route.nodes:
             node.receive(frame, now_s)
         self._flush()
-
-    def _count_sync(self, now_s: float, bits: int) -> None:
-        self.sync_count += 1
-        self.load.sync(now_s)
-        self.load.cycle_bits += bits
-        if self._paced:
-            self.load.occupy(now_s, bits)
-
-    def _deliver(self, packet: bytes, peer: Client) -> None:
-        try:
-            peer.send(packet)
-        except BlockingIOError:
-            # a client that does not read loses frames; the bus does not wait for it
-            peer.dropped += 1
-            self.dropped += 1
-        except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.ECONNRESET) or peer.essential:
-                self._remove(peer, f"lost: {error.strerror}")
-
-    def _route(self, can_id: int) -> Route:
-        if len(self._routes) >= _MOST_ROUTES:
-            self._routes.clear()
-        clients = [client for client in self._clients.values() if client.wants(can_id)]
-        # a remote frame has the identifier of what it asks for
-        plain = can_id & ~RTR_FLAG
-        nodes = [node for node in self.nodes if node.accepts is None or plain in node.accepts]
-        self._routes[can_id] = route = Route(can_id, clients, nodes)
-        return route
-
-    # -- frames from nodes
-
-    def _flush(self) -> None:
-        """Send what stands in the outboxes, in the order of arbitration.
-
-        Frames that other nodes of this process send in answer wait for the next call, so that a
-        ring of nodes that answer each other cannot keep the clients out.
-        """
-        batch = self._batch
-        self._leftover = False
-        for node in self.nodes:
-            if node.outbox:
-                for frame in node.outbox:
-                    can_id, length = HEADER.unpack_from(frame)
-                    route = self._routes.get(can_id) or self._route(can_id)
-                    if route.merges and any(other[4] == frame for other in batch):
-                        continue
-                    batch.append((route.key, len(batch), length, route, frame, node))
-                node.outbox.clear()
-        if not batch:
-            return
-        if len(batch) > 1:
-            batch.sort()
-        for _, _, length, route, frame, node in batch:
-            self._emit(frame, length, route, node)
-        batch.clear()
-
-    def _emit(self, frame: bytes, length: int, route: Route, source: LocalNode) -> None:
-        load = self.load
-        load.frames += 1
-        if route.sync:
-            self._count_sync(self._now_s, route.bits[length])
-        elif route.acyclic:
-            load.acyclic_bits += route.bits[length]
-        else:
-            load.cycle_bits += route.bits[length]
-            if self._paced:
-                load.occupy(self._now_s, route.bits[length])
-        for peer in route.clients:
-            self._deliver(frame, peer)
-        for node in route.nodes:
-            if node is not source:
-                node.receive(frame, self._now_s)
-                self._leftover = self._leftover or bool(node.outbox)
+        if leader is not None:
+            self.settle()
+            if leader is source:
+                self.lead.tell()

@@ -61,7 +61,7 @@ class Gateway:
             BusSetupError: it could not start; holds its reason.
         """
         self._process = subprocess.Popen(
-            [sys.executable, "-m", module, *arguments],
+            [sys.executable, "-P", "-m", module, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # a Ctrl-C at the terminal is the simulator's to handle

@@ -17,9 +17,9 @@ from pymodbus.server import ModbusSerialServer
 from pymodbus.simulator import SimDevice
 
 from sim_bus.errors import BusSetupError
+from sim_bus.modbus_tcp_server import END_OF_ANSWER
 from sim_bus.tension_twin import TensionFault
 
-_STEP_S = 0.005
 _CHUNK = 4096
 _CRC_BYTES = 2
 # what a device takes to answer, besides the time on the wire
@@ -38,9 +38,6 @@ class Unit(Protocol):
     def device(self) -> SimDevice:
         """Return what the server serves."""
 
-    def advance(self, elapsed_s: float) -> None:
-        """Let time pass."""
-
 
 class RtuServer:
     """Serves `units` on a pseudo-terminal until SIGTERM, SIGINT or `unplug`.
@@ -50,9 +47,12 @@ class RtuServer:
     `mend all`, `unplug`; each is answered by a line of JSON on standard output.
     """
 
-    def __init__(self, units: Sequence[Unit], baudrate: int, bits_per_byte: int) -> None:
+    def __init__(
+        self, units: Sequence[Unit], baudrate: int, bits_per_byte: int, *, lockstep: bool
+    ) -> None:
         self._units = {unit.unit: unit for unit in units}
         self._byte_s = bits_per_byte / baudrate
+        self._lockstep = lockstep
         self._ended = asyncio.Event()
         self._input = b""
         self._descriptors: list[int] = []
@@ -76,23 +76,13 @@ class RtuServer:
             loop.add_reader(self._inside, self._to_master, loop)
             ready = {"port": path, "pid": os.getpid(), "units": list(self._units), **told}
             print(json.dumps({"ready": ready}), flush=True)
-            await self._run(loop)
+            await self._ended.wait()
         finally:
             shutdown: Any = server.shutdown
             await shutdown()
             for descriptor in self._descriptors:
                 with contextlib.suppress(OSError):
                     os.close(descriptor)
-
-    async def _run(self, loop: asyncio.AbstractEventLoop) -> None:
-        before = loop.time()
-        while not self._ended.is_set():
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._ended.wait(), _STEP_S)
-            now = loop.time()
-            for unit in self._units.values():
-                unit.advance(now - before)
-            before = now
 
     # -- the line
 
@@ -117,7 +107,9 @@ class RtuServer:
 
     def _to_master(self, loop: asyncio.AbstractEventLoop) -> None:
         data = self._read(self._inside)
-        if data:  # question and answer take their time on the wire
+        if self._lockstep:  # who has asked lets bus time pass, as long as it takes on the wire
+            self._deliver(data)
+        elif data:  # question and answer take their time on the wire
             wire_s = (self._asked + len(data)) * self._byte_s
             self._asked = 0
             loop.call_later(wire_s + _TURNAROUND_S, self._deliver, data)
@@ -138,11 +130,12 @@ class RtuServer:
         unit = self._units.get(data[0]) if data else None
         if not sending:
             return data
+        end = END_OF_ANSWER if self._lockstep else b""
         # the server answers for units that are not there; on a line nobody does
         if unit is None or unit.fault is TensionFault.SILENT:
-            return b""
+            return end
         if unit.fault is TensionFault.TRUNCATED:
-            return data[: len(data) - 3]
+            return data[: len(data) - 3] + end
         if unit.fault is TensionFault.WRONG_CRC:
             return data[:-1] + bytes([data[-1] ^ 0xFF])
         if unit.fault is TensionFault.WRONG_UNIT:
@@ -217,14 +210,18 @@ def serve_rtu(
     baudrate: int,
     *,
     bits_per_byte: int,
+    lockstep: bool,
     broken: Sequence[list[str]],
     told: dict[str, Any],
     until_stdin_ends: bool,
 ) -> None:
-    """Serve `units` as RtuServer does, with what `broken` names broken from the start."""
+    """Serve `units` as RtuServer does, with what `broken` names broken from the start.
+
+    Answers take their time on the wire unless the units are in `lockstep`.
+    """
 
     async def run() -> None:
-        server = RtuServer(units, baudrate, bits_per_byte)
+        server = RtuServer(units, baudrate, bits_per_byte, lockstep=lockstep)
         for words in broken:
             server.break_or_mend(words)
         await server.serve(told, until_stdin_ends)

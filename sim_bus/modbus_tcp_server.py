@@ -21,6 +21,8 @@ from sim_bus.errors import BusSetupError
 _STEP_S = 0.002
 _UNIT_AT = 6
 _PANEL_UNITS = (247, 246)
+END_OF_ANSWER = bytes.fromhex("0000 ffff 0002 0000")
+"""Sent by devices in lockstep where an answer is missing or cut off: nothing more will come."""
 
 # a device says nothing about what its masters ask wrongly
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
@@ -29,8 +31,9 @@ logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
 class Line:
     """What can go wrong with the answers of one unit, byte by byte; 0 for its true unit id."""
 
-    def __init__(self, unit: int) -> None:
+    def __init__(self, unit: int, *, lockstep: bool) -> None:
         self._unit = unit
+        self._end = END_OF_ANSWER if lockstep else b""
         self.silent = False
         self.truncated = False
         self.wrong_unit = False
@@ -41,10 +44,10 @@ class Line:
         if not sending or not ours or data[_UNIT_AT] in _PANEL_UNITS:
             return data
         if self.silent:
-            return b""
+            return self._end
         if self.wrong_unit:
             data = data[:_UNIT_AT] + bytes([(data[_UNIT_AT] + 1) & 0xFF]) + data[_UNIT_AT + 1 :]
-        return data[: len(data) - 1] if self.truncated else data
+        return data[: len(data) - 1] + self._end if self.truncated else data
 
 
 class Panel:
@@ -86,15 +89,16 @@ def _nobody() -> SimDevice:
 def serve_units(
     units: list[SimDevice],
     line: Line,
-    step: Callable[[], None],
+    step: Callable[[], None] | None,
     port: int,
     told: dict[str, Any],
     until_stdin_ends: bool,
 ) -> None:
     """Serve `units` on 127.0.0.1:port (0: any that is free) until SIGTERM or SIGINT.
 
-    `step` is called every 2 ms. When all is up, one line of JSON goes to standard output:
-    {"ready": {"host", "port", "pid", and `told`}}. Raises BusSetupError for a port in use.
+    `step` is called every 2 ms, where there is one. When all is up, one line of JSON goes to
+    standard output: {"ready": {"host", "port", "pid", and `told`}}. Raises BusSetupError for a
+    port in use.
     """
     asyncio.run(_serve(units, line, step, port, told, until_stdin_ends))
 
@@ -102,7 +106,7 @@ def serve_units(
 async def _serve(
     units: list[SimDevice],
     line: Line,
-    step: Callable[[], None],
+    step: Callable[[], None] | None,
     port: int,
     told: dict[str, Any],
     until_stdin_ends: bool,
@@ -123,10 +127,11 @@ async def _serve(
     listening: Any = server.transport
     where = {"host": "127.0.0.1", "port": listening.sockets[0].getsockname()[1]}
     print(json.dumps({"ready": {**where, "pid": os.getpid(), **told}}), flush=True)
-    while not ended.is_set():
+    while step is not None and not ended.is_set():
         step()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(ended.wait(), _STEP_S)
+    await ended.wait()
     shutdown: Any = server.shutdown
     await shutdown()
 

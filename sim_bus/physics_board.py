@@ -6,25 +6,35 @@ devices and hands, each in a process of its own, read it and write what they do 
 
 from __future__ import annotations
 
+import math
 import mmap
 import os
 import struct
 import time
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 from sim_bus.errors import BusSetupError
 
-_HEADER = struct.Struct("<8sII")
-_MAGIC = b"cdprPHB1"
+_T = TypeVar("_T")
+_HEADER = struct.Struct("<8sIII")
+_MAGIC = b"cdprPHB2"
 _MAX_AXES = 256
 # each 8 bytes: the drive's own part first, behind its sequence number, then what others write
-_SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON = range(6)
-_POWER_ALLOWED, _BRAKE_RELEASED, _MASS = range(6, 9)
-_WORDS = 16
+_SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON, _COUNT = range(7)
+_POWER_FROM, _POWER_UNTIL, _BRAKE_FROM, _BRAKE_UNTIL, _MASS = range(7, 12)
+# the course of the tension behind it, a ring of instants and tensions, by the drive as well
+_SAMPLES, _SPACING_S = 512, 0.9e-3
+_RING = 16
+_WORDS = _RING + 2 * _SAMPLES
+_ALWAYS, _NEVER = (-math.inf, math.inf), (-math.inf, -math.inf)
 _SPINS, _TRIES = 100, 1000
 _PAUSE_S = 5e-4
+
+Window = tuple[float, float]
+"""Bus times from which on, and before which, something is so."""
 
 
 class BoardState(NamedTuple):
@@ -44,13 +54,16 @@ class BoardState(NamedTuple):
 class BoardAxis:
     """One axis of a board. The drive calls `publish`, everybody may read; the setters are others'.
 
-    Every field has one writer. A read of `state` is consistent: it is repeated while a write is
-    under way (a sequence lock; it relies on stores becoming visible in order, as on x86).
+    Every field has one writer. Reads of the drive's part are consistent: they are repeated while a
+    write is under way (a sequence lock; it relies on stores becoming visible in order, as on x86).
     """
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
         self._words = words
         self._numbers = numbers
+        self._sample_s = -math.inf
+
+    # -- what the drive writes
 
     def publish(
         self,
@@ -70,37 +83,88 @@ class BoardAxis:
         numbers[_ANGLE] = motor_rad
         numbers[_SPEED] = motor_rad_s
         numbers[_POWER_ON] = 1.0 if power_on else 0.0
+        if time_s >= self._sample_s:
+            self._sample_s = time_s + _SPACING_S
+            count = words[_COUNT]
+            at = _RING + 2 * (count % _SAMPLES)
+            numbers[at], numbers[at + 1] = time_s, tension_N
+            words[_COUNT] = count + 1
         words[_SEQUENCE] = (sequence + 1) & 0xFFFFFFFFFFFFFFFF
+
+    @property
+    def time_s(self) -> float:
+        """Bus time up to which the drive has come."""
+        return self._numbers[_TIME]
 
     def state(self) -> BoardState:
         """Return what the drive last wrote; after a writer that died in the middle, what stands."""
-        words, numbers = self._words, self._numbers
+        told = self._consistent(self._numbers[_TIME : _POWER_ON + 1].tolist)
+        time_s, tension, angle, speed, power = told
+        return BoardState(time_s, tension, angle, speed, power != 0.0)
+
+    def course(self, after: int) -> tuple[int, list[Window]]:
+        """Return how many samples of the tension there have been, and those that came `after`.
+
+        A sample is (bus time, tension in N), one a millisecond at the most; only the last
+        `_SAMPLES` are kept.
+        """
+        count, ring = self._consistent(
+            lambda: (self._words[_COUNT], self._numbers[_RING:_WORDS].tolist())
+        )
+        places = (2 * (i % _SAMPLES) for i in range(max(after, count - _SAMPLES), count))
+        return count, [(ring[at], ring[at + 1]) for at in places]
+
+    def _consistent(self, read: Callable[[], _T]) -> _T:
+        words = self._words
         for attempt in range(_TRIES):
             before = words[_SEQUENCE]
-            time_s, tension, angle, speed, power = numbers[_TIME : _POWER_ON + 1].tolist()
+            told = read()
             if not before & 1 and words[_SEQUENCE] == before:
                 break
             if attempt > _SPINS:  # its process waits for a core, perhaps for ours
                 time.sleep(_PAUSE_S)
-        return BoardState(time_s, tension, angle, speed, power != 0.0)
+        return told
+
+    # -- what others write
 
     @property
     def power_allowed(self) -> bool:
         """Whether the drive may have power; False is a safe torque off."""
-        return bool(self._numbers[_POWER_ALLOWED])
+        return self.allows_power(self.time_s)
 
     @power_allowed.setter
     def power_allowed(self, allowed: bool) -> None:
-        self._numbers[_POWER_ALLOWED] = 1.0 if allowed else 0.0
+        self.allow_power(_ALWAYS if allowed else _NEVER)
+
+    def allow_power(self, when: Window) -> None:
+        """Allow the drive its power for a time; what changes later is written beforehand."""
+        self._numbers[_POWER_FROM], self._numbers[_POWER_UNTIL] = when
+
+    def allows_power(self, at_s: float) -> bool:
+        """Return whether the drive may have power at a bus time."""
+        return self._numbers[_POWER_FROM] <= at_s < self._numbers[_POWER_UNTIL]
 
     @property
     def brake_released(self) -> bool:
         """Whether the rotor is free of its brake."""
-        return bool(self._numbers[_BRAKE_RELEASED])
+        return self.releases_brake(self.time_s)
 
     @brake_released.setter
     def brake_released(self, released: bool) -> None:
-        self._numbers[_BRAKE_RELEASED] = 1.0 if released else 0.0
+        self.release_brake(_ALWAYS if released else _NEVER)
+
+    def release_brake(self, when: Window) -> None:
+        """Have the rotor free of its brake for a time."""
+        self._numbers[_BRAKE_FROM], self._numbers[_BRAKE_UNTIL] = when
+
+    def releases_brake(self, at_s: float) -> bool:
+        """Return whether the rotor is free of its brake at a bus time."""
+        return self._numbers[_BRAKE_FROM] <= at_s < self._numbers[_BRAKE_UNTIL]
+
+    def next_change_s(self, after_s: float) -> float:
+        """Return the next bus time at which power or brake change, as far as is known."""
+        changes = self._numbers[_POWER_FROM:_MASS]
+        return min([at_s for at_s in changes if at_s > after_s], default=math.inf)
 
     @property
     def hung_mass_kg(self) -> float:
@@ -115,16 +179,18 @@ class BoardAxis:
 class PhysicsBoard:
     """A board for n axes in a file, best in /dev/shm; power is allowed and brakes are released."""
 
-    def __init__(self, path: Path, memory: mmap.mmap, axes: int, owned: bool) -> None:
+    def __init__(self, path: Path, memory: mmap.mmap, axes: int, lockstep: bool) -> None:
         """Use `create` or `attach`."""
         self.path = path
         self.axes = axes
+        self.lockstep = lockstep
+        """Whether its bus time is moved by a master; the clock runs along with it otherwise."""
         self._memory = memory
-        self._owned = owned
+        self._owned = False
         self._views: list[memoryview[Any]] = []
 
     @classmethod
-    def create(cls, path: str | Path, axes: int) -> Self:
+    def create(cls, path: str | Path, axes: int, *, lockstep: bool = False) -> Self:
         """Make the file anew; `close` removes it. Raises BusSetupError where it cannot be made."""
         if not 1 <= axes <= _MAX_AXES:
             raise ValueError(f"axes = {axes}; allowed: 1 to {_MAX_AXES}")
@@ -133,10 +199,10 @@ class PhysicsBoard:
             cls.attach(path).close()  # one that a killed simulator left is replaced, no other file
         fresh = path.with_name(f".{path.name}.{os.getpid()}")
         words = bytearray(8 * _WORDS * (1 + axes))
-        _HEADER.pack_into(words, 0, _MAGIC, axes, _WORDS)
+        _HEADER.pack_into(words, 0, _MAGIC, axes, _WORDS, lockstep)
         for axis in range(axes):
             start = 8 * _WORDS * (1 + axis)
-            struct.pack_into("<2d", words, start + 8 * _POWER_ALLOWED, 1.0, 1.0)
+            struct.pack_into("<4d", words, start + 8 * _POWER_FROM, *_ALWAYS, *_ALWAYS)
         try:
             fresh.write_bytes(words)
             fresh.replace(path)
@@ -160,13 +226,13 @@ class PhysicsBoard:
             raise BusSetupError(
                 f"physics board {path}: {reason}; `cdpr sim up ... --board {path}` makes it"
             ) from None
-        magic, axes, words = (
-            _HEADER.unpack_from(memory) if len(memory) >= _HEADER.size else (b"", 0, 0)
+        magic, axes, words, lockstep = (
+            _HEADER.unpack_from(memory) if len(memory) >= _HEADER.size else (b"", 0, 0, 0)
         )
         if magic != _MAGIC or words != _WORDS or len(memory) != 8 * _WORDS * (1 + axes):
             memory.close()
             raise BusSetupError(f"physics board {path}: the file is not a physics board")
-        return cls(path, memory, axes, owned=False)
+        return cls(path, memory, axes, bool(lockstep))
 
     def axis(self, number: int) -> BoardAxis:
         """Return one axis, counted from 0; raises IndexError."""
@@ -193,3 +259,20 @@ class PhysicsBoard:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def common_time(boards: Sequence[PhysicsBoard]) -> Callable[[], float] | None:
+    """Return what tells the bus time of boards in lockstep, None where the clock counts.
+
+    Raises BusSetupError where some of them are in lockstep and others not.
+    """
+    kinds = {board.lockstep for board in boards}
+    if len(kinds) > 1:
+        names = ", ".join(str(board.path) for board in boards if board.lockstep)
+        raise BusSetupError(
+            f"physics boards in lockstep ({names}) and paced ones do not go together"
+        )
+    if kinds != {True}:
+        return None
+    axes = [board.axis(i) for board in boards for i in range(board.axes)]
+    return lambda: max(axis.time_s for axis in axes)

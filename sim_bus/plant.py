@@ -15,6 +15,7 @@ from profiles.winch import Winch
 MAX_COGGING_TERMS = 32
 _RATED_Nm, _PEAK_Arms = 3.00, 22.8
 """Of the MPP0923D, whose figures the defaults are."""
+_Angle_deg = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Section = TypeVar("_Section", bound=Profile)
 
 
@@ -157,12 +158,12 @@ class LoadPlant(Profile):
 class LimitsPlant(Profile):
     """Mechanical angles of the switches, over several turns; a switch left out does not exist."""
 
-    negative_deg: float | None = None
+    negative_deg: _Angle_deg | None = None
     """Negative limit switch: active below."""
-    positive_deg: float | None = None
+    positive_deg: _Angle_deg | None = None
     """Positive limit switch: active above."""
-    home_from_deg: float | None = None
-    home_to_deg: float | None = None
+    home_from_deg: _Angle_deg | None = None
+    home_to_deg: _Angle_deg | None = None
     """Home switch: active between the two; one given alone leaves the other side open."""
 
     @model_validator(mode="after")

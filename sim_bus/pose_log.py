@@ -1,7 +1,8 @@
-"""Log of a robot's true pose and tensions, one record at every SYNC; for reports and tests alone.
+"""Log of a robot's true pose and tensions; for reports and tests alone.
 
-Records have the little-endian layout named in the header of their `RecordFile`. Each is written at
-once, whole, so that the last one can be read while the robot runs.
+There is one record at every SYNC, and some where none comes, as in a truth log. Records have the
+little-endian layout named in the header of their `RecordFile`. Each is written at once, whole, so
+that the last one can be read while the robot runs.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from profiles.rail import ModbusRail, RailProfile
 from sim_bus.modbus_tcp_server import Line, Panel
 
+_STEP_S = 1e-3
 _BRAKE_S = 0.05
 _ENABLE_S = 0.03
 _SLIP_M_S = 0.01
@@ -32,12 +33,15 @@ class RailFault(IntFlag):
 
 
 class RailTwin:
-    """The positioning drive, its brake and carriage; panel registers: 0 none, 1 faults."""
+    """The positioning drive, its brake and carriage; panel registers: 0 none, 1 faults.
 
-    def __init__(self, rail: RailProfile, clock: Callable[[], float] = time.monotonic) -> None:
+    It lives by `bus_time`, that of a bus in lockstep, or by CLOCK_MONOTONIC, in steps of 1 ms.
+    """
+
+    def __init__(self, rail: RailProfile, bus_time: Callable[[], float] | None = None) -> None:
         assert rail.modbus is not None  # the command has looked
-        self._rail, self._map, self._clock = rail, rail.modbus, clock
-        self.line = Line(self._map.unit)
+        self._rail, self._map, self._clock = rail, rail.modbus, bus_time or time.monotonic
+        self.line = Line(self._map.unit, lockstep=bus_time is not None)
         self.fault = RailFault(0)
         self.panel = Panel(self._map.unit, {0: lambda _: None, 1: self._break})
         self.position_m = rail.travel_min_m
@@ -48,10 +52,12 @@ class RailTwin:
         self._enabled = self._brake_released = False
         self._brake_due = self._enable_due = math.inf
         self._fed_at = self._watchdog_s = math.inf
-        self._time = clock()
+        self._start, self._steps = self._clock(), 0
+        self._time = self._start
         self._words: dict[int, int] = {}
 
     def _break(self, bits: int) -> None:
+        self.step()
         self.fault = RailFault(bits)
         self.line.silent = RailFault.SILENT in self.fault
         self.line.truncated = RailFault.TRUNCATED in self.fault
@@ -59,10 +65,15 @@ class RailTwin:
     # -- physics
 
     def step(self) -> None:
-        """Move on to now."""
+        """Move on to now, a step at a time, so that it does not matter when somebody looks."""
         now = self._clock()
-        dt, self._time = now - self._time, now
-        silent = now - self._fed_at > self._watchdog_s
+        while (time_s := self._start + (self._steps + 1) * _STEP_S) <= now:
+            self._steps += 1
+            self._time = time_s
+            self._step()
+
+    def _step(self) -> None:
+        silent = self._time - self._fed_at > self._watchdog_s
         if silent or RailFault.DRIVE_FAULT in self.fault:
             self._words[self._map.command_register] = 0
         bits = self._map.command
@@ -73,7 +84,7 @@ class RailTwin:
             self._brake_released, self._brake_due = self._delayed(
                 self._brake_released, self._asks(bits.release_brake), self._brake_due, _BRAKE_S
             )
-        self._move(dt)
+        self._move(_STEP_S)
 
     def _delayed(self, on: bool, asked: bool, due: float, delay_s: float) -> tuple[bool, float]:
         if asked == on:
@@ -127,9 +138,9 @@ class RailTwin:
     ) -> ExcCodes | None:
         if RailFault.TARGET_LOST in self.fault and values and address == self._map.target_register:
             values[:] = [False] * len(values)
+        self.step()
         for register, value in enumerate(values or (), address):
             self._take(register, int(value))
-        self.step()
         there = self._map
         counts = round(self.position_m / there.metre_per_unit) & 0xFFFFFFFF
         registers[there.position_register - start] = counts >> 16

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 HEADER_BYTES = 1024
+NO_SYNC = 0xFFFFFFFF
+"""In place of the SYNC's number in a record that belongs to none."""
 
 
 class RecordFile:

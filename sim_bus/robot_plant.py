@@ -14,7 +14,7 @@ from profiles.reader import Profile, read_toml_model
 from profiles.winch import Winch
 from sim_bus.plant import CoggingTerm, LoadPlant, Plant
 
-Vector = tuple[float, ...]
+Vector = tuple[Annotated[float, Field(ge=-1000.0, le=1000.0)], ...]
 _Relative = Annotated[float, Field(ge=-0.5, le=0.5)]
 
 
@@ -85,7 +85,7 @@ class StartPlant(Profile):
 class FloorPlant(Profile):
     """What the platform stands on."""
 
-    height_m: float | None = None
+    height_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] | None = None
     """Where left out, such that the platform stands at rest where it is at power-up."""
     present: bool = True
     stiffness_N_m: Annotated[float, Field(gt=0.0, le=1e7)] = 1e6

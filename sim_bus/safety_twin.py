@@ -16,9 +16,10 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from profiles.safety_io import Input, SafetyIoProfile
 from sim_bus.modbus_tcp_server import Line, Panel
-from sim_bus.physics_board import BoardAxis
+from sim_bus.physics_board import BoardAxis, Window
 from sim_bus.safety_plant import SafetyAxisPlant, SafetyPlant
 
+_ALWAYS, _NEVER = (-math.inf, math.inf), (-math.inf, -math.inf)
 _READ_COILS, _READ_INPUTS, _WRITE_COIL, _WRITE_COILS = 1, 2, 5, 15
 
 
@@ -44,10 +45,13 @@ class Follower:
     def __init__(self, on_delay_s: float, off_delay_s: float) -> None:
         self._delays = {True: on_delay_s, False: off_delay_s}
         self.on = False
+        self.stuck = False
         self._until: float | None = None
 
     def step(self, coil: bool, now: float) -> None:
-        """Move on to `now`."""
+        """Move on to `now`; the coil has been like that since the last step."""
+        if self.stuck:
+            return
         if coil == self.on:
             self._until = None
         elif self._until is None:
@@ -55,19 +59,37 @@ class Follower:
         if self._until is not None and now >= self._until:
             self.on, self._until = coil, None
 
+    def window(self, drop_s: float) -> Window:
+        """Return from when until when it will be on where the coil drops at `drop_s`, if it is."""
+        if self.stuck:
+            return (-math.inf, math.inf if self.on else -math.inf)
+        since = -math.inf if self.on else math.inf
+        until = drop_s + self._delays[False]
+        if self._until is not None and self.on:
+            until = self._until
+        elif self._until is not None and self._until <= drop_s:
+            since = self._until
+        return since, until
+
 
 class SafetyTwin:
-    """The device and what it switches; axes of the profile lie on `axes` of the board in turn."""
+    """The device and what it switches; axes of the profile lie on `axes` of the board in turn.
+
+    It lives by `bus_time`, that of the axes' buses in lockstep, or by CLOCK_MONOTONIC. In lockstep
+    it does nothing but when it is asked, as bus time stands then: what happens until it is asked
+    again is on the board beforehand, with its bus time.
+    """
 
     def __init__(
         self,
         profile: SafetyIoProfile,
         plant: SafetyPlant,
         axes: Sequence[BoardAxis] = (),
-        clock: Callable[[], float] = time.monotonic,
+        bus_time: Callable[[], float] | None = None,
     ) -> None:
-        self._profile, self._board, self._clock = profile, axes, clock
-        self.line = Line(profile.unit)
+        self._profile, self._board = profile, axes
+        self._lockstep, self._clock = bus_time is not None, bus_time or time.monotonic
+        self.line = Line(profile.unit, lockstep=self._lockstep)
         self.fault = Fault(0)
         self._pressed = False
         self._coils = [False] * (1 + max(output.coil for _, output in profile.outputs()))
@@ -77,6 +99,7 @@ class SafetyTwin:
         self._switches = (*plant.axes, *[SafetyAxisPlant()] * missing)
         self._fed_at = math.inf
         self._watchdog_s = math.inf
+        self._dropped = False
         self._stuck_feedback = False
         self._inputs = [False] * (1 + max(point.input for _, point in profile.inputs()))
         self.panel = Panel(profile.unit, {0: self._press, 1: self._break})
@@ -85,37 +108,72 @@ class SafetyTwin:
     # -- hands
 
     def _press(self, pressed: int) -> None:
+        self.step()
         self._pressed = bool(pressed)
         self.step()
 
     def _break(self, bits: int) -> None:
+        self.step()
         self.fault = Fault(bits)
+        self._contactor.stuck = Fault.CONTACTOR_WELDED in self.fault and self._contactor.on
+        for brake in self._brakes:
+            brake.stuck = Fault.BRAKES_STUCK in self.fault
         self.line.silent = Fault.SILENT in self.fault
         self.line.truncated = Fault.TRUNCATED in self.fault
         self.line.wrong_unit = Fault.WRONG_UNIT in self.fault
         self._stuck_feedback = self._contactor.on
+        self.step()
 
     # -- physics
 
     def step(self) -> None:
         """Move contactor, brakes and inputs on to now, and tell the board."""
-        now, profile, fault = self._clock(), self._profile, self.fault
-        if now - self._fed_at > self._watchdog_s:
+        now, drop_s = self._clock(), self._drop_s
+        if now > drop_s:  # it takes no outputs either until it is fed again
+            if not self._dropped:
+                self._switch(drop_s)
             self._coils = [False] * len(self._coils)
-        closed = self._coils[profile.contactor.output.coil] and not self._pressed
-        if closed or Fault.CONTACTOR_WELDED not in fault:
-            self._contactor.step(closed, now)
-        for axis, brake in zip(profile.axes, self._brakes, strict=True):
-            if axis.brake is not None and Fault.BRAKES_STUCK not in fault:
-                brake.step(self._coils[axis.brake.output.coil], now)
-        power = self._contactor.on and not self._pressed
-        for place, (axis, brake) in zip(
-            self._board, zip(profile.axes, self._brakes, strict=True), strict=False
-        ):
-            place.power_allowed = power
-            if axis.brake is not None:
-                place.brake_released = brake.on or Fault.BRAKES_WORN in fault
+            if not self._dropped:
+                self._switch(drop_s)
+            self._dropped = True
+        self._switch(now)
+        self._tell(now)
         self._read_switches()
+
+    @property
+    def _drop_s(self) -> float:
+        """When the device's own watchdog drops the outputs unless it is fed."""
+        return self._fed_at + self._watchdog_s
+
+    def _switch(self, at_s: float) -> None:
+        profile = self._profile
+        self._contactor.step(self._closes, at_s)
+        if Fault.CONTACTOR_WELDED in self.fault:
+            self._contactor.stuck = self._contactor.on
+        for axis, brake in zip(profile.axes, self._brakes, strict=True):
+            if axis.brake is not None:
+                brake.step(self._coils[axis.brake.output.coil], at_s)
+
+    @property
+    def _closes(self) -> bool:
+        """Whether the contactor's coil has current."""
+        return self._coils[self._profile.contactor.output.coil] and not self._pressed
+
+    def _tell(self, now: float) -> None:
+        """Write to the board what holds now, in lockstep with what is to come by itself."""
+        power = _NEVER if self._pressed else self._contactor.window(self._drop_s)
+        worn = Fault.BRAKES_WORN in self.fault
+        for place, axis, brake in zip(self._board, self._profile.axes, self._brakes, strict=False):
+            free = _ALWAYS if worn else brake.window(self._drop_s)
+            if not self._lockstep:
+                place.power_allowed = power[0] <= now < power[1]
+                if axis.brake is not None:
+                    place.brake_released = free[0] <= now < free[1]
+                continue
+            ahead_s = place.time_s - now  # of buses that nobody keeps together
+            place.allow_power((power[0] + ahead_s, power[1] + ahead_s))
+            if axis.brake is not None:
+                place.release_brake((free[0] + ahead_s, free[1] + ahead_s))
 
     def switch_off(self) -> None:
         """Lose the supply: the contactor opens, the brakes hold."""
@@ -175,6 +233,7 @@ class SafetyTwin:
     ) -> ExcCodes | None:
         if Fault.EXCEPTIONS in self.fault:
             return ExcCodes.DEVICE_FAILURE
+        self.step()
         if code in (_WRITE_COIL, _WRITE_COILS):
             if address + len(values or ()) > len(self._coils):
                 return ExcCodes.ILLEGAL_ADDRESS
@@ -197,7 +256,7 @@ class SafetyTwin:
             if address == watchdog.timeout_register:
                 self._watchdog_s = value * watchdog.timeout_unit_s
             if address == watchdog.trigger_register:
-                self._fed_at = self._clock()
+                self._fed_at, self._dropped = self._clock(), False
 
 
 def _fill(registers: list[int], bits: list[bool]) -> None:

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, Protocol
 
 from sim_bus.client import raw_can_socket
-from sim_bus.clock import HOLD_S, ClockMode
+from sim_bus.clock import ClockMode
 from sim_bus.control import status
 from sim_bus.errors import BusSetupError
 from sim_bus.hub import Hub
@@ -44,7 +44,6 @@ def serve(
     bitrate: int = 1_000_000,
     truth_log: str | None = None,
     until_stdin_ends: bool = False,
-    hold_s: float = HOLD_S,
     slcan: bool = False,
     socketcand_port: int | None = None,
 ) -> None:
@@ -53,7 +52,6 @@ def serve(
     `bus` is simbus:NAME, which is opened here, or socketcan:IFACE, which must exist. When all is
     up, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}}; a
     terminal gets a few readable lines instead.
-    In lockstep bus time stands for `hold_s` of wall time without SYNC at the most.
     With `until_stdin_ends` the end of standard input (a pipe whose other end the parent holds)
     stops it too, so that a simulator never outlives the command that started it.
 
@@ -70,7 +68,6 @@ def serve(
         raise BusSetupError(f"bus {bus!r}: --slcan and --socketcand are for simbus:NAME only")
     with ExitStack() as stack:
         hub = open_hub(stack, nodes, bus, mode=mode, bitrate=bitrate, truth_log=truth_log)
-        hub.clock.hold_s = hold_s
         gateways = _open_gateways(stack, hub, slcan, socketcand_port)
         ready = {"bus": bus, "pid": os.getpid(), **gateways, **status(hub)}
         run_until_stopped(hub, ready, mode, until_stdin_ends)

@@ -7,7 +7,7 @@ import random
 import struct
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated
 
 from pydantic import Field
 from pymodbus.constants import ExcCodes
@@ -15,7 +15,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 from profiles.reader import Profile, read_toml_model
 from profiles.tension_sensor import REGISTERS, Sensor, TensionSensors, ValueMap
-from sim_bus.physics_board import BoardState
+from sim_bus.physics_board import BoardAxis
 
 _HOLDING_CODES = (3, 6, 16, 22, 23)
 _BEYOND = 1.02
@@ -55,18 +55,15 @@ class TensionFault(Enum):
     WRONG_UNIT = "wrong-unit"
 
 
-class Tensioned(Protocol):
-    """An axis of the physics board."""
-
-    def state(self) -> BoardState:
-        """Return what its drive last wrote."""
-
-
 class SimAmplifier:
-    """One amplifier: follows the true tension of its cable, answers as `device`."""
+    """One amplifier: follows the true tension of its cable, answers as `device`.
+
+    It lives by the bus time of its cable's drive alone: the filter has followed the tension up to
+    there whenever it is read, and the noise is that of the reading's number.
+    """
 
     def __init__(
-        self, profile: TensionSensors, sensor: Sensor, plant: AmplifierPlant, axis: Tensioned
+        self, profile: TensionSensors, sensor: Sensor, plant: AmplifierPlant, axis: BoardAxis
     ) -> None:
         self.unit = sensor.unit
         self.fault = TensionFault.NONE
@@ -76,19 +73,26 @@ class SimAmplifier:
         self._random = random.Random(plant.seed * 1000 + sensor.unit)
         self._zero_N = self._random.gauss(0.0, plant.zero_spread_N)
         self._tare_N = 0.0
-        tension = axis.state().tension_N
-        self._first = self._second = tension
+        state = axis.state()
+        self._time_s = state.time_s
+        self._first = self._second = state.tension_N
+        self._samples, _ = axis.course(0)
         span = self._map.highest_N - self._map.lowest_N
         self._quantum_N = span / 2.0**plant.bits
 
-    def advance(self, elapsed_s: float) -> None:
-        """Let the filter follow the tension for a while."""
-        share = 1.0 - math.exp(-2.0 * math.pi * self._plant.filter_Hz * elapsed_s)
-        self._first += share * (self._axis.state().tension_N - self._first)
-        self._second += share * (self._first - self._second)
+    def _follow(self) -> None:
+        """Have the filter follow the tension up to the present bus time."""
+        self._samples, course = self._axis.course(self._samples)
+        rate = -2.0 * math.pi * self._plant.filter_Hz
+        for time_s, tension_N in course:
+            share = 1.0 - math.exp(rate * max(time_s - self._time_s, 0.0))
+            self._time_s = time_s
+            self._first += share * (tension_N - self._first)
+            self._second += share * (self._first - self._second)
 
     def measured_N(self) -> float:
         """Return a new reading before tare: filtered, with zero, gain error, noise and steps."""
+        self._follow()
         plant = self._plant
         true = self._second * (1.0 + plant.gain_error) + self._zero_N
         noisy = true + self._random.gauss(0.0, plant.noise_N)
@@ -141,6 +145,7 @@ class SimAmplifier:
             return ExcCodes.ILLEGAL_ADDRESS
         if values[0] != tare.value:
             return ExcCodes.ILLEGAL_VALUE
+        self._follow()
         self._tare_N = self._second * (1.0 + self._plant.gain_error) + self._zero_N
         return None
 

@@ -1,6 +1,8 @@
-"""Log of the true motion, one record at every SYNC; written for the report alone.
+"""Log of the true motion; written for the report alone.
 
-Records have the little-endian layout named in the header of their `RecordFile`.
+There is one record at every SYNC, and some where none comes, so that what a motor does whose master
+has died is in it; these have `NO_SYNC` for a number. Records have the little-endian layout named in
+the header of their `RecordFile`.
 """
 
 from __future__ import annotations

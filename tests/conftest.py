@@ -1,12 +1,14 @@
-"""How the tests are shared out between processes."""
+"""How the tests are shared out between processes, and for how long each may run."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Generator
 from typing import Any
 
 import pytest
+import pytest_timeout
 from xdist.scheduler import LoadScopeScheduling
 
 # before anything loads numpy: threads that spin for work take the cores of the other processes
@@ -32,3 +34,12 @@ class _ByFile(LoadScopeScheduling):
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
     """Keep files together: some make one long commissioning for all of their tests."""
     return _ByFile(config, log)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None]:
+    """Limit the time of a teardown as well: the test's own limit has ended where it failed."""
+    settings = pytest_timeout.get_env_settings(item.config)
+    if settings.timeout:
+        item.ihook.pytest_timeout_set_timer(item=item, settings=settings)
+    return (yield)  # pytest-timeout stops its clock after the teardown

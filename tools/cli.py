@@ -31,6 +31,7 @@ _COMMANDS = (
     "commission",
     "doctor",
     "drive",
+    "estop",
     "io",
     "log",
     "profiles",
@@ -79,12 +80,14 @@ def _exit_status(error: BaseException) -> int:
 
 def main() -> None:
     """Run the command line; a known error is one line on standard error, never a traceback."""
-    _register(sys.argv[1:])
     try:
+        _register(sys.argv[1:])
         app(standalone_mode=True)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
         notes = getattr(error, "__notes__", ())
         _end("; ".join([str(error), *notes]), _exit_status(error))
+    except KeyboardInterrupt:  # while libraries are loaded
+        _end("interrupted", FAILED)
     except SystemExit as end:
         # how the command line library passes an interrupt on
         if end.code == _INTERRUPTED:

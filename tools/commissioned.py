@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError
 from cdpr_rt.compensation import AxisCompensation
+from cdpr_rt.runtime.robot_arrays import limits_of
 from drivers.boot import BootReport
 from profiles import Robot, RobotAxis
+from profiles.motor_bounds import MotorBounds
 from tools.commissioning import Paths
 from tools.errors import BadInputError
 from tools.session import identity_of
@@ -38,7 +43,9 @@ def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
     if folder is None:
         return robot
     found = {i: folder / folder_of(axis) for i, axis in enumerate(robot.axes)}
-    found = {i: path.resolve() for i, path in found.items() if Paths(path).profile.is_file()}
+    # what lies there and is no file is refused when it is read, and not taken for nothing
+    there = {i: path for i, path in found.items() if os.path.lexists(Paths(path).profile)}
+    found = {i: path.resolve() for i, path in there.items()}
     if not found:
         subfolders = ", ".join(folder_of(axis) for axis in robot.axes)
         raise BadInputError(
@@ -62,34 +69,55 @@ def _with_paths(robot: Robot, paths: Mapping[int, Path | None]) -> Robot:
 def load_profiles(robot: Robot) -> CoggingProfiles:
     """Return the cogging profiles that the axes name.
 
-    Raises BadInputError, naming axis and file, for one that cannot be read or is of another motor.
+    Raises BadInputError, naming axis and file, for one that cannot be read, is of another motor or
+    cannot be true of it.
     """
-    return tuple(_load(axis) for axis in robot.axes)
+    found = tuple(map(_load, robot.axes, _bounds(robot)))
+    lengths = {len(one.better.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
+    if len(lengths) > 1:
+        paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
+        raise BadInputError(
+            f"{paths}: better.table_Nm of {' and '.join(map(str, lengths))} values; allowed: as "
+            "many for every axis"
+        )
+    return found
 
 
-def _load(axis: RobotAxis) -> CoggingProfile | None:
+def _bounds(robot: Robot) -> list[MotorBounds]:
+    torques = np.broadcast_to(limits_of(robot).torque_Nm, (len(robot.axes),)).tolist()
+    return [MotorBounds(axis.winch.motor, t) for axis, t in zip(robot.axes, torques, strict=True)]
+
+
+def _load(axis: RobotAxis, bounds: MotorBounds) -> CoggingProfile | None:
     path = axis.commissioned
     if path is None:
         return None
     path = Paths(path).profile if path.is_dir() else path
+    return load_profile(path, bounds, f"axis {axis.name}: ")
+
+
+def load_profile(path: Path, bounds: MotorBounds, whose: str = "") -> CoggingProfile:
+    """Return the cogging profile of a motor; raises BadInputError, which begins with `whose`.
+
+    It names file, key and value of what cannot be true of the motor.
+    """
     try:
         profile = CoggingProfile.load(path)
     except CoggingProfileError as error:
-        raise BadInputError(f"axis {axis.name}: {error}") from error
-    motor = axis.winch.motor.model
-    if profile.motor != motor:
-        raise BadInputError(
-            f"axis {axis.name}: {path}: motor = {profile.motor}; allowed: {motor}, which its winch "
-            "has"
-        )
+        raise BadInputError(f"{whose}{error}") from error
+    try:
+        profile.require_true_of(bounds)
+    except CoggingProfileError as error:
+        raise BadInputError(f"{whose}{path}: {error}") from error
     return profile
 
 
 def compensation_of(
-    profiles: Sequence[CoggingProfile | None],
+    robot: Robot, profiles: Sequence[CoggingProfile | None]
 ) -> tuple[AxisCompensation | None, ...]:
     """Return what the control compensates of each motor: the harmonic model and its friction."""
-    return tuple(None if p is None else p.better.compensation() for p in profiles)
+    pairs = zip(profiles, _bounds(robot), strict=True)
+    return tuple(None if p is None else p.better.compensation(bounds) for p, bounds in pairs)
 
 
 def refuse_strangers(
@@ -97,13 +125,22 @@ def refuse_strangers(
 ) -> None:
     """Raise CoggingProfileError, naming the axis, where a profile is of another drive.
 
-    `reports` are those of the axes that have booted, by their numbers.
+    BadInputError where a winch's calibration is, as the torque constant of its drive is in it; of
+    drives without a serial number (0) nothing can be said. `reports` are those of the axes that
+    have booted, by their numbers.
     """
+    bounds = _bounds(robot)
     for i, report in reports.items():
         profile, axis = profiles[i], robot.axes[i]
+        of = 0 if axis.calibration is None else axis.calibration.drive_serial
+        if of and report.serial not in (0, of):
+            raise BadInputError(
+                f"{robot.path}: axes[{i}].calibration: is of a winch whose drive has serial {of}, "
+                f"that of axis {axis.name} has {report.serial}; calibrate it anew"
+            )
         if profile is None:
             continue
         try:
-            profile.compensation("better", identity_of(report), axis.winch.motor.model)
+            profile.compensation("better", identity_of(report), bounds[i])
         except CoggingProfileError as error:
             raise CoggingProfileError(f"axis {axis.name}: {axis.commissioned}: {error}") from error

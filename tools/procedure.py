@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from cdpr_rt.measurement import Pass, both_ways, recording
 from cdpr_rt.rawlog import read_raw_log
 from cdpr_rt.tuning import PidDesign, TuningError, design_pid, stiffest_pid, sweep_gain
 from profiles import Winch
+from profiles.motor_bounds import MotorBounds
 from tools.commissioning import (
     VALIDATION_SPEED_RAD_S,
     Measurement,
@@ -148,6 +150,7 @@ class Commissioning:
         self._out = out
         self._paths = paths
         self._measure = Measurement(session, out, paths)
+        self._bounds = MotorBounds(session.winch.motor)
 
     def run(self, bandwidth_Hz: float, index: Index = "homing") -> dict[str, Any]:
         """Do everything on the bus; return what the report has to know of it."""
@@ -155,7 +158,9 @@ class Commissioning:
         started = time.monotonic()
         self.prepare(index)
         self.measure()
-        found = identify_first(winch, session.latency_s, self._paths)
+        # it takes its time, and a safety I/O is asked meanwhile
+        identified = partial(identify_first, winch, session.latency_s, self._paths)
+        found = session.network.clock.aside(identified)
         found = self.measure_again(found, bandwidth_Hz)
         identity = session.drive_identity
         store_profile(winch, identity, found, self._paths)
@@ -272,10 +277,10 @@ class Commissioning:
             self._out.note(f"second pass at 22 deg/s under compensation, round {number + 1}")
             session.enable()
             design = self._design(second.current, bandwidth_Hz)
-            known = stored_better(second.current).compensation()
+            known = stored_better(second.current).compensation(self._bounds)
             recorded = self._measure.track(round_name(number), design, known, passes)
             session.disable()
-            second.add(legs(recorded))
+            session.network.clock.aside(partial(second.add, legs(recorded)))
         return dataclasses.replace(found, better=second.best)
 
     def _design(self, better: BetterResult, bandwidth_Hz: float) -> PidDesign:
@@ -293,7 +298,7 @@ class Commissioning:
         """
         session = self._session
         known: dict[str, AxisCompensation | None] = {
-            method: profile.compensation(method, session.drive_identity, session.winch.motor.model)
+            method: profile.compensation(method, session.drive_identity, self._bounds)
             for method in ("thesis", "better")
         }
         known["none"] = None

@@ -7,8 +7,10 @@ from contextlib import ExitStack, contextmanager
 
 import canopen
 
+from cdpr_rt.clock import Clock, PacedClock
 from drivers.boot import BootSettings, boot
 from drivers.bus import BusUrl
+from drivers.bus.leading import open_clock
 from drivers.errors import BusError
 from drivers.modbus.rail import ModbusRailAxis
 from drivers.modbus.tension import TensionSampler
@@ -30,8 +32,25 @@ _FIRST_READINGS_S = 3.0
 
 
 @contextmanager
+def rail_clock(rail: RailProfile, bus: str | None, winch_buses: Sequence[str]) -> Iterator[Clock]:
+    """Yield the clock of a rail's bus and of those of winches; raises BadInputError."""
+    named = [*winch_buses] if rail.cia402 is None else [bus, *winch_buses]
+    urls = [_bus_of(rail, text) for text in named]
+    clock = open_clock({str(url): url for url in urls}.values())
+    try:
+        yield clock
+    finally:
+        clock.close()
+
+
+@contextmanager
 def open_rail(
-    reference: str, rail: RailProfile, bus: str | None, safety_io: str | None, out: Output
+    reference: str,
+    rail: RailProfile,
+    bus: str | None,
+    safety_io: str | None,
+    out: Output,
+    clock: Clock,
 ) -> Iterator[RailAxis]:
     """Get a rail ready to move; however the block ends, its drive has no power afterwards.
 
@@ -39,18 +58,18 @@ def open_rail(
     """
     with ExitStack() as stack:
         if rail.cia402 is None:
-            session = stack.enter_context(open_safety(safety_io, out, []))
-            axis = ModbusRailAxis(rail, None if session is None else session.io)
+            session = stack.enter_context(open_safety(safety_io, out, [], clock))
+            axis = ModbusRailAxis(rail, clock, None if session is None else session.io)
             stack.callback(axis.close)
             axis.open()
             yield axis
             return
         require_options(rail, bus, safety_io)
         url = _bus_of(rail, bus)
-        safety = stack.enter_context(open_safety(safety_io, out, []))
+        safety = stack.enter_context(open_safety(safety_io, out, [], clock))
         assert safety is not None  # one was named
         drive = load_rail_drive(reference, rail.cia402)
-        network = stack.enter_context(_network(rail.cia402, drive, url))
+        network = stack.enter_context(_network(rail.cia402, drive, url, clock))
         settings = BootSettings(
             rail.cia402.master_node_id, _SYNC_PERIOD_S, rail.cia402.torque_limit_Nm
         )
@@ -74,14 +93,14 @@ def require_options(rail: RailProfile, bus: str | None, safety_io: str | None) -
 def position_of(reference: str, rail: RailProfile, bus: str | None) -> float:
     """Return where the carriage is, in m; nothing is written to the drive."""
     if rail.cia402 is None:
-        axis = ModbusRailAxis(rail)
+        axis = ModbusRailAxis(rail, PacedClock())
         try:
             return axis.position_m()
         finally:
             axis.close()
     there = rail.cia402
     drive = load_rail_drive(reference, there)
-    with _network(there, drive, _bus_of(rail, bus)) as network:
+    with _network(there, drive, _bus_of(rail, bus), PacedClock()) as network:
         turn = network.read_int(there.node_id, 0x608F, 1)
         counts = network.read_int(there.node_id, 0x6064) - there.zero_counts
         sign = there.direction * drive.position_sign
@@ -90,7 +109,7 @@ def position_of(reference: str, rail: RailProfile, bus: str | None) -> float:
 
 @contextmanager
 def power_watch(
-    rail: RailProfile, bus: str | None, winch_buses: Sequence[str], out: Output
+    rail: RailProfile, bus: str | None, winch_buses: Sequence[str], out: Output, clock: Clock
 ) -> Iterator[Callable[[], str]]:
     """Yield what tells which winch has power, of those on the rail's own bus and on `winch_buses`.
 
@@ -106,7 +125,7 @@ def power_watch(
         watches = []
         for url, but in asked:
             try:
-                watch = PowerWatch(url, but)
+                watch = PowerWatch(url, clock, but)
             except BusError as error:
                 raise BadInputError(str(error)) from error
             stack.callback(watch.close)
@@ -122,7 +141,7 @@ def power_watch(
 
 @contextmanager
 def slack_watch(
-    rail: RailProfile, sensors: str | None, port: str | None, checked: bool
+    rail: RailProfile, sensors: str | None, port: str | None, checked: bool, clock: Clock
 ) -> Iterator[Callable[[], str]]:
     """Yield what tells which cable is tight: by load cells, or never where the user has looked.
 
@@ -138,7 +157,7 @@ def slack_watch(
         return
     if port is None:
         raise BadInputError("--tension: also name the serial line, --tension-port")
-    with TensionSampler(load_tension_sensors(sensors), port) as sampler:
+    with TensionSampler(load_tension_sensors(sensors), port, clock) as sampler:
         sampler.await_readings(_FIRST_READINGS_S)
         exchange = sampler.exchange
 
@@ -170,10 +189,12 @@ def _bus_of(rail: RailProfile, bus: str | None) -> BusUrl:
 
 
 @contextmanager
-def _network(there: Cia402Rail, drive: DriveProfile, url: BusUrl) -> Iterator[CanNetwork]:
+def _network(
+    there: Cia402Rail, drive: DriveProfile, url: BusUrl, clock: Clock
+) -> Iterator[CanNetwork]:
     heartbeat_s = drive.heartbeat_consumer_s / 4
     try:
-        network = CanNetwork(url, [there.node_id], there.master_node_id, heartbeat_s)
+        network = CanNetwork(url, clock, [there.node_id], there.master_node_id, heartbeat_s)
     except BusError as error:
         raise BadInputError(str(error)) from error
     try:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
-from typing import Any
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cdpr_rt.tuning import PidDesign, design_pid
+from profiles.bounded_input import read_json
+from profiles.errors import ProfileError
+from profiles.reader import read_json_model
 from tools.commissioning import METHODS, Paths
 from tools.errors import BadInputError
 from tools.evaluation import compare, lowest
@@ -20,15 +24,75 @@ TARGETS = {
 """Times smaller than without compensation: what the thesis reached, and what is aimed at here."""
 
 
+_Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+
+
+_Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Count = Annotated[int, Field(ge=0, le=(1 << 63) - 1)]
+_Word = Annotated[int, Field(ge=0, lt=1 << 32)]
+
+
+class _Part(BaseModel):
+    """Of what the report takes from `run.json`; the rest of it is for people."""
+
+    model_config = ConfigDict(extra="allow", strict=True, allow_inf_nan=False)
+
+
+class _Bus(_Part):
+    url: str = ""
+    period_s: _Positive
+    cycles: _Count = 0
+    wall_s: _Positive | None = None
+
+
+class _Drive(_Part):
+    name: str = ""
+    vendor_id: _Word = 0
+    product_code: _Word = 0
+    revision: _Word = 0
+
+
+class _Pid(_Part):
+    inertia_kg_m2: _Positive
+    latency_s: _Positive
+    bandwidth_Hz: _Positive
+    crossover_Hz: _Positive
+    phase_margin_deg: _Number
+    gain_margin_dB: _Number | None
+    """None where no gain is too much."""
+    sensitivity_peak: _Positive
+
+
+class _Run(_Part):
+    winch: str
+    date: str
+    drive: _Drive
+    encoder_counts_per_turn: int = Field(gt=0, le=1 << 32)
+    rated_torque_Nm: _Positive
+    inertia_kg_m2: _Positive
+    latency_s: _Positive
+    bandwidth_Hz: _Positive
+    bandwidths_Hz: list[_Positive]
+    torque_step_Nm: _Positive | None = None
+    pid: list[_Pid] = Field(min_length=1)
+    bus: _Bus
+
+    @model_validator(mode="after")
+    def _has_its_default(self) -> Self:
+        if self.bandwidth_Hz not in self.bandwidths_Hz:
+            raise ValueError("bandwidths_Hz: allowed: bandwidth_Hz among them")
+        if len(self.pid) != len(self.bandwidths_Hz):
+            raise ValueError("pid: allowed: one for each of bandwidths_Hz")
+        return self
+
+
 def read_run(paths: Paths) -> dict[str, Any]:
-    """Return what the run on the bus left; raises BadInputError when it is not there."""
+    """Return what the run on the bus left; raises BadInputError where it is not all there."""
     try:
-        run: dict[str, Any] = json.loads(paths.run.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        why = (isinstance(error, OSError) and error.strerror) or error
-        raise BadInputError(
-            f"{paths.run}: cannot be read ({why}); {paths.out} holds no finished commissioning"
-        ) from error
+        read_json_model(paths.run, _Run)
+        run: dict[str, Any] = read_json(paths.run)
+    except ProfileError as error:
+        raise BadInputError(f"{error}; {paths.out} holds no finished commissioning") from None
     return run
 
 

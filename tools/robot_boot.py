@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
+from cdpr_rt.clock import Clock
 from drivers.axis_buses import AxisBuses, BusAxes
 from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootReports, BootSettings, boot_all
@@ -21,7 +21,7 @@ from tools.session import lacking_guards
 
 
 def open_networks(
-    stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl]
+    stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl], clock: Clock
 ) -> dict[str, CanNetwork]:
     """Open the buses of `robot` as their only master here; `stack` closes them.
 
@@ -33,7 +33,7 @@ def open_networks(
         nodes = [axis.node_id for axis in axes]
         try:
             stack.enter_context(MasterLock(url))
-            network = CanNetwork(url, nodes, robot.master_node_id, robot.master_heartbeat_s)
+            network = CanNetwork(url, clock, nodes, robot.master_node_id, robot.master_heartbeat_s)
         except BusError as error:
             raise BadInputError(f"bus {name}: {error}") from error
         stack.callback(network.close)
@@ -53,20 +53,22 @@ def boot_robot(
     leaves the drives alone again. Raises WorkFailedError for a mandatory one that does not
     boot.
     """
-    with ThreadPoolExecutor(max_workers=len(networks)) as pool:
-        pending: dict[str, Future[BootReports]] = {}
-        for name, network in networks.items():
-            wanted = {
-                axis.node_id: (axis.winch.drive, _settings(robot, axis, most_Nm))
-                for axis, most_Nm in ((robot.axes[i], torque_Nm[i]) for i in robot.axes_on(name))
-            }
-            pending[name] = pool.submit(boot_all, network, wanted)
+
+    def boot_bus(name: str, network: CanNetwork) -> Callable[[], BootReports]:
+        wanted = {
+            axis.node_id: (axis.winch.drive, _settings(robot, axis, most_Nm))
+            for axis, most_Nm in ((robot.axes[i], torque_Nm[i]) for i in robot.axes_on(name))
+        }
+        return lambda: boot_all(network, wanted)
+
+    clock = next(iter(networks.values())).clock
+    tasks = clock.together([boot_bus(*bus) for bus in networks.items()])
     failures: list[DriverError] = []
     booted: dict[int, BootReport] = {}
     absent: dict[int, str] = {}
-    for name, job in pending.items():
+    for name, task in zip(networks, tasks, strict=True):
         try:
-            reports = job.result()
+            reports = task.result()
         except (BootError, BusError) as error:
             failures.append(error)
             error.add_note(f"on bus {name}")
@@ -119,8 +121,8 @@ def device_of(
             AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i]) for i in here
         ]
         places = [place_of[i] for i in here]
-        buses.append(BusAxes(name, network, configs, places, robot.master_heartbeat_s))
-    return AxisBuses(buses, robot.sync_period_s, robot.master_node_id)
+        buses.append(BusAxes(name, network, configs, places))
+    return AxisBuses(buses, robot.sync_period_s)
 
 
 def boot_notes(

@@ -20,6 +20,7 @@ from cdpr_rt.supervisor import Limits, Supervisor
 from drivers.axis_buses import AxisBuses
 from drivers.boot import BootReport
 from drivers.bus import BusUrl, query_status
+from drivers.bus.leading import open_clock
 from drivers.cia402 import State
 from drivers.errors import DriveFaultError
 from drivers.network import CanNetwork
@@ -177,8 +178,10 @@ def open_robot(
         real = not all(url.is_simulated for url in urls.values())
         reference = safety_io or (robot.safety_io if real else None)
         rehearse(len(robot.axes), robot.sync_period_s)  # compiling may keep a poll waiting
-        safety = stack.enter_context(open_safety(reference, out, nodes))
-        networks = open_networks(stack, robot, urls)
+        clock = open_clock(urls.values())
+        stack.callback(clock.close)
+        safety = stack.enter_context(open_safety(reference, out, nodes, clock))
+        networks = open_networks(stack, robot, urls, clock)
         begin = time.monotonic()
         torque_Nm = [torque_share * axis.winch.motor.rated_torque_Nm for axis in robot.axes]
         booted, absent = boot_robot(stack, robot, networks, torque_Nm)
@@ -189,6 +192,8 @@ def open_robot(
         device = stack.enter_context(device_of(robot, networks, booted, torque_Nm))
         if safety is not None:
             stack.callback(safety.drop_brakes)
+        stack.callback(stop_requested.closing)  # before what is closed above
+        stop_requested.energised = True
         for network in networks.values():
             network.start_heartbeat()
         if not device.lockstep:
@@ -223,7 +228,8 @@ def _explained(session: RobotSession, error: TripError) -> TripError | DriveFaul
     reason, faulted = str(error), session.device.faulted().any()
     if faulted:
         reason = f"{reason}: {faults_text(session.axes, session.device, session.networks)}"
-    reason = reason if session.safety is None else session.safety.cause(reason)
+    if session.safety is not None:
+        reason = session.safety.cause(reason)
     return (DriveFaultError if faulted else TripError)(reason)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.state_file import StateFileError, read_state, state_path
 from drivers.modbus.safety_io import SafetyIo
 from profiles.safety_io import load_safety_io
@@ -16,7 +16,7 @@ from tools.output import Output
 if TYPE_CHECKING:  # it brings a compiler along, which a look at the I/O does without
     from cdpr_rt.executive import Executive
 
-# a brake that does not follow trips by itself, on the clock; bus time may be much faster
+# a brake that does not follow trips by itself
 _FOR_EVER_S = 1e5
 
 
@@ -59,9 +59,8 @@ class SessionSafety:
 
         An open chain takes the drives' power, so that their faults are heard before the next poll.
         """
-        deadline = time.monotonic() + 3.0 * self.io.profile.poll_period_s
-        while not self.tripped and time.monotonic() < deadline:
-            time.sleep(self.io.profile.poll_period_s / 4.0)
+        clock = self.io.clock
+        clock.wait(lambda: self.tripped, clock.now_s + 3.0 * self.io.profile.poll_period_s)
         tripped = self.tripped
         return reason if not tripped or tripped in reason else f"{tripped} (besides: {reason})"
 
@@ -88,14 +87,14 @@ def kept_trip(reference: str) -> dict[str, Any] | None:
         return {"reason": str(error), "date": None}
 
 
-def connect(reference: str) -> SafetyIo:
+def connect(reference: str, clock: Clock) -> SafetyIo:
     """Return the safety I/O that `reference` names, not opened yet; raises ProfileError."""
-    return SafetyIo(load_safety_io(reference), trip_file(reference))
+    return SafetyIo(load_safety_io(reference), clock, trip_file(reference))
 
 
 @contextmanager
 def open_safety(
-    reference: str | None, out: Output, node_ids: Collection[int]
+    reference: str | None, out: Output, node_ids: Collection[int], clock: Clock
 ) -> Iterator[SessionSafety | None]:
     """Connect to a safety I/O and close its contactor, for as long as the block runs.
 
@@ -107,7 +106,7 @@ def open_safety(
     if reference is None:
         yield None
         return
-    with connect(reference) as io:
+    with connect(reference, clock) as io:
         io.energise()
         session = SessionSafety(io, node_ids)
         out.note(f"{io.name}: the chain is closed, the contactor is on")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from cdpr_rt.cogging_profile import DriveIdentity
 from cdpr_rt.errors import NotInTimeError, TripError
-from cdpr_rt.executive import Executive, Watch
+from cdpr_rt.executive import Executive
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.rehearsal import rehearse
 from cdpr_rt.supervisor import Limits, Supervisor
@@ -21,6 +21,7 @@ from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootSettings, boot
 from drivers.bus import BusUrl, query_status
 from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
+from drivers.bus.leading import open_clock
 from drivers.bus.master_lock import MasterLock
 from drivers.cia402 import Mode, State, fault_text
 from drivers.data_sheet import load_dictionary
@@ -35,6 +36,7 @@ from tools.output import Output
 from tools.safety import SessionSafety, open_safety
 from tools.signals import stop_on_signals
 from tools.simulator import OwnSimulator
+from tools.tension.session_watch import Watching, no_watches
 
 _SPEED_SHARE = 0.2
 # a bare rotor may swing by turns without doing harm; its speed is what is limited
@@ -225,8 +227,12 @@ def open_network(
         elif plant is not None:
             raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
         drive = winch.drive
+        clock = open_clock([url])
+        stack.callback(clock.close)
         try:
-            network = CanNetwork(url, [winch.node_id], winch.master_node_id, _heartbeat_s(winch))
+            network = CanNetwork(
+                url, clock, [winch.node_id], winch.master_node_id, _heartbeat_s(winch)
+            )
         except BusError as error:
             raise BadInputError(str(error)) from error
         stack.callback(network.close)
@@ -249,27 +255,31 @@ def open_winch(
     plant: Path | None = None,
     truth_log: Path | None = None,
     safety_io: str | None = None,
-    watches: Sequence[Watch] = (),
+    watching: Watching = no_watches,
 ) -> Iterator[WinchSession]:
     """Boot the winch's drive on `url` and get ready to run its axis.
 
     With `safety_io`, the profile of a safety I/O, there is power only while that allows it;
-    `watches` are asked every cycle besides. Whatever ends the block, the drive's power stage is off
-    afterwards. Raises what `open_network` and `open_safety` raise and the drivers' errors for a
-    drive that does not boot.
+    what `watching` opens by the robot's clock is asked every cycle besides. Whatever ends the
+    block, the drive's power stage is off afterwards. Raises what `open_network`, `watching` and
+    `open_safety` raise and the drivers' errors for a drive that does not boot.
     """
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
-        rehearse(1, winch.sync_period_s)  # compiling may keep a polling thread waiting
-        safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id]))
+        rehearse(1, winch.sync_period_s)  # compiling keeps a poll waiting
         network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
+        clock = network.clock
         stack.enter_context(_only_master(network.url))
+        watches = stack.enter_context(watching(clock))
+        safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id], clock))
         limit = winch.motor.rated_torque_Nm
         report = boot(network, winch.node_id, winch.drive, boot_settings(winch))
         stack.callback(network.release, winch.node_id)
         device = stack.enter_context(_axis(winch, network, report, limit))
         if safety is not None:
             stack.callback(safety.drop_brakes)
+        stack.callback(stop_requested.closing)  # before what is closed above
+        stop_requested.energised = True
         lacking = lacking_guards(f"node {winch.node_id}", report)
         if lacking:
             out.note(lacking)
@@ -288,7 +298,8 @@ def open_winch(
             reason, faulted = str(error), device.faulted().any()
             if faulted and (code := _fault_of(network, winch.node_id)) not in reason:
                 reason = f"{reason}: {code}"
-            reason = reason if safety is None else safety.cause(reason)
+            if safety is not None:
+                reason = safety.cause(reason)
             raise (DriveFaultError if faulted else TripError)(reason) from error
 
 
@@ -318,14 +329,7 @@ def _heartbeat_s(winch: Winch) -> float:
 
 def _axis(winch: Winch, network: CanNetwork, report: BootReport, limit_Nm: float) -> AxisGroup:
     axis = AxisConfig.from_boot(winch.drive, report, limit_Nm)
-    return AxisGroup(
-        network.url,
-        network,
-        [axis],
-        winch.sync_period_s,
-        winch.master_node_id,
-        _heartbeat_s(winch),
-    )
+    return AxisGroup(network, [axis], winch.sync_period_s)
 
 
 def _own_simulator(

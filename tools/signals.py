@@ -2,25 +2,55 @@
 
 from __future__ import annotations
 
+import os
 import signal
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+_TOLD = b"stopping under control; a second Ctrl-C takes the power at once\n"
+
+
+class StopRequest:
+    """Whether the user wants an end: asked once it is to be looked at, asked twice it interrupts.
+
+    It interrupts once, by KeyboardInterrupt: what comes later would keep the power from being
+    switched off.
+    """
+
+    def __init__(self) -> None:
+        self._times = 0
+        self._interrupts = True
+        self.energised = False
+        """Whether the user is told at the first request what a second one does."""
+
+    def __call__(self) -> bool:
+        """Whether an end is wanted."""
+        return self._times > 0
+
+    def closing(self) -> None:
+        """Have nothing interrupted any more, since the power is being switched off."""
+        self._interrupts = False
+
+    def note(self, _number: int, _frame: FrameType | None) -> None:
+        """Take a signal."""
+        self._times += 1
+        if self._times == 1 and self.energised and self._interrupts:
+            os.write(sys.stderr.fileno(), _TOLD)  # printing is not allowed to interrupt itself
+        if self._times > 1 and self._interrupts:
+            self._interrupts = False
+            raise KeyboardInterrupt
+
 
 @contextmanager
-def stop_on_signals() -> Iterator[Callable[[], bool]]:
+def stop_on_signals() -> Iterator[StopRequest]:
     """Yield what tells whether the user wants an end; asked a second time it is an interrupt."""
-    wanted: list[int] = []
-
-    def note(number: int, _frame: FrameType | None) -> None:
-        if wanted:
-            raise KeyboardInterrupt
-        wanted.append(number)
-
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    wanted = StopRequest()
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.signal(number, wanted.note) for number in numbers}
     try:
-        yield lambda: bool(wanted)
+        yield wanted
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -31,9 +31,8 @@ class OwnSimulator:
         board: Path | None = None,
         paced: bool = False,
         detached: bool = False,
-        hold_s: float | None = None,
     ) -> None:
-        command = [sys.executable, "-m", "tools.cli", "sim", "up", winch, "--bus", bus]
+        command = [sys.executable, "-P", "-m", "tools.cli", "sim", "up", winch, "--bus", bus]
         command += ["--paced" if paced else "--lockstep", "--exit-with-stdin"]
         command += ["--nodes", str(nodes)]
         if detached:
@@ -44,8 +43,6 @@ class OwnSimulator:
             command += ["--truth-log", str(truth_log)]
         if board is not None:
             command += ["--board", str(board)]
-        if hold_s is not None:
-            command += ["--hold", str(hold_s)]
         self.bus = bus
         self.process = subprocess.Popen(
             command,

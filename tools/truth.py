@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import math
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cdpr_rt.exchange import FloatArray
+from profiles.bounded_input import open_regular, parse_json
+from profiles.errors import ProfileError
 from tools.errors import BadInputError
 
 _HEADER_BYTES = 1024
 _FORMAT = "cdpr-rt truth log 1"
+NO_SYNC = 0xFFFFFFFF
+"""Number of a record that was made where no SYNC came."""
 
 
 class Truth:
@@ -25,12 +29,12 @@ class Truth:
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
-            with path.open("rb") as file:
-                header = json.loads(file.read(_HEADER_BYTES))
+            with os.fdopen(open_regular(path), "rb") as file:
+                header = parse_json(file.read(_HEADER_BYTES), path)
             self._dtype: np.dtype[Any] = np.dtype([(n, kind) for n, kind in header["fields"]])
             if header["format"] != _FORMAT or header["record_bytes"] != self._dtype.itemsize:
                 raise ValueError(header["format"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (ProfileError, OSError, ValueError, KeyError, TypeError) as error:
             raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
 
     def angle_at(self, sync_index: FloatArray, measured_rad: FloatArray) -> FloatArray:
@@ -41,9 +45,9 @@ class Truth:
         Raises BadInputError where a SYNC is missing.
         """
         first, last = int(sync_index[0]), int(sync_index[-1])
+        records = np.fromfile(self._path, self._dtype, offset=_HEADER_BYTES)
         # one record a SYNC, counted from zero
-        offset = _HEADER_BYTES + max(first, 0) * self._dtype.itemsize
-        records = np.fromfile(self._path, self._dtype, last - first + 1, offset=offset)
+        records = records[records["sync_index"] != NO_SYNC][max(first, 0) : last + 1]
         place = sync_index.astype(np.int64) - first
         if records.size != last - first + 1 or not np.array_equal(
             records["sync_index"][place], sync_index

@@ -13,8 +13,11 @@ import numpy as np
 from cdpr_rt.exchange import AxisFeedback, FloatArray
 from cdpr_rt.runtime.estimate import AxisEstimate
 from cdpr_rt.state_file import StateFileError, read_state, write_state
+from profiles.platform import FURTHEST_m
 
 _FIELDS = ("cable_length_m", "cable_at_index_m")
+_MOST_OF_LONGEST = 2.0
+"""A platform that was let down anywhere has its cables paid out further than in use."""
 
 
 @dataclass(frozen=True)
@@ -45,26 +48,31 @@ class LastLengths:
         self.displaced = False
         """Whether the platform has been let go since, other than at home."""
 
-    def load(self, n: int) -> None:
-        """Read the file of a robot with n axes; one that is damaged leaves none."""
+    def load(self, n: int, longest_m: float) -> None:
+        """Read the file of a robot with n axes; one that is damaged leaves none.
+
+        No length counts above twice `longest_m`, the longest that a cable is in use.
+        """
         if self.path is None:
             return
+        most_m = min(_MOST_OF_LONGEST * longest_m, FURTHEST_m)
         try:
             held = read_state(self.path)
             if held is not None:
-                self._take(held, n)
+                self._take(held, n, most_m)
         except StateFileError as error:
             self.why = str(error)
         except (KeyError, TypeError, ValueError):
-            self.why = f"{self.path}: is damaged: lengths of {n} cables are wanted"
+            self.why = (
+                f"{self.path}: is damaged: lengths of {n} cables are wanted, in metres, up to "
+                f"{most_m:.4g}"
+            )
 
-    def _take(self, held: dict[str, Any], n: int) -> None:
-        if not held["stopped"]:
+    def _take(self, held: dict[str, Any], n: int, most_m: float) -> None:
+        if held["stopped"] is not True:
             self.why = f"{self.path}: the robot was in motion when it was last heard of"
             return
-        lengths, at_index = (
-            np.array([math.nan if x is None else float(x) for x in held[key]]) for key in _FIELDS
-        )
+        lengths, at_index = (np.array([_length_m(x, most_m) for x in held[key]]) for key in _FIELDS)
         if lengths.shape != (n,) or at_index.shape != (n,) or not (lengths > 0.0).all():
             raise ValueError
         nowhere = np.full(n, math.nan)
@@ -121,6 +129,17 @@ def off_index_m(
     turn = math.tau * np.abs(cable_m)
     off = np.remainder(at_index - last.cable_at_index_m + 0.5 * turn, turn) - 0.5 * turn
     return np.where(feedback.index_known, off, math.nan)
+
+
+def _length_m(value: Any, most_m: float) -> float:
+    """Return a length, nan for None; raises TypeError and ValueError for what is none."""
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError
+    if not abs(value) <= most_m:
+        raise ValueError
+    return float(value)
 
 
 def _plain(values: FloatArray) -> list[float | None]:

@@ -15,20 +15,19 @@ from cdpr_rt.exchange import FloatArray, Setpoint
 from cdpr_rt.limits import BLINDING, MISLEADING, Limit
 from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_rows import CycleRows
-from cdpr_rt.runtime.job import Job
 from cdpr_rt.runtime.lifecycle import Lifecycle
 from cdpr_rt.runtime.loop_parts import LoopParts
 from cdpr_rt.runtime.machine import Machine
 from cdpr_rt.runtime.orders import Orders
+from cdpr_rt.runtime.right import RightToMove
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.runtime.states import LoopState, Reaction
 from cdpr_rt.runtime.status import StatusPage
+from cdpr_rt.runtime.stop_requests import StopRequests
+from cdpr_rt.task import Task
 
 IDLE, HOLD, LOWER = "idle", "hold", "lower"
 _TURN_S = 0.005
-_AT_ONCE_AFTER_S = 1.0
-"""A second request to end, so long after the first, takes the power at once."""
-_NOBODY_LEADS = "nobody holds the right to move any more"
 
 
 class ControlLoop:
@@ -36,10 +35,17 @@ class ControlLoop:
 
     Within a cycle nothing is allocated that stays, waited for, or logged. Commands are looked at
     after the cycle's own command has been sent; what takes several cycles is a generator that is
-    advanced once a cycle, what takes longer runs in a thread beside it.
+    advanced once a cycle, what waits for answers on a bus a task, which is advanced as often.
+    `clock_ns` is the clock that the right to move runs out by.
     """
 
-    def __init__(self, block: SharedBlock, machine: Machine, parts: LoopParts) -> None:
+    def __init__(
+        self,
+        block: SharedBlock,
+        machine: Machine,
+        parts: LoopParts,
+        clock_ns: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
         self.block = block
         self.machine = machine
         self.parts = parts
@@ -66,13 +72,13 @@ class ControlLoop:
         """Why cycles cannot go on, as a bus has gone away."""
         self.exchange_s = 0.0
         """From the last SYNC to its last answer."""
-        self._stop_requests, self._stopping_since_s = 0, 0.0
-        self._job: Job[Any] | None = None
+        self._requests = StopRequests(self)
+        self._job: Task[Any] | None = None
         self._program_error, self._punctual = "", False
         self._rows = CycleRows(block)
         self._asked: FloatArray = np.zeros(block.n)
         self._alive = block.counters["loop_alive_ns"]
-        self._lease = block.counters["lease_ns"]
+        self.right = RightToMove(block, clock_ns)
         self._orders = Orders(self)
         self.status = StatusPage(self)
         self._procedure: Iterator[None] | None = None
@@ -88,6 +94,8 @@ class ControlLoop:
             while not self.ended:
                 self.turn()
         finally:
+            if self._job is not None:
+                self._job.cancel()
             self.machine.close()
             self.status.publish()
 
@@ -96,17 +104,21 @@ class ControlLoop:
         self._alive[0] = time.monotonic_ns()
         if self.cycling:
             self._run_cycle()
+            self.machine.clock.turn()
         else:
-            time.sleep(_TURN_S)
-        self._watch_lease()
-        self._watch_stop_requests()
+            self.machine.clock.sleep(_TURN_S)
+        self._requests.watch()
         self._orders.take()
         self._advance()
         self.status.look()
 
     def request_stop(self) -> None:
-        """Have the loop end under control; asked again later, at once. For signal handlers."""
-        self._stop_requests += 1
+        """Have the loop end under control. For signal handlers."""
+        self._requests.stop = True
+
+    def request_power_off(self) -> None:
+        """Have the power taken at once, whatever goes on. For signal handlers."""
+        self._requests.power_off = True
 
     def start_cycles(self) -> None:
         """Run cycles from the next turn on, over the device that the machine has opened."""
@@ -129,7 +141,7 @@ class ControlLoop:
         self.cycling = self.driving = False
 
     def _run_cycle(self) -> None:
-        cycle, machine, program = self.cycle, self.machine, self.program
+        cycle, machine = self.cycle, self.machine
         assert cycle is not None  # cycles run
         device = cycle.device
         feedback, torque = device.feedback, device.command.torque_Nm
@@ -146,9 +158,10 @@ class ControlLoop:
             feedback,
             machine.read_tension(),
             cycle.elapsed_s,
-            program.controller.compensation_Nm,
+            self.program.controller.compensation_Nm,
         )
-        self._program_error = ""
+        self._watch_right()
+        program, self._program_error = self.program, ""
         try:
             program.update(feedback, self.setpoint, torque)
         except Exception as error:  # whatever a program does wrong: its drives are stopped
@@ -299,8 +312,11 @@ class ControlLoop:
         self.driving = True
         self.switch(HOLD)
 
-    def switch(self, name: str, wanted: Mapping[str, Any] | None = None) -> None:
-        """Go on with another program; raises ProgramError and goes on as before."""
+    def switch(self, name: str, wanted: Mapping[str, Any] | None = None, right: int = 0) -> None:
+        """Go on with another program; raises ProgramError and goes on as before.
+
+        `right` is the number of the taking on whose behalf it moves, 0 for nobody's.
+        """
         program = self.parts.programs[name]
         if wanted is not None:
             program.check(wanted)
@@ -312,22 +328,20 @@ class ControlLoop:
         program.start(device.feedback, self.setpoint, device.command.torque_Nm)
         if wanted is not None:
             program.command(wanted)
-        self.program = program
+        self.program, self.right.mover = program, right
         self.program_number = self.programs.index(program)
         estimate = self.parts.estimator.estimate
         self._rows.follow(cycle, self.setpoint, estimate, program, self._asked)
         self.status.touch()
 
-    @property
-    def has_lease(self) -> bool:
-        """Whether somebody holds the right to move."""
-        return int(self._lease[0]) > time.monotonic_ns()
-
-    def _watch_lease(self) -> None:
-        if not self.driving or self.reacting or not self.program.needs_lease or self.has_lease:
+    def _watch_right(self) -> None:
+        """Hold in place of a motion that is nobody's any more, or that of a past holder."""
+        if not self.driving or self.reacting or not self.program.needs_lease:
             return
-        self.life.blame(f"{self.program.name}: {_NOBODY_LEADS}; held")
-        self.switch(HOLD)
+        lost = self.right.lost()
+        if lost:
+            self.life.blame(f"{self.program.name}: {lost}; held")
+            self.switch(HOLD)
 
     # -- what takes longer than a cycle
 
@@ -365,25 +379,16 @@ class ControlLoop:
             self._orders.done(told)
         self.status.touch()
 
-    def _watch_stop_requests(self) -> None:
-        if not self._stop_requests or (self._job is not None and not self._job.done):
-            return
-        now_s = time.monotonic()
-        if not self._stopping_since_s:
-            self._stopping_since_s = now_s
-            self._stop_requests = 1
-            self.begin(procedures.shut_down(self))
-        elif not self.busy and not self.ended:
-            self.begin(procedures.shut_down(self))  # something worse had come between
-        elif self._stop_requests > 1:
-            self._stop_requests = 1
-            if self.driving and now_s - self._stopping_since_s > _AT_ONCE_AFTER_S:
-                self.stop(Reaction.TORQUE_OFF, LoopState.READY)  # brakes at once as well
+    @property
+    def works_slowly(self) -> bool:
+        """Whether slow work runs beside the cycle."""
+        return self._job is not None and not self._job.done
 
-    def job(self, work: Callable[[], Any]) -> Job[Any]:
-        """Start slow work beside the cycle."""
-        self._job = Job(work, set(self.parts.cores))
-        return self._job
+    def job(self, work: Callable[[], Any]) -> Task[Any]:
+        """Start slow work beside the cycle; what need not wait is done at once."""
+        self._job = job = self.machine.clock.start(work)
+        self.machine.clock.turn()
+        return job
 
     def cycles_in(self, seconds: float) -> int:
         """Return how many cycles a time lasts, at least one."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.last_lengths import LastLengths
@@ -31,5 +30,3 @@ class LoopParts:
     """Keeps the cables' lengths of the last stop, where a start can make use of them."""
     punctual: Callable[[], Sequence[str]] = tuple
     """Called once before the first paced cycle; returns what was not allowed, for people."""
-    cores: frozenset[int] = field(default_factory=lambda: frozenset(os.sched_getaffinity(0)))
-    """Where slow work beside the cycle may run."""

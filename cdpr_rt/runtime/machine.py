@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.cycle import Watch
 from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import AxisDevice
@@ -18,8 +19,8 @@ class MachineError(ControlError):
 class Machine(Protocol):
     """The axes of one robot with their buses, brakes and guards.
 
-    The slow methods run beside the cycle, in a thread of their own, or while no cycles run; they
-    raise MachineError. All others are called in a cycle and wait for nothing.
+    The slow methods are called in a task of `clock`, while cycles run or not, and wait by it alone;
+    they raise MachineError. All others are called in a cycle and wait for nothing.
     """
 
     failures: tuple[type[Exception], ...]
@@ -29,6 +30,10 @@ class Machine(Protocol):
     watches: Sequence[Watch]
     notices: Sequence[str]
     """What people should know of the drives that have booted."""
+
+    @property
+    def clock(self) -> Clock:
+        """The robot's time, the same one from beginning to end."""
 
     @property
     def device(self) -> AxisDevice | None:

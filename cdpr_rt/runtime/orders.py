@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Order = Mapping[str, Any]
 _MOST_TEXT, _SHORT_TEXT = 1500, 200
 _LONGEST_CABLE_m = 1000.0
+_MOVING = frozenset({"enable", "program", "set"})
 
 
 class Orders:
@@ -45,14 +46,18 @@ class Orders:
         }
 
     def take(self) -> None:
-        """Look at one command, if there is one."""
+        """Look at one stop, then at one command, if there are any."""
+        self._take("urgent", self._loop.block.take_urgent)
+        self._take("commands", self._loop.block.take_command)
+
+    def _take(self, queue: str, take: Callable[[], Order | None]) -> None:
         counters = self._counters
-        if counters["commands"][0] == counters["commands_taken"][0]:
+        if counters[queue][0] == counters[f"{queue}_taken"][0]:
             return
         try:
-            order = self._loop.block.take_command()
+            order = take()
         except (ValueError, RecursionError):  # no JSON: nobody can be answered
-            counters["commands_taken"][0] += 1
+            counters[f"{queue}_taken"][0] += 1
             return
         if isinstance(order, dict):
             self._obey(order)
@@ -68,6 +73,8 @@ class Orders:
         try:
             if doing is None:
                 raise RefusedError(f"do: {do!r}; allowed: {', '.join(self._doing)}")
+            if do in _MOVING and number <= int(self._counters["commands_void"][0]):
+                raise RefusedError(f"{do}: given up: a stop was asked for after it")
             procedure = doing(order)
         except ControlError as error:
             self._reply(number, str(error))
@@ -115,8 +122,8 @@ class Orders:
         self._refuse_read_only("enable")
         self._require(Transition.ENABLE)
         name = self._known(order.get("program") or "hold")
-        self._require_lease("enable")
-        return procedures.enable(self._loop, name, self._wanted(order))
+        right = self._right("enable", order)
+        return procedures.enable(self._loop, name, self._wanted(order), right)
 
     def _disable(self, _order: Order) -> Iterator[None] | None:
         self._refuse_read_only("disable")
@@ -136,26 +143,29 @@ class Orders:
                 "hold"  # the drives are getting their power: they hold, and stay so
             )
             return
-        self._run("hold", {})
+        self._require_running("hold")
+        if loop.program.name != "hold":  # asked for over and over, it stays where it is
+            self._run("hold", {}, 0)
 
     def _program(self, order: Order) -> None:
         name = self._known(order.get("program"))
-        self._require_lease("program")
-        self._run(name, self._wanted(order))
+        self._run(name, self._wanted(order), self._right("program", order))
         if name != "hold":
             self._loop.life.forget()  # why the last motion was held
 
     def _set(self, order: Order) -> None:
         self._require_running("set")
-        self._require_lease("set")
-        self._loop.program.command(self._wanted(order))
+        right, program = self._right("set", order), self._loop.program
+        if program.needs_lease and right != self._loop.right.mover:
+            raise RefusedError(f"set: {program.name} was not started by who holds the right now")
+        program.command(self._wanted(order))
         self._loop.status.touch()
 
     def _lengths(self, order: Order) -> None:
         loop, device = self._loop, self._loop.machine.device
         if device is None or loop.life.state not in (LoopState.READY, LoopState.ACTIVE):
             raise RefusedError(f"lengths: not in state {loop.life.state.label}")
-        self._require_lease("lengths")
+        self._right("lengths", order)
         if not device.feedback.valid.all():
             raise RefusedError("lengths: not every axis answers")
         length_m = self._lengths_in(self._wanted(order), device.n)
@@ -174,9 +184,9 @@ class Orders:
                 )
         return np.array([math.nan if length is None else length for length in told])
 
-    def _run(self, name: str, wanted: Mapping[str, Any]) -> None:
+    def _run(self, name: str, wanted: Mapping[str, Any], right: int) -> None:
         self._require_running(name)
-        self._loop.switch(name, wanted)
+        self._loop.switch(name, wanted, right)
 
     # -- what stands against it
 
@@ -196,9 +206,14 @@ class Orders:
             f"{what}: not in state {loop.life.state.label}; allowed in {LoopState.ACTIVE.label}"
         )
 
-    def _require_lease(self, what: str) -> None:
-        if not self._loop.has_lease:
-            raise RefusedError(f"{what}: nobody holds the right to move; take it first")
+    def _right(self, what: str, order: Order) -> int:
+        """Return the number of the taking that gives the order, which has to hold now."""
+        number = order.get("right")
+        right = number if type(number) is int else 0
+        missing = self._loop.right.missing(right)
+        if missing:
+            raise RefusedError(f"{what}: {missing}")
+        return right
 
     def _refuse_read_only(self, what: str) -> None:
         if self._loop.machine.read_only:

@@ -28,8 +28,8 @@ NUMBERS = 10
 and longest transits of this window and the one before, its begin, the sender's zero, the interval
 between samples."""
 SIZE, SESSION, EPOCH, _DONE, _HIGHEST = range(5)
-ACCEPTED, REPEATED, LATE, REFUSED, MISSING, OVERRUN = range(5, 11)
-WHOLE = 11
+ACCEPTED, REPEATED, LATE, REFUSED, MISSING, OVERRUN, OTHER_RIGHT = range(5, 12)
+WHOLE = 12
 """The whole ones: samples that wait, the sender, how often the stream has begun, the sequence
 numbers played and seen, and what became of the samples."""
 STOPPED, HELD, FRESH = range(3)
@@ -226,11 +226,13 @@ def receive(
     last: int,
     sequence: IntArray,
     session: NDArray[np.uint32],
+    right: IntArray,
     sent_ns: IntArray,
     position: FloatArray,
     quaternion: FloatArray,
     scale: FloatArray,
     buttons: NDArray[np.uint32],
+    mover: int,
     most_m_s: float,
     silence_s: float,
     row: FloatArray,
@@ -241,9 +243,15 @@ def receive(
     numbers: FloatArray,
     whole: IntArray,
 ) -> None:
-    """Take what was posted since: the samples numbered from `first` up to `last`."""
+    """Take what was posted since: the samples numbered from `first` up to `last`.
+
+    Those that came under another right to move than the mover's are only counted.
+    """
     for k in range(first, last):
         slot = k % SAMPLES
+        if right[slot] != mover:
+            whole[OTHER_RIGHT] += 1
+            continue
         for i in range(3):
             row[i] = position[slot, i]
         for i in range(4):

@@ -45,9 +45,10 @@ class StreamSettings:
 class PoseStream:
     """Plays the samples of the set-point stream, cycle by cycle; allocates nothing in `update`.
 
-    It knows no clock: time passes by one period a call. What is played is interpolated between
-    samples, never beyond the last one, and is continuous as long as `epoch` stays the same: with
-    a new sender, after a silence, or after a leap of hand or clock the stream begins anew.
+    Only samples that came under the taking of the right to move on whose behalf the loop moves are
+    played. It knows no clock: time passes by one period a call. What is played is interpolated
+    between samples, never beyond the last one, and is continuous as long as `epoch` stays the same:
+    with a new sender, after a silence, or after a leap of hand or clock the stream begins anew.
     """
 
     def __init__(
@@ -56,10 +57,12 @@ class PoseStream:
         self._period_s = period_s
         self._settings = settings
         self._posted = block.counters["samples"]
+        self._mover = block.counters["mover"]
         samples = block.samples
         self._fields = (
             samples["sequence"].view(np.int64),  # kernels mix no signed and unsigned numbers
             samples["session"],
+            samples["right"].view(np.int64),
             samples["sent_ns"],
             samples["position_m"],
             samples["quaternion"],
@@ -122,6 +125,7 @@ class PoseStream:
             first,
             last,
             *self._fields,
+            int(self._mover[0]),
             settings.hand_speed_m_s,
             settings.silence_s,
             self._row,
@@ -173,4 +177,5 @@ class PoseStream:
             "refused": int(whole[playback.REFUSED]),
             "missing": int(whole[playback.MISSING]),
             "overrun": int(whole[playback.OVERRUN]),
+            "other_right": int(whole[playback.OTHER_RIGHT]),
         }

@@ -157,8 +157,13 @@ def _refuse_trouble(loop: ControlLoop) -> None:
         raise RefusedError(f"check: {trouble}")
 
 
-def enable(loop: ControlLoop, program: str, wanted: Mapping[str, Any] | None) -> Iterator[None]:
-    """Give the drives power, hold, release the brakes, then run `program`."""
+def enable(
+    loop: ControlLoop, program: str, wanted: Mapping[str, Any] | None, right: int
+) -> Iterator[None]:
+    """Give the drives power, hold, release the brakes, then run `program`.
+
+    The drives go on to hold where the taking number `right` does not hold any more by then.
+    """
     life, machine = loop.life, loop.machine
     loop.parts.programs[program].check(wanted or {})
     loop.first_program = program
@@ -174,13 +179,19 @@ def enable(loop: ControlLoop, program: str, wanted: Mapping[str, Any] | None) ->
         raise ControlError(life.reason) from error
     last, device = loop.parts.last, machine.device
     if last is not None and device is not None:
-        yield from _slowly(loop, lambda: last.begin_to_move(device.feedback.position_rad))
+        position_rad = device.feedback.position_rad.copy()
+        yield from _aside(loop, lambda: last.begin_to_move(position_rad))
     loop.drive()
     machine.set_brakes(True)
     while not machine.brakes_are(True):
         yield
-    if loop.first_program != "hold":
-        loop.switch(program, wanted or {})
+    if loop.first_program == "hold":
+        return
+    missing = loop.right.missing(right)
+    if missing:
+        life.blame(f"{program}: {missing}; held")
+        raise RefusedError(life.reason)
+    loop.switch(program, wanted or {}, right)
 
 
 def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
@@ -232,7 +243,7 @@ def _keep_lengths(loop: ControlLoop) -> Iterator[None]:
     if last is None or device is None:
         return
     try:
-        yield from _slowly(loop, lambda: last.keep(loop.parts.estimator.estimate, device.feedback))
+        yield from _aside(loop, lambda: last.keep(loop.parts.estimator.estimate, device.feedback))
     except ControlError as error:
         loop.notices.append(str(error))
 
@@ -336,8 +347,13 @@ def _leave_cycles(loop: ControlLoop) -> Iterator[None]:
 
 
 def _slowly(loop: ControlLoop, work: Callable[[], Any]) -> Iterator[None]:
-    """Run `work` in a thread beside the loop until it is done; raises what it raises."""
+    """Run `work`, which may wait, as a task beside the cycle; raises what it raises."""
     job = loop.job(work)
     while not job.done:
         yield
     job.result()
+
+
+def _aside(loop: ControlLoop, work: Callable[[], Any]) -> Iterator[None]:
+    """Run `work`, which touches no bus, where it keeps no cycle waiting; raises what it raises."""
+    yield from _slowly(loop, lambda: loop.machine.clock.aside(work))

@@ -6,6 +6,7 @@ same counter around its copy has copied something whole. Neither side ever waits
 
 from __future__ import annotations
 
+import fcntl
 import json
 import mmap
 import os
@@ -18,13 +19,16 @@ from numpy.typing import NDArray
 from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.cycle_row import Row, cycle_dtype
 
-MAGIC: Final = 0x63647072_72743031
+MAGIC: Final = 0x63647072_72743032
 MOST_AXES: Final = 16
 DESCRIPTION_BYTES: Final = 1 << 17
 STATUS_BYTES: Final = 1 << 14
 MESSAGE_BYTES: Final = 1 << 12
 MESSAGES: Final = 64
+URGENT_MESSAGES: Final = 16
 SAMPLES: Final = 64
+# who shortened the file would kill everybody who reads behind its end (SIGBUS)
+_SEALS: Final = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
 _COUNTERS: Final = np.dtype(
     [
@@ -37,13 +41,18 @@ _COUNTERS: Final = np.dtype(
         ("start_realtime_ns", "<i8"),
         ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not
         ("service_alive_ns", "<i8"),  # of the service's last turn, 0 before the first
-        ("lease_ns", "<i8"),  # until when somebody holds the right to move
+        ("right_number", "<u8"),  # grows with every taking of the right to move
+        ("right_until_ns", "<i8"),  # until when the newest taking holds, 0 where it has ended
+        ("mover", "<u8"),  # number of the taking on whose behalf the loop moves, 0 for nobody's
         ("rows", "<u8"),  # rows written since the beginning
         ("recorded", "<u8"),  # of them, those that are safe in the recording
         ("description", "<u8"),  # versions of the texts; odd while one is being written
         ("status", "<u8"),
         ("commands", "<u8"),  # messages written since the beginning, and those taken
         ("commands_taken", "<u8"),
+        ("commands_void", "<u8"),  # commands up to this number may not start motion any more
+        ("urgent", "<u8"),  # stops: looked at before commands
+        ("urgent_taken", "<u8"),
         ("replies", "<u8"),
         ("replies_taken", "<u8"),
         ("samples", "<u8"),
@@ -59,6 +68,7 @@ SAMPLE: Final = np.dtype(
         ("scale", "<f8"),
         ("buttons", "<u4"),
         ("session", "<u4"),
+        ("right", "<u8"),  # number of the taking of the right to move under which it came
     ]
 )
 """One sample of the set-point stream; `sequence` only grows within a session."""
@@ -71,7 +81,8 @@ class SharedBlockError(ControlError):
 class SharedBlock:
     """All parts as arrays over one file descriptor; `create` makes it, `attach` joins it.
 
-    The descriptor is inherited by child processes; when the last has ended, nothing is left.
+    The descriptor is inherited by child processes; when the last has ended, nothing is left. Over
+    one that was opened for reading only, nothing can be written.
     """
 
     def __init__(self, fd: int, n: int, capacity: int) -> None:
@@ -80,7 +91,9 @@ class SharedBlock:
         self.capacity = capacity
         """Rows that are kept; a reader further behind has lost some."""
         sizes = _sizes(n, capacity)
-        self._map = mmap.mmap(fd, sum(sizes))
+        reads_only = fcntl.fcntl(fd, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+        access = mmap.ACCESS_READ if reads_only else mmap.ACCESS_WRITE
+        self._map = mmap.mmap(fd, sum(sizes), access=access)
         views, first = [], 0
         for size in sizes:
             views.append(np.frombuffer(self._map, np.uint8, size, first))
@@ -89,9 +102,10 @@ class SharedBlock:
         """One row; `counters["rows"][0]` and so on. Who writes which is said at its type."""
         self._description, self._status = views[1], views[2]
         self._commands = views[3].reshape(MESSAGES, MESSAGE_BYTES)
-        self._replies = views[4].reshape(MESSAGES, MESSAGE_BYTES)
-        self.samples: Row = views[5].view(SAMPLE)
-        self.rows: Row = views[6].view(cycle_dtype(n))
+        self._urgent = views[4].reshape(URGENT_MESSAGES, MESSAGE_BYTES)
+        self._replies = views[5].reshape(MESSAGES, MESSAGE_BYTES)
+        self.samples: Row = views[6].view(SAMPLE)
+        self.rows: Row = views[7].view(cycle_dtype(n))
 
     @classmethod
     def create(cls, n: int, seconds: float, rate_Hz: float) -> SharedBlock:
@@ -102,9 +116,10 @@ class SharedBlock:
         if not 1 <= n <= MOST_AXES:
             raise SharedBlockError(f"{n} axes; allowed: 1 to {MOST_AXES}")
         capacity = max(256, round(seconds * rate_Hz))
-        fd = os.memfd_create("cdpr-rt")
+        fd = os.memfd_create("cdpr-rt", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
         os.set_inheritable(fd, True)
         os.ftruncate(fd, sum(_sizes(n, capacity)))
+        fcntl.fcntl(fd, fcntl.F_ADD_SEALS, _SEALS)
         block = cls(fd, n, capacity)
         block.counters["axes"], block.counters["capacity"] = n, capacity
         block.counters["magic"] = MAGIC
@@ -113,13 +128,23 @@ class SharedBlock:
     @classmethod
     def attach(cls, fd: int) -> SharedBlock:
         """Join the block behind an inherited descriptor; raises SharedBlockError."""
-        if os.fstat(fd).st_size < _COUNTERS.itemsize:
+        size = os.fstat(fd).st_size
+        if size < _COUNTERS.itemsize:
             raise SharedBlockError("the shared memory is empty")
+        try:
+            sealed = fcntl.fcntl(fd, fcntl.F_GET_SEALS) & _SEALS == _SEALS
+        except OSError:  # not of a kind that can be sealed
+            sealed = False
+        if not sealed:
+            raise SharedBlockError("the shared memory can be resized by others")
         with mmap.mmap(fd, _COUNTERS.itemsize, prot=mmap.PROT_READ) as head:
             row = np.frombuffer(bytes(head), _COUNTERS)[0]
         if row["magic"] != MAGIC:
             raise SharedBlockError("the shared memory was made by another version")
-        return cls(fd, int(row["axes"]), int(row["capacity"]))
+        n, capacity = int(row["axes"]), int(row["capacity"])
+        if not 1 <= n <= MOST_AXES or sum(_sizes(n, capacity)) != size:
+            raise SharedBlockError(f"the shared memory has {size} bytes, not those of its axes")
+        return cls(fd, n, capacity)
 
     # -- texts: the loop writes, others read
 
@@ -173,6 +198,21 @@ class SharedBlock:
         """Return the next command, None where there is none."""
         return self._take("commands", self._commands)
 
+    def void_commands(self) -> None:
+        """Have no command that has been queued so far start motion: somebody asks for a stop."""
+        self.counters["commands_void"][0] = self.counters["commands"][0]
+
+    def post_urgent(self, value: Mapping[str, Any]) -> int:
+        """Queue a stop beside the commands; return its number, which is negative.
+
+        Raises SharedBlockError.
+        """
+        return self._post("urgent", self._urgent, value, sign=-1)
+
+    def take_urgent(self) -> dict[str, Any] | None:
+        """Return the next stop, None where there is none; its number is negative."""
+        return self._take("urgent", self._urgent)
+
     def post_reply(self, value: Mapping[str, Any]) -> int:
         """Queue a reply. Raises SharedBlockError where nobody takes them."""
         return self._post("replies", self._replies, value)
@@ -181,24 +221,27 @@ class SharedBlock:
         """Return the next reply, None where there is none."""
         return self._take("replies", self._replies)
 
-    def _post(self, name: str, slots: NDArray[np.uint8], value: Mapping[str, Any]) -> int:
+    def _post(
+        self, name: str, slots: NDArray[np.uint8], value: Mapping[str, Any], sign: int = 1
+    ) -> int:
         written, taken = int(self.counters[name][0]), int(self.counters[f"{name}_taken"][0])
-        if written - taken >= MESSAGES:
-            raise SharedBlockError(f"{name}: {MESSAGES} wait to be taken already")
-        data = json.dumps({**value, "number": written + 1}).encode()
-        slot = slots[written % MESSAGES]
+        if written - taken >= len(slots):
+            raise SharedBlockError(f"{name}: {len(slots)} wait to be taken already")
+        number = sign * (written + 1)
+        data = json.dumps({**value, "number": number}).encode()
+        slot = slots[written % len(slots)]
         if len(data) + 8 > slot.size:
             raise SharedBlockError(f"{name}: {len(data)} bytes, {slot.size - 8} allowed")
         slot[:8].view("<u8")[0] = len(data)
         slot[8 : 8 + len(data)] = np.frombuffer(data, np.uint8)
         self.counters[name][0] = written + 1
-        return written + 1
+        return number
 
     def _take(self, name: str, slots: NDArray[np.uint8]) -> dict[str, Any] | None:
         written, taken = int(self.counters[name][0]), int(self.counters[f"{name}_taken"][0])
         if taken >= written:
             return None
-        slot = slots[taken % MESSAGES]
+        slot = slots[taken % len(slots)]
         size = min(int(slot[:8].view("<u8")[0]), slot.size - 8)
         value: dict[str, Any] = json.loads(slot[8 : 8 + size].tobytes())
         self.counters[f"{name}_taken"][0] = taken + 1
@@ -271,6 +314,7 @@ def _sizes(n: int, capacity: int) -> tuple[int, ...]:
         DESCRIPTION_BYTES,
         STATUS_BYTES,
         MESSAGES * MESSAGE_BYTES,
+        URGENT_MESSAGES * MESSAGE_BYTES,
         MESSAGES * MESSAGE_BYTES,
         SAMPLES * SAMPLE.itemsize,
         capacity * cycle_dtype(n).itemsize,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from cdpr_rt.runtime.shared_block import SharedBlockError
@@ -11,6 +13,8 @@ if TYPE_CHECKING:
     from cdpr_rt.runtime.loop import ControlLoop
 
 _LOOK_NS = 500_000_000
+# a letter may take a dozen bytes in JSON
+_MOST_TEXT = 500
 
 
 class StatusPage:
@@ -50,9 +54,25 @@ class StatusPage:
         try:
             self._loop.block.write_status(status)
         except (SharedBlockError, TypeError, ValueError):  # a program that tells too much of itself
-            less: dict[str, Any] = {"program_progress": {}, "buses": {}, "notices": []}
-            self._loop.block.write_status({**status, **less})
+            self._publish_less(status)
         self._written = status
+
+    def _publish_less(self, status: Mapping[str, Any]) -> None:
+        """Write what is short in any case; where even that cannot be, readers see the one before.
+
+        No loop ends because it cannot be told of.
+        """
+        less: dict[str, Any] = {
+            "program_progress": {},
+            "buses": {},
+            "notices": [],
+            "check": {},
+            "reason": str(status["reason"])[:_MOST_TEXT],
+            "reason_limit": None,
+            "safety": str(status["safety"])[:_MOST_TEXT],
+        }
+        with suppress(SharedBlockError, TypeError, ValueError):
+            self._loop.block.write_status({**status, **less})
 
     def _progress(self) -> dict[str, Any]:
         try:

@@ -18,27 +18,30 @@ from cdpr_rt.service.link import CommandTooLongError, LoopBusyError, LoopGoneErr
 from cdpr_rt.service.live import LiveSockets
 from cdpr_rt.service.metrics import Metrics
 from cdpr_rt.service.service import Service
+from cdpr_rt.service.setpoint_stream import StreamError
 
 _ABOUT = """State, motion and figures of one robot's control loop.
 
 Reading needs nothing but the connection. `enable`, `program` and `set` need the right to move:
 `POST /control` gives it to one client at a time, the token goes into the header `X-Control-Token`.
-`hold`, `disable` and `shutdown` are for everybody.
+`hold`, `disable` and `shutdown` are for everybody let in, and never refused for being one too many:
+all who ask at once get one answer. What was asked for before them, and waits still, does not start.
 """
 _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     LeaseError: HTTPStatus.CONFLICT,
     LoopGoneError: HTTPStatus.SERVICE_UNAVAILABLE,
     LoopBusyError: HTTPStatus.SERVICE_UNAVAILABLE,
     CommandTooLongError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    StreamError: HTTPStatus.NOT_FOUND,
 }
 _ERRORS: Final[dict[int | str, dict[str, Any]]] = {
     400: {"model": models.Error, "description": "The body is not JSON"},
     401: {"model": models.Error, "description": "The key is missing or wrong"},
-    403: {"model": models.Error, "description": "Asked by a page of another host"},
+    403: {"model": models.Error, "description": "Asked by a page of another host, or by its name"},
     408: {"model": models.Error, "description": "The body came too slowly"},
     413: {"model": models.Error, "description": "Too much to take"},
     422: {"model": models.Error, "description": "Not what this takes"},
-    429: {"model": models.Error, "description": "Too many requests"},
+    429: {"model": models.Error, "description": "Too many requests; never for a stop"},
 }
 _REFUSALS: Final[dict[int | str, dict[str, Any]]] = {
     409: {
@@ -46,6 +49,9 @@ _REFUSALS: Final[dict[int | str, dict[str, Any]]] = {
         "description": "The loop, or the holder of the right to move, is in the way",
     },
     503: {"model": models.Error, "description": "No loop takes commands"},
+}
+_NO_STREAM: Final[dict[int | str, dict[str, Any]]] = {
+    404: {"model": models.Error, "description": "No set-point stream is received"},
 }
 _TOKEN_MOST = 64
 Token = Annotated[
@@ -167,13 +173,21 @@ def _add_control(app: FastAPI, service: Service) -> None:
     @app.put("/control", responses=_REFUSALS)
     async def renew(token: Token = None) -> models.Renewed:
         """Keep the right to move."""
-        return models.Renewed(ttl_s=service.lease.renew(token))
+        return models.Renewed(ttl_s=service.lease.renew(token).ttl_s)
 
     @app.delete("/control", responses=_REFUSALS)
     async def release(token: Token = None) -> models.Control:
         """Give the right to move back; what moves on somebody's behalf holds."""
         service.lease.release(token)
         return models.Control.model_validate(service.control())
+
+    @app.post("/stream", responses={**_REFUSALS, **_NO_STREAM})
+    async def stream(token: Token = None) -> models.StreamSession:
+        """Get a session of the set-point stream, in place of the one before.
+
+        It lasts as long as the right to move; `session` and `key` sign the packets.
+        """
+        return models.StreamSession.model_validate(service.give_stream(token))
 
 
 def _add_commands(app: FastAPI, service: Service) -> None:
@@ -203,17 +217,17 @@ def _add_commands(app: FastAPI, service: Service) -> None:
 
     @app.post("/hold", responses=_REFUSALS)
     async def hold(body: models.Who | None = None) -> models.Done:
-        """Stop the motion and stay there, with power; for everybody."""
+        """Stop the motion and stay there, with power; for everybody who is let in."""
         return await tell("hold", body)
 
     @app.post("/disable", responses=_REFUSALS)
     async def disable(body: models.Who | None = None) -> models.Done:
-        """Stop the motion, then take the power off; for everybody."""
+        """Stop the motion, then take the power off; for everybody who is let in."""
         return await tell("disable", body)
 
     @app.post("/shutdown", responses=_REFUSALS)
     async def shutdown(body: models.Who | None = None) -> models.Done:
-        """Stop the motion, take the power off, end the daemon; for everybody."""
+        """Stop the motion, take the power off, end the daemon; for everybody who is let in."""
         return await tell("shutdown", body)
 
     @app.post("/enable", responses=_REFUSALS)

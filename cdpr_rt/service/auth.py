@@ -9,21 +9,27 @@ import ipaddress
 import json
 import socket
 import time
-from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Final
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from cdpr_rt.service.link import URGENT
+from cdpr_rt.service.token_buckets import TokenBuckets
+
 MOST_BODY_BYTES: Final = 16384
 _BODY_S = 5.0
 _REQUESTS_PER_S, _BURST = 200.0, 400.0
-_URGENT_PER_S, _URGENT_BURST = 20.0, 40.0
-_MOST_PEERS = 1024
-_URGENT = frozenset({"/hold", "/disable", "/shutdown"})
+_TRIES_PER_S, _TRIES = 2.0, 10.0
+_TRIES_OF_ALL_PER_S, _TRIES_OF_ALL = 20.0, 100.0
+_WRONG_AGAIN_S = 1.0
+"""A wrong key or token is answered so late, once there have been too many."""
+URGENT_PATHS: Final = frozenset(f"/{do}" for do in URGENT)
 _OPEN = frozenset({"/", "/status", "/docs", "/openapi.json"})
+_FOR_ALL_HERE = frozenset({("http", "POST", "/hold"), ("http", "POST", "/disable")})
+_LOOKING_ON = "/live"
 _HEADERS = [(b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store")]
 
 
@@ -38,16 +44,45 @@ class Door:
     """What is asked of those who come by one address."""
 
     key: bytes | None = None
-    """The shared key; without one nobody is asked for it."""
+    """The shared key, asked for beyond the status; without one nobody moves or ends anything here.
+
+    Who can reach an address on loopback is any user of the machine: they may look on and stop.
+    """
     local: bool = False
-    """A Unix socket: its file's permissions say who may connect."""
+    """A Unix socket: its file's permissions say who may connect, who then may do everything."""
     hosts: frozenset[str] = frozenset()
     """Names of this machine, beside localhost and addresses in figures."""
 
     @classmethod
-    def named(cls, key: bytes | None, host: str) -> Door:
-        """Return a door on TCP at `host`, known by this machine's names too."""
-        return cls(key, hosts=frozenset({host.lower(), socket.gethostname().lower()}))
+    def named(cls, key: bytes | None, host: str, *, loopback: bool = False) -> Door:
+        """Return a door on TCP at `host`, known by this machine's names too unless on loopback.
+
+        There nobody needs them, and on a network without DNS anybody may answer to them.
+        """
+        names = frozenset[str]() if loopback else names_of_this_machine()
+        return cls(key, hosts=names | {host.lower()})
+
+
+def names_of_this_machine() -> frozenset[str]:
+    """Return what this machine is called, in its own words and on a network without DNS."""
+    name = socket.gethostname().lower()
+    return frozenset({name, f"{name}.local"})
+
+
+def is_ours(host: str, names: Container[str]) -> bool:
+    """Whether a request's `Host` is localhost, an address in figures, or one of `names`.
+
+    The name of a page's own host that was pointed to this machine afterwards is none of these.
+    """
+    name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
+    name = name.removeprefix("[").removesuffix("]").lower()
+    if name == "localhost" or name in names:
+        return True
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
 
 
 class Gate:
@@ -55,8 +90,9 @@ class Gate:
 
     A page that a browser has open can send requests to this machine. Those carry the page's
     `Origin`; and where its name was pointed to this machine afterwards, that name as `Host`.
-    `refused` is called for everybody who is not let in; `leads` says whether a token is that of
-    the client that may move, whom a flood from its own address shall not silence.
+    A stop is never refused for being one too many. `refused` is called for everybody who is not
+    let in; `leads` says whether a token is that of the client that may move, whom a flood from its
+    own address shall not silence.
     """
 
     def __init__(
@@ -70,8 +106,9 @@ class Gate:
         self._door = door
         self._refused = refused
         self._leads = leads
-        self._usual = _Buckets(_REQUESTS_PER_S, _BURST)
-        self._urgent = _Buckets(_URGENT_PER_S, _URGENT_BURST)
+        self._usual = TokenBuckets(_REQUESTS_PER_S, _BURST)
+        self._tries = TokenBuckets(_TRIES_PER_S, _TRIES)
+        self._tries_of_all = TokenBuckets(_TRIES_OF_ALL_PER_S, _TRIES_OF_ALL)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request through, or answer it here."""
@@ -79,7 +116,7 @@ class Gate:
             await self._app(scope, receive, send)
             return
         try:
-            self._check(scope)
+            await self._check(scope)
             if scope["type"] == "http":
                 receive = await _whole_body(receive)
         except _RefusedError as refused:
@@ -94,22 +131,56 @@ class Gate:
 
         await self._app(scope, receive, send_on)
 
-    def _check(self, scope: Scope) -> None:
+    def knows(self, head: bytes) -> bool:
+        """Whether a request's head, up to its blank line, shows the key or who may move's token.
+
+        It decides on places and turns only: the request itself is checked when it has its turn.
+        """
+        lines, end, _ = head.partition(b"\r\n\r\n")
+        if not end:
+            return False
+        pairs = (line.partition(b":") for line in lines.split(b"\r\n")[1:])
+        headers = {name.lower(): value.strip() for name, _, value in pairs}
+        has_key = self._door.key is not None and self._has_key(headers.get(b"authorization", b""))
+        return has_key or self._leads(headers.get(b"x-control-token", b"").decode("latin-1"))
+
+    async def _check(self, scope: Scope) -> None:
         headers = {name.lower(): value for name, value in scope["headers"]}
-        peer = "" if self._door.local or not scope["client"] else scope["client"][0]
-        if self._leads(headers.get(b"x-control-token", b"").decode("latin-1")):
-            peer = "the one that may move"
-        buckets = self._urgent if scope["path"] in _URGENT else self._usual
-        if not buckets.take(peer):
-            raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; go slower")
         if b"content-length" in headers and b"transfer-encoding" in headers:
             # a proxy may see its end elsewhere, and what follows as somebody else's request
             raise _RefusedError(
                 HTTPStatus.BAD_REQUEST, "Content-Length and Transfer-Encoding; allowed: one of them"
             )
+        self._check_page(headers)
+        peer = scope["client"][0] if scope["client"] else ""
+        has_key = self._has_key(headers.get(b"authorization", b""))
+        if not has_key and not self._is_open(scope):
+            await self._slow_down(peer, scope)
+            raise _RefusedError(
+                HTTPStatus.UNAUTHORIZED,
+                "Authorization: Bearer KEY is missing or wrong"
+                if self._door.key
+                else "nobody can show a key here: everybody may look on, hold and disable; for the "
+                "rest use the Unix socket, or start the daemon with --key-file",
+            )
+        if scope["path"] in URGENT_PATHS:
+            return
+        token = headers.get(b"x-control-token", b"").decode("latin-1")
+        if self._leads(token):
+            who = "the one that may move"
+        elif token:
+            await self._slow_down(peer, scope)
+            who = peer
+        else:
+            who = f"{peer}, with the key" if has_key and self._door.key else peer
+        if who != peer and (guest := scope["state"].get("guest")) and not guest.is_known:
+            guest.recognise()
+        if not self._usual.take(who, time.monotonic()):
+            raise _RefusedError(HTTPStatus.TOO_MANY_REQUESTS, "too many requests; go slower")
+
+    def _check_page(self, headers: Mapping[bytes, bytes]) -> None:
         host = headers.get(b"host", b"").decode("latin-1")
-        guarded = self._door.local or self._door.key is not None
-        if not guarded and not self._is_ours(host):
+        if not self._door.local and not is_ours(host, self._door.hosts):
             raise _RefusedError(
                 HTTPStatus.FORBIDDEN, "Host: not a name of this machine; use its address"
             )
@@ -118,50 +189,40 @@ class Gate:
             raise _RefusedError(
                 HTTPStatus.FORBIDDEN, "Origin: pages of other hosts may not do this"
             )
-        self._check_key(scope, headers.get(b"authorization", b""))
 
-    def _is_ours(self, host: str) -> bool:
-        name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
-        name = name.removeprefix("[").removesuffix("]").lower()
-        if name == "localhost" or name in self._door.hosts:
-            return True
-        try:
-            ipaddress.ip_address(name)
-        except ValueError:
-            return False
-        return True
-
-    def _check_key(self, scope: Scope, given: bytes) -> None:
+    def _has_key(self, given: bytes) -> bool:
         key = self._door.key
-        reads_only = scope["type"] == "http" and scope["method"] in ("GET", "HEAD")
-        if key is None or (reads_only and scope["path"] in _OPEN):
-            return
+        if key is None:
+            return self._door.local
         scheme, _, secret = given.partition(b" ")
         # digests: the comparison's time tells nothing, not even the key's length
         right = hmac.compare_digest(_digest(secret.strip()), _digest(key))
-        if scheme.lower() != b"bearer" or not right:
-            raise _RefusedError(
-                HTTPStatus.UNAUTHORIZED, "Authorization: Bearer KEY is missing or wrong"
-            )
+        return right and scheme.lower() == b"bearer"
 
+    def _is_open(self, scope: Scope) -> bool:
+        """Whether this is for everybody who can connect, the key or not."""
+        kind, method, path = scope["type"], scope.get("method", ""), scope["path"]
+        reads = kind == "http" and method in ("GET", "HEAD")
+        if self._door.key is not None:
+            return reads and path in _OPEN
+        looks_on = kind == "websocket" and path == _LOOKING_ON
+        return reads or looks_on or (kind, method, path) in _FOR_ALL_HERE
 
-class _Buckets:
-    """A steady rate and a burst for each peer; peers not seen for long are forgotten."""
+    async def _slow_down(self, peer: str, scope: Scope) -> None:
+        """Note a wrong key or token; have who tries too many, or all who do, wait for the answer.
 
-    def __init__(self, rate_Hz: float, burst: float) -> None:
-        self._rate_Hz = rate_Hz
-        self._burst = burst
-        self._peers: OrderedDict[str, tuple[float, float]] = OrderedDict()
-
-    def take(self, peer: str) -> bool:
-        now = time.monotonic()
-        left, before = self._peers.pop(peer, (self._burst, now))
-        left = min(self._burst, left + (now - before) * self._rate_Hz)
-        allowed = left >= 1.0
-        self._peers[peer] = (left - 1.0 if allowed else left), now
-        if len(self._peers) > _MOST_PEERS:
-            self._peers.popitem(last=False)
-        return allowed
+        Who has the right one never comes here. Whose connection waits here leaves first where
+        there are too many.
+        """
+        now_s = time.monotonic()
+        of_this, of_all = self._tries.take(peer, now_s), self._tries_of_all.take("", now_s)
+        if of_this and of_all:
+            return
+        if guest := scope["state"].get("guest"):
+            guest.is_refused = True
+        await asyncio.sleep(_WRONG_AGAIN_S)
+        if guest:
+            guest.is_refused = False
 
 
 async def _whole_body(receive: Receive) -> Receive:

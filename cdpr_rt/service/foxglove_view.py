@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ipaddress
 import json
 import logging
 import math
 import re
+import secrets
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, Final
 
 from foxglove import Channel, Context, start_server
@@ -29,10 +31,14 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.runtime.states import LoopState, Reaction
+from cdpr_rt.service.live_door import LiveDoor
 from cdpr_rt.service.recording import WallClock
 from cdpr_rt.service.recording_events import Events
+from cdpr_rt.service.server import listen_tcp
 
 RATE_Hz: Final = 50.0
+_HOST: Final = "127.0.0.1"
+_LOOPBACK: Final = ipaddress.ip_network("127.0.0.0/8")
 _BACKLOG: Final = 128
 """Messages kept for a client that reads slowly; the oldest are dropped for it."""
 _AXIS_FIELDS: Final = {
@@ -54,13 +60,17 @@ class LiveViewError(ControlError):
 class LiveView:
     """Shows the newest row of a block `RATE_Hz` times a second to whoever connects.
 
-    Only what is subscribed to is prepared. Clients cannot change anything.
+    Only what is subscribed to is prepared. Clients cannot change anything. `origins` are those web
+    pages that may look on too.
     """
 
     name = "live_view"
 
-    def __init__(self, block: SharedBlock, robot: str, port: int) -> None:
+    def __init__(
+        self, block: SharedBlock, robot: str, port: int, origins: Collection[str] = ()
+    ) -> None:
         self._block = block
+        self._origins = origins
         self._robot = robot
         self._port = port
         self._wall = WallClock(block)
@@ -70,6 +80,8 @@ class LiveView:
         self._context = Context()
         self._topics: _Topics | None = None
         self._server: WebSocketServer | None = None
+        self._door: LiveDoor | None = None
+        self._url: str | None = None
         self._messages = 0
         self._error = ""
         self._end = threading.Event()
@@ -79,17 +91,22 @@ class LiveView:
         """Listen on loopback; raises LiveViewError where the port is not free."""
         # it has a line for each client that talks nonsense: they could fill a disk with them
         logging.getLogger("foxglove.websocket").setLevel(logging.CRITICAL)
+        inner = str(_LOOPBACK[secrets.randbelow(_LOOPBACK.num_addresses - 512) + 256])
         try:
+            listener = listen_tcp(_HOST, self._port)
             self._server = start_server(
                 name=f"cdpr-rt {self._robot}",
-                host="127.0.0.1",
-                port=self._port,
+                host=inner,
+                port=0,
                 context=self._context,
                 message_backlog_size=_BACKLOG,
             )
         except Exception as error:
             self._error = f"port {self._port}: {error}"
             raise LiveViewError(f"live view: {self._error}") from error
+        self._url = f"ws://{_HOST}:{listener.getsockname()[1]}"
+        self._door = LiveDoor(listener, (inner, self._server.port), self._origins)
+        self._door.start()
         self._thread.start()
 
     def stop(self) -> None:
@@ -97,13 +114,15 @@ class LiveView:
         self._end.set()
         if self._thread.is_alive():
             self._thread.join()
+        if self._door is not None:
+            self._door.stop()
         if self._server is not None:
             self._server.stop()
 
     def told(self) -> dict[str, Any]:
         """Return the URL to connect to, the number of moments shown, and what is wrong."""
-        url = f"ws://127.0.0.1:{self._server.port}" if self._server else None
-        return {"url": url, "moments": self._messages, "error": self._error}
+        door = {} if self._door is None else self._door.told()
+        return {"url": self._url, "moments": self._messages, "error": self._error, **door}
 
     def _run(self) -> None:
         try:

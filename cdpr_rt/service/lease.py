@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.right import LONGEST_S, PublishedRight
 
 SHORTEST_S: Final = 0.2
-LONGEST_S: Final = 10.0
 
 
 class LeaseError(ControlError):
@@ -28,24 +28,32 @@ class Holder:
     left_s: float
 
 
+@dataclass(frozen=True)
+class Renewed:
+    """What a token has renewed: the taking it belongs to, and for how long at a time."""
+
+    number: int
+    """Of the taking; what is asked for with it counts under this taking only."""
+    ttl_s: float
+
+
 class Lease:
     """Given to one client under a token; any thread may use it.
 
-    `publish` is told the instant (CLOCK_MONOTONIC, ns) until which somebody holds it, 0 when nobody
-    does. The loop compares that instant with its own clock: it needs nobody to tell it that the
+    `right` tells the loop the number of the taking and the instant (CLOCK_MONOTONIC) until which it
+    holds. The loop compares that instant with its own clock: it needs nobody to tell it that the
     holder, or this whole process, has fallen silent.
     """
 
     def __init__(
-        self, publish: Callable[[int], None], clock_ns: Callable[[], int] = time.monotonic_ns
+        self, right: PublishedRight, clock_ns: Callable[[], int] = time.monotonic_ns
     ) -> None:
-        self._publish = publish
+        self._right = right
         self._clock_ns = clock_ns
         self._lock = threading.Lock()
         self._client = ""
         self._token = ""
         self._ttl_ns = self._until_ns = 0
-        publish(0)
 
     def take(self, client: str, ttl_s: float) -> str:
         """Give the right to `client` for `ttl_s` at a time; return the token that renews it.
@@ -62,18 +70,20 @@ class Lease:
                 )
             self._client, self._token = client, secrets.token_urlsafe(18)
             self._ttl_ns = round(ttl_s * 1e9)
-            self._extend()
+            self._until_ns = self._clock_ns() + self._ttl_ns
+            self._right.begin(self._until_ns)
             return self._token
 
-    def renew(self, token: str | None) -> float:
-        """Extend it by its whole time; return that time in s.
+    def renew(self, token: str | None) -> Renewed:
+        """Extend it by its whole time; return the number of its taking and that time.
 
         Raises LeaseError where `token` is not, or is no longer, that of the holder.
         """
         with self._lock:
             self._require(token)
-            self._extend()
-            return self._ttl_ns * 1e-9
+            self._until_ns = self._clock_ns() + self._ttl_ns
+            self._right.until(self._until_ns)
+            return Renewed(self._right.number, self._ttl_ns * 1e-9)
 
     def release(self, token: str | None) -> None:
         """Give it back; a program that moves on somebody's behalf holds then. As `renew`."""
@@ -81,7 +91,7 @@ class Lease:
             self._require(token)
             self._token = ""
             self._until_ns = 0
-            self._publish(0)
+            self._right.until(0)
 
     def holder(self) -> Holder | None:
         """Return who holds it, None where nobody does."""
@@ -107,10 +117,6 @@ class Lease:
 
     def _left_s(self) -> float:
         return (self._until_ns - self._clock_ns()) * 1e-9
-
-    def _extend(self) -> None:
-        self._until_ns = self._clock_ns() + self._ttl_ns
-        self._publish(self._until_ns)
 
     def _require(self, token: str | None) -> None:
         held = self._left_s() > 0.0

@@ -17,10 +17,12 @@ from cdpr_rt.service.rows import plain
 
 DEAD: Final = "dead"
 STARTING: Final = "starting"
-_POLL_BUSY_S, _POLL_IDLE_S = 0.004, 0.05
+_POLL_BUSY_S, _POLL_IDLE_S = 0.002, 0.05
 _MOST_PENDING = 32
 _SILENT_S = 5.0
-_ALIKE: Final = frozenset({"hold", "disable", "shutdown", "acknowledge", "configure", "check"})
+URGENT: Final = frozenset({"hold", "disable", "shutdown"})
+"""Stops: for everybody, never refused for want of room, before what waits for the loop already."""
+_ALIKE: Final = URGENT | {"acknowledge", "configure", "check"}
 """Commands that say nothing but their name: asked for twice at once, they are sent once."""
 
 
@@ -130,8 +132,12 @@ class LoopLink:
         CommandTooLongError.
         """
         self._require_loop()
+        if do in URGENT:
+            # in this order: one that is not answered yet is done after all that may still start
+            self.block.void_commands()
+            self._take_replies()
         future = self._alike.get(do)
-        if future is None:
+        if future is None or future.done():
             future = self._send(do, fields)
         try:
             return await asyncio.wait_for(asyncio.shield(future), wait_s)
@@ -149,10 +155,12 @@ class LoopLink:
             raise LoopGoneError(f"the loop has not turned for {self.silent_s():.1f} s")
 
     def _send(self, do: str, fields: dict[str, Any]) -> asyncio.Future[Reply]:
-        if len(self._pending) >= _MOST_PENDING:
+        urgent = do in URGENT
+        if not urgent and len(self._pending) >= _MOST_PENDING:
             raise LoopBusyError(f"{_MOST_PENDING} commands wait for the loop already")
+        post = self.block.post_urgent if urgent else self.block.post_command
         try:
-            number = self.block.post_command({"do": do, **fields})
+            number = post({"do": do, **fields})
         except SharedBlockError as error:
             if "bytes" in str(error):
                 raise CommandTooLongError(f"a command has {MESSAGE_BYTES} bytes at most") from None

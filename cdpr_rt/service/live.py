@@ -14,8 +14,9 @@ from pydantic import Field, TypeAdapter, ValidationError
 from starlette.websockets import WebSocketDisconnect
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.right import LONGEST_S
 from cdpr_rt.service import models
-from cdpr_rt.service.lease import LONGEST_S, SHORTEST_S, LeaseError
+from cdpr_rt.service.lease import SHORTEST_S, LeaseError
 from cdpr_rt.service.rows import FIELDS, newest_row, row_table
 from cdpr_rt.service.service import Service
 

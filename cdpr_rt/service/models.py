@@ -7,7 +7,8 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
 
-from cdpr_rt.service.lease import LONGEST_S, SHORTEST_S
+from cdpr_rt.runtime.right import LONGEST_S
+from cdpr_rt.service.lease import SHORTEST_S
 
 _MOST_KEYS, _MOST_NUMBERS, _LARGEST = 32, 64, 1e9
 _KEY: Final = "^[A-Za-z][A-Za-z0-9_]{0,39}$"
@@ -141,6 +142,15 @@ class Renewed(_Answer):
     """The right to move goes on."""
 
     ttl_s: float
+
+
+class StreamSession(_Answer):
+    """A session of the set-point stream, for the holder of the right to move."""
+
+    session: int
+    key: str = Field(description="32 bytes in hexadecimal; signs the packets.")
+    host: str = Field(description="Where the stream is received; 0.0.0.0 is every address.")
+    port: int
 
 
 class Control(_Answer):

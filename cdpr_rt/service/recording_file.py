@@ -12,6 +12,7 @@ from foxglove import Context, open_mcap
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.private_files import FILE_MODE, make_private_folder
 
 PROFILE: Final = "cdpr-rt"
 """The MCAP profile: what says that a file is a recording."""
@@ -71,11 +72,12 @@ class RecordingFile:
         self.path = path
         self._held = _Held()
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_private_folder(path.parent)
         except OSError as error:
             raise RecordingError(f"{path}: cannot record: {error.strerror}") from error
         try:
-            self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+            self._fd = os.open(path, flags, FILE_MODE)
         except FileExistsError as error:
             raise NameTakenError(f"{path}: cannot record: {error.strerror}") from error
         except OSError as error:

@@ -55,6 +55,7 @@ class RowTexts:
         self._integers = np.empty((_BATCH, used[False]), np.int64)
         self._text = np.empty(_BATCH * (self._literals.size + _MOST_CHARS * len(kinds)), np.uint8)
         self._ends = np.empty(_BATCH, np.int64)
+        self(np.zeros(1, dtype))  # compiles the kernel, while no rows wait for it yet
 
     def __call__(self, rows: Row) -> list[bytes]:
         """Return the text of each of `rows` (m,)."""

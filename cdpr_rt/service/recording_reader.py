@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 import struct
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -19,11 +19,14 @@ from zstandard import ZstdError
 
 from cdpr_rt.service.recording_file import PROFILE, RecordingError
 from cdpr_rt.service.recording_schema import CYCLE, DESCRIPTION, EVENTS, STATUS
+from profiles.bounded_input import open_regular, parse_json
+from profiles.errors import ProfileError
 
 Columns = dict[str, NDArray[Any]]
 """Fields of rows: (rows,) each, or (rows, axes); null is nan."""
 
 _BROKEN: Final = (
+    ProfileError,
     McapError,
     ZstdError,
     struct.error,
@@ -85,11 +88,9 @@ class RecordingReader:
 
     def _open(self) -> IO[bytes]:
         try:
-            if self.path.exists() and not self.path.is_file():
-                raise RecordingError(f"{self.path}: cannot be read: no file")
-            return self.path.open("rb")
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be read: {error.strerror}") from None
+            return os.fdopen(open_regular(self.path), "rb")
+        except ProfileError as error:
+            raise RecordingError(str(error)) from None
 
     def _chunks(self, file: IO[bytes]) -> Iterator[Chunk]:
         """Yield the chunks; note what stands between them."""
@@ -146,7 +147,7 @@ class RecordingReader:
                     self._take(channel.topic, record)
         if not rows:
             return {}
-        properties = json.loads(schemas[schema_id].data)["properties"]
+        properties = parse_json(schemas[schema_id].data, "schema")["properties"]
         for name in (*(fields or ()), *_ALWAYS):
             if name not in properties:
                 version = self.metadata.get("version")
@@ -156,7 +157,7 @@ class RecordingReader:
     def _take(self, topic: str, message: Message) -> None:
         if topic not in (DESCRIPTION, STATUS, EVENTS):
             return
-        value: dict[str, Any] = json.loads(message.data)
+        value: dict[str, Any] = parse_json(message.data, topic)
         if topic == DESCRIPTION:
             axes = enumerate(value.get("axes", []))
             self.axes = [str(axis.get("name") or k) for k, axis in axes]

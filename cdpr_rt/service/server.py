@@ -8,29 +8,31 @@ import errno
 import os
 import socket
 import stat
-import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+import h11
 import uvicorn
-from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
 from cdpr_rt.errors import ControlError
-from cdpr_rt.service.auth import MOST_BODY_BYTES
+from cdpr_rt.service.auth import MOST_BODY_BYTES, Gate
+from cdpr_rt.service.connections import Guests, Turns, peer_of
+from cdpr_rt.service.reception import LONGEST_STOP, STOPS, Reception, may_stop
 
-_MOST_CONNECTIONS: Final = 64
-_MOST_OF_ONE: Final = 24
 _REQUEST_S, _ANSWER_S, _LOOK_S = 10.0, 90.0, 2.0
 _LEAVE_S: Final = 5.0
 _MOST_UNSENT_BYTES: Final = 1 << 20
 _UNREAD_BYTES: Final = 1 << 16
 _MOST_FRAGMENTS: Final = 64
-_FULL: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
-_FULL_AGAIN_S: Final = 10.0
+_MOST_UNSEEN_BYTES: Final = 1 << 20
+_PIECE_BYTES: Final = 2048
+_STOP_AGAIN_S: Final = 0.2
+"""A connection that asks for a stop this soon after another waits for its turn as all do."""
 _NO_UTF8: Final = 1007  # RFC 6455, 7.4.1
 
 
@@ -39,16 +41,87 @@ class ListenError(ControlError):
 
 
 class _Http(H11Protocol):
-    """Ends a connection that neither asks anything nor takes its answer, and one too many."""
+    """Ends a connection that neither asks anything nor takes its answer, and one too many.
+
+    What it asks waits for its turn; a stop does not, unless the last one came just before.
+    """
+
+    def __init__(self, guests: Guests, turns: Turns, is_known: bool, **given: Any) -> None:
+        super().__init__(**given)
+        self.app_state = {**self.app_state, "guest": self}
+        self.peer = ""
+        self.is_known = is_known
+        self.is_refused = self.stops_only = False
+        self.since_s = 0.0
+        self._guests, self._turns = guests, turns
+        self._waits = self._stops = False
+        self._stopped_s = -_STOP_AGAIN_S
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether it has no complete request that waits for its answer."""
+        asked = self.cycle is not None and not self.cycle.response_complete
+        return self.is_refused or not (self._waits or (asked and not self.cycle.more_body))
+
+    def recognise(self) -> None:
+        """It has shown the key, or the token of who may move."""
+        self._guests.recognise(self)
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
-        peers = [getattr(one, "client", None) for one in self.connections]
-        of_this = sum(peer[0] == self.client[0] for peer in peers if peer and self.client)
-        if len(peers) > _MOST_CONNECTIONS or of_this > _MOST_OF_ONE:
+        try:
+            self.client = peer_of(transport.get_extra_info("socket"))
+        except OSError:  # it has gone already
+            transport.abort()
+            return
+        self.peer = self.client[0]
+        self.since_s = self.loop.time()
+        if not self._guests.admit(self):
             transport.abort()
             return
         self._watch(None, 0.0)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._guests.forget(self)
+        super().connection_lost(exc)
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        super().handle_websocket_upgrade(event)
+        successor: Any = self.transport.get_protocol()
+        self._guests.take_over(self, successor)
+
+    def on_response_complete(self) -> None:
+        self.since_s = self.loop.time()
+        super().on_response_complete()
+
+    def handle_events(self) -> None:
+        if self.conn.their_state is h11.IDLE:
+            head = self.conn.trailing_data[0][:LONGEST_STOP]
+            if self.stops_only and not may_stop(head):
+                self.transport.abort()
+                return
+            now_s = self.loop.time()
+            self._stops = head.startswith(STOPS) and now_s - self._stopped_s >= _STOP_AGAIN_S
+            if self._stops:
+                self._stopped_s = now_s
+                self._turns.give_way()
+            if not head:
+                super().handle_events()  # no more has come yet
+                return
+        if self._stops:
+            super().handle_events()
+        elif not self._waits:
+            self._waits = True
+            self.flow.pause_reading()
+            self._turns.ask(self._have_turn, self.is_known)
+
+    def _have_turn(self) -> bool:
+        self._waits = False
+        if self.transport.is_closing():
+            return False
+        self.flow.resume_reading()
+        super().handle_events()
+        return True
 
     def _watch(self, before: object, waited_s: float) -> None:
         if self not in self.connections:  # lost, or a WebSocket's by now
@@ -63,20 +136,69 @@ class _Http(H11Protocol):
 
 
 class _WebSocket(WebSocketsSansIOProtocol):
-    """Lets its handler cut the connection, and does so itself where nothing is read."""
+    """Lets its handler cut the connection, and does so itself where nothing is read.
+
+    What comes is looked at by the piece, each in its turn.
+    """
+
+    def __init__(self, guests: Guests, turns: Turns, **given: Any) -> None:
+        super().__init__(**given)
+        self.app_state = {**self.app_state, "guest": self}
+        self.peer = ""
+        self.is_known = self.is_refused = self.stops_only = False
+        self.since_s = 0.0
+        self._guests, self._turns = guests, turns
+        self._unseen = bytearray()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether it only takes its leave, or has never been let in."""
+        return self.is_refused or self.close_sent
+
+    def recognise(self) -> None:
+        """It has shown the key, or the token of who may move."""
+        self._guests.recognise(self)
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
+        with contextlib.suppress(OSError):  # it has gone already
+            self.client = peer_of(transport.get_extra_info("socket"))
+            self.peer = self.client[0]
+        self.since_s = self.loop.time()
         # what one is behind is held here for some kilobytes only; more would be old when it is read
         transport.get_extra_info("socket").setsockopt(
             socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD_BYTES
         )
 
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._guests.forget(self)
+        super().connection_lost(exc)
+
     def data_received(self, data: bytes) -> None:
-        super().data_received(data)
+        if not self.handshake_initiated:
+            super().data_received(data)
+            return
+        if not self._unseen:
+            self._turns.ask(self._have_turn, self.is_known)
+        self._unseen += data
+        self.transport.pause_reading()
+        if len(self._unseen) > _MOST_UNSEEN_BYTES:
+            self.transport.abort()
+
+    def _have_turn(self) -> bool:
+        if self.transport.is_closing():
+            return False
+        piece = bytes(self._unseen[:_PIECE_BYTES])
+        del self._unseen[:_PIECE_BYTES]
+        super().data_received(piece)
         # answers to pings are queued without limit otherwise
         if self.transport.get_write_buffer_size() > _MOST_UNSENT_BYTES:
             self.transport.abort()
+        elif self._unseen:
+            self._turns.ask(self._have_turn, self.is_known)
+        elif not self.read_paused and not self.transport.is_closing():
+            self.transport.resume_reading()
+        return True
 
     def handle_cont(self, event: Frame) -> None:
         if len(self.frames) >= _MOST_FRAGMENTS:  # empty ones count as nothing in `ws_max_size`
@@ -93,6 +215,12 @@ class _WebSocket(WebSocketsSansIOProtocol):
             return
         super().send_receive_event_to_app()
 
+    async def send(self, message: Any) -> None:
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body":
+            # refused: the base class takes it for one never answered, and logs each as an error
+            self.handshake_complete = True
+
     async def run_asgi(self) -> None:
         self.scope["state"]["abort"] = self.transport.abort
         try:
@@ -102,14 +230,25 @@ class _WebSocket(WebSocketsSansIOProtocol):
 
 
 class Server(uvicorn.Server):
-    """Serves an application on one socket, in the caller's asyncio loop, under its signals."""
+    """Serves an application on one socket, in the caller's asyncio loop, under its signals.
 
-    def __init__(self, app: ASGIApp, listener: socket.socket) -> None:
+    All servers of a process share their `turns`. `tell` is told when no connection more can be
+    taken.
+    """
+
+    def __init__(
+        self,
+        app: Gate,
+        listener: socket.socket,
+        turns: Turns,
+        tell: Callable[[str], None],
+    ) -> None:
+        shared = (Guests(), turns)
         super().__init__(
             uvicorn.Config(
                 app,
-                http=_Http,
-                ws=_WebSocket,
+                http=partial(_Http, *shared),  # type: ignore[arg-type]  # called as a class is
+                ws=partial(_WebSocket, *shared),  # type: ignore[arg-type]
                 lifespan="off",
                 log_config=None,
                 access_log=False,
@@ -121,11 +260,30 @@ class Server(uvicorn.Server):
                 ws_ping_timeout=5.0,
                 timeout_keep_alive=10,
                 timeout_graceful_shutdown=2,
-                backlog=2 * _MOST_CONNECTIONS,
                 h11_max_incomplete_event_size=MOST_BODY_BYTES,
             )
         )
         self._listener = listener
+        self._knows = app.knows
+        self._turns, self._tell = turns, tell
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen; called by `serve`."""
+        await self.lifespan.startup()
+        assert sockets is not None  # by `run_until_told`
+        made: Any = self.config.http_protocol_class
+        given = {"config": self.config, "server_state": self.server_state}
+
+        def factory(is_known: bool) -> asyncio.Protocol:
+            protocol: asyncio.Protocol = made(
+                is_known=is_known, **given, app_state=self.lifespan.state
+            )
+            return protocol
+
+        shared = self._knows, self._turns, self._tell
+        receptions: Any = [Reception(one, factory, *shared) for one in sockets]
+        self.servers = receptions
+        self.started = True
 
     async def run_until_told(self) -> None:
         """Serve until `should_exit` is set."""
@@ -135,25 +293,6 @@ class Server(uvicorn.Server):
     def capture_signals(self) -> Iterator[None]:
         """Leave signals to the process."""
         yield
-
-
-def watch_tables(loop: asyncio.AbstractEventLoop, tell: Callable[[str], None]) -> None:
-    """Have `tell` told, now and then, that the system gives no descriptor for a connection more.
-
-    asyncio waits for a second and tries again, but logs hundreds of tracebacks each time.
-    """
-    told_s = -_FULL_AGAIN_S
-
-    def handle(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        nonlocal told_s
-        error = context.get("exception")
-        if not isinstance(error, OSError) or error.errno not in _FULL:
-            loop.default_exception_handler(context)
-        elif time.monotonic() - told_s >= _FULL_AGAIN_S:
-            told_s = time.monotonic()
-            tell(f"no connection more can be taken: {error.strerror}")
-
-    loop.set_exception_handler(handle)
 
 
 def listen_unix(path: Path) -> socket.socket:
@@ -192,6 +331,7 @@ def listen_tcp(host: str, port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind(address)
+        listener.listen()  # before that, another could bind the same
     except OSError as error:
         listener.close()
         raise ListenError(f"{host}:{port}: {error.strerror or error}") from None

@@ -9,11 +9,13 @@ from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from typing import Any, Final
 
 from cdpr_rt.runtime.cycle_row import SCALARS
+from cdpr_rt.runtime.right import PublishedRight
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.link import LoopLink, Reply
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.rows import newest_row, plain, row_table
+from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError
 
 _TURN_S = 0.2
 _LOG = logging.getLogger("cdpr.service")
@@ -51,9 +53,11 @@ class Service:
         self.robot = robot
         self.block = block
         self.link = LoopLink(block)
-        self.lease = Lease(self._publish)
+        self.lease = Lease(PublishedRight(block))
         self.events = self.link.events
         self.parts: list[Part] = []
+        self.stream: SetpointStream | None = None
+        """That which has started, None where set-points are not received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
         """Figures of the service itself, shown as the part `service`."""
         self.background: list[Callable[[], Coroutine[Any, Any, None]]] = []
@@ -61,13 +65,11 @@ class Service:
         self.http: tuple[str, int] | None = None
         """Where it listens on TCP, None where it does not."""
         self._held_by = ""
+        self._noted: Reply | None = None
 
     def count_refusal(self) -> None:
         """Count a request that was refused at the door."""
         self.counts["refused"] += 1
-
-    def _publish(self, until_ns: int) -> None:
-        self.block.counters["lease_ns"][0] = until_ns
 
     def start_parts(self, parts: Sequence[Part]) -> None:
         """Start each; one that cannot start is left out, and an event says why."""
@@ -79,6 +81,8 @@ class Service:
                 _LOG.error("%s: cannot start: %s", part.name, error)
             else:
                 self.parts.append(part)
+                if isinstance(part, SetpointStream):
+                    self.stream = part
 
     def stop_parts(self) -> None:
         """End all that have started, whatever becomes of one."""
@@ -87,6 +91,19 @@ class Service:
                 part.stop()
             except Exception as error:
                 self.events.add(part.name, f"{part.name}: did not end well: {error}")
+
+    def give_stream(self, token: str | None) -> dict[str, Any]:
+        """Give the holder of the right to move a session of the stream, as `models.StreamSession`.
+
+        Raises LeaseError, and StreamError where no stream is received.
+        """
+        if self.stream is None:
+            raise StreamError(
+                f"{self.robot}: its daemon takes no set-point stream; allowed: one that was "
+                "started with --stream HOST:PORT"
+            )
+        given, (host, port) = self.stream.desk.give(token), self.stream.address
+        return {"session": given.number, "key": given.key.hex(), "host": host, "port": port}
 
     # -- commands
 
@@ -103,8 +120,8 @@ class Service:
         It lapses when the client has `gone` meanwhile. Raises LeaseError and what
         `LoopLink.command` raises.
         """
-        self.lease.renew(token)
-        work = asyncio.ensure_future(self.tell(do, client, **fields))
+        right = self.lease.renew(token).number
+        work = asyncio.ensure_future(self.tell(do, client, right=right, **fields))
         while True:
             done, _ = await asyncio.wait({work}, timeout=_TURN_S)
             if done:
@@ -119,6 +136,9 @@ class Service:
     async def tell(self, do: str, client: str, **fields: Any) -> Reply:
         """Send a command that anybody may give; raises what `LoopLink.command` raises."""
         reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
+        if reply is self._noted:
+            return reply  # many have asked for the same at once
+        self._noted = reply
         if do != "set" or not reply.ok:
             result = "" if reply.ok else f": refused: {reply.text}"
             self.events.add("command", f"{do} by {client}{result}")

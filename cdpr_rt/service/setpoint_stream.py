@@ -31,7 +31,8 @@ class SetpointStream:
     """Listens at `host` and `port` (0: any free one) from `start` until `stop`.
 
     Set-points go into `block` while their sender has the right to move, which `lease` gives.
-    Raises ControlError for a key that is too short.
+    Without a `key` only sessions are served that `desk.give` has given. Raises ControlError for a
+    key that is too short.
     """
 
     name = "stream"
@@ -72,6 +73,11 @@ class SetpointStream:
         self.desk.close()
         self._follow_holder(self._sock)
         self._sock.close()
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Return the host and the port it listens at."""
+        return self._wanted[0], self.port
 
     def told(self) -> dict[str, Any]:
         """Return who holds it, the delay there and back, and the packets counted."""

@@ -19,6 +19,7 @@ from cdpr_rt.service.stream_packet import (
     PacketError,
     Standing,
     StreamAnswer,
+    StreamSession,
     StreamSetpoint,
     Welcome,
     parse,
@@ -36,20 +37,23 @@ _SILENCE_S = 2.5
 class StreamClient:
     """Sends set-points to the robot at `host` and `port` and takes its answers; never waits.
 
-    `key` is the one shared with the robot, needed where that is not on the same machine. `token`
-    is that of a right to move which is held already; without, the stream asks for the right
-    itself. Nothing here runs by itself: call `send` 30 to 60 times a second and `receive` between,
-    or whenever `fileno` is readable. Raises OSError where there is no such host.
+    `access` is the session that the control interface has given, or the key shared with the robot.
+    With the key, `token` is that of a right to move which is held already; without, the stream asks
+    for the right itself. Nothing here runs by itself: call `send` 30 to 60 times a second and
+    `receive` between, or whenever `fileno` is readable. Raises OSError where there is no such host.
     """
 
     def __init__(
-        self, host: str, port: int, key: bytes | None = None, token: str | None = None
+        self,
+        host: str,
+        port: int,
+        access: StreamSession | bytes,
+        token: str | None = None,
     ) -> None:
         family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         self._sock = socket.socket(family, kind)
         self._sock.setblocking(False)
         self._sock.connect(address)
-        self._shared = None if key is None else stream_key(key)
         self._right = NO_RIGHT if token is None else right_digest(token)
         self.state: StreamAnswer | None = None
         """The newest answer, None before the first."""
@@ -57,13 +61,19 @@ class StreamClient:
         """Delay there and back of the newest answer."""
         self.sent = 0
         self.answered = 0
-        self._key: bytes | None = None
-        self._begin_session()
+        self._sequence = 0
+        self._echo_ns = self._echo_at_ns = self._heard_ns = 0
+        self._shared = self._key = b""
+        if isinstance(access, StreamSession):
+            self._session, self._key = access.number, access.key
+        else:
+            self._shared = stream_key(access)
+            self._begin_session()
 
     @property
     def ready(self) -> bool:
-        """Whether set-points go out: always without a key, else once the robot has greeted."""
-        return self._key is not None or self._shared is None
+        """Whether set-points go out: in a given session at once, else once it was greeted."""
+        return bool(self._key)
 
     def fileno(self) -> int:
         """Return the descriptor to poll for answers."""
@@ -81,7 +91,7 @@ class StreamClient:
         `position_m` is (3,), `quaternion` (4,) w x y z of length 1.
         """
         now_ns = time.monotonic_ns()
-        if self.ready and now_ns - self._heard_ns > _SILENCE_S * 1e9:
+        if self._shared and self.ready and now_ns - self._heard_ns > _SILENCE_S * 1e9:
             self._begin_session()
         if not self.ready:
             self._greet(now_ns)
@@ -111,7 +121,7 @@ class StreamClient:
             now_ns = time.monotonic_ns()
             answer = self._open(data)
             if isinstance(answer, Welcome):
-                self._key = session_key(self._shared or b"", answer.robot_nonce, self._session)
+                self._key = session_key(self._shared, answer.robot_nonce, self._session)
                 self._heard_ns = now_ns
             elif isinstance(answer, StreamAnswer):
                 self._note(answer, now_ns)
@@ -137,7 +147,7 @@ class StreamClient:
     def _begin_session(self) -> None:
         self._session = secrets.randbelow((1 << 32) - 1) + 1
         self._nonce = secrets.token_bytes(NONCE_BYTES)
-        self._key = None
+        self._key = b""
         self._sequence = 0
         self._echo_ns = self._echo_at_ns = 0
         self._greeted_ns = 0
@@ -151,7 +161,7 @@ class StreamClient:
     def _open(self, data: bytes) -> Welcome | StreamAnswer | None:
         """Return an answer that is meant for this session, None for anything else."""
         try:
-            packet = parse(data, self._shared if not self.ready else self._key)
+            packet = parse(data, self._key or self._shared)
         except PacketError:
             return None
         if isinstance(packet, Welcome):
@@ -170,7 +180,7 @@ class StreamClient:
             self._echo_ns, self._echo_at_ns = answer.robot_ns, now_ns
             self.round_trip_s = (now_ns - answer.sent_ns) * 1e-9
         refused = answer.standing in (Standing.BUSY, Standing.NO_RIGHT)
-        if refused and self._shared is not None:
+        if refused and self._shared:
             # the robot's nonce is used up
             self._begin_session()
             self._greeted_ns = now_ns

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import secrets
+import threading
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -20,9 +21,11 @@ from cdpr_rt.service.stream_packet import (
     Fault,
     Hello,
     Kind,
+    Packet,
     PacketError,
     Standing,
     StreamAnswer,
+    StreamSession,
     StreamSetpoint,
     Welcome,
     parse,
@@ -34,7 +37,7 @@ from cdpr_rt.service.stream_packet import (
 )
 
 SILENCE_NS: Final = 1_000_000_000
-"""After so long without a set-point the stream is free for others."""
+"""After so long without a set-point a session that began with the shared key ends."""
 MOST_RATE_Hz: Final = 250.0
 """Set-points a second that are taken of one sender, in the mean."""
 BURST: Final = 50
@@ -78,27 +81,38 @@ class Window:
 
 @dataclass
 class _Session:
-    """One sender's use of the stream, from its first set-point to its last."""
+    """One sender's use of the stream, under one taking of the right to move."""
 
     name: int
-    number: int
-    address: Address
-    key: bytes | None
+    key: bytes
     token: str
-    borrowed: bool
-    """Whether the right is that of the token's holder, who gives it back himself."""
-    last_ns: int
+    """That of the right, which it renews."""
+    right: int
+    """The number of the taking that the token belongs to."""
+    given: bool
+    """Whether the control interface has given it to the holder; such a one bears silence."""
+    own: bool = False
+    """Whether it has asked for the right itself, and so gives it back at its end."""
+    address: Address | None = None
+    """That of the first packet; no other counts."""
+    over: bool = False
+    """Whether its right has ended: what still comes is answered, and does not count."""
+    last_ns: int = 0
     credit: float = BURST
     window: Window = field(default_factory=Window)
+
+    def is_of(self, name: int, address: Address) -> bool:
+        """Whether a packet with this name, from there, belongs to it."""
+        return self.name == name and self.address in (None, address)
 
 
 class StreamDesk:
     """Takes packets, posts what counts into `block`, and says what is to be answered.
 
-    The first sender with the right to move holds the stream until it says good-bye or has been
-    silent for `SILENCE_NS`. With a shared `key` nobody is answered who does not know it, and what
-    was sent once cannot be sent again by others: each session has a key of its own, made of a
-    nonce that the robot uses once. Raises ControlError for a key that is too short.
+    One session holds the stream. The control interface gives it to the holder of the right to move
+    by `give`, or it begins with a shared `key`: nobody is answered who has neither. It is bound to
+    one taking of the right and to the first address that uses it; after its end nothing of it
+    counts. Any thread may use it. Raises ControlError for a key that is too short.
     """
 
     def __init__(self, block: SharedBlock, lease: Lease, key: bytes | None = None) -> None:
@@ -113,26 +127,76 @@ class StreamDesk:
         self._session: _Session | None = None
         self._sessions = 0
         self._sample = np.zeros((), SAMPLE)
+        self._lock = threading.Lock()
 
     @property
     def holder(self) -> Address | None:
         """Return the address of who holds the stream."""
-        return None if self._session is None else self._session.address
+        session = self._session
+        return None if session is None or session.over else session.address
+
+    def give(self, token: str | None) -> StreamSession:
+        """Give the holder of the right to move a session, in place of any other.
+
+        Raises LeaseError where `token` is not the holder's.
+        """
+        with self._lock:
+            right = self._lease.renew(token).number
+            given = StreamSession(secrets.randbelow((1 << 32) - 1) + 1, secrets.token_bytes(32))
+            self._begin(_Session(given.number, given.key, token or "", right, given=True))
+            return given
 
     def take(self, data: bytes, address: Address, now_ns: int) -> bytes | None:
         """Take one packet that came at `now_ns`; return the answer, None where none is due."""
-        self.expire(now_ns)
-        try:
-            packet, key = self._open(data, address)
-        except PacketError as error:
-            self.counts[error.fault.name.lower()] += 1
-            return None
+        with self._lock:
+            self._expire(now_ns)
+            try:
+                packet, key = self._open(data, address)
+            except PacketError as error:
+                self.counts[error.fault.name.lower()] += 1
+                return None
+            return self._answer(packet, key, address, now_ns)
+
+    def expire(self, now_ns: int) -> None:
+        """End a session whose right has ended, or whose sender was silent for too long."""
+        with self._lock:
+            self._expire(now_ns)
+
+    def close(self) -> None:
+        """Free the stream, as when its holder says good-bye."""
+        with self._lock:
+            self._end()
+
+    def _expire(self, now_ns: int) -> None:
+        session = self._session
+        if session is None or session.over:
+            return
+        if not self._lease.is_held_by(session.token):
+            session.over = True
+        elif not session.given and now_ns - session.last_ns > SILENCE_NS:
+            self.counts["silent"] += 1
+            self._end()
+
+    def _open(self, data: bytes, address: Address) -> tuple[Packet, bytes]:
+        """Return the packet and the key its tag was made with; raises PacketError."""
+        kind, name = peek(data)
+        session = self._session
+        if session is not None and session.is_of(name, address):
+            return parse(data, session.key), session.key
+        if self._key is None:
+            raise PacketError(Fault.SESSION, f"session {name} is none that was given")
+        # no limit of tries: only who forges could use it up, and a tag is not guessed anyway
+        greets = kind in (Kind.HELLO, Kind.WELCOME)
+        key = self._key if greets else session_key(self._key, self._nonce, name)
+        return parse(data, key), key
+
+    def _answer(self, packet: Packet, key: bytes, address: Address, now_ns: int) -> bytes | None:
         if isinstance(packet, Hello):
             self.counts["hello"] += 1
-            return seal(Welcome(packet.session, packet.nonce, self._nonce), self._key)
+            return seal(Welcome(packet.session, packet.nonce, self._nonce), key)
         if isinstance(packet, Bye):
             self.counts["bye"] += 1
-            if self._owns(packet.session, address):
+            if self._session is not None and self._session.is_of(packet.session, address):
                 self._end()
             return None
         if isinstance(packet, StreamSetpoint):
@@ -144,45 +208,17 @@ class StreamDesk:
         self.counts["kind"] += 1  # an answer, that nobody sends to a robot
         return None
 
-    def expire(self, now_ns: int) -> None:
-        """Free the stream of a sender that has been silent for too long."""
-        session = self._session
-        if session is not None and now_ns - session.last_ns > SILENCE_NS:
-            self.counts["silent"] += 1
-            self._end()
-
-    def close(self) -> None:
-        """Free the stream, as when its holder says good-bye."""
-        self._end()
-
-    def _open(self, data: bytes, address: Address) -> tuple[Any, bytes | None]:
-        """Return the packet and the key its tag was made with; raises PacketError."""
-        if self._key is None:
-            return parse(data, None), None
-        kind, name = peek(data, True)
-        if kind in (Kind.HELLO, Kind.WELCOME):
-            return parse(data, self._key), self._key
-        session = self._session
-        if session is not None and self._owns(name, address):
-            return parse(data, session.key), session.key
-        key = session_key(self._key, self._nonce, name)
-        return parse(data, key), key
-
-    def _owns(self, name: int, address: Address) -> bool:
-        session = self._session
-        return session is not None and (session.name, session.address) == (name, address)
-
-    def _judge(
-        self, packet: StreamSetpoint, address: Address, key: bytes | None, now_ns: int
-    ) -> Standing:
+    def _judge(self, packet: StreamSetpoint, address: Address, key: bytes, now_ns: int) -> Standing:
         """Say what becomes of a set-point, and post it where it counts."""
-        if self._session is None:
-            self._begin(packet, address, key, now_ns)
-            if self._session is None:
-                return Standing.NO_RIGHT
-        elif not self._owns(packet.session, address):
-            return Standing.BUSY
         session = self._session
+        if session is None or not session.is_of(packet.session, address):
+            if session is not None and not session.over:
+                return Standing.BUSY
+            session = self._begin_with_key(packet, key, address)
+            if session is None:
+                return Standing.NO_RIGHT
+        if session.address is None:
+            session.address, session.last_ns = address, now_ns
         # before all else: what others send once more costs the holder nothing and keeps nothing up
         if not session.window.take(packet.sequence):
             return Standing.REPEATED
@@ -194,37 +230,39 @@ class StreamDesk:
         try:
             self._lease.renew(session.token)
         except LeaseError:
-            self._end()
+            session.over = True
+            if not session.given:
+                self._end()  # its sender greets again
             return Standing.NO_RIGHT
         self._post(packet, session, now_ns)
         return Standing.ACCEPTED
 
-    def _begin(
-        self, packet: StreamSetpoint, address: Address, key: bytes | None, now_ns: int
-    ) -> None:
-        borrowed = packet.right != NO_RIGHT
-        token = self._borrow(packet.right) if borrowed else self._ask(address)
-        if token is None:
-            return
-        self._sessions += 1
-        self._session = _Session(
-            packet.session, self._sessions, address, key, token, borrowed, now_ns
-        )
-        self._renew_nonce()
-
-    def _borrow(self, digest: bytes) -> str | None:
-        return self._lease.find(digest, right_digest)
-
-    def _ask(self, address: Address) -> str | None:
-        host, port = address[:2]
+    def _begin_with_key(
+        self, packet: StreamSetpoint, key: bytes, address: Address
+    ) -> _Session | None:
+        """Begin a session with the right that is named, or its own; None where it has none."""
+        own = packet.right == NO_RIGHT
         try:
-            return self._lease.take(f"set-point stream from {host} port {port}", SILENCE_NS * 1e-9)
+            token = self._ask(address) if own else self._lease.find(packet.right, right_digest)
+            right = self._lease.renew(token).number
         except LeaseError:
             return None
+        return self._begin(_Session(packet.session, key, token or "", right, given=False, own=own))
+
+    def _ask(self, address: Address) -> str:
+        host, port = address[:2]
+        return self._lease.take(f"set-point stream from {host} port {port}", SILENCE_NS * 1e-9)
+
+    def _begin(self, session: _Session) -> _Session:
+        self._end()
+        self._sessions += 1
+        self._session = session
+        self._renew_nonce()
+        return session
 
     def _end(self) -> None:
         session, self._session = self._session, None
-        if session is not None and not session.borrowed:
+        if session is not None and session.own:
             with contextlib.suppress(LeaseError):  # it has run out, or is somebody else's by now
                 self._lease.release(session.token)
 
@@ -241,7 +279,8 @@ class StreamDesk:
         sample["quaternion"] = packet.quaternion
         sample["scale"] = packet.scale
         sample["buttons"] = packet.buttons
-        sample["session"] = session.number
+        sample["session"] = self._sessions
+        sample["right"] = session.right
         self._block.post_sample(sample)
         there_and_back_ns = now_ns - packet.echo_ns - packet.echo_held_ns
         if packet.echo_ns > 0 and 0 <= there_and_back_ns < _LONGEST_ROUND_TRIP_NS:

@@ -1,7 +1,7 @@
 """Packets of the set-point stream: bytes in and out, checked; docs/setpoint-stream.md shows them.
 
-Little-endian. Every packet begins with magic, version, kind, status and session; where a key is
-shared, it ends with an HMAC-SHA256 of everything before.
+Little-endian. Every packet begins with magic, version, kind, status and session, and ends with an
+HMAC-SHA256 of everything before.
 """
 
 from __future__ import annotations
@@ -74,6 +74,10 @@ class Fault(IntEnum):
     TAG = 4
     NOT_FINITE = 5
     ABSURD = 6
+    UNSIGNED = 7
+    """It has no tag at all."""
+    SESSION = 8
+    """It is of no session that there is, or comes from another address than the session's."""
 
 
 class PacketError(ControlError):
@@ -86,7 +90,7 @@ class PacketError(ControlError):
 
 @dataclass(frozen=True)
 class Hello:
-    """A sender asks for the robot's nonce; only needed where a key is shared."""
+    """A sender that knows the shared key asks for the robot's nonce."""
 
     session: int
     nonce: bytes
@@ -113,6 +117,14 @@ class Welcome:
 
 
 @dataclass(frozen=True)
+class StreamSession:
+    """A session that the control interface has given to the holder of the right to move."""
+
+    number: int
+    key: bytes
+
+
+@dataclass(frozen=True)
 class StreamSetpoint:
     """Where the hand that leads is: position in m, attitude as a unit quaternion w x y z."""
 
@@ -128,7 +140,10 @@ class StreamSetpoint:
     echo_held_ns: int = 0
     """Time from that answer's arrival until this packet was sent."""
     right: bytes = NO_RIGHT
-    """First bytes of the SHA-256 of the token that gives the right to move."""
+    """First bytes of the SHA-256 of the token that gives the right to move.
+
+    Looked at where a session begins with the shared key; one that was given has its right already.
+    """
 
     def pack(self) -> bytes:
         """Return it without a tag."""
@@ -195,7 +210,7 @@ _SIZES: Final = {
 LONGEST_BYTES: Final = max(_SIZES.values()) + TAG_BYTES
 
 
-def peek(data: bytes, tagged: bool) -> tuple[Kind, int]:
+def peek(data: bytes) -> tuple[Kind, int]:
     """Return kind and session of a packet whose head and length are right; raises PacketError."""
     if len(data) < _HEAD.size:
         raise PacketError(Fault.SIZE, f"{len(data)} bytes are no packet")
@@ -208,28 +223,29 @@ def peek(data: bytes, tagged: bool) -> tuple[Kind, int]:
         kind = Kind(number)
     except ValueError:
         raise PacketError(Fault.KIND, f"kind {number}; allowed: 1 to {max(Kind)}") from None
-    size = _SIZES[kind] + (TAG_BYTES if tagged else 0)
+    size = _SIZES[kind] + TAG_BYTES
+    if len(data) == _SIZES[kind]:
+        raise PacketError(Fault.UNSIGNED, f"{kind.name}: without a tag")
     if len(data) != size:
         raise PacketError(Fault.SIZE, f"{kind.name}: {len(data)} bytes; allowed: {size}")
     return kind, session
 
 
-def parse(data: bytes, key: bytes | None) -> Packet:
-    """Take a packet apart, its tag made with `key` where there is one; raises PacketError."""
-    kind, session = peek(data, key is not None)
-    if key is not None:
-        body, tag = data[:-TAG_BYTES], data[-TAG_BYTES:]
-        if not hmac.compare_digest(tag, _tag(body, key)):
-            raise PacketError(Fault.TAG, "the tag was not made with this key")
+def parse(data: bytes, key: bytes) -> Packet:
+    """Take a packet apart whose tag was made with `key`; raises PacketError."""
+    kind, session = peek(data)
+    body, tag = data[:-TAG_BYTES], data[-TAG_BYTES:]
+    if not hmac.compare_digest(tag, _tag(body, key)):
+        raise PacketError(Fault.TAG, "the tag was not made with this key")
     if session == 0:
         raise PacketError(Fault.ABSURD, "session 0; allowed: 1 to 4294967295")
     return _PARSERS[kind](data)
 
 
-def seal(packet: Packet, key: bytes | None) -> bytes:
-    """Return a packet's bytes, with its tag where there is a key."""
+def seal(packet: Packet, key: bytes) -> bytes:
+    """Return a packet's bytes with its tag."""
     body = packet.pack()
-    return body if key is None else body + _tag(body, key)
+    return body + _tag(body, key)
 
 
 def stream_key(shared: bytes) -> bytes:

@@ -26,11 +26,16 @@ __all__ = [
 
 
 def open_port(
-    url: BusUrl, filters: Filters | None = None, health: BusHealth | None = None
+    url: BusUrl,
+    filters: Filters | None = None,
+    health: BusHealth | None = None,
+    *,
+    hears_errors: bool = False,
 ) -> FramePort:
     """Open `url` for packed frames; only frames that pass one of `filters` come in.
 
-    What the port notices of the bus's state goes into `health`, into one of its own without.
+    What the port notices of the bus's state goes into `health`, into one of its own without. Who
+    `hears_errors` gets the controller's error frames too, where the interface tells of errors.
 
     Raises:
         BusError: the bus cannot be opened.
@@ -38,7 +43,7 @@ def open_port(
     if url.interface == "simbus":
         return open_simbus(url, filters, health)
     if url.interface == "socketcan":
-        return open_socketcan(url, filters, health)
+        return open_socketcan(url, filters, health, hears_errors=hears_errors)
     if url.interface == "socketcand":
-        return SocketcandPort(url, filters, health)
-    return open_line_port(url, filters, health)
+        return SocketcandPort(url, filters, health, hears_errors=hears_errors)
+    return open_line_port(url, filters, health, hears_errors=hears_errors)

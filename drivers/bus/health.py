@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import time
 from enum import IntEnum
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import can
 
 ERR_FLAG = 0x20000000
 ALL_ERRORS = 0x1FFFFFFF
@@ -69,10 +65,6 @@ class BusHealth:
     def usable(self) -> bool:
         """Whether frames can go out: false while bus-off."""
         return self.state is not BusState.BUS_OFF
-
-    def take_message(self, message: can.Message) -> bool:
-        """Take in an error frame of python-can; return whether the state changed."""
-        return self.take_error(message.arbitration_id, bytes(message.data))
 
     def take_error(self, can_id: int, data: bytes) -> bool:
         """Take in an error frame: its class bits and its 8 bytes; return whether `state` changed.

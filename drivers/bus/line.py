@@ -220,10 +220,12 @@ class LinePort(PackedPort):
         open_line: Callable[[BusUrl], Line],
         filters: Filters | None,
         health: BusHealth | None = None,
+        *,
+        hears_errors: bool = False,
     ) -> None:
         """Join the line; raises BusError when it cannot be opened."""
         health = health if health is not None else BusHealth()
-        self._member = _Member(filters, health, hears_errors=False)
+        self._member = _Member(filters, health, hears_errors=hears_errors)
         super().__init__(url, self._member.own_end, {}, health)
         try:
             self._shared = _join(url, open_line, self._member)
@@ -233,6 +235,10 @@ class LinePort(PackedPort):
             raise
         self.send = self._send
         self.close = self._close
+
+    def set_filters(self, filters: Filters) -> None:
+        """Have only frames come in that pass one of `filters`, from now on."""
+        self._shared.set_filters(self._member, filters)
 
     def _send(self, frame: Bytes) -> int:
         self._shared.write(frame, self._member)

@@ -40,16 +40,22 @@ __all__ = [
 
 
 class FrameBuffer:
-    """Room for `n` frames, seen as one structured array and as `n` writable 16-byte views."""
+    """Room for `n` frames, seen as an array of bytes, as a structured one and as `n` views.
 
-    def __init__(self, n: int) -> None:
-        self.array: NDArray[np.void] = np.zeros(n, FRAME_DTYPE)
+    `row_bytes` is more than 16 where other packets come between the frames.
+    """
+
+    def __init__(self, n: int, row_bytes: int = FRAME_BYTES) -> None:
+        self.bytes: NDArray[np.uint8] = np.zeros((n, row_bytes), np.uint8)
+        """Shape (n, row_bytes)."""
+        self.rows: list[memoryview] = [memoryview(row.data) for row in self.bytes]
+        """The writable views to hand to `send` and `recv_into`."""
+
+    @property
+    def array(self) -> NDArray[np.void]:
         """Shape (n,), fields can_id, length, data (8 bytes)."""
-        raw = memoryview(self.array.view(np.uint8).data)
-        self.rows: list[memoryview] = [
-            raw[start : start + FRAME_BYTES] for start in range(0, n * FRAME_BYTES, FRAME_BYTES)
-        ]
-        """The views to hand to `send` and `recv_into`."""
+        frames: NDArray[np.void] = self.bytes[:, :FRAME_BYTES].view(FRAME_DTYPE)[:, 0]
+        return frames
 
 
 class FramePort(Protocol):
@@ -77,6 +83,9 @@ class FramePort(Protocol):
 
     def settimeout(self, seconds: float | None) -> None:
         """Limit the wait of `recv_into`; None waits for ever, 0 does not wait."""
+
+    def set_filters(self, filters: Filters) -> None:
+        """Have only frames come in that pass one of `filters`, from some moment on."""
 
     def drain(self) -> int:
         """Throw away the frames that wait; return how many."""
@@ -131,6 +140,10 @@ class PackedPort:
         """
         self._sock.setblocking(seconds != 0)
         set_receive_timeout(self._sock, seconds)
+
+    def set_filters(self, filters: Filters) -> None:
+        """Have only frames come in that pass one of `filters`, from some moment on."""
+        simbus_socket.set_filters(self._sock, filters)
 
     def drain(self) -> int:
         """Throw away the frames that wait; return how many."""

@@ -53,10 +53,15 @@ class PythonCanLine:
 
 
 def open_line_port(
-    url: BusUrl, filters: Filters | None = None, health: BusHealth | None = None
+    url: BusUrl,
+    filters: Filters | None = None,
+    health: BusHealth | None = None,
+    *,
+    hears_errors: bool = False,
 ) -> LinePort:
     """Return packed frames on an interface without a packed socket of its own; raises BusError."""
-    return LinePort(url, _LINES.get(url.interface, PythonCanLine), filters, health)
+    line = _LINES.get(url.interface, PythonCanLine)
+    return LinePort(url, line, filters, health, hears_errors=hears_errors)
 
 
 def open_python_can(

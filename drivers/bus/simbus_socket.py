@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from drivers.errors import BusError
+from profiles.bounded_input import parse_json
+from profiles.errors import ProfileError
 
 FRAME_BYTES = 16
 Filters = Iterable[tuple[int, int]]
@@ -16,6 +18,7 @@ Filters = Iterable[tuple[int, int]]
 
 _ANSWER_TIMEOUT_S = 5.0
 _CONTROL_BYTES = 65536
+_CLOSED = "the simulated bus closed the connection; it takes the user who runs it, and root"
 # the hub takes control messages below 448 bytes; a pair has up to 24
 _FILTERS_A_MESSAGE = 16
 
@@ -68,24 +71,28 @@ def exchange(sock: socket.socket, filters: Filters | None) -> dict[str, Any]:
     Raises:
         BusError: the hub did not answer in time, refused, or went away.
     """
-    if filters is not None:
-        set_filters(sock, filters)
-    sock.send(control_message({"status": True}))
     before = sock.gettimeout()
     sock.settimeout(_ANSWER_TIMEOUT_S)
     try:
+        if filters is not None:
+            set_filters(sock, filters)
+        sock.send(control_message({"status": True}))
         while True:
             packet = sock.recv(_CONTROL_BYTES)
             if not packet:
-                raise BusError("the simulated bus closed the connection")
+                raise BusError(_CLOSED)
             if len(packet) == FRAME_BYTES:
                 continue
-            answer = json.loads(packet)
+            answer = parse_json(packet, "its answer")
             if "error" in answer:
                 raise BusError(f"the simulated bus refused: {answer['error']}")
             return dict(answer["status"])
+    except (ProfileError, LookupError, TypeError, ValueError) as error:
+        raise BusError(f"the simulated bus answered what is no status: {error}") from None
     except TimeoutError:
         raise BusError(f"the simulated bus did not answer in {_ANSWER_TIMEOUT_S:g} s") from None
+    except (BrokenPipeError, ConnectionResetError):
+        raise BusError(_CLOSED) from None
     except OSError as error:
         raise BusError(f"the simulated bus went away ({error.strerror})") from None
     finally:

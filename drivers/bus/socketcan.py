@@ -14,7 +14,7 @@ from typing import Any
 import can
 from can.interfaces.socketcan import SocketcanBus
 
-from drivers.bus.health import BusHealth
+from drivers.bus.health import ALL_ERRORS, BusHealth
 from drivers.bus.packed import BUFFER_BYTES, SEND_TIMEOUT_S, Bytes, PackedPort
 from drivers.bus.simbus_socket import Filters
 from drivers.bus.url import BusUrl
@@ -26,6 +26,7 @@ _TIMESPEC = struct.Struct("ll")
 _IFF_UP = 0x1
 _ARPHRD_CAN = 280
 _SO_RCVBUFFORCE = 33
+_CAN_RAW_ERR_FILTER = 2
 _TRIES = 1000
 
 
@@ -47,6 +48,11 @@ class SocketCanPort(PackedPort):
             return time.time()  # no frame yet
         seconds, nanoseconds = _TIMESPEC.unpack(stamp)
         return float(seconds + nanoseconds * 1e-9)
+
+    def set_filters(self, filters: Filters) -> None:
+        """Have only frames come in that pass one of `filters`, from now on."""
+        packed = b"".join(struct.pack("=II", can_id, mask) for can_id, mask in filters)
+        self._sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, packed)
 
     def lost(self, error: OSError | None = None) -> BusError:
         """Return the BusError that tells why the bus cannot be used any more, and what helps."""
@@ -110,7 +116,11 @@ def _queue_full(channel: str) -> str:
 
 
 def open_socketcan(
-    url: BusUrl, filters: Filters | None, health: BusHealth | None = None
+    url: BusUrl,
+    filters: Filters | None,
+    health: BusHealth | None = None,
+    *,
+    hears_errors: bool = False,
 ) -> SocketCanPort:
     """Open a raw CAN socket on the network interface that `url` names.
 
@@ -126,14 +136,16 @@ def open_socketcan(
         with contextlib.suppress(OSError):
             # fails, no frame having come, but from now on the kernel stamps them
             fcntl.ioctl(sock, _SIOCGSTAMPNS, bytes(_TIMESPEC.size))
+        port = SocketCanPort(url, sock, health)
         if filters is not None:
-            packed = b"".join(struct.pack("=II", can_id, mask) for can_id, mask in filters)
-            sock.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, packed)
+            port.set_filters(filters)
+        if hears_errors:
+            sock.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, ALL_ERRORS)
         sock.bind((url.channel,))
     except OSError as error:
         sock.close()
         raise BusError(f"{url}: {url.channel} cannot be used ({error.strerror})") from None
-    return SocketCanPort(url, sock, health)
+    return port
 
 
 def interface_problem(url: BusUrl) -> str:

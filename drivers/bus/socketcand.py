@@ -200,12 +200,20 @@ def _frame_of(message: bytes) -> bytes | None:
 class SocketcandPort(PackedPort):
     """Packed frames on a connection of its own, read by the caller: no thread stands between."""
 
-    def __init__(self, url: BusUrl, filters: Filters | None, health: BusHealth | None) -> None:
+    def __init__(
+        self,
+        url: BusUrl,
+        filters: Filters | None,
+        health: BusHealth | None,
+        *,
+        hears_errors: bool = False,
+    ) -> None:
         """Connect; raises BusError."""
         self._line = SocketcandLine(url)
         super().__init__(url, self._line.sock, {}, health)
         self._line.sock.setblocking(True)  # time-outs are the kernel's
         self._filters = None if filters is None else list(filters)
+        self._hears_errors = hears_errors
         self._wanted: dict[int, bool] = {}
         self._flags = 0
         self._pending: deque[bytes] = deque()
@@ -226,6 +234,11 @@ class SocketcandPort(PackedPort):
         """Limit the wait of `recv_into`; None waits for ever, 0 does not wait."""
         self._flags = socket.MSG_DONTWAIT if seconds == 0 else 0
         set_receive_timeout(self._line.sock, seconds)
+
+    def set_filters(self, filters: Filters) -> None:
+        """Have only frames come in that pass one of `filters`, from now on."""
+        self._filters = list(filters)
+        self._wanted = {}
 
     def drain(self) -> int:
         """Throw away the frames that wait; return how many."""
@@ -272,12 +285,14 @@ class SocketcandPort(PackedPort):
             self._line.close()
 
     def _keep(self, frames: list[bytes]) -> None:
-        """Put aside those that pass the filters; error frames are for the acyclic side."""
+        """Put aside those that pass the filters, and error frames where they are wanted."""
         for frame in frames:
             can_id = int.from_bytes(frame[:4], sys.byteorder)
             wanted = self._wanted.get(can_id)
             if wanted is None:
-                wanted = not can_id & ERR_FLAG and passes(can_id, self._filters)
+                wanted = passes(can_id, self._filters)
+                if can_id & ERR_FLAG:
+                    wanted = self._hears_errors
                 if len(self._wanted) < _MOST_IDENTIFIERS:
                     self._wanted[can_id] = wanted
             if wanted:

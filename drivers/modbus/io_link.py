@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
 
+from cdpr_rt.clock import Clock
 from drivers.modbus.io_rules import IoState, interpret
 from drivers.modbus.tcp import ModbusTcp
 from profiles.safety_io import SafetyIoProfile
@@ -13,9 +13,11 @@ from profiles.safety_io import SafetyIoProfile
 class IoLink:
     """A connection to one safety I/O; every method raises ModbusError."""
 
-    def __init__(self, profile: SafetyIoProfile) -> None:
+    def __init__(self, profile: SafetyIoProfile, clock: Clock) -> None:
         self.profile = profile
-        self._client = ModbusTcp(profile.host, profile.port, profile.unit, profile.answer_timeout_s)
+        self.clock = clock
+        place = (profile.host, profile.port, profile.unit)
+        self._client = ModbusTcp(*place, profile.answer_timeout_s, clock)
         self.name = f"safety I/O {self._client.name}"
         self._inputs = _span(point.input for _, point in profile.inputs())
         self._coils = _span(point.coil for _, point in profile.outputs())
@@ -30,8 +32,8 @@ class IoLink:
 
     def state(self) -> IoState:
         """Return what the I/O says now."""
-        began = time.monotonic()
-        return interpret(self.profile, *self.read(), began)
+        began_s = self.clock.now_s
+        return interpret(self.profile, *self.read(), began_s)
 
     def write(self, coil: int, on: bool) -> None:
         """Set one coil."""

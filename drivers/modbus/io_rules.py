@@ -15,7 +15,7 @@ class IoState:
     """What one good poll saw; made once, never changed."""
 
     at_s: float
-    """Monotonic time at which the poll was begun: nothing in it is older."""
+    """Time of the robot's clock at which the poll was begun: nothing in it is older."""
     chain_ok: bool
     contactor_asked: bool
     contactor_closed: bool

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from typing import Final
 
+from cdpr_rt.clock import Clock
 from drivers.modbus.safety_io import SafetyIo
 from drivers.modbus.tcp import ModbusTcp
 from drivers.rail import RailError
@@ -23,12 +23,12 @@ class ModbusRailAxis:
     the move.
     """
 
-    def __init__(self, rail: RailProfile, safety: SafetyIo | None = None) -> None:
+    def __init__(self, rail: RailProfile, clock: Clock, safety: SafetyIo | None = None) -> None:
         assert rail.modbus is not None  # its kind says so
-        self._safety = safety
+        self._clock, self._safety = clock, safety
         self._rail, self._map = rail, rail.modbus
         there = self._map
-        self._client = ModbusTcp(there.host, there.port, there.unit, there.answer_timeout_s)
+        self._client = ModbusTcp(there.host, there.port, there.unit, there.answer_timeout_s, clock)
         self._command = self._count = 0
 
     def open(self) -> None:
@@ -148,9 +148,10 @@ class ModbusRailAxis:
             self._client.write_registers(watchdog.trigger_register, [self._count])
 
     def _await(self, bit: int, wanted: bool, timeout_s: float, problem: str) -> None:
-        deadline = time.monotonic() + timeout_s
+        clock = self._clock
+        deadline_s = clock.now_s + timeout_s
         while self._is(bit) != wanted:
-            if time.monotonic() > deadline:
+            if clock.now_s > deadline_s:
                 status = self._map.status_register
                 raise RailError(f"{self._rail.name}: {problem} (status register {status})")
-            time.sleep(_LOOK_S)
+            clock.sleep(_LOOK_S)

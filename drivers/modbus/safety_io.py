@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import threading
-import time
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.state_file import StateFileError, read_state, remove_state, write_state
+from cdpr_rt.task import Task
 from drivers.errors import DriverError
 from drivers.modbus.io_link import IoLink
 from drivers.modbus.io_rules import IoState, Rules, interpret
@@ -21,9 +21,6 @@ from profiles.safety_io import Brake, SafetyIoProfile
 
 _STOP_GRACE_S: Final = 2.0
 """Longest time that a controlled stop may take before power is taken all the same."""
-_LOOK_S = 0.002
-_CONNECT_S: Final = 2.0
-_PRIORITY: Final = 50
 _SHOWN: Final = ("red", "yellow", "green")
 
 
@@ -34,19 +31,21 @@ class SafetyIoError(DriverError):
 class SafetyIo:
     """One safety I/O; implements `cdpr_rt.executive.Watch`.
 
-    A thread of its own polls and writes; whoever reads `alarm` or `stop_reason` judges by himself
-    how old the last good poll is, so that a thread that hangs trips as well. A trip stays, also in
-    the file `latch`, until `acknowledge`. The contactor closes only by `energise`. Leaving the
-    block applies the brakes and opens the contactor.
+    A task of `clock` polls and writes; whoever reads `alarm` or `stop_reason` judges by himself
+    how old the last good poll is, so that a task that waits for an answer trips as well. While
+    nobody waits by the clock nor runs cycles there are no polls: then the device's own watchdog
+    opens the contactor and applies the brakes. A trip stays, also in the file `latch`, until
+    `acknowledge`. The contactor closes only by `energise`. Leaving the block applies the brakes and
+    opens the contactor.
     """
 
-    def __init__(self, profile: SafetyIoProfile, latch: Path | None = None) -> None:
+    def __init__(self, profile: SafetyIoProfile, clock: Clock, latch: Path | None = None) -> None:
         self.profile = profile
-        self._link = IoLink(profile)
+        self.clock = clock
+        self._link = IoLink(profile, clock)
         self.name = self._link.name
         self._latch_file = latch
         self._rules = Rules(profile)
-        self._lock = threading.Lock()
         self._contactor = profile.contactor.output.coil
         self._brakes = {a.axis: a.brake for a in profile.axes if a.brake is not None}
         safe = [self._contactor, *(brake.output.coil for brake in self._brakes.values())]
@@ -60,8 +59,7 @@ class SafetyIo:
         self._good_at_s = self._asked_at_s = 0.0
         self._granted_for_s = self._granted_at_s = 0.0
         self._state: IoState | None = None
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="safety-io", daemon=True)
+        self._task: Task[None] | None = None
 
     # -- what the executive asks every cycle
 
@@ -71,11 +69,11 @@ class SafetyIo:
 
     def stop_reason(self) -> str:
         """Return why the motion must be braked to its end, or an empty text."""
-        now = time.monotonic()
+        now = self.clock.now_s
         good, timeout = self._good_at_s, self._timeout_s
         if now - good > timeout and self._armed and not self._stop:
-            # cycles that begin after a pause, in which polls may have had to wait for the
-            # interpreter, are no silence yet: that is granted once for each good poll
+            # cycles that begin after a pause, in which nobody polled, are no silence yet: that is
+            # granted once for each good poll
             if now - self._asked_at_s > timeout and good != self._granted_for_s:
                 self._granted_for_s, self._granted_at_s = good, now
             elif good != self._granted_for_s or now - self._granted_at_s > timeout:
@@ -103,7 +101,7 @@ class SafetyIo:
         except BaseException:
             self._link.close()
             raise
-        self._thread.start()
+        self._task = self.clock.start(self._run)
         return self
 
     def energise(self) -> None:
@@ -112,9 +110,8 @@ class SafetyIo:
         if tripped:
             raise SafetyIoError(f"{tripped}; see to it, then acknowledge it: cdpr io ack")
         self._refuse(self._obstacle(self._next()))
-        with self._lock:
-            self._rules.restart(time.monotonic())
-            self._armed = self._wanted[self._contactor] = True
+        self._rules.restart(self.clock.now_s)
+        self._armed = self._wanted[self._contactor] = True
         self._await(lambda state: state.contactor_closed, self.profile.contactor.timeout_s)
 
     def release_brakes(self, *axes: str) -> None:
@@ -140,12 +137,12 @@ class SafetyIo:
 
     def de_energise(self) -> str:
         """Apply the brakes, open the contactor; return what did not follow, empty if all did."""
-        with self._lock:
-            self._armed = False
+        self._armed = False
+        if self._task is not None and self._task.done:  # an interrupt may have ended it
+            self._task = self.clock.start(self._run)
         self.apply_brakes()
         doubt = self._doubt(lambda: self.await_brakes(False))
-        with self._lock:
-            self._wanted[self._contactor] = False
+        self._wanted[self._contactor] = False
         timeout_s = self.profile.contactor.timeout_s
         opened = self._doubt(lambda: self._await(lambda s: not s.contactor_closed, timeout_s))
         return "; ".join(dict.fromkeys(text for text in (doubt, opened) if text))
@@ -153,24 +150,21 @@ class SafetyIo:
     def acknowledge(self) -> None:
         """Forget a trip whose cause is gone; raises SafetyIoError while it is not."""
         self._refuse(self._obstacle(self._next(), limits=False))
-        with self._lock:
-            self._alarm = self._stop = ""
-            self._kept_trip = False
-            self._written.clear()
-            self._rules.restart(time.monotonic())
+        self._alarm = self._stop = ""
+        self._kept_trip = False
+        self._written.clear()
+        self._rules.restart(self.clock.now_s)
         if self._latch_file is not None:
             remove_state(self._latch_file)
 
     def close(self) -> str:
         """Apply the brakes, open the contactor and leave; return what did not follow."""
-        if self._ended.is_set():
+        if self._task is None:
             return ""
         doubt = self.de_energise()
-        self._ended.set()
-        self._thread.join(_CONNECT_S + 5 * self.profile.answer_timeout_s)
+        self.clock.cancel(self._task)
+        self._task = None
         self._keep_trip()
-        if self._thread.is_alive():
-            return f"{doubt}; the polling thread hangs"
         with contextlib.suppress(ModbusError):
             for colour, output in self.profile.lights.items():
                 if colour in _SHOWN:  # red stays on until the trip is acknowledged
@@ -194,37 +188,34 @@ class SafetyIo:
         if doubt and error is not None:
             error.add_note(doubt)
 
-    # -- the polling thread
+    # -- the polling task
 
     def _run(self) -> None:
-        # who holds the interpreter must not be kept waiting: the control cycle waits for it then
-        with contextlib.suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
-        due = time.monotonic()
-        while not self._ended.is_set():
+        clock = self.clock
+        due_s = clock.now_s
+        while True:
+            due_s = max(due_s + self.profile.poll_period_s, clock.now_s)
+            clock.wait(None, due_s)
             try:
                 self._poll()
             except ModbusError as error:
                 self._error = str(error)
             except Exception as error:
-                # a thread that ended could switch nothing off any more; this counts as silence
+                # a task that ended could switch nothing off any more; this counts as silence
                 self._error = f"{type(error).__name__}: {error}"
             self._keep_trip()
-            due = max(due + self.profile.poll_period_s, time.monotonic())
-            self._ended.wait(due - time.monotonic())
 
     def _poll(self) -> None:
         """Write what has changed, read everything, judge it; raises ModbusError."""
-        began = time.monotonic()
+        began = self.clock.now_s
         self._link.feed_watchdog()
         wanted = self._write()
         inputs, coils = self._link.read()
         state = interpret(self.profile, inputs, coils, began)
         self._state, self._good_at_s, self._error = state, began, ""
         stray = {coil: coils[coil] for coil, on in wanted.items() if coils[coil] != on}
-        with self._lock:
-            alarm = self._rules.alarm(state, inputs, wanted, stray)
-            armed = self._armed
+        alarm = self._rules.alarm(state, inputs, wanted, stray)
+        armed = self._armed
         if armed and alarm:
             self._trip(alarm=f"{self.name}: {alarm}")
         elif armed and state.limits:
@@ -234,8 +225,7 @@ class SafetyIo:
         self._light(state)
 
     def _write(self) -> dict[int, bool]:
-        with self._lock:
-            wanted = dict(self._wanted)
+        wanted = dict(self._wanted)
         for coil, on in (wanted | self._lights).items():
             if self._written.get(coil) != on:
                 self._link.write(coil, on)
@@ -244,8 +234,7 @@ class SafetyIo:
 
     def _drop(self) -> None:
         """Apply all brakes and open the contactor, without waiting for the next poll."""
-        with self._lock:
-            self._wanted = dict.fromkeys(self._wanted, False)
+        self._wanted = dict.fromkeys(self._wanted, False)
         self._write()
 
     def _light(self, state: IoState) -> None:
@@ -264,20 +253,19 @@ class SafetyIo:
         return self._alarm or self._stop
 
     def _trip(self, alarm: str = "", stop: str = "") -> None:
-        with self._lock:
-            self._alarm = self._alarm or alarm
-            if stop and not self._stop:
-                self._stop, self._stop_at_s = stop, time.monotonic()
+        self._alarm = self._alarm or alarm
+        if stop and not self._stop:
+            self._stop, self._stop_at_s = stop, self.clock.now_s
 
     def _keep_trip(self) -> None:
         """Write a new trip down for later commands; never in the control cycle, as disks wait."""
-        reason = self._tripped
-        if not reason or self._kept_trip or self._latch_file is None:
+        reason, latch = self._tripped, self._latch_file
+        if not reason or self._kept_trip or latch is None:
             return
         self._kept_trip = True
         date = datetime.now(UTC).isoformat(timespec="seconds")
         try:
-            write_state(self._latch_file, {"reason": reason, "date": date})
+            self.clock.aside(partial(write_state, latch, {"reason": reason, "date": date}))
         except StateFileError as error:
             self._alarm = f"{reason} ({error})"
 
@@ -292,7 +280,7 @@ class SafetyIo:
         return "" if held is None else f"tripped on {held.get('date')}: {held.get('reason')}"
 
     def _unheard(self) -> str:
-        age = time.monotonic() - self._good_at_s
+        age = self.clock.now_s - self._good_at_s
         return (
             f"{self.name}: no good poll for {age:.2f} s, {self._timeout_s:g} s allowed "
             f"({self._error or 'no answer has come'})"
@@ -335,11 +323,10 @@ class SafetyIo:
 
     def _set_brakes(self, axes: tuple[str, ...], released: bool) -> None:
         coils = [self._brake(axis).output.coil for axis in axes or self._brakes]
-        with self._lock:
-            if released and self._tripped:
-                raise SafetyIoError(self._tripped)
-            for coil in coils:
-                self._wanted[coil] = released
+        if released and self._tripped:
+            raise SafetyIoError(self._tripped)
+        for coil in coils:
+            self._wanted[coil] = released
 
     def _brake(self, axis: str) -> Brake:
         brake = self._brakes.get(axis)
@@ -354,21 +341,23 @@ class SafetyIo:
 
     def _await(self, done: Callable[[IoState], bool], timeout_s: float) -> IoState:
         """Wait until a poll begun from now on sees `done`; raises SafetyIoError."""
-        asked = time.monotonic()
+        clock, asked_s = self.clock, self.clock.now_s
+
+        def settled() -> bool:
+            return (self._armed and bool(self._tripped)) or (
+                self.state.at_s > asked_s and done(self.state)
+            )
+
         # the rules know better what is wrong, a poll after the same time
-        patience = timeout_s + self._timeout_s
-        while True:
-            if self._armed and self._tripped:
-                raise SafetyIoError(self._tripped)
-            state = self.state
-            if state.at_s > asked and done(state):
-                return state
-            now = time.monotonic()
-            if now - asked > patience:
-                if now - state.at_s > self._timeout_s:
-                    raise SafetyIoError(self._unheard())
-                raise SafetyIoError(f"{self.name}: {self._obstacle(state) or 'does not follow'}")
-            time.sleep(_LOOK_S)
+        followed = clock.wait(settled, asked_s + timeout_s + self._timeout_s)
+        state = self.state
+        if self._armed and self._tripped:
+            raise SafetyIoError(self._tripped)
+        if followed:
+            return state
+        if clock.now_s - state.at_s > self._timeout_s:
+            raise SafetyIoError(self._unheard())
+        raise SafetyIoError(f"{self.name}: {self._obstacle(state) or 'does not follow'}")
 
     @staticmethod
     def _doubt(wait: Callable[[], object]) -> str:

@@ -1,14 +1,13 @@
-"""Load-cell amplifiers on one serial line, sampled by a thread beside the control cycle."""
+"""Load-cell amplifiers on one serial line, sampled by a task beside the control cycle."""
 
 from __future__ import annotations
 
 import struct
-import threading
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Self
 
+from cdpr_rt.clock import Clock
+from cdpr_rt.task import Task
 from cdpr_rt.tension import TensionExchange, TensionFault
 from drivers.modbus.line import LineError, ModbusLine
 from drivers.modbus.tcp import ModbusError
@@ -51,14 +50,15 @@ def raw_value(value: ValueMap, registers: list[int]) -> float:
 class LoadCells:
     """The load cells of a profile on an open line; reads and tares them one by one.
 
-    Methods raise ModbusError. Not for several threads at once.
+    Methods raise ModbusError. For one task of `clock` at a time.
     """
 
-    def __init__(self, profile: TensionSensors, port: str) -> None:
+    def __init__(self, profile: TensionSensors, port: str, clock: Clock) -> None:
         self.profile = profile
         self.line = ModbusLine(
             port,
             profile.baudrate,
+            clock,
             parity=profile.parity,
             stop_bits=profile.stop_bits,
             timeout_s=profile.answer_timeout_s,
@@ -117,51 +117,41 @@ def _requests(amplifier: Amplifier) -> list[tuple[RegisterKind, int, int]]:
 
 
 class TensionSampler:
-    """Reads all load cells in turn in a thread of its own and publishes them.
+    """Reads all load cells in turn in a task of `clock` and publishes them.
 
     `exchange` is what the cycle reads. Sensors that fail are asked again in turn, a port that is
     gone is opened again; what went wrong last stands in `errors`, by sensor.
     """
 
-    def __init__(
-        self,
-        profile: TensionSensors,
-        port: str,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, profile: TensionSensors, port: str, clock: Clock) -> None:
         names = [sensor.cable for sensor in profile.sensors]
         self.exchange = TensionExchange(names, profile.stale_after_s, clock)
         self.errors = [""] * len(names)
         self.readings = [0] * len(names)
         """Good answers of each sensor so far."""
-        self._cells = LoadCells(profile, port)
+        self._cells = LoadCells(profile, port, clock)
         self._clock = clock
         self._rounds = 0
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"tension {port}", daemon=True)
+        self._task: Task[None] | None = None
 
     def start(self) -> Self:
         """Open the line and begin to sample. Raises LineError for a port that does not open."""
         self._cells.line.open()
-        self._thread.start()
+        self._task = self._clock.start(self._run)
         return self
 
     def await_readings(self, timeout_s: float) -> None:
         """Wait until every sensor was read at least once; raises ModbusError."""
-        until = time.monotonic() + timeout_s
-        while not all(self.readings):
-            if time.monotonic() > until:
-                missing = self.readings.index(0)
-                cable = self.exchange.cables[missing]
-                why = self.errors[missing] or f"no reading within {timeout_s:g} s"
-                raise ModbusError(f"{cable}: {why}")
-            time.sleep(0.005)
+        if not self._clock.wait(lambda: all(self.readings), self._clock.now_s + timeout_s):
+            missing = self.readings.index(0)
+            cable = self.exchange.cables[missing]
+            why = self.errors[missing] or f"no reading within {timeout_s:g} s"
+            raise ModbusError(f"{cable}: {why}")
 
     def stop(self) -> None:
-        """End the thread and close the line."""
-        self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        """End the task and close the line."""
+        if self._task is not None:
+            self._clock.cancel(self._task)
         self._cells.close()
 
     def __enter__(self) -> Self:
@@ -171,11 +161,12 @@ class TensionSampler:
         self.stop()
 
     def _run(self) -> None:
-        due = time.monotonic()
-        while not self._stop.is_set():
-            pause = self._round()
-            due = max(due + self._cells.profile.period_s, time.monotonic())
-            self._stop.wait(max(due - time.monotonic(), pause))
+        clock = self._clock
+        due_s = clock.now_s
+        while True:
+            pause_s = self._round()
+            due_s = max(due_s + self._cells.profile.period_s, clock.now_s + pause_s)
+            clock.wait(None, due_s)
 
     def _round(self) -> float:
         """Read every sensor once; return how long to wait at least before the next round.
@@ -187,11 +178,9 @@ class TensionSampler:
         again = failing[self._rounds % len(failing)] if failing else -1
         self._rounds += 1
         for number in range(self.exchange.n):
-            if self._stop.is_set():
-                break
             if number in failing and number != again:
                 continue
-            asked = self._clock()
+            asked_s = self._clock.now_s
             try:
                 self._cells.line.patient = number not in failing
                 reading = self._cells.read(number)
@@ -202,6 +191,6 @@ class TensionSampler:
                 self.errors[number] = str(error)
                 continue
             self.errors[number] = ""
-            self.exchange.publish(number, reading.tension_N, asked, reading.fault)
+            self.exchange.publish(number, reading.tension_N, asked_s, reading.fault)
             self.readings[number] += 1
         return 0.0

@@ -49,6 +49,7 @@ class CanopenSlave:
         self.od = od
         self.app = app
         self.store = store or ParameterStore()
+        self.store.check(od)
         self.node_id = self.store.node_id or node_id
         """Active node id, 255 while unconfigured."""
         self.bus_bitrate = bitrate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -10,6 +11,7 @@ from canopen import import_od
 from canopen.objectdictionary import ObjectDictionary as CanopenDictionary
 from canopen.objectdictionary import ODVariable
 
+from profiles.eds_text import Remarks, decoded_eds
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.datatypes import CODECS, DOMAIN, Codec, Value
 from sim_bus.errors import SimulatorError
@@ -252,7 +254,13 @@ class ObjectDictionary:
 @lru_cache(maxsize=8)
 def _read_eds(path: str | Path, _changed_ns: int) -> CanopenDictionary:
     """Read an EDS, once for all drives of its kind as long as it does not change."""
-    return import_od(str(path), 0)
+    return import_od(_Sheet(decoded_eds(Path(path), Remarks())), 0)
+
+
+class _Sheet(io.StringIO):
+    """What a file holds; the library looks at the name for the format."""
+
+    name = "sheet.eds"
 
 
 def _entry(variable: ODVariable) -> Entry:

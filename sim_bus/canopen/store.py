@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Callable, Collection
 from pathlib import Path
+from typing import Any
 
+from profiles.bounded_input import read_json
+from profiles.errors import ProfileError, brief
+from profiles.winch import BITRATES_bit_s
 from sim_bus.canopen.abort import Abort, SdoAbort
 from sim_bus.canopen.datatypes import Value
 from sim_bus.canopen.od import Entry, ObjectDictionary
@@ -39,16 +44,25 @@ class ParameterStore:
 
     def _read(self, path: Path) -> None:
         try:
-            data = json.loads(path.read_text())
-            self._values = dict(data["values"])
-            for key, value in self._values.items():
-                bytes.fromhex(key)
-                if not isinstance(value, str | int | float):
-                    raise ValueError(f"value of {key}")
-            self.node_id = data["node_id"]
-            self.bitrate = data["bitrate"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            self._values, self.node_id, self.bitrate = _parts(read_json(path))
+        except ProfileError as error:
+            raise StoreError(str(error)) from None
+        except (ValueError, KeyError, TypeError) as error:
             raise StoreError(f"{path}: not a parameter file: {error!r}") from error
+
+    def check(self, od: ObjectDictionary) -> None:
+        """Raise StoreError for a stored value that its object cannot hold."""
+        for entry in od:
+            try:
+                value = self._stored(entry)
+                if value is not None:
+                    entry.codec.encode(value)
+            except (ValueError, TypeError, AttributeError, OverflowError, struct.error):
+                key = _key(entry)
+                raise StoreError(
+                    f"{self._path}: values.{key}: value {brief(repr(self._values[key]))}; allowed: "
+                    f"what {entry.index:04X}h:{entry.sub} can hold"
+                ) from None
 
     def keeps(self, index: int) -> bool:
         """Return whether an object is a parameter, which 1010h stores."""
@@ -93,6 +107,20 @@ class ParameterStore:
         if isinstance(value, str) and isinstance(entry.codec.zero, bytes):
             return bytes.fromhex(value)
         return value
+
+
+def _parts(held: Any) -> tuple[dict[str, str | int | float], int | None, int | None]:
+    """Return values, node id and bit rate; raises ValueError, KeyError or TypeError."""
+    values, node_id, bitrate = dict(held["values"]), held["node_id"], held["bitrate"]
+    for key, value in values.items():
+        bytes.fromhex(key)
+        if not isinstance(value, str | int | float):
+            raise ValueError(f"value of {key}")
+    if type(node_id) not in (int, type(None)) or node_id not in (None, *range(1, 128), 255):
+        raise ValueError(f"node_id {node_id!r}; allowed: null, 1 to 127, 255")
+    if type(bitrate) not in (int, type(None)) or bitrate not in (None, *BITRATES_bit_s):
+        raise ValueError(f"bitrate {bitrate!r}; allowed: null, {BITRATES_bit_s}")
+    return values, node_id, bitrate
 
 
 def _key(entry: Entry) -> str:

@@ -48,7 +48,7 @@ class Axis:
         self.motor = build_motor(plant, ratings, transmission)
         self._robot = robot
         if robot is not None:
-            self.motor = robot.adopt(self.motor)
+            self.motor = robot.adopt(self.motor, self._command)
         self.kind = servo.OFF
         self.target = 0.0
         self.setpoint: Callable[[], float] | None = None
@@ -66,8 +66,6 @@ class Axis:
 
     def step(self, until: float) -> int:
         """Advance physics and inner loops to bus time `until`; return the flags of `motor.run`."""
-        if self.setpoint is not None:
-            self.target = self.setpoint()
         self.sample = sample = self._run(until)
         self.time = until
         counts = sample[1] + self.position_offset
@@ -80,8 +78,13 @@ class Axis:
 
     def _run(self, until: float) -> MotorSample:
         if self._robot is not None:
-            return self._robot.step(until, self.kind, self.target)
-        return run(self.motor, until, self.kind, self.target)
+            return self._robot.step(until)
+        return run(self.motor, until, *self._command())
+
+    def _command(self) -> tuple[int, float]:
+        if self.setpoint is not None:
+            self.target = self.setpoint()
+        return self.kind, self.target
 
     def drive(self, kind: int, target: float) -> None:
         """Switch the power stage on under a kind of control (named in `servo`)."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdpr_rt.clock import LockstepClock, PacedClock
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.errors import InterruptedMotionError, RawLogError, TripError
 from cdpr_rt.exchange import AxisCommand, AxisFeedback
@@ -28,6 +29,7 @@ class Inertias:
         self.n = 2
         self.period_s = 1e-3
         self.lockstep = lockstep
+        self.clock = LockstepClock() if lockstep else PacedClock()
         self.feedback = AxisFeedback(2)
         self.command = AxisCommand(2)
         self.silent: set[int] = set()

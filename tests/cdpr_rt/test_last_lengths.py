@@ -37,7 +37,7 @@ def stopped(path: Path) -> LastLengths:
 
 def read(path: Path) -> LastLengths:
     last = LastLengths(path)
-    last.load(3)
+    last.load(3, 3.0)
     return last
 
 
@@ -87,6 +87,14 @@ def test_what_did_not_move_stays_true_though_nobody_knew_it(path: Path):
                 "stopped": True,
                 "date": "",
                 "cable_length_m": [1.0, "x", 2.0],
+                "cable_at_index_m": [None, None, None],
+            }
+        ),
+        json.dumps(  # longer than twice the longest that is in use
+            {
+                "stopped": True,
+                "date": "",
+                "cable_length_m": [1.0, 6.1, 2.0],
                 "cable_at_index_m": [None, None, None],
             }
         ),

@@ -38,11 +38,13 @@ class Sender:
         session: int = 1,
         scale: float = 1.0,
         buttons: int = 0,
+        right: int = 0,
     ) -> None:
         row = np.zeros((), SAMPLE)
         row["sequence"], row["session"], row["scale"] = sequence, session, scale
         row["sent_ns"] = self.offset_ns + round(sent_s * 1e9)
         row["position_m"], row["quaternion"], row["buttons"] = position, quaternion, buttons
+        row["right"] = right
         heapq.heappush(self._waiting, (sent_s + transit_s, next(self._number), row))
 
     def cycle(self) -> StreamState:
@@ -314,3 +316,22 @@ def test_update_keeps_no_memory() -> None:
         tracemalloc.stop()
     assert after - before < 2000
     assert sender.stream.state == StreamState.FRESH
+
+
+def test_only_samples_of_the_mover_s_right_are_played() -> None:
+    sender = Sender()
+    sender.block.counters["mover"] = 5
+    for k in range(1, 40):
+        for right, place in ((4, -1.0), (5, 0.01 * k), (6, -2.0)):
+            sender.send(k, k / 60.0, (place, 0.0, 0.0), right=right, session=right)
+    poses, _ = sender.run(40 / 60.0)
+    counts = sender.stream.counts()
+    assert (counts["accepted"], counts["other_right"]) == (39, 78)
+    assert poses[:, 0].min() >= 0.0
+    assert poses[-1, 0] > 0.3
+    sender.block.counters["mover"] = 6  # another's turn
+    sender.send(40, 40 / 60.0, (0.5, 0.0, 0.0), right=5, session=5)
+    before = sender.stream.pose[0]
+    sender.run(0.1)
+    assert sender.stream.counts()["other_right"] == 79
+    assert sender.stream.pose[0] <= before + 0.02

@@ -51,7 +51,7 @@ def test_the_cycle_compiles_nothing_after_it(n: int) -> None:
     feedback.valid, feedback.index_known = flags[0], flags[1]
     feedback.statusword = np.zeros((1, n), np.uint16)[0]
     torque = rows[3]
-    known = AxisCompensation(np.zeros((2, 720)), look_ahead_s=1e-3)
+    known = AxisCompensation(np.zeros((2, 720)), look_ahead_s=1e-3, most_Nm=10.0)
     limit = np.full(n, 0.75)
     pid = Pid([PidGains(1.0, 1.0, 0.1, 1e-3)] * n, limit, 1e-3, Compensation([known] * n, 1e-3))
     read = TensionFeedback(n)

@@ -11,10 +11,12 @@ from pathlib import Path
 
 import canopen
 
+from cdpr_rt.clock import PacedClock
 from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
 from drivers.boot import BootReport, BootSettings, boot_all
 from drivers.bus import BusUrl
+from drivers.bus.leading import open_clock
 from drivers.cia402 import Mode, State
 from drivers.network import CanNetwork
 from profiles import DriveProfile, load_drive
@@ -27,9 +29,11 @@ DRIVE = load_drive("generic-cia402")
 SETTINGS = BootSettings(MASTER, PERIOD_S, 3.0, 3.0)
 
 
-def start_simulator(nodes: int = 1, plant: Path | None = None) -> OwnSimulator:
+def start_simulator(
+    nodes: int = 1, plant: Path | None = None, *, paced: bool = False
+) -> OwnSimulator:
     bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
-    return OwnSimulator("winch-mpp0923d", bus, plant, nodes=nodes)
+    return OwnSimulator("winch-mpp0923d", bus, plant, nodes=nodes, paced=paced)
 
 
 def dictionary(node_id: int) -> canopen.ObjectDictionary:
@@ -37,14 +41,18 @@ def dictionary(node_id: int) -> canopen.ObjectDictionary:
 
 
 @contextmanager
-def open_network(bus: str, nodes: list[int]) -> Iterator[CanNetwork]:
-    network = CanNetwork(BusUrl.parse(bus), nodes, MASTER, HEARTBEAT_S)
+def open_network(bus: str, nodes: list[int], *, lead: bool = True) -> Iterator[CanNetwork]:
+    """Join a bus; who does not `lead` it goes by the wall, so that other programs can answer."""
+    url = BusUrl.parse(bus)
+    clock = open_clock([url]) if lead else PacedClock()
+    network = CanNetwork(url, clock, nodes, MASTER, HEARTBEAT_S)
     try:
         for node in nodes:
             network.add_node(node, dictionary(node))
         yield network
     finally:
         network.close()
+        clock.close()
 
 
 class Rig:
@@ -64,9 +72,9 @@ class Rig:
         self.reports: dict[int, BootReport] = boot_all(
             network, dict.fromkeys(nodes, (drive, replace(SETTINGS, sync_period_s=period_s)))
         )
-        network.start_heartbeat()
         axes = [AxisConfig.from_boot(drive, self.reports[node], 3.0) for node in nodes]
-        self.group = AxisGroup(network.url, network, axes, period_s, MASTER, HEARTBEAT_S)
+        self.group = AxisGroup(network, axes, period_s)
+        network.start_heartbeat()
 
     def cycle(self) -> None:
         self.group.sync()
@@ -114,11 +122,11 @@ class Rig:
 
 @contextmanager
 def open_rig(
-    bus: str, nodes: list[int] | None = None, drive: DriveProfile = DRIVE
+    bus: str, nodes: list[int] | None = None, drive: DriveProfile = DRIVE, *, lead: bool = True
 ) -> Iterator[Rig]:
     nodes = nodes or [1]
     with ExitStack() as stack:
-        network = stack.enter_context(open_network(bus, nodes))
+        network = stack.enter_context(open_network(bus, nodes, lead=lead))
         rig = Rig(bus, network, drive, nodes)
         stack.enter_context(rig.group)
         yield rig

@@ -14,15 +14,13 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from axis_rig import Rig, open_network, open_rig
 
-from drivers.network import CanNetwork
-
 
 @pytest.fixture(scope="module")
 def simulated_bus() -> Iterator[str]:
     """A bus with the drives 1 and 2, whose time stands for a short while only after a SYNC."""
     bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
     command = [sys.executable, "-m", "tools.cli", "sim", "up", "winch-mpp0923d", "--bus", bus]
-    command += ["--nodes", "2", "--exit-with-stdin", "--hold", "0.1"]
+    command += ["--nodes", "2", "--exit-with-stdin"]
     simulator = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert simulator.stdout is not None
     assert b"ready" in simulator.stdout.readline()
@@ -42,19 +40,13 @@ def brief_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("drivers.axis_shutdown._TIMEOUT_S", 0.4)
 
 
-@pytest.fixture(scope="module")
-def mains(simulated_bus: str) -> Iterator[CanNetwork]:
-    """What switches the drives of `bus` off and on."""
-    with open_network(simulated_bus, [1, 2]) as network:
-        yield network
-
-
 @pytest.fixture
-def bus(simulated_bus: str, mains: CanNetwork) -> str:
+def bus(simulated_bus: str) -> str:
     """A bus with the drives 1 and 2, freshly switched on."""
-    for node in (1, 2):
-        mains.reset(node)
-        assert mains.read_int(node, 0x1001) == 0  # it is there again
+    with open_network(simulated_bus, [1, 2]) as mains:
+        for node in (1, 2):
+            mains.reset(node)
+            assert mains.read_int(node, 0x1001) == 0  # it is there again
     return simulated_bus
 
 

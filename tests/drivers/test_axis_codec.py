@@ -42,12 +42,12 @@ class Group:
         s = self.state
         return codec.decode(
             array, 0, len(array), self.layout.slots, self.layout.fields, STATE_TABLE,
-            s.ints, s.floats, s.words, s.flags,
+            s.ints, s.floats, s.words, s.flags, np.zeros(len(array) + 1, np.int64),
         )  # fmt: skip
 
     def give(self) -> list[tuple[int, bytes]]:
         rpdos, s = self.layout.rpdos, self.state
-        raw = rpdos.array.view(np.uint8).reshape(-1, 16)
+        raw = rpdos.bytes
         codec.end_answers(s.ints, s.floats, s.flags)
         self.alarms = codec.encode(raw, self.layout.answer, CONTROLWORD_TABLE, s.ints, s.floats)
         frames = [CAN_FRAME.unpack(row) for row in rpdos.rows]
@@ -125,11 +125,16 @@ def test_no_frame_whatsoever_breaks_the_decoder(frames: list[tuple[int, bytes, i
     ]  # at least as long as the map
     array = np.frombuffer(bytearray(raw), np.uint8).reshape(-1, 16)
     s = group.state
+    others = np.full(len(array) + 1, -1, np.int64)
     answered = codec.decode(
         array, 0, len(array), group.layout.slots, group.layout.fields, STATE_TABLE,
-        s.ints, s.floats, s.words, s.flags,
+        s.ints, s.floats, s.words, s.flags, others,
     )  # fmt: skip
     assert answered == min(1, len(whole))
+    # all but this axis' TPDOs are for the acyclic side, in the order in which they came
+    assert others[1 : others[0] + 1].tolist() == [
+        k for k, (identifier, _, _) in enumerate(frames) if identifier not in (0x181, 0x281)
+    ]
 
 
 @SETTINGS

@@ -12,8 +12,7 @@ from collections.abc import Iterator
 import pytest
 from axis_rig import DRIVE, Rig, open_network
 
-from drivers import axis_exchange
-from drivers.bus import open_line_port
+from drivers.bus import member, open_line_port
 from drivers.cia402 import Mode, State, state_of
 
 PERIOD_S = 10e-3
@@ -39,7 +38,7 @@ def rig(
     paced_bus: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Rig]:
     if request.param == "python-can":
-        monkeypatch.setattr(axis_exchange, "open_port", open_line_port)
+        monkeypatch.setattr(member, "open_port", open_line_port)
     with open_network(paced_bus, [1, 2]) as network:
         for node in (1, 2):
             network.reset(node)

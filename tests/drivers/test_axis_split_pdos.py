@@ -44,14 +44,14 @@ class Pair:
         s = self.state
         return codec.decode(
             array, 0, len(array), self.layout.slots, self.layout.fields, STATE_TABLE,
-            s.ints, s.floats, s.words, s.flags,
+            s.ints, s.floats, s.words, s.flags, np.zeros(len(array) + 1, np.int64),
         )  # fmt: skip
 
     def give(self) -> dict[int, bytes]:
         s, rpdos = self.state, self.layout.rpdos
         codec.end_answers(s.ints, s.floats, s.flags)
         codec.encode(
-            rpdos.array.view(np.uint8).reshape(-1, 16), self.layout.answer, CONTROLWORD_TABLE,
+            rpdos.bytes, self.layout.answer, CONTROLWORD_TABLE,
             s.ints, s.floats,
         )  # fmt: skip
         frames = [CAN_FRAME.unpack(row) for row in rpdos.rows]
@@ -184,7 +184,7 @@ def test_more_millinewtonmetres_than_16_bits_hold_are_cut_and_not_wrapped(torque
     state.command.torque_Nm[0] = torque_Nm
     for _ in range(3):
         codec.encode(
-            layout.rpdos.array.view(np.uint8).reshape(-1, 16), layout.answer, CONTROLWORD_TABLE,
+            layout.rpdos.bytes, layout.answer, CONTROLWORD_TABLE,
             state.ints, state.floats,
         )  # fmt: skip
         (units,) = struct.unpack("<h", CAN_FRAME.unpack(layout.rpdos.rows[1])[2][:2])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -14,14 +13,17 @@ from bus_log import logged
 
 from drivers.boot import boot, boot_all
 from drivers.bus import BusUrl, query_status
+from drivers.bus.leading import open_clock
 from drivers.cia402 import State
 from drivers.errors import BootError, BusError
 from drivers.network import CanNetwork
 from profiles import DriveProfile
 
 
-def _boot_fails(bus: str, profile: DriveProfile = DRIVE, node: int = 1, **want: Any) -> BootError:
-    with open_network(bus, [node]) as network, pytest.raises(BootError) as caught:
+def _boot_fails(
+    bus: str, profile: DriveProfile = DRIVE, node: int = 1, lead: bool = True, **want: Any
+) -> BootError:
+    with open_network(bus, [node], lead=lead) as network, pytest.raises(BootError) as caught:
         boot(network, node, profile, replace(SETTINGS, **want))
     return caught.value
 
@@ -71,11 +73,11 @@ def test_a_drive_that_somebody_drives_is_step_l(rig: Rig) -> None:
 
 
 def test_another_master_is_step_l(bus: str) -> None:
-    with open_network(bus, [1]) as network, can.Bus(interface="simbus", channel=bus[7:]) as other:
+    with (
+        open_network(bus, [1], lead=False) as network,
+        can.Bus(interface="simbus", channel=bus[7:]) as other,
+    ):
         other.send(can.Message(arbitration_id=0x700 + MASTER, data=[5], is_extended_id=False))
-        deadline = time.monotonic() + 2.0
-        while not network.foreign_master.is_set() and time.monotonic() < deadline:
-            time.sleep(0.01)
         with pytest.raises(BootError) as caught:
             boot(network, 1, DRIVE, SETTINGS)
     assert caught.value.letter == "L"
@@ -93,7 +95,7 @@ def test_another_masters_sync_is_step_l_before_anything_is_sent(bus: str) -> Non
         producer = threading.Thread(target=produce)
         producer.start()
         try:
-            error = _boot_fails(bus)
+            error = _boot_fails(bus, lead=False)
         finally:
             stop.set()
             producer.join()
@@ -161,9 +163,9 @@ def test_eight_drives_boot_at_the_same_time() -> None:
     nodes = list(range(1, 9))
     try:
         with open_network(simulator.bus, nodes) as network:
-            begin_s = query_status(simulator.bus[7:])["bus_time_s"]
+            assert network.clock.now_s == query_status(simulator.bus[7:])["bus_time_s"] == 0.0
             reports = boot_all(network, dict.fromkeys(nodes, (DRIVE, SETTINGS)))
-            assert query_status(simulator.bus[7:])["bus_time_s"] - begin_s < 2.0
+            assert network.clock.now_s == query_status(simulator.bus[7:])["bus_time_s"] < 0.5
             assert [reports[node].node_id for node in nodes] == nodes
             for node in nodes:
                 assert network.wait_for_heartbeat(node, 1.0) == 5
@@ -180,4 +182,5 @@ def test_of_several_failures_all_are_told(bus: str) -> None:
 
 def test_a_bus_that_nobody_runs_is_told_by_name() -> None:
     with pytest.raises(BusError, match="nobody-here"):
-        CanNetwork(BusUrl.parse("simbus:nobody-here"), [1], MASTER, HEARTBEAT_S)
+        url = BusUrl.parse("simbus:nobody-here")
+        CanNetwork(url, open_clock([url]), [1], MASTER, HEARTBEAT_S)

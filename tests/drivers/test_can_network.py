@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 import time
+from functools import partial
 
 import pytest
 from axis_rig import Rig, open_network, start_simulator
@@ -48,52 +48,44 @@ def test_an_object_the_eds_lacks_is_told(network: CanNetwork) -> None:
 
 def test_a_silent_node_is_told_after_the_attempts(bus: str) -> None:
     with open_network(bus, [9]) as network:
-        begin = time.monotonic()
+        begin_s = network.clock.now_s
         with pytest.raises(SdoError, match="node 9"):
             network.read(9, 0x1000, attempts=1)
-        assert time.monotonic() - begin < 1.5
+        assert network.clock.now_s - begin_s == pytest.approx(0.5)
 
 
 def test_long_values_come_in_segments(network: CanNetwork) -> None:
     assert network.read(1, 0x1008) == "Generic CiA 402 torque servo"
 
 
-def test_several_threads_may_use_it_at_once(rig: Rig) -> None:
-    wrong: list[object] = []
-
-    def work(node_objects: list[tuple[int, int, int]]) -> None:
-        for _ in range(40):
-            for index, sub, value in node_objects:
-                try:
-                    found = rig.network.read_int(1, index, sub)
-                except Exception as error:
-                    wrong.append(error)
-                    return
-                if found != value:
-                    wrong.append((index, sub, found))
+def test_several_tasks_may_use_it_at_once(rig: Rig) -> None:
+    def work(node_objects: list[tuple[int, int, int]]) -> bool:
+        return all(
+            rig.network.read_int(1, index, sub) == value
+            for _ in range(40)
+            for index, sub, value in node_objects
+        )
 
     jobs = [
         [(0x1018, 1, 0x00CD9A01), (0x6076, 0, 3000)],
         [(0x1018, 2, 0x402), (0x608F, 1, 8192)],
         [(0x1000, 0, 0x00020192), (0x608F, 2, 1)],
     ]
-    threads = [threading.Thread(target=work, args=(job,)) for job in jobs]
-    for thread in threads:
-        thread.start()
+    tasks = [rig.network.clock.start(partial(work, job)) for job in jobs]
     rig.set_mode()
-    rig.run(0.3)  # and cycles run meanwhile
-    for thread in threads:
-        thread.join()
-    assert wrong == []
+    for _ in range(1000):  # one answer each a cycle, for all three ask the same node
+        rig.cycle()
+        rig.network.clock.turn()
+    assert all(task.result() for task in tasks)
+    assert rig.group.alarm() == ""
 
 
 def test_emergencies_between_cycles_are_kept_and_raise_the_alarm(rig: Rig) -> None:
     rig.set_mode()
     rig.group.stop_cycling()
     rig.misbehave(1, 0x8611)
-    deadline = time.monotonic() + 2.0
-    while not rig.network.emergencies and time.monotonic() < deadline:
-        time.sleep(0.01)
+    clock = rig.network.clock
+    assert clock.wait(lambda: rig.network.emergencies, clock.now_s + 2.0)
     kept = rig.network.emergencies[-1]
     assert (kept.node_id, kept.code) == (1, 0x8611)
     assert "8611h following error" in str(kept)

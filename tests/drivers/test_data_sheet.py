@@ -40,5 +40,5 @@ def test_a_file_that_is_none_is_told_by_name(content: bytes, words: str, tmp_pat
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(ProfileError, match="cannot be read: Is a directory"):
+    with pytest.raises(ProfileError, match="is no regular file"):
         load_dictionary(tmp_path)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from bus_log import BusLog, logged
 
+from cdpr_rt.clock import PacedClock
 from drivers.bus import BusUrl
 from drivers.bus.simbus_socket import connect, exchange
 from drivers.cia402 import State
@@ -73,7 +74,7 @@ def device(stages: Sequence[Stage], nodes: Sequence[Sequence[int]]) -> Listening
         HeardBus(f"b{i}", BusUrl.parse(stage.bus), [heard_axis(WINCH, n) for n in each], where)
         for i, (stage, each, where) in enumerate(zip(stages, nodes, places, strict=True))
     ]
-    return ListeningDevice(buses, PERIOD_S)
+    return ListeningDevice(buses, PERIOD_S, PacedClock())
 
 
 @contextmanager
@@ -308,4 +309,6 @@ def test_a_bus_that_goes_away_is_told(stage: Stage) -> None:
 def test_a_bus_that_is_not_there_is_told() -> None:
     axis = heard_axis(WINCH, 1)
     with pytest.raises(BusError, match="no simulated bus"):
-        ListeningDevice([HeardBus("left", BusUrl.parse("simbus:nobody"), [axis], [0])], PERIOD_S)
+        ListeningDevice(
+            [HeardBus("left", BusUrl.parse("simbus:nobody"), [axis], [0])], PERIOD_S, PacedClock()
+        )

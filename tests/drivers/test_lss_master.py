@@ -7,14 +7,16 @@ import random
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import can
 import canopen
 import pytest
 
+from cdpr_rt.clock import PacedClock
 from drivers.bus import BusUrl
+from drivers.bus.leading import open_clock
 from drivers.errors import BusError
 from drivers.lss import UNCONFIGURED, LssAddress, LssError, LssMaster
 from profiles import load_drive
@@ -61,11 +63,19 @@ def bus_with(*nodes: CanopenSlave) -> Iterator[str]:
 
 
 @contextmanager
-def master_of(*nodes: CanopenSlave) -> Iterator[LssMaster]:
+def master_on(name: str, timeout_s: float = TIMEOUT_S, *, lead: bool = True) -> Iterator[LssMaster]:
+    """An LSS master; who does not `lead` goes by the wall, as others who answer do."""
+    url = BusUrl.parse(f"simbus:{name}")
     with (
-        bus_with(*nodes) as name,
-        LssMaster(BusUrl.parse(f"simbus:{name}"), TIMEOUT_S) as master,
+        closing(open_clock([url]) if lead else PacedClock()) as clock,
+        LssMaster(url, clock, timeout_s) as master,
     ):
+        yield master
+
+
+@contextmanager
+def master_of(*nodes: CanopenSlave) -> Iterator[LssMaster]:
+    with bus_with(*nodes) as name, master_on(name) as master:
         yield master
 
 
@@ -119,7 +129,7 @@ def test_a_new_device_gets_its_node_id_boots_and_keeps_it(tmp_path: Path) -> Non
 
 def test_a_silent_owner_of_a_node_id_is_known_by_its_heartbeat() -> None:
     node = device(1, node_id=9)
-    with bus_with(node) as name, LssMaster(BusUrl.parse(f"simbus:{name}"), TIMEOUT_S) as master:
+    with bus_with(node) as name, master_on(name, lead=False) as master:
         with canopen.Network() as network:
             network.connect(interface="simbus", channel=name)
             network.add_node(9, str(EDS)).sdo[0x1017].raw = 100
@@ -227,7 +237,7 @@ def test_answers_that_run_into_the_next_question_are_no_bits() -> None:
     with ExitStack() as stack:
         name = stack.enter_context(bus_with(device(3)))
         stack.enter_context(sluggish_device(name, 6, 0.0015))
-        master = stack.enter_context(LssMaster(BusUrl.parse(f"simbus:{name}"), 0.04))
+        master = stack.enter_context(master_on(name, 0.04, lead=False))
         assert _found_at_last(master) == [address(3), address(6)]
 
 
@@ -248,7 +258,7 @@ def test_a_device_that_is_found_again_and_again_ends_the_search(
     with ExitStack() as stack:
         name = stack.enter_context(bus_with())
         stack.enter_context(sluggish_device(name, 3, 0.0))
-        master = stack.enter_context(LssMaster(BusUrl.parse(f"simbus:{name}"), 0.02))
+        master = stack.enter_context(master_on(name, 0.02, lead=False))
         with pytest.raises(LssError, match="serial 3 takes part in the fastscan after"):
             master.unconfigured()
 
@@ -257,7 +267,7 @@ def test_a_device_too_slow_for_the_timeout_is_an_error_not_a_wrong_identity() ->
     with ExitStack() as stack:
         name = stack.enter_context(bus_with())
         stack.enter_context(sluggish_device(name, 0x0F0F0F0F, 0.015))
-        master = stack.enter_context(LssMaster(BusUrl.parse(f"simbus:{name}"), 0.012))
+        master = stack.enter_context(master_on(name, 0.012, lead=False))
         try:
             found = master.unconfigured()
         except LssError as error:
@@ -280,7 +290,7 @@ def test_a_babbling_node_does_not_hold_the_search() -> None:
         thread.start()
         try:
             start = time.monotonic()
-            with LssMaster(BusUrl.parse(f"simbus:{name}"), TIMEOUT_S) as master:
+            with master_on(name, lead=False) as master:
                 assert master.who_has(5, 0.05) == ""
                 assert not master.has_unconfigured()
             assert time.monotonic() - start < 10.0
@@ -291,4 +301,4 @@ def test_a_babbling_node_does_not_hold_the_search() -> None:
 
 def test_a_bus_that_is_not_there_is_a_bus_error() -> None:
     with pytest.raises(BusError):
-        LssMaster(BusUrl.parse("simbus:nobody-runs-this"))
+        LssMaster(BusUrl.parse("simbus:nobody-runs-this"), PacedClock())

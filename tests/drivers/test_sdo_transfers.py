@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import threading
 import time
 from collections.abc import Iterator
 
@@ -26,7 +25,7 @@ def bus(simulated_bus: str) -> str:
 
 @pytest.fixture(scope="module")
 def network(bus: str) -> Iterator[CanNetwork]:
-    with open_network(bus, [1, 2, SCRIPTED]) as opened:
+    with open_network(bus, [1, 2, SCRIPTED], lead=False) as opened:
         yield opened
 
 
@@ -165,10 +164,8 @@ def test_every_code_of_the_standard_has_words_of_its_own() -> None:
 
 
 @pytest.mark.parametrize("block", [False, True], ids=["segments", "blocks"])
-def test_a_transfer_is_cancelled_from_another_thread(
-    network: CanNetwork, bus: str, block: bool
-) -> None:
-    ended: list[BaseException] = []
+def test_a_transfer_of_a_task_is_cancelled(network: CanNetwork, bus: str, block: bool) -> None:
+    clock = network.clock
 
     def endless_blocks(request: bytes) -> list[bytes]:
         if request[0] >> 5 != 5:
@@ -177,29 +174,18 @@ def test_a_transfer_is_cancelled_from_another_thread(
             return [b"\xc0" + request[1:4] + bytes(4)]
         return [bytes([k]) + bytes(7) for k in range(1, 128)]
 
-    def work() -> None:
-        try:
-            network.read_bytes(SCRIPTED, 0x1008, block=block)
-        except BaseException as error:
-            ended.append(error)
-
     assert not network.cancel(SCRIPTED)  # nothing runs
     with scripted(bus, SCRIPTED, endless_blocks if block else endless) as node:
-        thread = threading.Thread(target=work)
-        thread.start()
-        deadline = time.monotonic() + 5.0
-        while len(node.requests) < 3 and time.monotonic() < deadline:
-            time.sleep(0.01)
+        task = clock.start(lambda: network.read_bytes(SCRIPTED, 0x1008, block=block))
+        while len(node.requests) < 3:
+            clock.sleep(0.01)
         assert network.cancel(SCRIPTED)
-        cancelled = time.monotonic()
-        thread.join(5.0)
-        assert time.monotonic() - cancelled < 1.0
-        time.sleep(0.1)
+        assert clock.wait(lambda: task.done, clock.now_s + 5.0)
+        clock.sleep(0.1)
         assert node.requests[-1] == b"\x80\x08\x10\x00" + struct.pack("<I", 0x08000000)
-        assert isinstance(ended[0], SdoCancelledError)
-        assert f"node {SCRIPTED}: object 1008h:0 cannot be read: the transfer was cancelled" in str(
-            ended[0]
-        )
+        told = f"node {SCRIPTED}: object 1008h:0 cannot be read: the transfer was cancelled"
+        with pytest.raises(SdoCancelledError, match=told):
+            task.result()
         # the next transfer is none the worse for it
         node.answer = lambda request: [expedited(request, 4711)]
         assert network.read_int(SCRIPTED, 0x1000) == 4711
@@ -207,22 +193,12 @@ def test_a_transfer_is_cancelled_from_another_thread(
 
 def test_the_drive_is_told_and_serves_the_next_request(network: CanNetwork) -> None:
     network.write_bytes(1, 0x2F10, 0, bytes(6000))
-    ended: list[BaseException] = []
-
-    def work() -> None:
-        try:
-            while True:
-                network.read_bytes(1, 0x2F10)
-        except SdoCancelledError as error:
-            ended.append(error)
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    deadline = time.monotonic() + 5.0
-    while not network.cancel(1) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    thread.join(5.0)
-    assert ended
+    task = network.clock.start(lambda: network.read_bytes(1, 0x2F10))
+    network.clock.sleep(0.001)
+    assert network.cancel(1)
+    network.clock.wait(lambda: task.done)
+    with pytest.raises(SdoCancelledError):
+        task.result()
     assert network.read_int(1, 0x1018, 1) == 0x00CD9A01
 
 

@@ -20,7 +20,7 @@ STRANGER = 9
 
 @pytest.fixture
 def network(simulated_bus: str) -> Iterator[CanNetwork]:
-    with open_network(simulated_bus, [STRANGER]) as opened:
+    with open_network(simulated_bus, [STRANGER], lead=False) as opened:
         yield opened
 
 
@@ -163,6 +163,7 @@ def test_a_flood_of_answers_fills_no_memory(simulated_bus: str, network: CanNetw
             node.send(0x580 + STRANGER, bytes(8))
             if k % 100 == 0:
                 time.sleep(0.002)
+        network.clock.sleep(0.1)
         assert network.read_int(STRANGER, 0x1000) == 4711
         waiting = network.clients[STRANGER].strays
     assert 100 < waiting < 2000

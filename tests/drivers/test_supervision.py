@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -19,6 +18,7 @@ from axis_rig import start_simulator as _start_simulator
 from bus_log import BusLog, logged
 from scripted_node import scripted
 
+from cdpr_rt.clock import Clock, PacedClock
 from cdpr_rt.controllers.base import Idle
 from cdpr_rt.errors import TripError
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
@@ -48,7 +48,7 @@ def trio(three_drives: str) -> Iterator[Rig]:
     """Three drives, enabled."""
     with open_network(three_drives, NODES) as network:
         for node in NODES:
-            _eventually(lambda node=node: _answers(network, node))
+            _eventually(network.clock, lambda node=node: _answers(network, node))
             network.reset(node)
             assert network.read_int(node, 0x1001) == 0
     with open_rig(three_drives, NODES) as rig:
@@ -64,11 +64,8 @@ def _answers(network: CanNetwork, node: int) -> bool:
         return False
 
 
-def _eventually(condition: Callable[[], object], timeout_s: float = 5.0) -> None:
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+def _eventually(clock: Clock, condition: Callable[[], object]) -> None:
+    assert clock.wait(condition, clock.now_s + 5.0)
 
 
 class _Push(Idle):
@@ -148,7 +145,7 @@ def test_a_node_lost_between_cycles_is_an_alarm(trio: Rig) -> None:
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
     trio.misbehave(MUTE, 1, node=3)
-    _eventually(lambda: trio.network.alarm_text)
+    _eventually(trio.network.clock, lambda: trio.network.alarm_text)
     assert "node 3 is lost: no heartbeat for" in trio.network.alarm_text
     assert "node 3 is lost" in trio.group.alarm()
 
@@ -156,7 +153,7 @@ def test_a_node_lost_between_cycles_is_an_alarm(trio: Rig) -> None:
 def test_all_are_heard_between_cycles(trio: Rig) -> None:
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
-    time.sleep(1.6)  # longer than the patience
+    trio.network.clock.sleep(1.6)  # longer than the patience
     assert trio.network.alarm_text == ""
 
 
@@ -165,7 +162,7 @@ def test_a_restart_between_cycles_is_an_alarm_and_voids_the_index(trio: Rig) -> 
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
     trio.network.send(0, bytes([129, 2]))
-    _eventually(lambda: trio.network.alarm_text)
+    _eventually(trio.network.clock, lambda: trio.network.alarm_text)
     text, _ = trio.until_alarm(0.01)
     assert "node 2: the drive has restarted" in text
     assert not trio.group.feedback.index_known[1]
@@ -175,9 +172,9 @@ def test_a_restart_between_cycles_is_an_alarm_and_voids_the_index(trio: Rig) -> 
 def test_a_node_that_leaves_operational_between_cycles_is_an_alarm(trio: Rig) -> None:
     trio.reach(State.SWITCH_ON_DISABLED)
     trio.group.stop_cycling()
-    _eventually(lambda: trio.network.wait_for_heartbeat(1, 1.0) == 5)
+    _eventually(trio.network.clock, lambda: trio.network.wait_for_heartbeat(1, 1.0) == 5)
     trio.network.send(0, bytes([128, 1]))
-    _eventually(lambda: trio.network.alarm_text)
+    _eventually(trio.network.clock, lambda: trio.network.alarm_text)
     assert "node 1 is not operational any more (NMT state 127, pre-op" in trio.network.alarm_text
 
 
@@ -196,7 +193,7 @@ def test_an_emergency_is_told_in_words_and_kept_until_it_is_taken_back(trio: Rig
     assert [record.code for record in network.error_history(3)] == [0x4310]
     assert str(network.error_history(3)[0]) == "4310h drive temperature too high"
     network.write(3, 0x6040, 0, 0x80)
-    _eventually(lambda: not network.log.standing(3))
+    _eventually(network.clock, lambda: not network.log.standing(3))
     assert [e.code for e in network.log.of(3)] == [0x4310, 0]  # the history is kept
     assert "error reset" in str(network.log.of(3)[-1])
 
@@ -280,11 +277,11 @@ def test_a_flood_of_emergencies_between_cycles_is_named(three_drives: str) -> No
     ):
         for _ in range(150):
             node.send(0x082, b"\x00\xff\x81\0\0\0\0\0")
-        _eventually(lambda: len(network.log.of(2)) == 150)
+        _eventually(network.clock, lambda: len(network.log.of(2)) == 150)
         assert "node 2: FF00h device specific" in network.alarm_text
         network.clear_alarm()
         node.send(0x082, b"\x00\xff\x81\0\0\0\0\0")
-        _eventually(lambda: network.alarm_text)
+        _eventually(network.clock, lambda: network.alarm_text)
         assert "node 2 floods the bus: 151 emergency messages within 1 s" in network.alarm_text
         assert network.read_int(1, 0x1018, 1) == 0x00CD9A01
 
@@ -322,20 +319,20 @@ class _Server:
 
 def test_bus_off_is_an_alarm_until_the_controller_has_come_back() -> None:
     server = _Server()
-    network = CanNetwork(BusUrl.parse(server.url), [1], MASTER, HEARTBEAT_S)
+    network = CanNetwork(BusUrl.parse(server.url), PacedClock(), [1], MASTER, HEARTBEAT_S)
     try:
         network.add_node(1, dictionary(1))
         server.tell(b"< error 20000080 1.0 >")
-        _eventually(lambda: network.health.errors == 1)
+        _eventually(network.clock, lambda: network.health.errors == 1)
         assert network.alarm_text == ""  # a disturbed frame is sent again by the controller
         server.tell(b"< error 20000040 1.0 >")
-        _eventually(lambda: network.alarm_text)
+        _eventually(network.clock, lambda: network.alarm_text)
         assert "the CAN controller is bus-off" in network.alarm_text
         assert "restart the interface" in network.alarm_text
         network.clear_alarm()
         assert "bus-off" in network.alarm_text  # its cause is not gone
         server.tell(b"< error 20000100 1.0 >")
-        _eventually(lambda: network.health.state is BusState.ACTIVE)
+        _eventually(network.clock, lambda: network.health.state is BusState.ACTIVE)
         assert "bus-off" in network.alarm_text  # latched
         network.clear_alarm()
         assert network.alarm_text == ""

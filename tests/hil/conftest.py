@@ -12,6 +12,13 @@ import vcan_guest
 import vcan_replay
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Each test has its time limit in the guest; the first of them waits for all, out here."""
+    for item in items:
+        if item.get_closest_marker("vcan") and not _runs_here():
+            item.add_marker(pytest.mark.timeout(0))
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
     """Replay what a `vcan` test did in the guest; every other test runs as usual."""

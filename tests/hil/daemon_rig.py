@@ -78,6 +78,7 @@ class RealDaemon:
         period_s: float = PERIOD_S,
         limits: str = "",
         robot: Path | None = None,
+        cwd: Path | None = None,
     ) -> None:
         self.socket = folder / "control.sock"
         self.at = ("--socket", str(self.socket))
@@ -86,13 +87,14 @@ class RealDaemon:
         self._errors = (folder / "errors").open("w+")
         self.robot = robot or write_robot(folder, period_s, limits)
         asked = ("run", str(self.robot), "--bus", bus, *self.at)
-        command = [sys.executable, "-m", "tools.cli", *asked]
+        command = [sys.executable, "-P", "-m", "tools.cli", *asked]
         self.process = subprocess.Popen(
             [*command, *options],
             stdout=subprocess.PIPE,
             stderr=self._errors,
             text=True,
             env={**os.environ, **(env or {})},
+            cwd=cwd,
         )
         try:
             self.ready: dict[str, Any] = json.loads(self._first_line())["ready"]

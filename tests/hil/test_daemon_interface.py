@@ -218,6 +218,29 @@ def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
     assert status["control"]["held"] is False
 
 
+def test_a_service_that_comes_back_needs_the_keys_file_no_more(daemon: RealDaemon) -> None:
+    """The launcher has read the key once; last, as the service's address is another afterwards."""
+    key_file = daemon.socket.parent / "key"
+    text = key_file.read_text()
+    key_file.unlink()
+    service = daemon.children()["service"]
+    os.kill(service, signal.SIGKILL)
+    try:
+        until(lambda: daemon.children().get("service") not in (None, service))
+        daemon.wait_for("ready")
+        address = f"http://{daemon.status()['parts']['service']['http']}"
+        wrong = {"Authorization": f"Bearer {text}x"}
+        assert httpx.get(f"{address}/events", headers=RIGHT).status_code == 200
+        assert httpx.get(f"{address}/events", headers=wrong).status_code == 401
+        loop = daemon.children()["loop"]
+        held = [path.readlink() for path in Path(f"/proc/{loop}/fd").iterdir()]
+        assert not [path for path in held if "cdpr-rt-key" in str(path)]
+        assert text not in Path(f"/proc/{loop}/cmdline").read_text()
+    finally:
+        key_file.touch(mode=0o600)
+        key_file.write_text(text)
+
+
 def flood(url: str, ended: threading.Event, what: bytes) -> None:
     host, _, port = url.removeprefix("http://").partition(":")
     while not ended.is_set():
@@ -240,11 +263,11 @@ def test_a_flood_from_the_holders_own_address_neither_moves_nor_silences_it(
     floods = [
         b"\x00\xff" * 5000,
         b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n" * 20,
-        b"POST /program HTTP/1.1\r\nHost: a\r\nAuthorization: "
+        b"POST /program HTTP/1.1\r\nHost: localhost\r\nAuthorization: "
         + key
         + b"\r\nContent-Length: 2\r\n\r\n{}",
         b"POST /hold HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9999\r\n\r\n{",
-        b"GET /live HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+        b"GET /live HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
         b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
         b"Authorization: " + key + b"\r\n\r\n",
     ]

@@ -16,6 +16,7 @@ import httpx
 import pytest
 from daemon_rig import RealDaemon, until
 
+from cdpr_rt.clock import PacedClock
 from drivers.bus import BusUrl, open_port
 from drivers.bus.packed import FRAME
 from drivers.cia402 import POWER_OFF, State, state_of
@@ -118,16 +119,23 @@ def speed_of(ear: Ear, node: int) -> float:
     return (counts[-1] - counts[0]) / 8192 * 6.2832 / (heard[-1][0] - heard[0][0])
 
 
-def ask_drives(bus: BusUrl) -> list[State]:
-    """Ask every drive by SDO, as a stranger."""
+@contextmanager
+def stranger(bus: BusUrl) -> Iterator[CanNetwork]:
+    """Join the drives' bus beside their master."""
     eds = load_drive("generic-cia402").eds
-    network = CanNetwork(bus, NODES, 126, 1.0)
+    network = CanNetwork(bus, PacedClock(), NODES, 126, 1.0)
     try:
         for node in NODES:
             network.add_node(node, load_dictionary(eds, node))
-        return [state_of(network.read_int(node, 0x6041)) for node in NODES]
+        yield network
     finally:
         network.close()
+
+
+def ask_drives(bus: BusUrl) -> list[State]:
+    """Ask every drive by SDO, as a stranger."""
+    with stranger(bus) as network:
+        return [state_of(network.read_int(node, 0x6041)) for node in NODES]
 
 
 def told_lost(ear: Ear, since_s: float) -> dict[int, float]:

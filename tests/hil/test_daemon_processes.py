@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import socket
+import time
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
@@ -38,8 +39,10 @@ class Manager:
     def hears(self, wanted: str) -> None:
         """Wait for a line."""
         self._socket.settimeout(30.0)
-        while wanted not in self._socket.recv(4096).decode().split("\n"):
-            pass
+        told, end = list[str](), time.monotonic() + 30.0
+        while wanted not in told:
+            assert time.monotonic() < end, told
+            told += self._socket.recv(4096).decode().split("\n")
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import socket
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +18,7 @@ from hostile_proxy import hostile
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording_reader import RecordingReader
 from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import Standing
+from cdpr_rt.service.stream_packet import Standing, StreamSession, StreamSetpoint
 from profiles import load_winch
 
 WINCH = load_winch("winch-mpp0923d")
@@ -63,6 +64,13 @@ def follow(daemon: RealDaemon) -> str:
     return str(token)
 
 
+def hand_of(daemon: RealDaemon, token: str, port: int | None = None) -> StreamClient:
+    """Return a sender with a session for the holder of the right to move."""
+    told = ask(daemon, "/stream", token)
+    given = StreamSession(told["session"], bytes.fromhex(told["key"]))
+    return StreamClient(told["host"], port or told["port"], given)
+
+
 def lead(client: StreamClient, path: Callable[[float], float], seconds: float) -> None:
     """Send x of the hand along `path` at 60 Hz."""
     begin = time.monotonic()
@@ -84,7 +92,7 @@ def setpoints(daemon: RealDaemon) -> list[float]:
 def test_a_hand_leads_until_it_is_gone(daemon: RealDaemon) -> None:
     token = follow(daemon)
     before = setpoints(daemon)
-    with StreamClient("127.0.0.1", port_of(daemon), token=token) as hand:
+    with hand_of(daemon, token) as hand:
         lead(hand, lambda t: 0.04 * min(t, 1.0), 1.5)
         assert hand.state is not None
         assert (hand.state.standing, hand.state.state) == (Standing.ACCEPTED, LoopState.ACTIVE)
@@ -103,26 +111,36 @@ def test_a_hand_leads_until_it_is_gone(daemon: RealDaemon) -> None:
         np.testing.assert_allclose(moved, [0.06 * SCALE, 0.0], atol=4e-4)
 
 
-def test_a_stranger_without_the_right_moves_nothing(daemon: RealDaemon) -> None:
+def test_who_has_no_key_and_no_session_moves_nothing_even_when_the_holder_is_silent(
+    daemon: RealDaemon,
+) -> None:
+    """An unprivileged user of the same machine, who can reach the port but not the socket."""
     token = follow(daemon)
     before = setpoints(daemon)
-    with StreamClient("127.0.0.1", port_of(daemon)) as stranger:
-        lead(stranger, lambda t: 0.2 * t, 0.5)
-        assert stranger.state is not None
-        assert stranger.state.standing == Standing.NO_RIGHT
-    with StreamClient("127.0.0.1", port_of(daemon), token="guessed") as stranger:
-        lead(stranger, lambda t: 0.2 * t, 0.5)
-        assert stranger.state is not None
-        assert stranger.state.standing == Standing.NO_RIGHT
-    np.testing.assert_allclose(setpoints(daemon), before, atol=1e-4)
+    with hand_of(daemon, token) as hand:
+        lead(hand, lambda t: 0.0, 0.2)
     daemon.http.delete("/control", headers={"X-Control-Token": token})
+    guesses = StreamSession(7, bytes(32)), b"a key that is long enough"
+    for access in guesses:
+        with StreamClient("127.0.0.1", port_of(daemon), access) as stranger:
+            lead(stranger, lambda t: 0.2 * t, 0.5)
+            assert stranger.answered == 0
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as keyless:
+        for k in range(30):
+            packet = StreamSetpoint(9, k, k, (0.01 * k, 0.0, 0.0)).pack()
+            keyless.sendto(packet, ("127.0.0.1", port_of(daemon)))
+            time.sleep(0.02)
+    assert not daemon.http.get("/control").json()["held"]
+    assert daemon.status()["parts"]["stream"]["packets"]["unsigned"] == 30
+    assert daemon.status()["program"] == "hold"
+    np.testing.assert_allclose(setpoints(daemon), before, atol=1e-4)
 
 
 def test_a_hostile_network_makes_no_step(daemon: RealDaemon) -> None:
     token = follow(daemon)
     with (
         hostile(port_of(daemon), 4) as proxy,
-        StreamClient("127.0.0.1", proxy.port, token=token) as hand,
+        hand_of(daemon, token, proxy.port) as hand,
     ):
         lead(hand, lambda t: 0.06 * math.sin(1.4 * math.pi * t), 4.0)
         assert proxy.passed < 0.95 * proxy.came

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 
 import canopen
 import numpy as np
@@ -14,6 +14,7 @@ from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
 from drivers.boot import BootSettings, boot_all
 from drivers.bus import BusUrl
+from drivers.bus.leading import open_clock
 from drivers.cia402 import Mode, State
 from drivers.errors import ModeRefusedError
 from drivers.network import CanNetwork
@@ -29,17 +30,18 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AxisGroup]:
         simulator = MixedSimulator(files)
         stack.callback(simulator.stop)
         winches = {winch.node_id: winch for winch in simulator.winches}
-        network = CanNetwork(BusUrl.parse(simulator.bus), list(winches), MASTER, HEARTBEAT_S)
-        stack.callback(network.close)
+        url = BusUrl.parse(simulator.bus)
+        clock = stack.enter_context(closing(open_clock([url])))
+        network = stack.enter_context(
+            closing(CanNetwork(url, clock, list(winches), MASTER, HEARTBEAT_S))
+        )
         for node, winch in winches.items():
             network.add_node(node, canopen.import_od(str(winch.drive.eds), node))
         settings = BootSettings(MASTER, PERIOD_S, 3.0, 3.0, counts_per_turn=8192)
         reports = boot_all(network, {node: (w.drive, settings) for node, w in winches.items()})
         network.start_heartbeat()
         axes = [AxisConfig.from_boot(w.drive, reports[n], 3.0) for n, w in winches.items()]
-        yield stack.enter_context(
-            AxisGroup(network.url, network, axes, PERIOD_S, MASTER, HEARTBEAT_S)
-        )
+        yield stack.enter_context(AxisGroup(network, axes, PERIOD_S))
 
 
 def _cycles(group: AxisGroup, count: int, torques_Nm: list[float]) -> None:

@@ -21,7 +21,7 @@ from pymodbus.client import ModbusTcpClient
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
-from safety_rig import PANEL, Twin, board_file, patient_profile, ready, start, wait_until
+from safety_rig import CLOCK, PANEL, Twin, board_file, patient_profile, ready, start, wait_until
 
 from drivers.errors import DriverError
 from drivers.modbus.rail import ModbusRailAxis
@@ -51,6 +51,12 @@ class Rails:
     modbus_port: int
     tension_port: str
     home: Path
+
+    def pull(self, tension_N: float) -> None:
+        """Have the winch's cable carry this tension for half a second of its board's time."""
+        begun_s = self.winch.time_s
+        for step in range(1, 501):
+            self.winch.publish(begun_s + 1e-3 * step, tension_N, 0.0, 0.0, False)
 
     def begin(self, *arguments: str | Path) -> subprocess.Popen[str]:
         return subprocess.Popen(
@@ -158,7 +164,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rails]:
 
 @pytest.fixture
 def rails(parts: Rails) -> Rails:
-    parts.winch.publish(0.0, 0.0, 0.0, 0.0, False)
+    parts.pull(0.0)
     parts.twin.mend()
     parts.break_modbus(RailFault(0))
     parts.forget()
@@ -226,16 +232,16 @@ def test_a_drive_that_does_not_do_as_it_is_told_is_not_moved(
 def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
     before = rails.position_m("cia402")
     cells = ("--tension", "rtu-load-cell-1", "--tension-port", rails.tension_port)
-    rails.winch.publish(0.0, 40.0, 0.0, 0.0, False)
+    rails.pull(40.0)
     error = rails.refused("cia402", before + 0.3, *cells)
     assert "not moved unless the cables are slack: winch 1 has 4" in error
     assert "(5 N allowed)" in error
     assert abs(rails.position_m("cia402") - before) < 1e-4
     assert rails.calibration()["calibrated"] is True
-    rails.winch.publish(0.0, 0.0, 0.0, 0.0, False)
+    rails.pull(0.0)
     command = rails.move("cia402", before + 0.5, *cells)
     await_motion(rails, "cia402", command, before + 0.01)
-    rails.winch.publish(0.0, 40.0, 0.0, 0.0, False)
+    rails.pull(40.0)
     assert "the cables are not slack any more" in result(command, FAILED)["error"]
     assert rails.braked("cia402")
     assert before + 0.01 < rails.position_m("cia402") < before + 0.3
@@ -276,7 +282,7 @@ def test_a_rail_on_modbus_heeds_the_safety_io_and_one_command(rails: Rails) -> N
     command = rails.move("modbus", before + 0.5, *slack)
     await_motion(rails, "modbus", command, before + 0.005)
     with pytest.raises(RailError, match="enabled already: another command moves it"):
-        ModbusRailAxis(load_rail(rails.modbus)).open()
+        ModbusRailAxis(load_rail(rails.modbus), CLOCK).open()
     rails.twin.press()
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
     assert rails.braked("modbus")

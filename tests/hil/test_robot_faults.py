@@ -168,7 +168,7 @@ def lead(robot: LockstepRobot, hand: Hand, places: list[list[float]]) -> Any:
 
 def test_a_hand_that_leaps_by_a_metre_moves_nothing_at_a_step(healthy: LockstepRobot) -> None:
     healthy.program("pose", stream=True)
-    hand = Hand(session=5, token=healthy.right.token)
+    hand = healthy.stream.hand()
     lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
     truth = Truth(healthy)
     rows = lead(healthy, hand, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]] * 15)
@@ -181,7 +181,7 @@ def test_a_hand_that_leaps_by_a_metre_moves_nothing_at_a_step(healthy: LockstepR
 
 def test_a_hand_that_is_no_number_is_not_followed(healthy: LockstepRobot) -> None:
     healthy.program("pose", stream=True)
-    hand = Hand(session=6, token=healthy.right.token)
+    hand = healthy.stream.hand()
     lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
     truth = Truth(healthy)
     lead(healthy, hand, [[math.nan, 0.0, 0.0], [0.0, math.inf, 0.0]] * 15)
@@ -246,7 +246,7 @@ def test_a_stop_leaves_the_next_start_its_lengths_and_the_platform_on_its_stand(
         # as if the daemon and its drives had been without power meanwhile
         robot.loop.parts.estimator.forget_lengths()
         last.take()
-        last.load(3)
+        last.load(3, 3.0)
         aloft(robot, **{"from": "last"})
         assert robot.truth()["position_m"][:2] == pytest.approx(HIGH, abs=0.01)
 

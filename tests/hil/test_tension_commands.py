@@ -25,6 +25,7 @@ from sim_bus.physics_board import PhysicsBoard
 from tools.cli import main
 
 WINCH = "winch-mpp0923d"
+ANCHOR = "[load]\nkind = 'fixed_anchor'\npretension_N = 2.0\nanchor_stiffness_N_m = 500.0\n"
 FAILED, BAD_INPUT = 1, 2
 
 
@@ -191,8 +192,7 @@ def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
 
 
 def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
-    plant = "[load]\nkind = 'fixed_anchor'\npretension_N = 2.0\nanchor_stiffness_N_m = 500.0\n"
-    plant += "drum_radius_error = 0.03\n"
+    plant = ANCHOR + "drum_radius_error = 0.03\n"
     out = tmp_path / "out"
     sensors = "rtu-load-cell-1"
     with (
@@ -233,6 +233,38 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
     again = run("tension", "fit", out)
     assert again["gain_m"] == result["gain_m"]
     assert Path(again["picture"]).read_bytes().startswith(b"\x89PNG")
+
+
+def pull(folder: Path, *, disturbed: bool) -> bytes:
+    """Calibrate by a load cell with everything fresh; return the recording."""
+    folder.mkdir()
+    sensors, out = "rtu-load-cell-1", folder / "out"
+    with (
+        winch(folder, ANCHOR) as (bus, board),
+        simulator("tension", sensors, "--board", board) as cells,
+    ):
+        command = subprocess.Popen(
+            cdpr("tension", "calibrate", WINCH, "--bus", bus, "--sensors", sensors, "--port",
+                 cells.port, "--out", out, "--speed-mm-s", "100", "--highest-n", "60", "--json"),
+            stdout=subprocess.PIPE,
+        )  # fmt: skip
+        with PhysicsBoard.attach(board) as shared:
+            for tension_N in (20.0, 40.0) if disturbed else ():
+                while shared.axis(0).state().tension_N < tension_N:
+                    assert command.poll() is None
+                    time.sleep(0.005)
+                for process in (cells.process, command):
+                    process.send_signal(signal.SIGSTOP)
+                    time.sleep(1.0)
+                    process.send_signal(signal.SIGCONT)
+        told, _ = command.communicate(timeout=60)
+        assert command.returncode == 0, told
+    return (out / "raw" / "pull.raw").read_bytes()
+
+
+def test_the_same_calibration_gives_the_same_bytes_however_it_is_held_up(tmp_path: Path) -> None:
+    calm = pull(tmp_path / "calm", disturbed=False)
+    assert pull(tmp_path / "disturbed", disturbed=True) == calm
 
 
 def test_what_cannot_be_calibrated_is_refused(tmp_path: Path) -> None:

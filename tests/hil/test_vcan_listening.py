@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from cdpr_rt.clock import PacedClock
 from drivers.bus import BusUrl, open_port
 from drivers.bus.packed import FRAME
 from drivers.listening import HeardBus, ListeningDevice, heard_axis
@@ -22,7 +23,7 @@ def test_what_is_said_is_heard_and_nothing_added() -> None:
     winch, url = load_winch("winch-mpp0923d"), BusUrl.parse("socketcan:vcan0")
     talker = open_port(url, [])
     axis = heard_axis(winch, 1)
-    with ListeningDevice([HeardBus("can0", url, [axis], [0])], 0.001) as device:
+    with ListeningDevice([HeardBus("can0", url, [axis], [0])], 0.001, PacedClock()) as device:
         before = int(SENT.read_text())
         for k in range(100):
             talker.send(FRAME.pack(0x080, 0, bytes(8)))

@@ -15,6 +15,7 @@ import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
 
+from cdpr_rt.clock import PacedClock
 from drivers.bus import BusUrl
 from drivers.lss import LssAddress, LssMaster
 from profiles import load_drive
@@ -125,7 +126,7 @@ def test_new_devices_get_their_node_ids_by_lss() -> None:
     wanted = [LssAddress(0x00CD9A01, 0x402, 0x10000, serial) for serial in serials]
     with (
         on_vcan(*(new_device(serial) for serial in serials)),
-        LssMaster(BusUrl.parse("socketcan:vcan0"), 0.03) as master,
+        LssMaster(BusUrl.parse("socketcan:vcan0"), PacedClock(), 0.03) as master,
     ):
         assert master.unconfigured() == wanted
         assert master.select(wanted[1]) == UNCONFIGURED

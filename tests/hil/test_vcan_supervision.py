@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import pytest
 
+from cdpr_rt.clock import PacedClock
 from drivers.bus import BusState, BusUrl, open_port
 from drivers.bus.packed import ERR_FLAG, FRAME
 from drivers.network import CanNetwork
@@ -16,15 +16,13 @@ pytestmark = pytest.mark.vcan
 VCAN0 = BusUrl.parse("socketcan:vcan0")
 
 
-def _eventually(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 5.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+def _eventually(clock: PacedClock, condition: Callable[[], object]) -> None:
+    assert clock.wait(condition, clock.now_s + 5.0)
 
 
 def test_error_passive_is_told_and_bus_off_is_an_alarm_until_it_is_over() -> None:
-    network = CanNetwork(VCAN0, [1], 127, 0.1)
+    clock = PacedClock()
+    network = CanNetwork(VCAN0, clock, [1], 127, 0.1)
     wire = open_port(VCAN0, [])
 
     def tell(error: int, detail: int = 0) -> None:
@@ -32,15 +30,15 @@ def test_error_passive_is_told_and_bus_off_is_an_alarm_until_it_is_over() -> Non
 
     try:
         tell(0x004, 0x20)
-        _eventually(lambda: network.health.state is BusState.PASSIVE)
+        _eventually(clock, lambda: network.health.state is BusState.PASSIVE)
         assert network.alarm_text == ""
         tell(0x040)
-        _eventually(lambda: network.alarm_text)
+        _eventually(clock, lambda: network.alarm_text)
         assert "socketcan:vcan0: the CAN controller is bus-off" in network.alarm_text
         network.clear_alarm()
         assert "bus-off" in network.alarm_text
         tell(0x100)
-        _eventually(lambda: network.health.state is BusState.ACTIVE)
+        _eventually(clock, lambda: network.health.state is BusState.ACTIVE)
         network.clear_alarm()
         assert network.alarm_text == ""
         tell(0x004, 0x40)

@@ -19,6 +19,7 @@ from sim_bus.drive import SimDrive
 from sim_bus.plant import Plant
 from sim_bus.server import serve
 from tools.session import WinchSession
+from tools.truth import NO_SYNC
 
 SHIPPED = Path(profiles.__file__).parent
 DRIVES = sorted(path.stem for path in (SHIPPED / "drives").glob("*.toml"))
@@ -84,8 +85,8 @@ class Motion:
             device.transmit()
         device.command.torque_Nm[:] = powered
         start = first + self.session.sync_offset() - 1
-        offset = _HEADER_BYTES + start * _TRUTH.itemsize
-        records: NDArray[Any] = np.fromfile(self._log, _TRUTH, last - first + 1, offset=offset)
+        logged: NDArray[Any] = np.fromfile(self._log, _TRUTH, offset=_HEADER_BYTES)
+        records = logged[logged["sync"] != NO_SYNC][start : start + last - first + 1]
         assert records["sync"][0] == start
         assert records.size == last - first + 1
         return records

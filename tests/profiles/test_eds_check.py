@@ -248,7 +248,7 @@ def test_what_is_no_data_sheet_is_refused(tmp_path: Path, content: bytes, proble
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="cannot be read: No such file"):
         read_eds(tmp_path / "nothing.eds")
-    with pytest.raises(ProfileError, match="cannot be read: Is a directory"):
+    with pytest.raises(ProfileError, match="is no regular file"):
         read_eds(tmp_path)
 
 

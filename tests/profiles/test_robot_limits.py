@@ -17,9 +17,10 @@ from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
 from cdpr_rt.runtime.states import Reaction
 from drivers.bus.budget import machine_budget
 from profiles import ProfileError, load_robot
+from profiles.bounded_input import read_toml
 from profiles.catalogue import SHIPPED
 from profiles.platform import PlatformFile
-from profiles.reader import read_toml, validated
+from profiles.reader import validated
 from profiles.robot_limits import Reactions, RobotLimits
 from profiles.winch_calibration import WinchCalibration
 
@@ -92,6 +93,11 @@ def test_figures_are_one_for_all_or_one_for_each(tmp_path: Path) -> None:
     ("parts", "key", "problem"),
     [
         ({"limits": "torque_Nm = [1.0, 2.0, 3.0]"}, "limits.torque_Nm", "allowed: 1 or 2"),
+        (
+            {"limits": "speed_rad_s = 1037.0"},
+            "limits.speed_rad_s[0]",
+            "twice the motor's rated speed",
+        ),
         ({"limits": "torque_Nm = 12.0"}, "limits.torque_Nm[0]", "the motor's peak torque (11.55)"),
         ({"limits": "torque_Nm = 0.0"}, "limits.torque_Nm[0]", "greater than 0"),
         ({"limits": "torque_Nm = true"}, "limits.torque_Nm[0]", "a valid number"),
@@ -218,11 +224,36 @@ def test_an_axis_knows_its_calibration(tmp_path: Path) -> None:
     np.testing.assert_allclose(arrays.friction_per_N_m, [0.0, 1e-4])
     np.testing.assert_allclose(arrays.bias_Nm, [0.0, 0.01])
     (tmp_path / "mine.toml").write_text(calibration("MPP0922C").to_toml())
-    with pytest.raises(ProfileError, match=r"axes\[1\].calibration: is of a MPP0922C; allowed"):
+    with pytest.raises(ProfileError, match=r"mine\.toml: motor: .*'MPP0922C'; allowed"):
         load_robot(path)
     (tmp_path / "mine.toml").unlink()
     with pytest.raises(ProfileError, match=r"mine\.toml: cannot be read"):
         load_robot(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "allowed"),
+    [
+        ("gain_m", 0.0129, "allowed: 0.013 to 0.039 m, 0.5 to 1.5 times drum_radius_m"),
+        ("gain_m", 1e6, "allowed: 0.013 to 0.039 m, 0.5 to 1.5 times drum_radius_m"),
+        ("bias_Nm", -1.6, "allowed: -1.5 to 1.5 Nm, 50 % of the rated torque of MPP0923D"),
+        ("friction_Nm", 1.6, "allowed: -1.5 to 1.5 Nm, 50 % of the rated torque of MPP0923D"),
+        ("friction_per_N_m", 0.03, "allowed: -0.027 to 0.027 m, gain_m"),
+        ("highest_tension_N", 1e5, "N, the cable's breaking force"),
+        ("lowest_tension_N", 81.0, "allowed: 0 to 80 N, highest_tension_N"),
+    ],
+)
+def test_a_calibration_that_no_such_winch_can_have_is_refused(
+    tmp_path: Path, key: str, value: float, allowed: str
+) -> None:
+    spoilt = calibration().model_copy(update={key: value})
+    (tmp_path / "mine.toml").write_text(spoilt.to_toml())
+    path = robot_file(tmp_path, second='calibration = "mine.toml"')
+    with pytest.raises(ProfileError) as refused:
+        load_robot(path)
+    assert refused.value.file.endswith("mine.toml")
+    assert refused.value.key == key
+    assert allowed in refused.value.problem
 
 
 def test_drives_miss_their_master_in_fewer_than_two_heartbeats(tmp_path: Path) -> None:

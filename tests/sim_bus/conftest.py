@@ -7,6 +7,7 @@ import json
 import math
 import os
 import socket
+import struct
 import threading
 from collections.abc import Callable, Iterator
 
@@ -89,6 +90,31 @@ class Member:
 
     def status(self) -> dict[str, object]:
         return self.ask({"status": True})["status"]  # type: ignore[return-value]
+
+    def lead(self) -> tuple[float, float]:
+        """Take the lead and return bus time and the time of the next event."""
+        answer = self.ask({"lead": True})["lead"]
+        assert isinstance(answer, dict)
+        return answer["now_s"], math.inf if answer["next_s"] is None else answer["next_s"]
+
+    def until_time(self) -> tuple[list[bytes], float, float]:
+        """Return the frames up to the next time packet, bus time, and the next event's."""
+        frames = []
+        while len(packet := self.recv()) == 16:
+            frames.append(packet)
+        mark, now_s, next_s = struct.unpack("<8sdd", packet)
+        assert mark == b"bus-time"
+        return frames, now_s, next_s
+
+    def go(self, until_s: float) -> tuple[list[bytes], float, float]:
+        """Let the bus go on and return what `until_time` does."""
+        self.sock.send(struct.pack("<8sdd", b"bus-go\0\0", until_s, 0.0))
+        return self.until_time()
+
+    def sync(self) -> tuple[list[bytes], float, float]:
+        """Send the SYNC of a leader and return what `until_time` does."""
+        self.send(SYNC_ID)
+        return self.until_time()
 
     def filters(self, *pairs: tuple[int, int]) -> None:
         self.sock.send(json.dumps({"filters": pairs}).encode().ljust(17))

@@ -33,8 +33,33 @@ def test_lockstep_counts_syncs_and_not_the_wall() -> None:
         assert clock.now(50.0 + 0.3 * k + 0.1) == pytest.approx(start + 0.002 * k)
 
 
+def test_lockstep_stands_until_it_is_told_to_run() -> None:
+    clock = BusClock(ClockMode.LOCKSTEP, 0.0)
+    assert clock.now(9.0) == clock.ask(10.0) == 0.0
+    clock.run(20.0)
+    assert clock.now(20.5) == pytest.approx(0.5)
+    clock.stand(21.0)
+    assert clock.now(30.0) == pytest.approx(1.0)
+    assert clock.sync(31.0, 0.25) == clock.now(90.0) == pytest.approx(1.25)
+    assert clock.sync(91.0, 0.0) == pytest.approx(1.25)
+    clock.move(2.0)
+    clock.run(100.0)
+    clock.run(200.0)
+    assert clock.now(201.0) == pytest.approx(103.0)
+
+
+def test_a_hold_ends_where_the_clock_is_told_to_stand() -> None:
+    clock = BusClock(ClockMode.LOCKSTEP, 0.0)
+    clock.run(0.0)
+    held = clock.sync(1.0, 0.001)
+    clock.stand(1.1)
+    clock.run(5.0)
+    assert clock.now(5.25) == pytest.approx(held + 0.25)
+
+
 def test_time_runs_again_half_a_second_after_the_last_sync() -> None:
     clock = BusClock(ClockMode.LOCKSTEP, 0.0)
+    clock.run(0.0)
     held = clock.sync(10.0, 0.001)
     assert clock.wall_wait(10.2, 99.0) == pytest.approx(HOLD_S - 0.2)
     assert clock.now(10.0 + HOLD_S) == pytest.approx(held)
@@ -44,6 +69,7 @@ def test_time_runs_again_half_a_second_after_the_last_sync() -> None:
 
 def test_lockstep_without_a_cycle_period_runs_with_the_wall() -> None:
     clock = BusClock(ClockMode.LOCKSTEP, 0.0)
+    clock.run(0.0)
     assert clock.sync(4.0, 0.0) == pytest.approx(4.0)
     assert not clock.held
     assert clock.now(5.0) == pytest.approx(5.0)
@@ -51,15 +77,24 @@ def test_lockstep_without_a_cycle_period_runs_with_the_wall() -> None:
 
 @given(
     st.sampled_from(ClockMode),
-    st.lists(st.tuples(st.floats(0.0, 1.5), st.sampled_from([None, 0.0, 0.001, 0.01]))),
+    st.lists(
+        st.tuples(st.floats(0.0, 1.5), st.sampled_from([None, 0.0, 0.001, 0.01, "stand", "run"]))
+    ),
 )
 @LAW
-def test_bus_time_never_goes_back(mode: ClockMode, steps: list[tuple[float, float | None]]) -> None:
+def test_bus_time_never_goes_back(
+    mode: ClockMode, steps: list[tuple[float, float | str | None]]
+) -> None:
     clock = BusClock(mode, 7.0)
     wall, before = 7.0, 0.0
     for pause, period in steps:
         wall += pause
-        now = clock.now(wall) if period is None else clock.sync(wall, period)
+        if isinstance(period, float):
+            now = clock.sync(wall, period)
+        else:
+            if period is not None and mode is ClockMode.LOCKSTEP:
+                getattr(clock, period)(wall)
+            now = clock.now(wall)
         assert now >= before
         assert clock.now(wall) == now
         before = now
@@ -185,11 +220,3 @@ def test_paced_timers_keep_wall_time(start_bus: Callable[..., object], stub_node
     for _ in range(40):
         assert member.recv_id() == 0x703
     assert time.monotonic() - started == pytest.approx(0.15, abs=0.08)
-
-
-def test_a_held_clock_waits_as_long_as_it_is_told():
-    clock = BusClock(ClockMode.LOCKSTEP, 0.0)
-    clock.hold_s = 3.0
-    held = clock.sync(10.0, 0.001)
-    assert clock.now(12.9) == pytest.approx(held)
-    assert clock.now(13.5) == pytest.approx(held + 0.5)

@@ -196,6 +196,28 @@ def test_ctrl_c_ends_a_jog_under_control(lab: str) -> None:
     assert done("drive", "info", WINCH, "--bus", lab)["state"] == "switch on disabled"
 
 
+def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str) -> None:
+    command = [sys.executable, "-m", "tools.cli", "drive", "jog", WINCH, "--bus", lab]
+    process = subprocess.Popen(
+        [*command, "--seconds", "600", "--speed-deg-s", "90"], stderr=subprocess.PIPE, text=True
+    )
+    with can.Bus(interface="simbus", channel=lab.partition(":")[2]) as listener:
+        until = time.monotonic() + 60
+        while not _is_enabled(listener.recv(1.0)):
+            assert time.monotonic() < until
+    assert process.stderr is not None
+    process.send_signal(signal.SIGINT)
+    while "a second Ctrl-C takes the power at once" not in (line := process.stderr.readline()):
+        assert line
+    for _ in range(10):  # as somebody does who is afraid
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.002)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1, errors
+    assert "Traceback" not in errors
+    assert done("drive", "info", WINCH, "--bus", lab)["state"] == "switch on disabled"
+
+
 # -- bad input: one line that says what is allowed, status 2
 
 
@@ -326,3 +348,16 @@ def test_an_error_is_json_too() -> None:
     assert told["ok"] is False
     assert told["exit_status"] == result.returncode == 2
     assert told["error"] in result.stderr
+
+
+def test_ctrl_c_while_a_command_is_loaded_is_no_traceback() -> None:
+    code = (
+        "import os, signal, sys; from tools import cli;"
+        "cli._load = lambda module: os.kill(os.getpid(), signal.SIGINT);"
+        "sys.argv = ['cdpr', 'run', '--json']; cli.main()"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (told.returncode, told.stderr) == (1, "cdpr: interrupted\n")
+    assert json.loads(told.stdout)["error"] == "interrupted"

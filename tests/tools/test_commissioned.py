@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from drivers.boot import BootReport
 from profiles import Robot, load_robot
 from profiles.errors import ProfileError
 from sim_bus.plant import Plant
+from tests.profiles.test_robot_limits import calibration
 from tests.tools.motor_profiles import leave_profiles
 from tests.tools.robot_rig import robot_file
 from tools.commissioned import (
@@ -47,7 +49,7 @@ def test_each_axis_has_a_folder_of_its_own(robot: Robot, learnt: Path) -> None:
         learnt / "upper-right",
         learnt / "lower",
     ]
-    known = compensation_of(load_profiles(found))
+    known = compensation_of(robot, load_profiles(found))
     assert [one is not None for one in known] == [True] * 3
     assert not any(load_profiles(without_commissioned(found)))
     assert with_commissioned(found, None) is found
@@ -85,7 +87,7 @@ def test_a_damaged_profile_or_another_motors_is_refused(robot: Robot, learnt: Pa
     whole = path.read_text()
     found = with_commissioned(robot, learnt)
     path.write_text(whole.replace('"MPP0923D"', '"MPP1003D"'))
-    with pytest.raises(BadInputError, match=r"axis lower: .*MPP1003D; allowed: MPP0923D"):
+    with pytest.raises(BadInputError, match=r"axis lower: .*MPP1003D'; allowed: MPP0923D"):
         load_profiles(found)
     path.write_text(whole[: len(whole) // 2])
     with pytest.raises(BadInputError, match=r"axis lower: .*cogging-profile\.json"):
@@ -110,6 +112,18 @@ def test_another_drive_is_refused_by_its_serial_number(robot: Robot, learnt: Pat
     with pytest.raises(CoggingProfileError, match=r"axis upper right: .*serial = 2, .* has 77"):
         refuse_strangers(found, profiles, reports)
     refuse_strangers(found, (profiles[0], None, profiles[2]), reports)
+
+
+@pytest.mark.parametrize(("booted", "refused"), [(1, False), (0, False), (77, True)])
+def test_a_calibration_of_a_winch_with_another_drive_is_refused(
+    robot: Robot, booted: int, refused: bool
+) -> None:
+    drive = robot.axes[0].winch.drive
+    report = BootReport(node_id=1, vendor_id=drive.vendor_id, serial=booted)
+    axes = (replace(robot.axes[0], calibration=calibration()), *robot.axes[1:])
+    told = r"axes\[0\]\.calibration: .*serial 1, that of axis upper left has 77; calibrate it anew"
+    with pytest.raises(BadInputError, match=told) if refused else nullcontext():
+        refuse_strangers(replace(robot, axes=axes), (None,) * 3, {0: report})
 
 
 def test_motors_to_commission_are_named(robot: Robot, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from robot_rig import OUT, hold, robot_file, simulated
 
+from cdpr_rt.clock import PacedClock
 from drivers.bus.simbus_socket import connect, exchange
 from drivers.listening import HeardBus, ListeningDevice, heard_axis
 from profiles import Robot, load_robot
@@ -61,7 +62,7 @@ def listen(robot: Robot, url: str) -> ListeningDevice:
         places = robot.axes_on(name)
         axes = [heard_axis(robot.axes[i].winch, robot.axes[i].node_id) for i in places]
         buses.append(HeardBus(name, bus, axes, places))
-    return ListeningDevice(buses, robot.sync_period_s)
+    return ListeningDevice(buses, robot.sync_period_s, PacedClock())
 
 
 def test_a_listener_hears_all_and_adds_nothing(tmp_path: Path) -> None:

@@ -24,14 +24,15 @@ slack_m = 0.0
 
 
 def records(path: Path) -> np.ndarray:
-    """Return what stands in the log by now."""
+    """Return what stands in the log by now of the SYNCs."""
     data = path.read_bytes()
     header = json.loads(data[:HEADER_BYTES])
     fields = [(name, kind, *map(tuple, shape)) for name, kind, *shape in header["fields"]]
     record = np.dtype(fields)
     assert record.itemsize == header["record_bytes"]
     assert (len(data) - HEADER_BYTES) % record.itemsize == 0, "no record is ever half there"
-    return np.frombuffer(data[HEADER_BYTES:], record)
+    all_of_them = np.frombuffer(data[HEADER_BYTES:], record)
+    return all_of_them[all_of_them["sync_index"] != 0xFFFFFFFF]
 
 
 class Robot:
@@ -55,7 +56,10 @@ class Robot:
         for _ in range(count):
             self.bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
             time.sleep(0.01)
-        seen = records(self.log)
+        until = time.monotonic() + 20.0
+        while len(seen := records(self.log)) < before + count:
+            assert time.monotonic() < until
+            time.sleep(0.01)
         assert len(seen) == before + count
         return seen[-1]
 

@@ -233,7 +233,7 @@ def _delivery(way: OwnWay) -> dict[str, float]:
 def _echo(bus: str) -> Iterator[dict[str, Any]]:
     """Run the far end on `bus`; yield what it told when it was up."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tools.bench.echo_bus", bus],
+        [sys.executable, "-P", "-m", "tools.bench.echo_bus", bus],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -16,6 +16,7 @@ from cdpr_rt.realtime import one_core
 from drivers.axis_group import AxisConfig, AxisGroup
 from drivers.boot import BootReport, BootSettings, boot
 from drivers.bus import BusUrl, query_status
+from drivers.bus.leading import open_clock
 from drivers.data_sheet import load_dictionary
 from drivers.network import CanNetwork
 from profiles import Winch, load_winch
@@ -133,7 +134,9 @@ def _contenders(out: Output) -> Iterator[tuple[str, Sequence[Exchange]]]:
         # the simulator does the same work for all three; on one core no wake-up crosses cores
         stack.enter_context(one_core(simulator.process.pid))
         heartbeat_s = winch.drive.heartbeat_consumer_s / 4
-        network = CanNetwork(url, nodes, winch.master_node_id, heartbeat_s)
+        clock = open_clock([url])
+        stack.callback(clock.close)
+        network = CanNetwork(url, clock, nodes, winch.master_node_id, heartbeat_s)
         stack.callback(network.close)
         dictionaries = {node: load_dictionary(winch.drive.eds, node) for node in nodes}
         reports = []
@@ -144,7 +147,7 @@ def _contenders(out: Output) -> Iterator[tuple[str, Sequence[Exchange]]]:
         axes = [AxisConfig.from_boot(winch.drive, report, limit) for report in reports]
 
         def join() -> AxisGroup:
-            return AxisGroup(url, network, axes, PERIOD_S, winch.master_node_id, heartbeat_s)
+            return AxisGroup(network, axes, PERIOD_S)
 
         yield (
             bus,

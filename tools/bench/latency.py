@@ -118,7 +118,7 @@ def _figures(times: Times) -> dict[str, float]:
 
 
 def _probe(period_s: float, cycles: int, way: str) -> tuple[list[str], Times]:
-    command = [sys.executable, "-m", "tools.bench.wakeups", repr(period_s), str(cycles), way]
+    command = [sys.executable, "-P", "-m", "tools.bench.wakeups", repr(period_s), str(cycles), way]
     run = subprocess.run(command, capture_output=True, check=False)
     head, _, data = run.stdout.partition(b"\n")
     if run.returncode != 0 or not data:
@@ -130,7 +130,7 @@ def _probe(period_s: float, cycles: int, way: str) -> tuple[list[str], Times]:
 def _load(wanted: bool) -> Iterator[None]:
     """Keep every processor busy with ordinary processes while the block runs."""
     count = len(os.sched_getaffinity(0)) if wanted else 0
-    burners = [subprocess.Popen([sys.executable, "-c", _BURN]) for _ in range(count)]
+    burners = [subprocess.Popen([sys.executable, "-P", "-c", _BURN]) for _ in range(count)]
     try:
         yield
     finally:

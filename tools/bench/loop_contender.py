@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_rt.clock import PacedClock
 from cdpr_rt.runtime.robot_arrays import limits_of
 from cdpr_rt.tuning import stiffest_pid
 from profiles import Robot
@@ -37,7 +38,7 @@ def measure(robot: Robot, seconds: float, speed_rad_s: float) -> dict[str, Any]:
     with _booted(robot) as channels:
         given = {**_axes(robot, channels), "seconds": seconds, "speed_rad_s": speed_rad_s}
         done = subprocess.run(
-            [sys.executable, "-m", PROGRAM, json.dumps(given)],
+            [sys.executable, "-P", "-m", PROGRAM, json.dumps(given)],
             capture_output=True,
             text=True,
             timeout=_PATIENCE_S + seconds,
@@ -60,7 +61,7 @@ def _booted(robot: Robot) -> Iterator[dict[str, str]]:
         stack.callback(simulator.stop)
         urls = robot_urls(robot, (simulator.bus,))
         with ExitStack() as booting:
-            networks = open_networks(booting, robot, urls)
+            networks = open_networks(booting, robot, urls, PacedClock())
             torque_Nm = np.asarray(limits_of(robot).torque_Nm).tolist()
             boot_robot(booting, robot, networks, torque_Nm)
             for axis in robot.axes:

@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Any, Self
 
 from cdpr_rt.runtime.cycle_row import Row
+from cdpr_rt.runtime.right import PublishedRight
 from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
 from profiles import Robot, load_robot
 from tools.bench.processor_time import processor_time_s
-from tools.daemon.launcher import LOOP, SERVICE, Child
+from tools.daemon.child_process import Child
+from tools.daemon.launcher import LOOP, SERVICE
 from tools.daemon.settings import RunSettings
 from tools.errors import WorkFailedError
 from tools.robot_buses import robot_urls
@@ -26,7 +28,7 @@ LIVE_CLIENT = "tools.bench.live_client"
 _RING_S = 60.0
 _PATIENCE_S = 60.0
 _STOP_S = 20.0
-_LEASE_NS = 10**9
+_RIGHT_NS = 10**9
 _TO_AND_FRO_RAD = 10.0
 _CHECKS = 4
 _TURN_S = 0.05
@@ -60,6 +62,8 @@ class BenchDaemon:
     def __init__(self, robot: Robot, folder: Path) -> None:
         self.robot = robot
         self.block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
+        self._right = PublishedRight(self.block)
+        self._right.begin(0)
         self._folder = folder
         self._bus = f"simbus:bench-{time.monotonic_ns() % 10**9}"
         self._stack = ExitStack()
@@ -117,7 +121,8 @@ class BenchDaemon:
             "legs": 1000,
         }
         do = "program" if self.block.status()["state"] == "active" else "enable"
-        self.block.post_command({"do": do, "program": "sweep", "wanted": wanted})
+        right = self._right.number
+        self.block.post_command({"do": do, "right": right, "program": "sweep", "wanted": wanted})
         self._await("active", "sweep")
 
     def measure(self, seconds: float) -> tuple[Row, float]:
@@ -156,7 +161,7 @@ class BenchDaemon:
         return sorted((self._folder / "recordings").glob("*.mcap"))
 
     def _keep_right_to_move(self) -> None:
-        self.block.counters["lease_ns"] = time.monotonic_ns() + _LEASE_NS
+        self._right.until(time.monotonic_ns() + _RIGHT_NS)
 
     def _await_ready(self) -> None:
         """Wait for the end of boot and check; on a machine that is busy the check may need more."""
@@ -192,7 +197,7 @@ class _LiveClient:
 
     def __init__(self, control: Path) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", LIVE_CLIENT, str(control)],
+            [sys.executable, "-P", "-m", LIVE_CLIENT, str(control)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -106,7 +106,7 @@ def compare(name: str, session: RobotSession, before: Counts, after: Counts) -> 
     cycles, transmits = after.cycles - before.cycles, after.transmits - before.transmits
     missed = after.missed - before.missed
     elapsed_s = after.bus_time_s - before.bus_time_s
-    frames = cycles - missed + cycles / max(1, round(here.heartbeat_s / device.period_s))
+    frames = cycles - missed + cycles / max(1, round(here.network.heartbeat_s / device.period_s))
     for drive in (axis.drive for axis in here.axes):
         frames += transmits * len(command_pdos(drive))
         frames += sum(cycles / pdo.transmission_type for pdo in answer_pdos(drive))

@@ -14,6 +14,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_rt.clock import PacedClock
 from cdpr_rt.cycle import Cycle
 from cdpr_rt.exchange import AxisDevice
 from cdpr_rt.realtime import settle_memory, stay_punctual
@@ -29,6 +30,7 @@ class _NoDrives:
 
     def __init__(self, period_s: float) -> None:
         self.period_s = period_s
+        self.clock = PacedClock()
 
     def sync(self) -> None:
         """Send nothing."""

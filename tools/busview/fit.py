@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from profiles import DriveProfile, ProfileError, list_profiles, load_drive
-from profiles.reader import read_toml
+from profiles.bounded_input import read_toml
 from tools.busview.asking import Found
 from tools.errors import BadInputError
 

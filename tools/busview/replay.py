@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -14,6 +15,8 @@ import can
 from drivers.bus import BusUrl, FramePort, open_port
 from drivers.decode import Frame, Logged, read_log
 from drivers.errors import BusError
+from profiles.bounded_input import open_regular
+from profiles.errors import ProfileError
 from tools.busview.monitor import Viewer
 from tools.busview.source import frame_of
 from tools.errors import BadInputError, WorkFailedError
@@ -64,10 +67,13 @@ def _frames(path: Path) -> Iterator[Logged]:
         if str(path) == "-":
             yield from read_log("standard input", sys.stdin)
         elif path.suffix.lower() in _CANDUMP:
-            with path.open(encoding="ascii", errors="replace") as lines:
+            with os.fdopen(open_regular(path), encoding="ascii", errors="replace") as lines:
                 yield from read_log(str(path), lines)
         else:
+            os.close(open_regular(path))  # python-can opens what has this name, of any kind
             yield from _foreign(path)
+    except ProfileError as error:
+        raise BadInputError(str(error)) from None
     except OSError as error:
         raise BadInputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:

@@ -91,9 +91,10 @@ class SimbusSource:
         return [Frame.unpack(*self._waiting.popleft()) for _ in range(count)]
 
     def ask(self) -> dict[str, float]:
-        """Return what the bus says has passed since we joined: frames and bus_time_s."""
+        """Return what the bus says: `frames`, `bus_time_s` since we joined; whether it is `led`."""
         now = query_status(self._url.channel)
-        return {key: now[key] - self._before[key] for key in ("frames", "bus_time_s")}
+        passed = {key: now[key] - self._before[key] for key in ("frames", "bus_time_s")}
+        return passed | {"led": now["led"]}
 
     @property
     def seen(self) -> int | None:

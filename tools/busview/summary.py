@@ -35,6 +35,8 @@ class Summary:
     """Whether the time stamps are not those of the traffic and nothing else tells its time."""
     missed: int | None = None
     """Frames that went past the monitor, where that is known."""
+    led: bool | None = None
+    """Whether a master leads the bus at the end, where that is known."""
     _by_id: dict[tuple[str, str], _Traffic] = field(default_factory=dict)
 
     def add(self, record: Record) -> None:
@@ -93,6 +95,7 @@ class Summary:
             "bitrate_bit_s": self.bitrate_bit_s,
             "problems": self.problems,
             "missed": self.missed,
+            "led": self.led,
             "ids": self.rows(),
         }
 
@@ -110,6 +113,8 @@ class Summary:
             lines.append(
                 f"{self.missed} frames went by unseen: the bus was faster than the monitor"
             )
+        if self.led:
+            lines.append("a master leads this bus: its time moves by that master's packets alone")
         if self._by_id:
             lines.append(f"{'id':>8} {'node':>5}  {'what':<10}{'frames':>9}{'per s':>10}")
         for row in self.rows():

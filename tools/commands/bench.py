@@ -8,7 +8,14 @@ import typer
 
 from tools.bench import cycle as cycle_bench
 from tools.bench import profile_loading
-from tools.commands import bench_bus, bench_latency, bench_loop, bench_planar, bench_soak
+from tools.commands import (
+    bench_bus,
+    bench_latency,
+    bench_loop,
+    bench_planar,
+    bench_soak,
+    bench_stop,
+)
 from tools.output import Output
 
 app = typer.Typer(help="Measure this project's own cost on this machine.", no_args_is_help=True)
@@ -28,6 +35,7 @@ def register(parent: typer.Typer) -> None:
     bench_loop.add(app)
     bench_planar.add(app)
     bench_soak.add(app)
+    bench_stop.add(app)
     parent.add_typer(app, name="bench")
 
 

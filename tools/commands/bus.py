@@ -170,7 +170,7 @@ def _ask_bus(source: SimbusSource, summary: Summary) -> None:
     except BusError:
         summary.untimed = True  # it has ended, and its time with it
         return
-    summary.time_s = passed["bus_time_s"]
+    summary.time_s, summary.led = passed["bus_time_s"], bool(passed["led"])
     if source.seen is None:
         return
     before = -1

@@ -8,10 +8,11 @@ from typing import Annotated
 
 import typer
 
-from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError, DriveIdentity
+from cdpr_rt.cogging_profile import CoggingProfileError, DriveIdentity
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import read_raw_log
 from profiles import Winch, load_winch
+from profiles.motor_bounds import MotorBounds
 from tools import summary
 from tools.commands.commission import keeping_raw_data, prepare
 from tools.commands.options import (
@@ -22,6 +23,7 @@ from tools.commands.options import (
     WinchArgument,
     YesOption,
 )
+from tools.commissioned import load_profile
 from tools.commissioning import METHODS, Paths
 from tools.errors import BadInputError
 from tools.evaluation import compare
@@ -133,15 +135,13 @@ def validate(
     """Follow ramps without and with the profile's compensation, under one PID."""
     out = Output(as_json)
     profile, url = load_winch(winch), open_bus(bus)
-    try:
-        learnt = CoggingProfile.load(cogging_profile)
-    except CoggingProfileError as error:
-        raise BadInputError(str(error)) from error
+    bounds = MotorBounds(profile.motor)
+    learnt = load_profile(cogging_profile, bounds)
     paths = prepare(out_dir, overwrite)
     confirm_motion(url, yes, "the validation turns the motor")
     with keeping_raw_data(paths), open_winch(profile, url, out, plant, paths.truth) as session:
         try:  # before the motor moves
-            learnt.compensation("better", session.drive_identity, profile.motor.model)
+            learnt.compensation("better", session.drive_identity, bounds)
         except CoggingProfileError as error:
             raise BadInputError(f"{cogging_profile}: {error}") from error
         plan = Plan(bandwidths_Hz=())

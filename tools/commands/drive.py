@@ -114,10 +114,9 @@ def enable(
     out = Output(as_json)
     profile, url = load_winch(winch), open_bus(bus)
     confirm_motion(url, yes, "the drive's power stage is switched on")
-    with (
-        tension_watch(sensors, port) as watches,
-        open_winch(profile, url, out, plant, safety_io=safety_io, watches=watches) as session,
-    ):
+    watching = tension_watch(sensors, port)
+    opened = open_winch(profile, url, out, plant, safety_io=safety_io, watching=watching)
+    with opened as session:
         session.set_mode(profile.drive.mode_torque)
         session.enable()
         out.say(f"{session.device.states()[0].label}, no torque")
@@ -169,10 +168,9 @@ def home(
             f"--method {method}: {profile.drive.name} has {', '.join(map(str, known))}"
         )
     confirm_motion(url, yes, "homing turns the motor by up to a turn")
-    with (
-        tension_watch(sensors, port) as watches,
-        open_winch(profile, url, out, plant, safety_io=safety_io, watches=watches) as session,
-    ):
+    watching = tension_watch(sensors, port)
+    opened = open_winch(profile, url, out, plant, safety_io=safety_io, watching=watching)
+    with opened as session:
         session.find_index(method)
         position = math.degrees(session.device.feedback.position_rad[0])
         out.say(f"homed by method {method}; the motor stands {position:.2f} deg from there")
@@ -203,10 +201,9 @@ def jog(
             f"--speed-deg-s {speed_deg_s:g}: allowed are up to {fastest:.0f} deg/s, not 0"
         )
     confirm_motion(url, yes, f"the motor turns at {speed_deg_s:g} deg/s for {seconds:g} s")
-    with (
-        tension_watch(sensors, port) as watches,
-        open_winch(profile, url, out, plant, safety_io=safety_io, watches=watches) as session,
-    ):
+    watching = tension_watch(sensors, port)
+    opened = open_winch(profile, url, out, plant, safety_io=safety_io, watching=watching)
+    with opened as session:
         session.set_mode(profile.drive.mode_torque)
         speed = math.radians(speed_deg_s)
         session.restrict(max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S), _JOG_ERROR_RAD)

@@ -10,7 +10,9 @@ from typing import Annotated, Any
 import typer
 
 from profiles import load_drive
+from profiles.bounded_input import read_bytes
 from profiles.eds_check import EdsFile, read_eds
+from profiles.eds_text import MOST_EDS_BYTES
 from tools.commands.options import JsonOption
 from tools.drive_import.files import eds_text, profile_text
 from tools.drive_import.proposal import Proposal, propose
@@ -74,7 +76,7 @@ def _write(
     """Write profile and EDS; neither replaces a file that is there."""
     profile, copy = folder / f"{stem}.toml", folder / f"{stem}{suffix}"
     is_source = copy.exists() and copy.samefile(file)
-    if is_source and content == file.read_bytes():
+    if is_source and content == read_bytes(file, MOST_EDS_BYTES):
         writes: list[tuple[Path, bytes]] = []
     else:
         copy = folder / f"{stem}-mended{suffix}" if is_source else copy

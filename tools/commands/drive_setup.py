@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
 
 from drivers.bus import BusUrl
+from drivers.bus.leading import open_clock
 from drivers.errors import BusError
 from drivers.lss import BITRATE_INDEX, NOT_TOLD, UNCONFIGURED, LssAddress, LssError, LssMaster
 from profiles import DriveProfile, list_profiles, load_drive
@@ -119,11 +121,12 @@ def lss(
     rate = None if bitrate is None else _bitrate(bitrate)
     wish = _Wish(node_id, rate, store, switch_delay_ms * 1e-3 if activate else None)
     kind = None if profile is None else load_drive(profile)
+    clock = open_clock([url])
     try:
-        master = LssMaster(url, timeout_ms * 1e-3)
+        master = LssMaster(url, clock, timeout_ms * 1e-3)
     except BusError as error:
         raise BadInputError(str(error)) from error
-    with master:
+    with closing(clock), master:
         out.note("looking for devices ...")
         found = [_only_device(master)] if alone else _search(master, profile, kind, serial)
         out.say(f"{len(found)} device{'s' * (len(found) != 1)} found")

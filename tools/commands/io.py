@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from cdpr_rt.clock import PacedClock
 from drivers.modbus.io_link import IoLink
 from drivers.modbus.io_rules import IoState
 from drivers.modbus.tcp import ModbusError
@@ -51,18 +52,19 @@ def show(io: _IoArgument, as_json: JsonOption = False) -> None:
 def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = False) -> None:
     """Say what changes, as it changes; changes nothing."""
     out = Output(as_json)
-    deadline = time.monotonic() + seconds
     before: list[str] = []
     with _link(io) as link:
+        clock = link.clock
+        deadline_s = clock.now_s + seconds
         state = link.state()
         try:
-            while time.monotonic() < deadline:
+            while clock.now_s < deadline_s:
                 lines = _lines(state)
                 for line in lines:
                     if line not in before:
                         out.say(f"{time.strftime('%H:%M:%S')}  {line}")
                 before = lines
-                time.sleep(link.profile.poll_period_s)
+                clock.sleep(link.profile.poll_period_s)
                 state = link.state()
         except KeyboardInterrupt:
             out.note("stopped on request")
@@ -150,7 +152,7 @@ def off(io: _IoArgument, as_json: JsonOption = False) -> None:
                 refused.append(str(error))
         if refused:
             raise WorkFailedError("; ".join(dict.fromkeys(refused)))
-        time.sleep(max(device.timeout_s for device in devices))
+        link.clock.sleep(max(device.timeout_s for device in devices))
         state = link.state()
     for line in _lines(state):
         out.say(line)
@@ -164,7 +166,7 @@ def ack(io: _IoArgument, as_json: JsonOption = False) -> None:
     """Acknowledge a trip whose cause is gone; nothing is energised by it."""
     out = Output(as_json)
     kept = kept_trip(io)
-    with connect(io) as safety:
+    with connect(io, PacedClock()) as safety:
         safety.acknowledge()
     out.say("no trip was kept" if kept is None else f"acknowledged: {kept.get('reason')}")
     out.result({"ok": True, "acknowledged": kept})
@@ -172,7 +174,7 @@ def ack(io: _IoArgument, as_json: JsonOption = False) -> None:
 
 @contextmanager
 def _link(io: str) -> Iterator[IoLink]:
-    link = IoLink(load_safety_io(io))
+    link = IoLink(load_safety_io(io), PacedClock())
     try:
         yield link
     finally:
@@ -209,10 +211,10 @@ def _keep(
     """Set an output and keep the device's watchdog content for a while."""
     link.feed_watchdog()  # a device whose watchdog has run out takes no outputs
     link.write(coil, on)
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline and not ended():
+    deadline_s = link.clock.now_s + seconds
+    while link.clock.now_s < deadline_s and not ended():
         link.feed_watchdog()
-        time.sleep(link.profile.poll_period_s)
+        link.clock.sleep(link.profile.poll_period_s)
 
 
 def _told(state: IoState) -> dict[str, Any]:

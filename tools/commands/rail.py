@@ -15,7 +15,14 @@ from tools.commands.options import JsonOption, SafetyIoOption, YesOption
 from tools.consent import require_consent
 from tools.errors import BadInputError
 from tools.output import Output
-from tools.rail_session import open_rail, position_of, power_watch, require_options, slack_watch
+from tools.rail_session import (
+    open_rail,
+    position_of,
+    power_watch,
+    rail_clock,
+    require_options,
+    slack_watch,
+)
 from tools.signals import stop_on_signals
 
 app = typer.Typer(help="The rails on which winches stand.", no_args_is_help=True)
@@ -59,7 +66,10 @@ def reset(
     """Acknowledge the fault of a rail's CiA 402 drive; nothing is enabled by it."""
     out = Output(as_json)
     profile = load_rail(rail)
-    with open_rail(rail, profile, bus, safety_io, out) as axis:
+    with (
+        rail_clock(profile, bus, ()) as clock,
+        open_rail(rail, profile, bus, safety_io, out, clock) as axis,
+    ):
         if not isinstance(axis, Cia402RailAxis):
             raise BadInputError(f"{profile.name}: acknowledge its fault at the drive itself")
         axis.acknowledge_fault()
@@ -108,9 +118,10 @@ def move_(
         require_consent(f"{question} again.", yes)
     with (
         stop_on_signals() as stop_requested,
-        slack_watch(profile, tension, tension_port, cables_slack_checked) as tight,
-        power_watch(profile, bus, winch_bus or (), out) as powered,
-        open_rail(rail, profile, bus, safety_io, out) as axis,
+        rail_clock(profile, bus, winch_bus or ()) as clock,
+        slack_watch(profile, tension, tension_port, cables_slack_checked, clock) as tight,
+        power_watch(profile, bus, winch_bus or (), out, clock) as powered,
+        open_rail(rail, profile, bus, safety_io, out, clock) as axis,
     ):
         travel_s = abs(to_m - axis.position_m()) / profile.speed_m_s
         begun = axis.position_m()
@@ -118,6 +129,7 @@ def move_(
             done = move(
                 profile,
                 axis,
+                clock,
                 to_m,
                 Conditions(
                     tight,

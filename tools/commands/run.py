@@ -21,8 +21,9 @@ from tools.commands.options import JsonOption, SafetyIoOption, YesOption
 from tools.commissioned import load_profiles, with_commissioned
 from tools.consent import require_consent
 from tools.daemon.launcher import Launcher
+from tools.daemon.loop_file import LoopFile
 from tools.daemon.notify import ServiceManager
-from tools.daemon.paths import default_recordings, default_socket
+from tools.daemon.paths import SOCKET_SUFFIX, default_recordings, default_socket
 from tools.daemon.settings import Address, RunSettings
 from tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
 from tools.output import Output, to_json
@@ -51,7 +52,7 @@ _Socket = Annotated[
 ]
 _KeyFile = Annotated[
     Path | None,
-    typer.Option(help="Secret that everybody must know who is not on this machine."),
+    typer.Option(help="Secret of those who may move the robot over --http or --stream."),
 ]
 _Record = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Record into this folder instead of the user's.")
@@ -60,6 +61,13 @@ _NoRecord = Annotated[bool, typer.Option("--no-record", help="Record nothing.")]
 _Live = Annotated[
     int | None,
     typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
+]
+_LiveOrigin = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="ORIGIN",
+        help="A web page that may look at the live view, such as https://app.foxglove.dev.",
+    ),
 ]
 _Stream = Annotated[
     str | None,
@@ -95,6 +103,7 @@ def run(
     record: _Record = None,
     no_record: _NoRecord = False,
     live: _Live = None,
+    live_origin: _LiveOrigin = None,
     stream: _Stream = None,
     read_only: _ReadOnly = False,
     safety_io: SafetyIoOption = None,
@@ -121,6 +130,7 @@ def run(
         record=record,
         no_record=no_record,
         live=live,
+        live_origin=live_origin,
         stream=stream,
         read_only=read_only,
         safety_io=safety_io,
@@ -151,6 +161,7 @@ def settings_for(
     record: Path | None,
     no_record: bool,
     live: int | None,
+    live_origin: list[str] | None = None,
     stream: str | None,
     read_only: bool,
     safety_io: str | None,
@@ -185,6 +196,7 @@ def settings_for(
         key_file=key_file,
         record=None if no_record else record or default_recordings(),
         live=live,
+        live_origins=tuple(live_origin or ()),
         stream=None if stream is None else Address.parse("--stream", stream),
         launcher_pid=os.getpid(),
     )
@@ -200,7 +212,7 @@ def _launch(
     block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
     block.counters["start_monotonic_ns"] = time.monotonic_ns()
     block.counters["start_realtime_ns"] = time.time_ns()
-    settings = settings.model_copy(update={"block_fd": block.fd})
+    settings = settings.with_key_kept().model_copy(update={"block_fd": block.fd})
 
     def ready(status: dict[str, Any]) -> None:
         told = {"robot": robot.name, "state": status["state"], "reason": status.get("reason", "")}
@@ -228,16 +240,31 @@ def _ended(reason: str, status: int) -> CommandError:
 
 def _require_free(control: Path) -> None:
     """Raise BadInputError where a daemon listens at `control` already, or none ever could."""
+    if control.suffix != SOCKET_SUFFIX:  # the loop's file beside it has this name but for that
+        raise BadInputError(f"--socket {control}: allowed: a name that ends in {SOCKET_SUFFIX}")
     if not os.access(control.parent, os.W_OK | os.X_OK):
         raise BadInputError(f"--socket {control}: {control.parent} is no folder to write into")
+    if _answers(control) or _loop_runs_beside(control):
+        raise BadInputError(f"--socket {control}: a daemon runs there already; `cdpr stop` ends it")
+
+
+def _answers(control: Path) -> bool:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
         try:
             caller.connect(str(control))
         except (FileNotFoundError, ConnectionRefusedError):
-            return
+            return False
         except OSError as error:
             raise BadInputError(f"--socket {control}: {error}") from None
-    raise BadInputError(f"--socket {control}: a daemon runs there already; `cdpr stop` ends it")
+    return True
+
+
+def _loop_runs_beside(control: Path) -> bool:
+    """Whether a loop runs whose service does not answer at present."""
+    try:
+        return LoopFile.read(LoopFile.beside(control)).runs()
+    except WorkFailedError:  # there is none, or it is not to be believed
+        return False
 
 
 def _require_no_master(robot: Robot, settings: RunSettings) -> None:

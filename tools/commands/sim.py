@@ -16,7 +16,7 @@ from drivers.errors import BusError
 from profiles import Robot, Winch, load_machine
 from sim_bus.canopen.lss import UNCONFIGURED
 from sim_bus.canopen.store import StoreError
-from sim_bus.clock import HOLD_S, ClockMode
+from sim_bus.clock import ClockMode
 from sim_bus.drive import SimDrive
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
@@ -65,16 +65,6 @@ def up(
             "--lockstep/--paced", help="Bus time moves with each SYNC, or with the clock."
         ),
     ] = True,
-    hold_s: Annotated[
-        float,
-        typer.Option(
-            "--hold",
-            metavar="SECONDS",
-            min=0.01,
-            max=3600.0,
-            help="In lockstep: without SYNC for so long bus time goes on by the clock.",
-        ),
-    ] = HOLD_S,
     nodes: Annotated[
         int, typer.Option(min=1, max=16, help="So many drives, node ids counted up.")
     ] = 1,
@@ -121,7 +111,6 @@ def up(
             *(profile, bus, plant, mode, stores, board, exit_with_stdin),
             truth_log=truth_log,
             detached=detached,
-            hold_s=hold_s,
         )
         return
     if detached:
@@ -136,14 +125,19 @@ def up(
         raise BadInputError(f"--nodes {nodes}: node ids end at 127, the first is {profile.node_id}")
     ids = [UNCONFIGURED] * nodes if unconfigured else range(profile.node_id, last + 1)
     with ExitStack() as stack:
+        drives = _drives(stack, profile, ids, truth, truth_log, store)
+        if board is not None:
+            made = PhysicsBoard.create(board, len(drives), lockstep=lockstep)
+            shared = stack.enter_context(made)
+            for number, drive in enumerate(drives):
+                drive.connect(shared.axis(number))
         serve(
-            _drives(stack, profile, ids, truth, truth_log, store, board),
+            drives,
             str(url),
             mode=mode,
             bitrate=profile.bitrate_bit_s,
             truth_log=str(truth_log) if truth_log else None,
             until_stdin_ends=exit_with_stdin,
-            hold_s=hold_s,
             slcan=slcan,
             socketcand_port=socketcand,
         )
@@ -156,7 +150,6 @@ def _drives(
     plant: Plant,
     truth_log: Path | None,
     store: Path | None,
-    board: Path | None,
 ) -> list[SimDrive]:
     """Return a drive of the winch for each node id, closed with `stack`."""
     drives = []
@@ -171,10 +164,6 @@ def _drives(
             raise BadInputError(f"--truth-log {truth_log}: {error.strerror}") from error
         stack.callback(drive.close)
         drives.append(drive)
-    if board is not None:
-        shared = stack.enter_context(PhysicsBoard.create(board, len(drives)))
-        for number, drive in enumerate(drives):
-            drive.connect(shared.axis(number))
     return drives
 
 

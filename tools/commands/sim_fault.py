@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 
 import typer
 
+from cdpr_rt.clock import PacedClock
 from drivers.data_sheet import load_dictionary
 from drivers.errors import BusError, SdoError
 from drivers.network import CanNetwork
@@ -77,7 +78,9 @@ def fault(
     url = robot_urls(robot, bus)[chosen.bus]
     winch = chosen.winch
     try:
-        network = CanNetwork(url, [winch.node_id], robot.master_node_id, robot.master_heartbeat_s)
+        network = CanNetwork(
+            url, PacedClock(), [winch.node_id], robot.master_node_id, robot.master_heartbeat_s
+        )
     except BusError as error:
         raise BadInputError(str(error)) from error
     try:

@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from profiles.rail import RailProfile, load_rail
+from profiles.rail import ModbusRail, RailProfile, load_rail
 from profiles.rail_drive import load_rail_drive
 from sim_bus.clock import ClockMode
 from sim_bus.drive import SimDrive
 from sim_bus.modbus_tcp_server import serve_units
-from sim_bus.physics_board import PhysicsBoard
+from sim_bus.physics_board import PhysicsBoard, common_time
 from sim_bus.plant import Plant
 from sim_bus.rail_twin import RailTwin
 from sim_bus.server import serve
@@ -33,8 +33,18 @@ def rail(
         str | None, typer.Option(help="For CiA 402: simbus:NAME, opened here, or socketcan:IFACE.")
     ] = None,
     board: Annotated[
-        Path | None, typer.Option(help="For CiA 402: make this physics board, for its brake.")
+        Path | None,
+        typer.Option(
+            help="For CiA 402: make this physics board, for its brake. For Modbus: the board of a "
+            "simulator in lockstep, whose time the rail lives in."
+        ),
     ] = None,
+    lockstep: Annotated[
+        bool,
+        typer.Option(
+            "--lockstep/--paced", help="For CiA 402: bus time moves with its master, or the clock."
+        ),
+    ] = False,
     plant: Annotated[
         Path | None, typer.Option(help="For CiA 402: the truth about motor and drive.")
     ] = None,
@@ -48,14 +58,25 @@ def rail(
     """Run a simulated rail until Ctrl-C; tells on standard output when it is up."""
     profile = load_rail(rail_name)
     if profile.modbus is not None:
-        twin = RailTwin(profile)
-        told = {"unit": profile.modbus.unit, "panel_unit": twin.panel.unit}
-        where = profile.modbus.port if port is None else port
-        serve_units(twin.units(), twin.line, twin.step, where, told, exit_with_stdin)
+        _serve_modbus(profile, profile.modbus, board, port, exit_with_stdin)
         return
     if bus is None:
         raise BadInputError(f"--bus: {profile.name} is on a CAN bus; name it")
-    _serve_drive(rail_name, profile, bus, board, plant, exit_with_stdin)
+    mode = ClockMode.LOCKSTEP if lockstep else ClockMode.PACED
+    _serve_drive(rail_name, profile, bus, board, plant, mode, exit_with_stdin)
+
+
+def _serve_modbus(
+    rail: RailProfile, there: ModbusRail, board: Path | None, port: int | None, until_ends: bool
+) -> None:
+    with ExitStack() as stack:
+        boards = [] if board is None else [stack.enter_context(PhysicsBoard.attach(board))]
+        bus_time = common_time(boards)
+        twin = RailTwin(rail, bus_time)
+        step = twin.step if bus_time is None else None
+        told = {"unit": there.unit, "panel_unit": twin.panel.unit}
+        where = there.port if port is None else port
+        serve_units(twin.units(), twin.line, step, where, told, until_ends)
 
 
 def _serve_drive(
@@ -64,6 +85,7 @@ def _serve_drive(
     bus: str,
     board: Path | None,
     plant: Path | None,
+    mode: ClockMode,
     exit_with_stdin: bool,
 ) -> None:
     assert rail.cia402 is not None  # its kind says so
@@ -72,5 +94,6 @@ def _serve_drive(
     with ExitStack() as stack:
         stack.callback(drive.close)
         if board is not None:
-            drive.connect(stack.enter_context(PhysicsBoard.create(board, 1)).axis(0))
-        serve([drive], bus, mode=ClockMode.PACED, until_stdin_ends=exit_with_stdin)
+            made = PhysicsBoard.create(board, 1, lockstep=mode is ClockMode.LOCKSTEP)
+            drive.connect(stack.enter_context(made).axis(0))
+        serve([drive], bus, mode=mode, until_stdin_ends=exit_with_stdin)

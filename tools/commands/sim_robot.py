@@ -10,7 +10,7 @@ from profiles import Robot
 from profiles.platform import Platform
 from sim_bus.cable_robot import CableRobot, RobotShape
 from sim_bus.canopen.store import StoreError
-from sim_bus.clock import HOLD_S, ClockMode
+from sim_bus.clock import ClockMode
 from sim_bus.drive import SimDrive, transmission_of
 from sim_bus.fleet import FleetBus, serve_fleet
 from sim_bus.motor_state import Transmission
@@ -33,7 +33,6 @@ def up(
     until_stdin_ends: bool,
     truth_log: Path | None = None,
     detached: bool = False,
-    hold_s: float = HOLD_S,
 ) -> None:
     """Run the simulated drives of `robot` until Ctrl-C; serial numbers count the axes from 1.
 
@@ -66,7 +65,9 @@ def up(
         if truth_log is not None:
             drives[0].record_with(_pose_log(truth_log, body))
         if board is not None:
-            shared = stack.enter_context(PhysicsBoard.create(board, len(drives)))
+            lockstep = mode is ClockMode.LOCKSTEP
+            made = PhysicsBoard.create(board, len(drives), lockstep=lockstep)
+            shared = stack.enter_context(made)
             for i, drive in enumerate(drives):
                 drive.connect(shared.axis(i))
         fleet = [
@@ -78,9 +79,7 @@ def up(
             )
             for bus in robot.buses
         ]
-        serve_fleet(
-            robot.reference, fleet, mode=mode, hold_s=hold_s, until_stdin_ends=until_stdin_ends
-        )
+        serve_fleet(robot.reference, fleet, mode=mode, until_stdin_ends=until_stdin_ends)
 
 
 def _physics(

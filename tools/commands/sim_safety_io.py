@@ -12,7 +12,7 @@ from pymodbus.exceptions import ModbusException
 
 from profiles.safety_io import load_safety_io
 from sim_bus.modbus_tcp_server import serve_units
-from sim_bus.physics_board import PhysicsBoard
+from sim_bus.physics_board import PhysicsBoard, common_time
 from sim_bus.safety_plant import SafetyPlant
 from sim_bus.safety_twin import Fault, SafetyTwin
 from tools.errors import BadInputError, WorkFailedError
@@ -49,13 +49,14 @@ def safety_io(
     with ExitStack() as stack:
         boards = [stack.enter_context(PhysicsBoard.attach(path)) for path in board or ()]
         axes = [one.axis(i) for one in boards for i in range(one.axes)]
-        twin = SafetyTwin(profile, truth, axes)
+        bus_time = common_time(boards)
+        twin = SafetyTwin(profile, truth, axes, bus_time)
         stack.callback(twin.switch_off)
         told = {"unit": profile.unit, "panel_unit": twin.panel.unit}
         serve_units(
             twin.units(),
             twin.line,
-            twin.step,
+            twin.step if bus_time is None else None,
             profile.port if port is None else port,
             told,
             exit_with_stdin,

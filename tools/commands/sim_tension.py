@@ -10,7 +10,7 @@ import typer
 
 from profiles.tension_sensor import load_tension_sensors
 from sim_bus.modbus_rtu_server import serve_rtu
-from sim_bus.physics_board import PhysicsBoard
+from sim_bus.physics_board import PhysicsBoard, common_time
 from sim_bus.tension_twin import AmplifierPlant, SimAmplifier
 from tools.errors import BadInputError
 
@@ -63,6 +63,7 @@ def tension(
             units,
             profile.baudrate,
             bits_per_byte=9 + profile.stop_bits + (profile.parity != "N"),
+            lockstep=common_time(boards) is not None,
             broken=[text.split() for text in fault or ()],
             told={"sensors": sensors},
             until_stdin_ends=exit_with_stdin,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from cdpr_rt.clock import Clock, PacedClock
 from cdpr_rt.errors import ControlError
 from cdpr_rt.realtime import one_core
 from drivers.bus import BusUrl
@@ -78,8 +78,9 @@ def watch(
     """Show the tensions as they come, and their figures at the end; reads only."""
     out = Output(as_json)
     profile = load_tension_sensors(sensors)
-    with stop_on_signals() as stop_requested, TensionSampler(profile, port) as sampler:
-        figures = watching.watch(sampler, out, seconds or float("inf"), stop_requested)
+    clock = PacedClock()
+    with stop_on_signals() as stop_requested, TensionSampler(profile, port, clock) as sampler:
+        figures = watching.watch(sampler, clock, out, seconds or float("inf"), stop_requested)
     for one in figures:
         shown = f"{one['mean_N']:8.2f} N ± {one['std_N']:.2f}, {one['rate_Hz']:.0f} readings/s"
         state = "" if one["valid"] else f"  {one['error'] or one['fault']}"
@@ -107,14 +108,15 @@ def tare(
     out = Output(as_json)
     profile = load_tension_sensors(sensors)
     chosen = [_number_of(profile, name) for name in cable or [s.cable for s in profile.sensors]]
-    cells = LoadCells(profile, port)
+    clock = PacedClock()
+    cells = LoadCells(profile, port, clock)
     try:
-        before = _means(cells, chosen, seconds)
+        before = _means(cells, chosen, clock, seconds)
         if profile.amplifier.tare is not None:
             for number in chosen:
                 cells.tare(number)
-            time.sleep(profile.amplifier.tare.settle_s)
-        after = _means(cells, chosen, seconds) if profile.amplifier.tare else before
+            clock.sleep(profile.amplifier.tare.settle_s)
+        after = _means(cells, chosen, clock, seconds) if profile.amplifier.tare else before
     finally:
         cells.close()
     told = []
@@ -129,9 +131,9 @@ def tare(
     out.result({"ok": True, "cables": told})
 
 
-def _means(cells: LoadCells, chosen: list[int], seconds: float) -> list[float]:
-    sums, rounds, until = [0.0] * len(chosen), 0, time.monotonic() + seconds
-    while rounds == 0 or time.monotonic() < until:
+def _means(cells: LoadCells, chosen: list[int], clock: Clock, seconds: float) -> list[float]:
+    sums, rounds, until_s = [0.0] * len(chosen), 0, clock.now_s + seconds
+    while rounds == 0 or clock.now_s < until_s:
         for i, number in enumerate(chosen):
             reading = cells.read(number)
             if reading.fault:
@@ -222,7 +224,7 @@ def calibrate(
         # the others' cells are of no interest: they may be silent, and are not waited for
         cell = cells.model_copy(update={"sensors": (cells.sensors[number],)})
         run.prepare(overwrite, yes, "the made-fast cable is pulled by the winch")
-        run.by_load_cell(pull, TensionSampler(cell, port))
+        run.by_load_cell(pull, cell, port)
     run.finish()
 
 
@@ -257,15 +259,19 @@ class _Run:
             raw = calibration.raw_folder(self.folder)
             measure_masses(session, out, raw, plan, masses_kg, hang, gravity)
 
-    def by_load_cell(self, plan: AnchorPlan, sampler: TensionSampler) -> None:
+    def by_load_cell(self, plan: AnchorPlan, cell: TensionSensors, port: str) -> None:
         """Record the pull at a made-fast cable."""
         winch, out = self.winch, self.out
-        with sampler, _keeping(self.folder):
+        with ExitStack() as stack:
+            stack.enter_context(_keeping(self.folder))
+            opened = open_winch(winch, self.url, out, self.plant, safety_io=self.safety_io)
+            session = stack.enter_context(opened)
+            clock = session.network.clock
+            sampler = stack.enter_context(TensionSampler(cell, port, clock))
             sampler.await_readings(_FIRST_READING_S)
-            with open_winch(winch, self.url, out, self.plant, safety_io=self.safety_io) as session:
-                session.set_mode(winch.drive.mode_torque)
-                path = calibration.pull_file(self.folder)
-                measure_anchored(session, out, path, plan, sampler)
+            session.set_mode(winch.drive.mode_torque)
+            path = calibration.pull_file(self.folder)
+            measure_anchored(session, out, path, plan, sampler)
 
     def finish(self) -> None:
         """Identify, and say and store what was found."""

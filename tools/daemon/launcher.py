@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 import select
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any, Final
 
 from cdpr_rt.runtime.shared_block import SharedBlock, SharedBlockError
+from cdpr_rt.runtime.stop_requests import CUT_SHORT
+from tools.daemon.child_process import Child, move_to
+from tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
 from tools.daemon.notify import ServiceManager
 from tools.daemon.settings import RunSettings
 from tools.errors import BAD_INPUT, DONE, FAILED
@@ -28,6 +28,10 @@ DEAD: Final = "dead"
 _TURN_S = 0.2
 # a controlled stop from full speed, and brakes that follow, take less, besides a lowering
 _LOOP_STOP_S = 30.0
+# a second Ctrl-C: the power is off and the drives have said so in less
+_AT_ONCE_S = 10.0
+# what relays a terminal's Ctrl-C besides, such as sudo, is no second one
+_SAME_PRESS_S = 0.2
 # the recording is closed in this time
 _SERVICE_STOP_S = 10.0
 # the loop turns at every cycle, or some ten times a second where no cycles run
@@ -39,53 +43,6 @@ _SERVICE_START_S = 30.0
 # a service that dies at once is not started in a tight circle
 _RESTART_S = (0.1, 0.5, 2.0, 5.0)
 _STEADY_S = 30.0
-# one thread for each library: the loop's process has one core to itself
-_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-
-
-class Child:
-    """One of the daemon's processes; it inherits the shared memory and nothing else."""
-
-    def __init__(self, module: str, settings: RunSettings, keep: Sequence[int] = ()) -> None:
-        command = [sys.executable, "-m", module, settings.model_dump_json()]
-        self.process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=sys.stderr.fileno(),  # standard output is the launcher's alone
-            env={**os.environ, **_ONE_THREAD},
-            pass_fds=(settings.block_fd, *keep),
-            start_new_session=True,  # a Ctrl-C at the terminal is ours to handle, not its
-        )
-        self.started = time.monotonic()
-        self.pidfd = os.pidfd_open(self.process.pid)
-
-    @property
-    def end(self) -> str:
-        """How it ended, in words; empty while it lives."""
-        code = self.process.poll()
-        if code is None:
-            return ""
-        return f"killed by signal {-code}" if code < 0 else f"ended with exit status {code}"
-
-    def stop(self, timeout_s: float) -> bool:
-        """Ask it to end and wait; whether it did so by itself in time."""
-        if self.process.poll() is None:
-            self.process.terminate()
-        try:
-            self.process.wait(timeout_s)
-            return True
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-            return False
-        finally:
-            self.close()
-
-    def close(self) -> None:
-        """Let go of the descriptor; safe to repeat."""
-        if self.pidfd >= 0:
-            os.close(self.pidfd)
-            self.pidfd = -1
 
 
 class Launcher:
@@ -109,12 +66,13 @@ class Launcher:
         self._ready = ready
         self._simulator = simulator
         self._manager = manager
-        self._signals: list[int] = []
+        self._signals: list[tuple[int, float]] = []
         self._restarts = 0
         self._restart_at = 0.0
         self._up = False
         self._stalled = False
         self._left_core = False
+        self._loop_file: LoopFile | None = None
         self._told = ""
         self._fault: tuple[Any, str] | None = None
         self._fed = 0.0
@@ -127,28 +85,34 @@ class Launcher:
         with _noted_signals(self._signals) as wakeup:
             # it stays as long as the loop does, whatever becomes of this process
             lifeline = () if self._simulator is None else (self._simulator.lifeline,)
-            self._loop = Child(LOOP, self._settings, lifeline)
-            self._service: Child | None = Child(SERVICE, self._settings)
+            self._loop, self._wakeup = Child(LOOP, self._settings, lifeline), wakeup
+            self._service: Child | None = self._start_service()
             try:
                 while not self._signals and not self._finished():
-                    self._wait(wakeup)
+                    self._wait()
                     self._turn()
                 return self._stop()
             finally:
                 # whatever went wrong here: power goes with the loop
                 self._loop.stop(_LOOP_STOP_S)
+                if self._loop_file is not None:
+                    self._loop_file.remove(LoopFile.beside(self._settings.socket))
                 if self._service is not None:
                     self._service.stop(_SERVICE_STOP_S)
 
-    def _wait(self, wakeup: int) -> None:
+    def _start_service(self) -> Child:
+        key_fd = self._settings.key_fd
+        return Child(SERVICE, self._settings, () if key_fd < 0 else (key_fd,))
+
+    def _wait(self) -> None:
         poll = select.poll()
-        poll.register(wakeup, select.POLLIN)
+        poll.register(self._wakeup, select.POLLIN)
         for child in (self._loop, self._service):
             if child is not None and not child.end:
                 poll.register(child.pidfd, select.POLLIN)
         for fd, _ in poll.poll(1000.0 * _TURN_S):
-            if fd == wakeup:
-                os.read(wakeup, 4096)
+            if fd == self._wakeup:
+                os.read(self._wakeup, 4096)
 
     def _finished(self) -> bool:
         """Whether the daemon ends: its loop did so on command, or one of the two cannot begin.
@@ -170,10 +134,12 @@ class Launcher:
     def _turn(self) -> None:
         now = time.monotonic()
         self._leave_core()
+        self._name_loop()
         self._watch_loop()
         self._watch_service(now)
         status = self._status()
-        if not self._up and _settled(status) and self._settings.socket.exists():
+        reachable = self._loop_file is not None and self._settings.socket.exists()
+        if not self._up and _settled(status) and reachable:
             self._up = True
             self._manager.tell(READY=1)
             self._ready(status)
@@ -199,6 +165,31 @@ class Launcher:
                 else "the loop turns again"
             )
 
+    def _name_loop(self) -> None:
+        """Say in the runtime folder which process `cdpr estop` goes to, once it would obey.
+
+        A daemon whose loop cannot be named ends, before it has said that it is ready.
+        """
+        counters, pid = self._block.counters, self._loop.process.pid
+        if self._loop_file is not None or self._loop.end or counters["loop_pid"][0] != pid:
+            return
+        named = LoopFile(
+            robot=self._settings.name,
+            uid=os.geteuid(),
+            pid=pid,
+            started=started(pid),
+            block_fd=self._settings.block_fd,
+            drives_stop_s=2.0 * self._described("master_heartbeat_s"),
+        )
+        path = LoopFile.beside(self._settings.socket)
+        try:
+            named.write(path)
+        except OSError as error:
+            self.reason = f"{path}: cannot be written, for `cdpr estop`: {error.strerror}"
+            self._failure = BAD_INPUT
+            return
+        self._loop_file = named
+
     def _leave_core(self) -> None:
         """Leave the loop's core to it, once it has taken one; a new service inherits that."""
         if self._left_core or self._loop.end:
@@ -210,12 +201,12 @@ class Launcher:
         self._left_core = True
         besides = (self._service, self._simulator)
         for pid in (os.getpid(), *(one.process.pid for one in besides if one is not None)):
-            _move_to(pid, here - taken)
+            move_to(pid, here - taken)
 
     def _watch_service(self, now: float) -> None:
         if self._service is not None:
             if not self._service.end:
-                self._watch_service_turns()
+                self._watch_service_turns(self._service)
                 return
             # an address that is taken may be free again in a moment, bad input stays bad
             hopeless = self._service.process.returncode == BAD_INPUT
@@ -230,13 +221,10 @@ class Launcher:
             self._service, self._restart_at = None, now + pause
         elif now >= self._restart_at:
             self._block.counters["service_alive_ns"] = 0
-            self._service = Child(SERVICE, self._settings)
+            self._service = self._start_service()
 
-    def _watch_service_turns(self) -> None:
-        service, allowed_s = self._service, _SERVICE_STALLED_S
-        if service is None:
-            return
-        silent_s = self._silence_s("service_alive_ns")
+    def _watch_service_turns(self, service: Child) -> None:
+        silent_s, allowed_s = self._silence_s("service_alive_ns"), _SERVICE_STALLED_S
         if not self._block.counters["service_alive_ns"][0]:  # it has not turned even once
             silent_s, allowed_s = time.monotonic() - service.started, _SERVICE_START_S
         if silent_s > allowed_s:
@@ -257,13 +245,14 @@ class Launcher:
     def _report(self, status: dict[str, Any], now: float) -> None:
         """Keep the service manager informed; its watchdog is fed while the loop lives and turns."""
         text = _summary(status)
-        if text != self._told:
+        if text == self._told:
+            self._manager.tell_again()
+        else:
             self._told = text
             self._manager.tell(STATUS=text)
         due = self._manager.watchdog_s and now - self._fed > self._manager.watchdog_s / 4.0
-        if due and not self._loop.end and not self._stalled:
+        if due and not self._loop.end and not self._stalled and self._manager.feed():
             self._fed = now
-            self._manager.tell(WATCHDOG=1)
 
     def _stop(self) -> int:
         """End the loop under control, then the service, so that the recording is whole."""
@@ -272,21 +261,51 @@ class Launcher:
         self.reason = self.reason or failure
         if self._service is not None and not self._service.stop(_SERVICE_STOP_S):
             self._tell("the service did not end by itself and was killed")
+        self._manager.tell_again()
         return self._failure if self.reason else DONE
 
     def _stop_loop(self) -> str:
         """End the loop; return why it did not end well, empty when it did."""
-        patience_s = _LOOP_STALLED_S if self._stalled else _LOOP_STOP_S + self._lowering_s()
-        if not self._loop.stop(patience_s):
+        patience_s = self._described("lowering_s") + _LOOP_STOP_S
+        if self._status().get("driving"):
+            self._tell(self._what_a_stop_does(patience_s))
+        patience_s = _LOOP_STALLED_S if self._stalled else patience_s
+        self._loop.process.terminate()
+        began_s, at_once = time.monotonic(), False
+        while not self._loop.end and time.monotonic() < began_s + patience_s:
+            self._wait()
+            self._manager.tell_again()
+            if not at_once and self._asked_twice():
+                at_once, began_s, patience_s = True, time.monotonic(), _AT_ONCE_S
+                self._tell("the power is taken at once")
+                self._loop.process.send_signal(POWER_OFF_SIGNAL)
+        if not self._loop.end:
+            self._loop.process.kill()
+            self._loop.process.wait()
             return f"the loop did not stop within {patience_s:g} s and was killed"
+        if CUT_SHORT in (reason := str(self._status().get("reason", ""))):
+            return reason
         code = self._loop.process.returncode
         # one that is asked while it loads has opened nothing yet
         loading = code == -signal.SIGTERM and not self._block.counters["loop_alive_ns"][0]
         return "" if code == DONE or loading else f"the loop {self._loop.end}"
 
-    def _lowering_s(self) -> float:
+    def _what_a_stop_does(self, patience_s: float) -> str:
+        lowers = self._described("lowering_s") > 0.0
+        what = "the platform is let down, unless brakes hold it" if lowers else "the axes brake"
+        return (
+            f"stopping: {what}, then the power goes off; this may take up to {patience_s:.0f} s. "
+            "A second Ctrl-C takes the power at once"
+        )
+
+    def _asked_twice(self) -> bool:
+        """Whether somebody has asked for the end again; a terminal that closes asks nothing."""
+        times = [at_s for number, at_s in self._signals if number != signal.SIGHUP]
+        return bool(times) and times[-1] - self._signals[0][1] > _SAME_PRESS_S
+
+    def _described(self, key: str) -> float:
         try:
-            return float(self._block.description().get("lowering_s", 0.0))
+            return float(self._block.description().get(key, 0.0))
         except SharedBlockError:  # the loop died in the middle of it
             return 0.0
 
@@ -311,19 +330,12 @@ def _summary(status: dict[str, Any]) -> str:
     return f"{state}: {reason}" if reason else str(state)
 
 
-def _move_to(pid: int, cores: set[int]) -> None:
-    """Keep all threads of a process on these cores, and those that they will start."""
-    with suppress(OSError):  # it, or one of its threads, has ended meanwhile
-        for task in Path(f"/proc/{pid}/task").iterdir():
-            os.sched_setaffinity(int(task.name), cores)
-
-
 @contextmanager
-def _noted_signals(noted: list[int]) -> Iterator[int]:
+def _noted_signals(noted: list[tuple[int, float]]) -> Iterator[int]:
     """Note what asks the daemon to end, and yield a descriptor that can be read after each."""
 
     def note(number: int, _frame: FrameType | None) -> None:
-        noted.append(number)
+        noted.append((number, time.monotonic()))
 
     reader, writer = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     asked = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from typing import Any, Final
 
+from cdpr_rt.clock import PacedClock
 from cdpr_rt.cycle import Watch
 from cdpr_rt.runtime.machine import MachineError
 from cdpr_rt.tension import TensionFeedback
@@ -35,6 +35,7 @@ class ListeningMachine:
     """The other master's affair."""
 
     def __init__(self, robot: Robot, settings: RunSettings) -> None:
+        self.clock = PacedClock()
         self._robot = robot
         self._urls = robot_urls(robot, settings.buses)
         self._device: ListeningDevice | None = None
@@ -56,13 +57,13 @@ class ListeningMachine:
             axes = [heard_axis(robot.axes[i].winch, robot.axes[i].node_id) for i in places]
             buses.append(HeardBus(name, url, axes, places))
         try:
-            self._device = ListeningDevice(buses, robot.sync_period_s)
+            self._device = ListeningDevice(buses, robot.sync_period_s, self.clock)
         except DriverError as error:
             raise MachineError(str(error)) from error
 
     def prepare(self) -> None:
         """Begin to wait for the other master's SYNC."""
-        self._patient_until_s = time.monotonic() + _MASTER_S
+        self._patient_until_s = self.clock.now_s + _MASTER_S
 
     def acknowledge(self) -> None:
         """Do nothing: there is no guard here that latches."""
@@ -100,7 +101,7 @@ class ListeningMachine:
 
     def prepared(self) -> bool:
         """Whether a master runs the axes; raises MachineError after a while without."""
-        if not self._led and time.monotonic() > self._patient_until_s:
+        if not self._led and self.clock.now_s > self._patient_until_s:
             raise MachineError(
                 f"no SYNC came for {_MASTER_S:g} s: no other master runs {self._robot.name}; "
                 "start it, then check again"

@@ -36,6 +36,7 @@ from tools.bus_fit import require_fit
 from tools.commissioned import compensation_of, load_profiles, with_commissioned
 from tools.daemon.child import end_with
 from tools.daemon.listening_machine import ListeningMachine
+from tools.daemon.loop_file import POWER_OFF_SIGNAL
 from tools.daemon.machine import RobotMachine
 from tools.daemon.settings import RunSettings
 from tools.errors import BAD_INPUT, DONE, FAILED, CommandError
@@ -56,12 +57,12 @@ def main() -> int:
         print(f"cdpr: {error}", file=sys.stderr)
         return BAD_INPUT
     block.write_description(description(robot, parts))
-    if parts.last is not None:
+    if parts.last is not None and robot.platform is not None:
         parts.last.path = state_path("lengths", robot.profile)
-        parts.last.load(len(robot.axes))
+        parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
     loop = ControlLoop(block, machine, parts)
     loop.notices += settle_memory()
-    _end_on_signals(loop)
+    _obey_signals(loop)
     end_with(settings.launcher_pid)
     counters = block.counters
     if counters["start_monotonic_ns"][0] == 0:
@@ -80,7 +81,7 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
     limits = limits_of(robot)
     latencies = [latency_s(axis.winch) for axis in axes]
-    known = compensation_of(load_profiles(robot))
+    known = compensation_of(robot, load_profiles(robot))
     model = model_of(axes, period_s, latencies, limits, known)
     estimator = Estimator(n, period_s, winches_of(axes))
     platform = platform_parts(robot, limits, model, estimator)
@@ -139,12 +140,16 @@ def description(robot: Robot, parts: LoopParts) -> dict[str, Any]:
     }
 
 
-def _end_on_signals(loop: ControlLoop) -> None:
+def _obey_signals(loop: ControlLoop) -> None:
     def stop(_number: int, _frame: FrameType | None) -> None:
         loop.request_stop()
 
+    def take_power(_number: int, _frame: FrameType | None) -> None:
+        loop.request_power_off()
+
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, stop)
+    signal.signal(POWER_OFF_SIGNAL, take_power)
 
 
 if __name__ == "__main__":

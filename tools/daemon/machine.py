@@ -18,6 +18,7 @@ from cdpr_rt.tension import TensionFeedback
 from drivers import touch_probe
 from drivers.axis_buses import AxisBuses
 from drivers.axis_shutdown import switch_off_by_sdo
+from drivers.bus.leading import open_clock
 from drivers.cia402 import POWER_OFF, State, state_of
 from drivers.errors import BusError, DriverError
 from drivers.network import CanNetwork
@@ -62,6 +63,7 @@ class RobotMachine:
         self._robot = robot
         self._profiles = load_profiles(robot)
         self._urls = robot_urls(robot, settings.buses)
+        self.clock = open_clock(self._urls.values())
         real = not all(url.is_simulated for url in self._urls.values())
         self._tensions = RobotTensions(robot, settings.tension_port)
         self._reference = settings.safety_io or (robot.safety_io if real else None)
@@ -79,8 +81,8 @@ class RobotMachine:
         """Open the buses and boot the drives; they are left without power."""
         with ExitStack() as stack:
             self._safety = self._open_safety(stack)
-            self._tensions.open(stack)
-            networks = open_networks(stack, self._robot, self._urls)
+            self._tensions.open(stack, self.clock)
+            networks = open_networks(stack, self._robot, self._urls, self.clock)
             torque_Nm = np.asarray(limits_of(self._robot).torque_Nm).tolist()
             booted, absent = boot_robot(stack, self._robot, networks, torque_Nm)
             if absent:
@@ -129,7 +131,7 @@ class RobotMachine:
     def _open_safety(self, stack: ExitStack) -> SessionSafety | None:
         if self._reference is None:
             return None
-        io = stack.enter_context(connect(self._reference))
+        io = stack.enter_context(connect(self._reference, self.clock))
         return SessionSafety(io, [axis.node_id for axis in self._robot.axes])
 
     @_told

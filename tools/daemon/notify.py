@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Mapping
+from typing import Final
+
+# systemd takes datagrams of 4096 bytes; a character has up to 4
+_MOST_CHARS: Final = 900
 
 
 class ServiceManager:
@@ -17,6 +22,7 @@ class ServiceManager:
         microseconds = os.environ.pop("WATCHDOG_USEC", "")
         whose = os.environ.pop("WATCHDOG_PID", "")
         self._address = "\0" + address[1:] if address.startswith("@") else address
+        self._owed: dict[str, str] = {}
         watched = microseconds.isdigit() and whose in ("", str(os.getpid()))
         self.watchdog_s = int(microseconds) / 1e6 if watched else 0.0
         """Silence of this length has the daemon restarted; 0 where nobody watches."""
@@ -27,12 +33,34 @@ class ServiceManager:
         return bool(self._address)
 
     def tell(self, **fields: str | int) -> None:
-        """Send assignments such as READY=1; a manager that has gone is not missed."""
+        """Send assignments such as READY=1; what the manager does not take now is kept.
+
+        Of each name the newest is kept, until `tell_again` finds that it is taken.
+        """
+        self._owed.update({key: _one_line(str(value)) for key, value in fields.items()})
+        self.tell_again()
+
+    def tell_again(self) -> None:
+        """Send what is owed, if anything is; never waits."""
+        if self._owed and self._sent(self._owed):
+            self._owed.clear()
+
+    def feed(self) -> bool:
+        """Feed the watchdog; whether that was taken. It is not kept: it tells of this moment."""
+        return self._sent({"WATCHDOG": "1"})
+
+    def _sent(self, fields: Mapping[str, str]) -> bool:
         if not self._address:
-            return
+            return True
         text = "\n".join(f"{key}={value}" for key, value in fields.items())
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as speaker:
             try:
                 speaker.sendto(text.encode(), socket.MSG_DONTWAIT, self._address)
-            except OSError:
-                return
+            except OSError:  # its queue is full, or it is being started anew
+                return False
+        return True
+
+
+def _one_line(text: str) -> str:
+    """Return a value that is no second assignment, and that the manager has room for."""
+    return " ".join(text.split())[:_MOST_CHARS]

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
+from typing import Final
 
 from tools.errors import BadInputError
 
+LOOP_SUFFIX: Final = ".loop"
+SOCKET_SUFFIX: Final = ".sock"
 _FOLDER = "cdpr-rt"
 _SYSTEM = Path("/run") / _FOLDER
 
@@ -20,27 +24,67 @@ def default_socket(robot: str) -> Path:
     folder = _runtime_folder()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        held = folder.lstat()
     except OSError as error:
         raise BadInputError(f"{folder}: cannot be made: {error.strerror}; give --socket") from None
-    if folder.is_symlink() or held.st_uid != os.geteuid() or held.st_mode & 0o022:
+    if not _is_kept_by(folder, os.geteuid()):
         raise BadInputError(f"{folder}: is open to others or not this user's; give --socket")
-    return folder / f"{robot}.sock"
+    return folder / f"{robot}{SOCKET_SUFFIX}"
 
 
 def find_sockets(robot: str | None = None) -> list[Path]:
     """Return the sockets of daemons, of one robot or of any: this user's first, then the system's.
 
-    A socket that is found may be left over from a daemon that was killed.
+    A socket that is found may be left over from a daemon that was killed. Nothing is looked for in
+    a folder that somebody else has made or may write to.
     """
-    pattern = "*.sock" if robot is None else f"{robot}.sock"
+    return [path for path in _find(robot, SOCKET_SUFFIX) if path.is_socket()]
+
+
+def find_loop_files(robot: str | None = None) -> list[Path]:
+    """Return the files that name the loops of daemons, found as sockets are."""
+    return _find(robot, LOOP_SUFFIX)
+
+
+def left_out() -> str:
+    """Return in words where daemons were not looked for though some may be there."""
+    own, told = _runtime_folder(), []
+    if os.path.lexists(own) and not _is_kept_by(own, os.geteuid()):
+        told.append(f"{own} is open to others or not this user's, and was not looked into")
+    if _SYSTEM.is_dir() and not os.access(_SYSTEM, os.R_OK | os.X_OK):
+        told.append(f"{_SYSTEM} is closed to this user, try it with `sudo`")
+    return "; ".join(told)
+
+
+def is_trusted(path: Path, owner: int) -> bool:
+    """Whether a file of this owner at `path` is this user's, or of who owns its folder."""
+    try:
+        return owner in (os.geteuid(), path.parent.stat().st_uid)
+    except OSError:  # the folder has gone meanwhile
+        return False
+
+
+def _find(robot: str | None, suffix: str) -> list[Path]:
     found = []
-    for folder in (_runtime_folder(), _SYSTEM):
+    # only root makes folders in /run: whoever it has given ours to, is the daemons' user
+    for folder, owner in ((_runtime_folder(), os.geteuid()), (_SYSTEM, None)):
         try:
-            found += sorted(path for path in folder.glob(pattern) if path.is_socket())
+            files = folder.iterdir() if _is_kept_by(folder, owner) else ()
+            found += sorted(
+                path for path in files if path.suffix == suffix and robot in (None, path.stem)
+            )
         except OSError:  # not for this user to look into
             continue
     return found
+
+
+def _is_kept_by(folder: Path, owner: int | None) -> bool:
+    """Whether there is a folder, no link to one, of this owner alone; None for any."""
+    try:
+        held = folder.lstat()
+    except OSError:
+        return False
+    alone = not held.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return stat.S_ISDIR(held.st_mode) and alone and owner in (None, held.st_uid)
 
 
 def default_recordings() -> Path:

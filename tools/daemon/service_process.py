@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import os
 import resource
@@ -18,30 +19,40 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.service.app import create_app
 from cdpr_rt.service.auth import Door, Gate
+from cdpr_rt.service.bounded_log import BoundedLog
+from cdpr_rt.service.connections import Turns
 from cdpr_rt.service.foxglove_view import LiveView
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recording import Recorder
-from cdpr_rt.service.server import ListenError, Server, listen_tcp, listen_unix, watch_tables
+from cdpr_rt.service.server import ListenError, Server, listen_tcp, listen_unix
 from cdpr_rt.service.service import Service
 from cdpr_rt.service.setpoint_stream import SetpointStream
 from tools.daemon.child import end_with, is_running, orphaned
-from tools.daemon.settings import RunSettings, read_key
+from tools.daemon.settings import RunSettings
 from tools.errors import DONE, FAILED, CommandError
 
 _LOOP_STOP_S, _TURN_S = 70.0, 0.05
 _MOST_FILES = 4096
+_SWITCH_S = 5e-4
 _LOG = logging.getLogger("cdpr.service")
 
 
 def main() -> int:
     """Serve until SIGTERM; return the exit status."""
     logging.basicConfig(level=logging.ERROR, format="service: %(message)s", stream=sys.stderr)
+    bounded = BoundedLog()
+    for handler in logging.getLogger().handlers:
+        handler.addFilter(bounded)
     settings = RunSettings.from_argv()
+    # stream, recorder and live view have threads: none keeps a stop waiting for longer than this
+    sys.setswitchinterval(_SWITCH_S)
     _allow_many_files()
     block = SharedBlock.attach(settings.block_fd)
     block.counters["service_pid"] = os.getpid()
+    service = Service(block, settings.name)
+    service.background.append(bounded.watch)
     try:
-        asyncio.run(_serve(settings, Service(block, settings.name)))
+        asyncio.run(_serve(settings, service))
     except (ControlError, CommandError) as error:
         print(f"service: {error}", file=sys.stderr)
         return FAILED
@@ -65,11 +76,10 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
         service.events.listeners.append(partial(_note, recorder))
         parts.append(recorder)
     if settings.live is not None:
-        parts.append(LiveView(block, settings.name, settings.live))
+        parts.append(LiveView(block, settings.name, settings.live, settings.live_origins))
     if settings.stream is not None:
         host, port = settings.stream.host, settings.stream.port
-        key = None if settings.stream.is_loopback else _key(settings)
-        parts.append(SetpointStream(block, lease, host, port, key))
+        parts.append(SetpointStream(block, lease, host, port, settings.key()))
     return parts
 
 
@@ -88,9 +98,10 @@ async def _serve(settings: RunSettings, service: Service) -> None:
     app = create_app(service)
     servers = _listen(settings, app, service)
     service.start_parts(build_parts(settings, service))
+    gc.collect()
+    gc.freeze()  # looking through all that was loaded takes tens of ms, in which no stop is taken
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
-    watch_tables(loop, partial(service.events.add, "http"))
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, ended.set)
     end_with(settings.launcher_pid)
@@ -130,11 +141,14 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
     A robot in motion is not let go because somebody else has taken its port.
     """
     watched = (service.count_refusal, service.lease.is_held_by)
-    servers = [Server(Gate(app, Door(local=True), *watched), listen_unix(settings.socket))]
+    turns = Turns()
+    tell = partial(service.events.add, "http")
+    unix = listen_unix(settings.socket)
+    servers = [Server(Gate(app, Door(local=True), *watched), unix, turns, tell)]
     address = settings.http
     if address is None:
         return servers
-    door = Door.named(_key(settings), address.host)
+    door = Door.named(settings.key(), address.host, loopback=address.is_loopback)
     try:
         listener = listen_tcp(address.host, address.port)
     except ListenError as error:
@@ -142,12 +156,8 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
         _LOG.error("--http %s", error)
     else:
         service.http = listener.getsockname()[:2]
-        servers.append(Server(Gate(app, door, *watched), listener))
+        servers.append(Server(Gate(app, door, *watched), listener, turns, tell))
     return servers
-
-
-def _key(settings: RunSettings) -> bytes | None:
-    return None if settings.key_file is None else read_key(settings.key_file)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 import ipaddress
+import os
 import stat
 import sys
 from pathlib import Path
@@ -10,9 +12,12 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from profiles.bounded_input import open_regular
+from profiles.errors import ProfileError
 from tools.errors import BadInputError
 
-_SECRET_CHARS = 16
+_SECRET_CHARS, _MOST_KEY_BYTES = 16, 4096
+_ALL_SEALS = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL
 _OPEN_TO_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _HIGHEST_PORT = 65535
 
@@ -88,16 +93,20 @@ class RunSettings(BaseModel):
     """Folder for recordings, None to record nothing."""
     live: int | None = Field(default=None, ge=0, le=_HIGHEST_PORT)
     """Port of the live view, on loopback."""
+    live_origins: tuple[str, ...] = ()
+    """Web pages that may look at the live view, as `Origin` names them."""
     stream: Address | None = None
     """Where the set-point stream is received."""
     launcher_pid: int = 0
     block_fd: int = -1
     """The shared memory's descriptor, inherited under the same number."""
+    key_fd: int = -1
+    """The key's descriptor, inherited by the service alone, in place of `key_file`."""
 
     @model_validator(mode="after")
     def _reachable_with_key_only(self) -> Self:
         for option, address in (("--http", self.http), ("--stream", self.stream)):
-            if address is not None and not address.is_loopback and self.key_file is None:
+            if address is not None and not address.is_loopback and not self.has_key:
                 raise BadInputError(
                     f"{option} {address}: others can reach it; give a --key-file, or listen at "
                     "127.0.0.1"
@@ -105,6 +114,29 @@ class RunSettings(BaseModel):
         if self.key_file is not None:
             read_key(self.key_file)
         return self
+
+    @property
+    def has_key(self) -> bool:
+        """Whether there is a shared key."""
+        return self.key_file is not None or self.key_fd >= 0
+
+    def with_key_kept(self) -> RunSettings:
+        """Return settings that need the key's file no more: it is read now, once.
+
+        Processes that are started later inherit the key in sealed memory, whatever becomes of the
+        file. Raises BadInputError.
+        """
+        if self.key_file is None:
+            return self
+        key = read_key(self.key_file)
+        fd = os.memfd_create("cdpr-rt-key", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        os.write(fd, key)
+        fcntl.fcntl(fd, fcntl.F_ADD_SEALS, _ALL_SEALS)
+        return self.model_copy(update={"key_file": None, "key_fd": fd})
+
+    def key(self) -> bytes | None:
+        """Return the shared key that the launcher has kept, None where there is none."""
+        return None if self.key_fd < 0 else os.pread(self.key_fd, _MOST_KEY_BYTES, 0)
 
     @classmethod
     def from_argv(cls) -> RunSettings:
@@ -118,16 +150,23 @@ def read_key(path: Path) -> bytes:
     Raises BadInputError.
     """
     try:
-        mode = path.stat().st_mode
-        text = path.read_bytes()
+        with os.fdopen(open_regular(path), "rb") as file:
+            mode = os.fstat(file.fileno()).st_mode
+            text = file.read(_MOST_KEY_BYTES + 1)
+    except ProfileError as error:
+        raise BadInputError(f"--key-file {error}") from None
     except OSError as error:
         raise BadInputError(f"--key-file {path}: cannot be read: {error.strerror}") from None
     if mode & _OPEN_TO_OTHERS:
         raise BadInputError(f"--key-file {path}: others may read it; allowed: chmod 600 {path}")
+    if len(text) > _MOST_KEY_BYTES:
+        raise BadInputError(
+            f"--key-file {path}: is too long; allowed: up to {_MOST_KEY_BYTES} bytes"
+        )
     key = text.split(b"\n", 1)[0].strip()
     if len(key) < _SECRET_CHARS or not key.isascii():
         raise BadInputError(
-            f"--key-file {path}: {len(key)} characters; allowed: {_SECRET_CHARS} or more of ASCII, "
-            f"such as `openssl rand -hex 32` writes"
+            f"--key-file {path}: {len(key)} characters; allowed: {_SECRET_CHARS} to "
+            f"{_MOST_KEY_BYTES} of ASCII, such as `openssl rand -hex 32` writes"
         )
     return key

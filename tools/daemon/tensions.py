@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.tension import TensionFeedback
 from drivers.modbus.tension import TensionSampler
 from profiles import Robot
@@ -14,7 +15,7 @@ _FIRST_READINGS_S = 3.0
 
 
 class RobotTensions:
-    """The load cells of a robot, read by a thread for as long as they are open.
+    """The load cells of a robot, read beside the cycle for as long as they are open.
 
     Without a `port` there are none, and tensions are estimated from torques. Raises
     BadInputError for a port without sensors to it, and for more sensors than axes.
@@ -36,11 +37,11 @@ class RobotTensions:
                 f"{robot.tension_sensors}: {sensors} sensors; allowed: up to {axes}"
             )
 
-    def open(self, stack: ExitStack) -> None:
+    def open(self, stack: ExitStack, clock: Clock) -> None:
         """Begin to read, until `stack` ends it; raises ModbusError for a sensor that is silent."""
         if self._profile is None or self._port is None:
             return
-        self._sampler = stack.enter_context(TensionSampler(self._profile, self._port))
+        self._sampler = stack.enter_context(TensionSampler(self._profile, self._port, clock))
         stack.callback(self._forget)
         self._sampler.await_readings(_FIRST_READINGS_S)
 

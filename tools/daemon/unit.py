@@ -49,7 +49,7 @@ OOMScoreAdjust=-500
 
 # where it may write
 RuntimeDirectory=cdpr-rt
-RuntimeDirectoryMode=0755
+RuntimeDirectoryMode=0700
 RuntimeDirectoryPreserve=yes
 StateDirectory=cdpr-rt
 CacheDirectory=cdpr-rt

@@ -9,7 +9,9 @@ from typing import Any
 from canopen.objectdictionary import ObjectDictionary, ODVariable
 from canopen.objectdictionary.eds import import_eds
 
+from profiles.bounded_input import read_bytes
 from profiles.eds_check import EdsFile
+from profiles.eds_text import MOST_EDS_BYTES
 from profiles.eds_write import render_eds
 from tools.drive_import.proposal import Proposal
 
@@ -34,7 +36,7 @@ def eds_text(eds: EdsFile) -> tuple[bytes, bool]:
     we do.
     """
     mended = render_eds(eds)
-    original = eds.path.read_bytes()
+    original = read_bytes(eds.path, MOST_EDS_BYTES)
     try:
         same = _meaning(original.decode("utf-8")) == _meaning(mended)
     except Exception:  # whatever a flaw of the file makes the package raise

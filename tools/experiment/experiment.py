@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import io
 import multiprocessing
+import os
 import signal
 from collections.abc import Iterable
 from functools import partial
@@ -13,7 +14,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from cdpr_rt.exchange import FloatArray
 from profiles import load_robot
+from profiles.bounded_input import read_bytes
+from profiles.errors import ProfileError
 from tools.errors import BadInputError, WorkFailedError
 from tools.experiment import figures
 from tools.experiment.path import centre_m, targets_m
@@ -21,6 +25,7 @@ from tools.experiment.points import Points, points_of_perfect_robot, points_of_s
 from tools.experiment.report import lines
 from tools.experiment.session import Asked, run_session
 from tools.experiment.statistics import rows, variance_analysis
+from tools.kept import kept
 from tools.output import Output, to_json
 from tools.trials.run import platform_of
 
@@ -28,6 +33,7 @@ ASKED: Final = "experiment.json"
 RESULT: Final = "result.json"
 _SESSIONS: Final = "sessions"
 _DONE: Final = "done"
+_MOST_BYTES: Final = 1 << 28
 _SESSION_S: Final = 300.0
 """What one session takes in the robot's time, for the progress shown."""
 
@@ -58,10 +64,7 @@ def begin(asked: Asked, folder: Path) -> None:
 def load(folder: Path) -> Asked:
     """Return what the experiment in `folder` was asked for; raises BadInputError."""
     path = folder / ASKED
-    try:
-        return Asked.of(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise BadInputError(f"{path}: not of an experiment: {error}") from error
+    return kept(path, Asked)
 
 
 def perform(asked: Asked, folder: Path, jobs: int, out: Output) -> None:
@@ -89,6 +92,8 @@ def perform(asked: Asked, folder: Path, jobs: int, out: Output) -> None:
 
 def _processes(jobs: int) -> Pool:
     """Return processes that end with the block; an interrupt of the terminal is ours to handle."""
+    # each is started with -c, which looks into the working directory before all others
+    os.environ["PYTHONSAFEPATH"] = "1"
     own = multiprocessing.get_context("spawn")
     return own.Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN))
 
@@ -167,8 +172,19 @@ def _drawn(asked: Asked, points: Points, alone: Points, session: Path, folder: P
     ticks = min(session.glob("*.npy"))
     targets = targets_m(centre_m(load_robot(asked.robot), session.name.split("-")[0]))
     path = folder / "figure-2.8.png"
-    figures.path(targets, np.load(ticks)["truth_m"]).savefig(path)
+    figures.path(targets, _truth_m(ticks)).savefig(path)
     return [path, *figures.draw(points, alone, folder)]
+
+
+def _truth_m(ticks: Path) -> FloatArray:
+    """Return the way of a run that was kept, (k, 2); raises BadInputError."""
+    try:
+        held = np.load(io.BytesIO(read_bytes(ticks, _MOST_BYTES)), allow_pickle=False)
+        return np.asarray(held["truth_m"], float)
+    except ProfileError as error:
+        raise BadInputError(str(error)) from None
+    except (ValueError, LookupError, EOFError, MemoryError, TypeError) as error:
+        raise BadInputError(f"{ticks}: not the way of a run: {error}") from None
 
 
 def judge(folder: Path, jobs: int) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from tools.experiment.parameters import OperatorParameters, Station
 from tools.experiment.path import centre_m, targets_m
 from tools.experiment.trial import Condition, run_trial
 from tools.trials.run import TrialRun, trial_run
-from tools.trials.stream import Hand, answer_of
 
 MARK = "path"
 """What the recording's events say of each run: the condition, and what the operator did."""
@@ -58,16 +57,6 @@ class Asked:
         """Return it as it is kept."""
         return asdict(self)
 
-    @classmethod
-    def of(cls, kept: dict[str, Any]) -> Self:
-        """Return what was kept; raises TypeError and KeyError for what is no such thing."""
-        lists = {name: tuple(kept[name]) for name in ("places", "scales", "round_trips_s")}
-        people = {
-            "operator": OperatorParameters(**kept["operator"]),
-            "station": Station(**kept["station"]),
-        }
-        return cls(**{**kept, **lists, **people})
-
 
 class LedRobot:
     """The plant of a run: packets go to the daemon's own desk, cycles over the bus."""
@@ -75,7 +64,7 @@ class LedRobot:
     def __init__(self, run: TrialRun) -> None:
         self._rig = run.rig
         self._stay = run.stay
-        self._hand = Hand(token=run.rig.right.token)
+        self._hand = run.rig.stream.hand()
 
     @property
     def now_s(self) -> float:
@@ -102,7 +91,7 @@ class LedRobot:
         """Hand a packet to the desk; raises WorkFailedError where it is not taken."""
         packet = self._hand.packet(sent_s, (*hand_m, 0.0), scale, buttons)
         answer = self._rig.stream.take(packet)
-        standing = None if answer is None else answer_of(answer).standing
+        standing = None if answer is None else self._hand.answer_of(answer).standing
         if standing is not Standing.ACCEPTED:
             raise WorkFailedError(f"the robot did not take a packet of the stream: {standing}")
 

@@ -16,8 +16,9 @@ from urllib.parse import urlsplit
 from rich.live import Live
 
 from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import StreamSession
 from tools.daemon.client import Daemon, open_daemon
-from tools.daemon.settings import Address, read_key
+from tools.daemon.settings import Address
 from tools.errors import BadInputError, CommandError, WorkFailedError
 from tools.output import Output
 from tools.signals import stop_on_signals
@@ -62,12 +63,11 @@ def lead(wish: Wish, out: Output) -> None:
             raise BadInputError(f"{wish.robot}: {daemon.where} runs {status['robot']}")
         host, port = stream_address(status, wish)
         program, wanted = _program_of(description)
-        key = None if wish.key_file is None else read_key(wish.key_file)
         with (
             _ended_by_signals() as ended,
             closing(wish.take_up()) as device,
             daemon.control() as control,
-            _stream(host, port, key, control.token) as stream,
+            _stream(host, port, daemon, control.token) as stream,
         ):
             control.post("/program", {"program": program, "wanted": wanted})
             number = description["programs"].index(program)
@@ -86,9 +86,11 @@ def lead(wish: Wish, out: Output) -> None:
         _tell(session, end, daemon, status["reason"], out)
 
 
-def _stream(host: str, port: int, key: bytes | None, token: str) -> StreamClient:
+def _stream(host: str, port: int, daemon: Daemon, token: str) -> StreamClient:
+    given = daemon.post("/stream", token=token)
+    session = StreamSession(int(given["session"]), bytes.fromhex(given["key"]))
     try:
-        return StreamClient(host, port, key, token)
+        return StreamClient(host, port, session)
     except (OSError, UnicodeError) as error:
         why = getattr(error, "strerror", None) or "is no name of a host"
         raise BadInputError(f"set-points to {host}:{port}: {why}") from None

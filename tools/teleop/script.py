@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cdpr_rt.service.stream_packet import REACH_M
+from profiles.bounded_input import read_text
+from profiles.errors import ProfileError, brief
 from tools.errors import BadInputError
 from tools.teleop.hand import End, Hand
 
 _WORDS = ("clutch", "confirm")
 _SHAPE = "seconds x_mm y_mm [clutch] [confirm]"
 _LONGEST_m = 20.0
+_MOST_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -34,10 +37,9 @@ def read_script(path: Path, scale: float = 1.0) -> tuple[ScriptLine, ...]:
     leads a robot further than set-points may at `scale`.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "is no text"
-        raise BadInputError(f"--script {path}: cannot be read: {reason}") from None
+        text = read_text(path, _MOST_BYTES)
+    except ProfileError as error:
+        raise BadInputError(f"--script {error}") from None
     lines: list[ScriptLine] = []
     for number, raw in enumerate(text.splitlines(), 1):
         words = raw.partition("#")[0].split()
@@ -67,12 +69,12 @@ def _parsed(where: str, words: list[str]) -> ScriptLine:
     try:
         time_s, x_mm, y_mm = (float(word) for word in words[:3])
     except ValueError:
-        raise BadInputError(f"{where}: {' '.join(words)!r}; allowed: {_SHAPE}") from None
+        raise BadInputError(f"{where}: {brief(' '.join(words))!r}; allowed: {_SHAPE}") from None
     for word in words[3:]:
         if word not in _WORDS:
-            raise BadInputError(f"{where}: {word!r}; allowed: {', '.join(_WORDS)}")
+            raise BadInputError(f"{where}: {brief(word)!r}; allowed: {', '.join(_WORDS)}")
     if not (math.isfinite(time_s) and time_s >= 0.0):
-        raise BadInputError(f"{where}: {words[0]} s; allowed: 0 and more")
+        raise BadInputError(f"{where}: {brief(words[0])} s; allowed: 0 and more")
     x, y = x_mm * 1e-3, y_mm * 1e-3
     if not (abs(x) <= _LONGEST_m and abs(y) <= _LONGEST_m):
         raise BadInputError(f"{where}: {x_mm:g} {y_mm:g} mm; allowed: up to {_LONGEST_m:g} m")

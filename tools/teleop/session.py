@@ -29,7 +29,7 @@ _ARRIVE_S: Final = 15.0
 _UNSEEN_S: Final = 1.0
 """Where the robot does not say where it is: longer than what has come waits to be played."""
 _MOST_KEPT: Final = 36_000
-_NEVER_ANSWERED: Final = ": its stream cannot be reached there, or needs the daemon's --key-file"
+_NEVER_ANSWERED: Final = ": its stream cannot be reached there"
 _WHY_NOT: Final = {
     Standing.BUSY: "another sender holds the set-point stream",
     Standing.NO_RIGHT: "the right to move has ended, or is somebody else's now",

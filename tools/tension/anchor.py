@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -115,8 +114,6 @@ class _Recording:
         self._sums = np.zeros(3)
         self._row = np.zeros((1, len(COLUMNS)))
         self._read_s = -math.inf
-        # a bus in lockstep must not run ahead of the load cell, which lives in the host's time
-        self._ahead_s = time.monotonic() - session.device.feedback.time_s
 
     def pull(self, winding_in: bool, log: RawLogWriter) -> None:
         """Wind in to the highest tension, or pay out to the lowest."""
@@ -129,9 +126,6 @@ class _Recording:
         torque = self._puller.cycle()
         feedback, told = self._session.device.feedback, self._exchange.feedback
         self._sums += (1.0, torque, feedback.position_rad[0])
-        early_s = feedback.time_s + self._ahead_s - time.monotonic()
-        if self._session.device.lockstep and early_s > 0.0:
-            time.sleep(early_s)
         self._exchange.update()
         if not told.valid[0]:
             raise TripError(self._exchange.reason())

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import read_raw_log
-from cdpr_rt.tension_gain import identify_tension_gain
+from cdpr_rt.tension_gain import CalibrationRefusedError, identify_tension_gain
 from profiles import Winch
 from profiles.winch_calibration import WinchCalibration
 from tools.errors import BadInputError, WorkFailedError
@@ -101,6 +101,8 @@ def calibrate(folder: Path, winch: Winch) -> WinchCalibration:
         highest_tension_N=found.highest_N,
         raw_data=tuple(str(path.relative_to(folder)) for path in recorded),
     )
+    for key, problem in calibration.faults(winch):
+        raise CalibrationRefusedError(f"{key}: {problem}")
     calibration.save(folder / FILE_NAME)
     from tools.tension.picture import draw_calibration  # noqa: PLC0415  # slow to load
 

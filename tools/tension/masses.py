@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 import signal
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.errors import TripError
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
 from cdpr_rt.recorder import column_names
 from cdpr_rt.tension_gain import (
-    FARTHEST_FROM_NOMINAL,
     LEAST_LEVELS,
     LEAST_SPAN,
     CalibrationRefusedError,
     TorquePoint,
 )
 from profiles import Winch
+from profiles.motor_bounds import FARTHEST_FROM_NOMINAL
 from sim_bus.physics_board import PhysicsBoard
 from tools.errors import BadInputError
 from tools.output import Output
@@ -32,8 +34,8 @@ _TORQUE_SHARE = 0.9
 _LIMIT_RATIO, _LIMIT_MORE_Nm = 1.3, 0.6
 _SPEED_RATIO, _LEAST_SPEED_RAD_S = 5.0, 30.0
 
-Hang = Callable[[float], None]
-"""Sees to it that a mass hangs on the cable, in kg; returns when it does."""
+Hang = Callable[[float, Clock], None]
+"""Sees to it that a mass hangs on the cable, in kg, while time goes on; returns when it does."""
 
 
 def plan_hoist(winch: Winch, speed_m_s: float, lead_m: float, turns: int) -> HoistPlan:
@@ -69,7 +71,7 @@ def _file_name(mass_kg: float) -> str:
     return f"mass-{mass_kg:g}kg.raw"
 
 
-def by_prompt(mass_kg: float) -> None:
+def by_prompt(mass_kg: float, clock: Clock) -> None:
     """Ask the person at the winch; the drive has no power, so Ctrl-C may end it here at once.
 
     Only Enter alone raises the mass: who types a word wants something else.
@@ -80,10 +82,11 @@ def by_prompt(mass_kg: float) -> None:
         f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
         "press Enter (Ctrl-C ends)"
     )
+    ask = partial(typer.prompt, question, default="", show_default=False, err=True)
     try:
-        while typer.prompt(question, default="", show_default=False, err=True):
+        while clock.aside(ask):  # a person takes their time; the safety I/O is asked meanwhile
             typer.echo("Enter alone, please.", err=True)
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):
         raise BadInputError(f"nobody has hung {mass_kg:g} kg; the drive is without power") from None
     finally:
         for number, handler in before.items():
@@ -93,7 +96,7 @@ def by_prompt(mass_kg: float) -> None:
 def on_board(board: Path) -> Hang:
     """Return what hangs masses on the first cable of a simulator, by its physics board."""
 
-    def hang(mass_kg: float) -> None:
+    def hang(mass_kg: float, _: Clock) -> None:
         with PhysicsBoard.attach(board) as shared:
             shared.axis(0).hung_mass_kg = mass_kg
 
@@ -115,7 +118,7 @@ def measure_masses(
     """
     recorded = []
     for mass_kg in masses_kg:
-        hang(mass_kg)
+        hang(mass_kg, session.network.clock)
         path = folder / _file_name(mass_kg)
         with out.progress(f"raising and lowering {mass_kg:g} kg", plan.duration_s) as advance:
             session.executive.on_progress = advance

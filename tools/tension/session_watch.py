@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.executive import Watch
 from cdpr_rt.tension import TensionWatch
 from drivers.modbus.tension import TensionSampler
@@ -14,19 +15,31 @@ from tools.errors import BadInputError
 _FIRST_READINGS_S = 2.0
 
 
-@contextmanager
-def tension_watch(sensors: str | None, port: str | None) -> Iterator[Sequence[Watch]]:
-    """Yield what `open_winch` takes as watches: the tensions, or none without `sensors`.
+Watching = Callable[[Clock], AbstractContextManager[Sequence[Watch]]]
+"""Opens watches of a session by its clock, for as long as the block runs."""
 
-    Raises BadInputError where one of both is missing, ProfileError, and ModbusError for load
-    cells that do not answer.
+
+def no_watches(_: Clock) -> AbstractContextManager[Sequence[Watch]]:
+    """Open nothing."""
+    return nullcontext(())
+
+
+def tension_watch(sensors: str | None, port: str | None) -> Watching:
+    """Return what opens the tensions as a session's watch, or none without `sensors`.
+
+    Raises BadInputError where one of both is missing, and ProfileError; opening them raises
+    ModbusError for load cells that do not answer.
     """
     if (sensors is None) != (port is None):
         raise BadInputError("--sensors and --port go together: the load cells and their line")
     if sensors is None or port is None:
-        yield ()
-        return
+        return no_watches
     profile = load_tension_sensors(sensors)
-    with TensionSampler(profile, port) as sampler:
-        sampler.await_readings(_FIRST_READINGS_S)
-        yield (TensionWatch(sampler.exchange, profile.stop_above_N),)
+
+    @contextmanager
+    def watching(clock: Clock) -> Iterator[Sequence[Watch]]:
+        with TensionSampler(profile, port, clock) as sampler:
+            sampler.await_readings(_FIRST_READINGS_S)
+            yield (TensionWatch(sampler.exchange, profile.stop_above_N),)
+
+    return watching

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +11,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from cdpr_rt.clock import Clock
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.tension import TensionFault
 from drivers.modbus.tension import TensionSampler
@@ -37,26 +37,30 @@ class _Sums:
 
 
 def watch(
-    sampler: TensionSampler, out: Output, seconds: float, stop_requested: Callable[[], bool]
+    sampler: TensionSampler,
+    clock: Clock,
+    out: Output,
+    seconds: float,
+    stop_requested: Callable[[], bool],
 ) -> list[dict[str, Any]]:
     """Look at the tensions for `seconds`, or until a stop is asked for; return their figures."""
     exchange = sampler.exchange
     sums = _Sums(exchange.n)
-    begun = shown = time.monotonic()
+    begun_s = shown_s = clock.now_s
     highest = _LEAST_SCALE_N
     live = Live(console=out.notes, refresh_per_second=_SHOW_HZ, transient=True)
     with live:
-        while time.monotonic() < begun + seconds and not stop_requested():
-            time.sleep(_LOOK_S)
+        while clock.now_s < begun_s + seconds and not stop_requested():
+            clock.sleep(_LOOK_S)
             exchange.update()
             sums.take(sampler)
             told = exchange.feedback
             highest = float(np.max(told.tension_N, where=told.valid, initial=highest))
-            if time.monotonic() > shown + 1.0 / _SHOW_HZ:
-                shown = time.monotonic()
+            if clock.now_s > shown_s + 1.0 / _SHOW_HZ:
+                shown_s = clock.now_s
                 live.update(_table(sampler, highest))
-    elapsed = time.monotonic() - begun
-    return [_figures(sampler, i, sums.values[i], elapsed) for i in range(exchange.n)]
+    elapsed_s = clock.now_s - begun_s
+    return [_figures(sampler, i, sums.values[i], elapsed_s) for i in range(exchange.n)]
 
 
 def _table(sampler: TensionSampler, highest_N: float) -> Group:

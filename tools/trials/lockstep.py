@@ -43,8 +43,6 @@ from tools.trials.stream import StreamInBusTime
 RING_S: Final = 30.0
 _PATIENCE_S: Final = 60.0
 """Time by the clock in which no cycle runs at all, as while drives boot."""
-_HELD_UP_S: Final = 5.0
-"""For so long a busy machine may hold up the loop without drives that miss their master."""
 _LOOK_CYCLES: Final = 512
 _WATCH_S: Final = 0.4
 _names = count()
@@ -117,9 +115,7 @@ class LockstepRobot:
         if self._truth_path is None and robot.platform is not None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-"))
             self._truth_path = Path(folder) / "truth.log"
-        simulator = OwnSimulator(
-            self._reference, bus, self._plant, self._truth_path, hold_s=_HELD_UP_S
-        )
+        simulator = OwnSimulator(self._reference, bus, self._plant, self._truth_path)
         stack.callback(simulator.stop)
         self.simulator = simulator
         self.block = block = SharedBlock.create(n, RING_S, 1.0 / self.period_s)
@@ -130,11 +126,12 @@ class LockstepRobot:
             robot=self._reference, name=robot.profile, buses=(bus,), socket=Path("unused")
         )
         self.machine = RobotMachine(robot, settings)
+        stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
         parts = loop_parts(robot, block)
         parts = replace(parts, programs={**parts.programs, **self._more_programs})
         block.write_description(description(robot, parts))
-        self.loop = ControlLoop(block, self.machine, parts)
+        self.loop = ControlLoop(block, self.machine, parts, lambda: self.now_ns)
         self.right = RightInBusTime(block, lambda: self.now_ns)
         self.stream = StreamInBusTime(block, self.right, lambda: self.now_ns)
         self._reader = RowReader(block)
@@ -239,7 +236,8 @@ class LockstepRobot:
 
         `what` are its keys: program, wanted. Raises OrderRefusedError where it is refused or fails.
         """
-        number = self.block.post_command({"do": do, "client": "trial", **what})
+        right = self.right.number
+        number = self.block.post_command({"do": do, "client": "trial", "right": right, **what})
         answers: list[dict[str, Any]] = []
 
         def answered() -> bool:

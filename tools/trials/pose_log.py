@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 from types import TracebackType
@@ -11,14 +10,17 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from profiles.bounded_input import open_regular, parse_json
+from profiles.errors import ProfileError
 from tools.errors import BadInputError
+from tools.truth import NO_SYNC
 
 _HEADER_BYTES = 1024
 _FORMAT = "cdpr-rt pose log 1"
 
 Truth = NDArray[np.void]
 """Records of the log, (k,): `sync_index`, `time_s` (bus time), `position_m` (3,), `velocity_m_s`
-(3,), `rotation` (3, 3), `tension_N` (n,) and `motor_rad` (n,), all true at their SYNC."""
+(3,), `rotation` (3, 3), `tension_N` (n,) and `motor_rad` (n,), all true at that time."""
 
 
 class PoseLogTail:
@@ -31,12 +33,12 @@ class PoseLogTail:
         self.path = path
         self._fd = -1
         try:
-            self._fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-            header = json.loads(os.pread(self._fd, _HEADER_BYTES, 0))
+            self._fd = open_regular(path)
+            header = parse_json(os.pread(self._fd, _HEADER_BYTES, 0), path)
             self.dtype = _dtype(header["fields"])
             if header["format"] != _FORMAT or header["record_bytes"] != self.dtype.itemsize:
                 raise ValueError(header["format"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (ProfileError, OSError, ValueError, KeyError, TypeError) as error:
             self.close()
             raise BadInputError(f"{path}: not a log of true poses: {error}") from error
 
@@ -78,10 +80,14 @@ class PoseLogTail:
         self.close()
 
 
-def read_pose_log(path: Path) -> Truth:
-    """Return all records of a log; raises BadInputError when `path` is no such log."""
+def read_pose_log(path: Path, *, without_sync: bool = False) -> Truth:
+    """Return the records of the SYNCs, or all, those `without_sync` among them (`NO_SYNC`).
+
+    Raises BadInputError when `path` is no such log.
+    """
     with PoseLogTail(path) as log:
-        return log.read()
+        records = log.read()
+    return records if without_sync else records[records["sync_index"] != NO_SYNC]
 
 
 def _dtype(fields: list[list[Any]]) -> np.dtype[np.void]:

@@ -8,11 +8,10 @@ from typing import Final
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.service.stream_desk import Address, StreamDesk
 from cdpr_rt.service.stream_packet import (
-    NO_RIGHT,
     StreamAnswer,
+    StreamSession,
     StreamSetpoint,
     parse,
-    right_digest,
     seal,
 )
 from tools.trials.right import RightInBusTime
@@ -28,8 +27,16 @@ class StreamInBusTime:
         self, block: SharedBlock, right: RightInBusTime, clock_ns: Callable[[], int]
     ) -> None:
         self.desk = StreamDesk(block, right.lease)
+        self._right = right
         self._clock_ns = clock_ns
         self._look_ns = 0
+
+    def hand(self) -> Hand:
+        """Return a sender for the right that is held here, in place of any before.
+
+        Raises LeaseError where none is held.
+        """
+        return Hand(self.desk.give(self._right.token))
 
     def take(self, data: bytes, address: Address = _HERE) -> bytes | None:
         """Take one packet as it arrives now; return the answer, None where none is due."""
@@ -44,12 +51,11 @@ class StreamInBusTime:
 
 
 class Hand:
-    """A sender's packets, numbered and stamped; `session` names it, `token` is a right held."""
+    """The packets of one session, numbered and stamped."""
 
-    def __init__(self, session: int = 1, token: str | None = None) -> None:
+    def __init__(self, session: StreamSession) -> None:
         self._session = session
         self._sequence = 0
-        self._right = NO_RIGHT if token is None else right_digest(token)
 
     def packet(
         self,
@@ -64,14 +70,13 @@ class Hand:
         x, y, z = position_m
         w, i, j, k = quaternion
         setpoint = StreamSetpoint(
-            self._session, self._sequence, round(sent_s * 1e9), (x, y, z), (w, i, j, k), scale,
-            buttons, right=self._right,
+            self._session.number, self._sequence, round(sent_s * 1e9), (x, y, z), (w, i, j, k),
+            scale, buttons,
         )  # fmt: skip
-        return seal(setpoint, None)
+        return seal(setpoint, self._session.key)
 
-
-def answer_of(data: bytes) -> StreamAnswer:
-    """Return the robot's answer; raises PacketError for what is none."""
-    packet = parse(data, None)
-    assert isinstance(packet, StreamAnswer)  # the desk gives no other
-    return packet
+    def answer_of(self, data: bytes) -> StreamAnswer:
+        """Return the robot's answer; raises PacketError for what is none of this session's."""
+        packet = parse(data, self._session.key)
+        assert isinstance(packet, StreamAnswer)  # the desk gives no other
+        return packet

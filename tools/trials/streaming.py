@@ -14,7 +14,6 @@ from tools.trials.channel import Channel, Network
 from tools.trials.figures import Figure
 from tools.trials.recorded import Recorded
 from tools.trials.run import TrialRun, platform_of
-from tools.trials.stream import Hand
 
 RATE_Hz: Final = 50.0
 SCALE: Final = 4.0
@@ -65,7 +64,7 @@ def drive(run: TrialRun, seconds: float) -> None:
     network = Network()
     channel = Channel(network, chance)
     way = Wandering(chance, (run.high_m - run.low_m) / (2.0 * SCALE))
-    hand = Hand(token=rig.right.token)
+    hand = rig.stream.hand()
     rig.program("pose", stream=True)
     between = round(1.0 / (RATE_Hz * rig.period_s))
     cycles = round(seconds / rig.period_s)

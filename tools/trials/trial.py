@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure as Picture
 
 from profiles import Robot, load_robot
 from tools.errors import BadInputError
+from tools.kept import kept
 from tools.output import Output, to_json
 from tools.robots.checks import refuse_impossible
 from tools.trials import limits, line, pictures, streaming, targets
@@ -82,11 +82,7 @@ class Asked:
     @classmethod
     def load(cls, folder: Path) -> Asked:
         """Return what the trial in `folder` was asked for; raises BadInputError."""
-        path = folder / ASKED
-        try:
-            return cls(**json.loads(path.read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError) as error:
-            raise BadInputError(f"{path}: not of a trial: {error}") from error
+        return kept(folder / ASKED, cls)
 
     @property
     def parts(self) -> Sequence[str]:

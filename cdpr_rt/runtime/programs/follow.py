@@ -56,6 +56,10 @@ class FollowProgram(AxisProgram):
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until the stream begins."""
         super().start(feedback, setpoint, torque_Nm)
+        # where the axes come to rest: the stream may begin before they have
+        speed = setpoint.velocity_rad_s
+        braked = 0.5 * speed * np.abs(speed) / self._model.acceleration_rad_s2
+        self._target[:] = setpoint.position_rad + braked
         self.stream.reset()
 
     @property

@@ -281,7 +281,7 @@ class Bench:
         fr = FrictionFeedforward(
             p.coulomb * up, p.coulomb * dn, s * up, s * dn, p.stribeck, p.viscous * ff
         )
-        return AxisCompensation(np.vstack([table, table]), fr, look_ahead, observer_s)
+        return AxisCompensation(np.vstack([table, table]), fr, look_ahead, observer_s, most_Nm=10.0)
 
 
 NOMINAL_INERTIA = 1.13e-4
@@ -312,7 +312,9 @@ def fast_legs(bench):
 
 def compensation(better):
     look_ahead = max(0.0, better.latency_s.value)
-    return AxisCompensation(better.tables(4096), better.friction, look_ahead, OBSERVER)
+    return AxisCompensation(
+        better.tables(4096), better.friction, look_ahead, OBSERVER, most_Nm=10.0
+    )
 
 
 def commission(plant):
@@ -360,7 +362,7 @@ def validate(done: Commissioned) -> dict[str, Metrics]:
         for v in (RAMP_SPEED, -RAMP_SPEED):
             known = {
                 "none": lambda: None,
-                "thesis": lambda: AxisCompensation(done.thesis.tables(4096)),
+                "thesis": lambda: AxisCompensation(done.thesis.tables(4096), most_Nm=10.0),
                 "better": lambda: compensation(done.better),
                 "oracle": lambda: bench.oracle(latency, OBSERVER),
             }[name]()

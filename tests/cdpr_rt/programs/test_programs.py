@@ -181,6 +181,25 @@ def test_follow_pays_out_cable_as_the_hand_moves() -> None:
     np.testing.assert_allclose(rig.setpoint.position_rad, start + way)
 
 
+def test_a_stream_that_is_there_at_once_begins_where_the_axes_are() -> None:
+    """Not where an earlier one has left its target."""
+    rig = ProgramRig()
+    rig.switch("follow")
+    for k in range(30):
+        rig.send((0.01 * k, 0.0, 0.0))
+        rig.run(1 / 30.0)
+    rig.switch("jog", {"velocity_rad_s": [-5.0, 0.0, 0.0], "timeout_s": 1.0})
+    rig.run(0.8)
+    turning = rig.setpoint.position_rad.copy()
+    rig.switch("follow")
+    rig.send((0.0, 0.0, 0.0))
+    rig.run(0.4)
+    way = rig.setpoint.position_rad - turning
+    # braked, and neither on to the old target nor back
+    assert way[0] == pytest.approx(-(5.0**2) / 160.0, rel=0.01)
+    np.testing.assert_array_equal(way[1:], 0.0)
+
+
 def test_an_axis_slower_than_the_hand_does_not_run_on_for_long() -> None:
     rig = ProgramRig()
     rig.switch("follow")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ from cdpr_rt.runtime.shared_block import RowWriter, SharedBlock
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.app import create_app
 from cdpr_rt.service.auth import Door, Gate
+from cdpr_rt.service.connections import Turns
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.server import Server, listen_tcp, listen_unix
 from cdpr_rt.service.service import Service
@@ -58,7 +60,8 @@ class MadeUpLoop:
 
     def turn(self) -> None:
         self.block.counters["loop_alive_ns"] = time.monotonic_ns()
-        while self.answers and (command := self.block.take_command()) is not None:
+        take = (self.block.take_urgent, self.block.take_command)
+        while self.answers and (command := take[0]() or take[1]()) is not None:
             self.commands.append(command)
             self.block.post_reply({"to": command["number"], **self._obey(command)})
         row = self._rows.slot()
@@ -89,6 +92,7 @@ class Rig:
         self.loop = MadeUpLoop(self.block)
         self.socket = folder / "control.sock"
         self.port = self.guarded_port = 0
+        self.told: list[str] = []
         self._ended = threading.Event()
         self._up = threading.Event()
         self._threads = [
@@ -126,8 +130,14 @@ class Rig:
             plain: Door.named(None, "127.0.0.1"),
             guarded: Door.named(KEY, "127.0.0.1"),
         }
+        turns = Turns()
         servers = [
-            Server(Gate(app, door, service.count_refusal, service.lease.is_held_by), listener)
+            Server(
+                Gate(app, door, service.count_refusal, service.lease.is_held_by),
+                listener,
+                turns,
+                self.told.append,
+            )
             for listener, door in doors.items()
         ]
         serving = [asyncio.create_task(server.run_until_told()) for server in servers]
@@ -157,7 +167,7 @@ class Rig:
 
     @property
     def lease_left_s(self) -> float:
-        return (int(self.block.counters["lease_ns"][0]) - time.monotonic_ns()) * 1e-9
+        return (int(self.block.counters["right_until_ns"][0]) - time.monotonic_ns()) * 1e-9
 
 
 @contextmanager
@@ -175,3 +185,21 @@ def wait_for(seen: Callable[[], bool], seconds: float = 10.0) -> None:
     while not seen():
         assert time.monotonic() < deadline, "never came true"
         time.sleep(0.01)
+
+
+def raw(rig: Rig, text: bytes, wait_s: float = 5.0, port: int = 0) -> bytes:
+    """Send bytes, return what came until the other side closed or paused."""
+    with socket.create_connection(("127.0.0.1", port or rig.port), wait_s) as sock:
+        sock.sendall(text)
+        sock.settimeout(wait_s)
+        try:
+            return sock.recv(65536)
+        except (TimeoutError, ConnectionResetError):
+            return b""
+
+
+def reachable(rig: Rig) -> bool:
+    try:
+        return httpx.get(f"{rig.url}/status").status_code == 200
+    except httpx.HTTPError:
+        return False

@@ -16,6 +16,10 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from service_rig import AXES, Rig, running, wait_for
 
+from cdpr_rt.service.setpoint_stream import SetpointStream
+from cdpr_rt.service.stream_client import StreamClient
+from cdpr_rt.service.stream_packet import Standing, StreamSession
+
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
@@ -73,6 +77,56 @@ def test_its_holder_moves_and_others_are_told_who_that_is(rig: Rig) -> None:
     assert command["do"] == "enable"
     assert (command["program"], command["wanted"]) == ("jog", wanted)
     assert command["client"] == "maria"
+
+
+def test_an_order_carries_the_number_of_the_taking_it_was_given_under(rig: Rig) -> None:
+    with rig.client() as client:
+        for name in ("maria", "jan"):
+            headers = take(client, name)
+            for path, body in (
+                ("/enable", {}),
+                ("/program", {"program": "jog"}),
+                ("/set", {"wanted": {}}),
+                ("/lengths", {"wanted": {}}),
+            ):
+                assert client.post(path, json=body, headers=headers).status_code == 200
+            client.delete("/control", headers=headers)
+        client.post("/hold")
+    numbers = [command.get("right") for command in rig.loop.commands]
+    last = int(rig.block.counters["right_number"][0])
+    assert numbers == [last - 1] * 4 + [last] * 4 + [None], "hold is everybody's"
+
+
+def test_the_holder_alone_is_given_a_session_of_the_stream(rig: Rig) -> None:
+    with rig.client() as client:
+        headers = take(client)
+        answer = client.post("/stream", headers=headers)
+        assert answer.status_code == 404
+        assert "takes no set-point stream" in answer.json()["error"]
+        stream = SetpointStream(rig.block, rig.service.lease)
+        rig.service.start_parts([stream])
+        try:
+            for wrong in ({}, {"X-Control-Token": "made up"}):
+                assert client.post("/stream", headers=wrong).status_code == 409
+            told = client.post("/stream", headers=headers).json()
+            assert (told["host"], told["port"]) == ("127.0.0.1", stream.port)
+            given = StreamSession(told["session"], bytes.fromhex(told["key"]))
+            with StreamClient(told["host"], told["port"], given) as hand:
+                wait_for(lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != [])
+                assert hand.state is not None
+                assert hand.state.standing is Standing.ACCEPTED
+                client.delete("/control", headers=headers)
+                take(client, "jan")
+                answered = hand.answered
+                wait_for(
+                    lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != []
+                    and hand.answered > answered + 2
+                )  # fmt: skip
+                assert hand.state.standing is Standing.NO_RIGHT
+            assert rig.block.samples["right"].max() < rig.block.counters["right_number"][0]
+        finally:
+            rig.service.stop_parts()
+            rig.service.parts, rig.service.stream = [], None
 
 
 @pytest.mark.parametrize("do", ["hold", "disable", "shutdown"])
@@ -233,6 +287,31 @@ def test_what_makes_no_sense_is_refused_by_name(rig: Rig, path: str, body: str, 
     assert answer.status_code in (400, 422)
     assert where in answer.json()["error"]
     assert rig.loop.commands == []
+
+
+@pytest.mark.parametrize("depth", [20, 210, 900, 980, 2000])
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('{"wanted": {"v": ', "}}"),
+        ('{"wanted": ', "}"),
+        ('{"client": ', "}"),
+        ('{"unknown": ', ', "wanted": {}}'),
+        ("", ""),
+    ],
+)
+def test_however_deep_a_body_is_it_is_refused_and_nothing_breaks(
+    rig: Rig, capfd: pytest.CaptureFixture[str], depth: int, before: str, after: str
+) -> None:
+    with rig.client() as client:
+        headers = {**take(client), "content-type": "application/json"}
+        for opened, closed in (("[", "]"), ('{"a":', "}")):
+            body = before + opened * depth + "1" + closed * depth + after
+            answer = client.post("/set", content=body, headers=headers)
+            assert answer.status_code in (400, 422), answer.text
+            assert len(answer.json()["error"]) < 300
+    assert rig.loop.commands == []
+    assert capfd.readouterr().err == ""
 
 
 def test_a_command_too_long_for_the_loop_is_refused(rig: Rig) -> None:

@@ -8,7 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdpr_rt.runtime.right import PublishedRight
+from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.service.lease import Lease, LeaseError
+
+BLOCK = SharedBlock.create(1, 0.1, 100.0)
 
 
 class Clock:
@@ -19,28 +23,34 @@ class Clock:
         return self.ns
 
 
-def made() -> tuple[Lease, Clock, list[int]]:
-    clock, published = Clock(), [-1]
-    return Lease(published.append, clock), clock, published
+def made() -> tuple[Lease, Clock]:
+    clock = Clock()
+    return Lease(PublishedRight(BLOCK), clock), clock
+
+
+def until_ns() -> int:
+    """Until when the loop is told that the newest taking holds."""
+    return int(BLOCK.counters["right_until_ns"][0])
 
 
 def test_nobody_holds_it_at_first_whatever_an_earlier_service_has_published() -> None:
-    lease, _, published = made()
-    assert published[-1] == 0
+    BLOCK.counters["right_until_ns"] = 1 << 62
+    lease, _ = made()
+    assert until_ns() == 0
     assert lease.holder() is None
 
 
 def test_the_loop_is_told_until_when_and_each_sign_of_life_extends_it() -> None:
-    lease, clock, published = made()
+    lease, clock = made()
     token = lease.take("maria", 2.0)
-    assert published[-1] == clock.ns + 2_000_000_000
+    assert until_ns() == clock.ns + 2_000_000_000
     clock.ns += 1_500_000_000
-    assert lease.renew(token) == 2.0
-    assert published[-1] == clock.ns + 2_000_000_000
+    assert lease.renew(token).ttl_s == 2.0
+    assert until_ns() == clock.ns + 2_000_000_000
 
 
 def test_another_is_refused_by_the_holders_name_until_it_has_been_silent() -> None:
-    lease, clock, _ = made()
+    lease, clock = made()
     lease.take("maria", 2.0)
     with pytest.raises(LeaseError, match="maria holds the right to move"):
         lease.take("jan", 2.0)
@@ -52,19 +62,19 @@ def test_another_is_refused_by_the_holders_name_until_it_has_been_silent() -> No
 
 
 def test_who_was_silent_has_lost_it_also_where_nobody_else_took_it() -> None:
-    lease, clock, published = made()
+    lease, clock = made()
     token = lease.take("maria", 0.5)
     clock.ns += 600_000_000
     with pytest.raises(LeaseError, match="run out: maria was silent"):
         lease.renew(token)
-    assert published[-1] < clock.ns
+    assert until_ns() < clock.ns
 
 
 def test_given_back_it_is_gone_at_once() -> None:
-    lease, _, published = made()
+    lease, _ = made()
     token = lease.take("maria", 2.0)
     lease.release(token)
-    assert published[-1] == 0
+    assert until_ns() == 0
     for wrong in (token, "", None):
         with pytest.raises(LeaseError):
             lease.renew(wrong)
@@ -72,10 +82,10 @@ def test_given_back_it_is_gone_at_once() -> None:
 
 @pytest.mark.parametrize("ttl_s", [0.0, -1.0, 0.19, 10.01, float("nan"), float("inf")])
 def test_no_silence_of_any_length(ttl_s: float) -> None:
-    lease, _, published = made()
+    lease, _ = made()
     with pytest.raises(LeaseError, match=r"allowed: 0\.2 to 10 s"):
         lease.take("maria", ttl_s)
-    assert published[-1] == 0
+    assert until_ns() == 0
 
 
 OPERATIONS = st.lists(
@@ -94,18 +104,21 @@ def test_at_most_one_token_counts_and_only_while_it_is_renewed(
     operations: list[tuple[str, int, float]],
 ) -> None:
     """Against a model that knows the time at which each token was last good."""
-    lease, clock, published = made()
+    lease, clock = made()
     tokens: dict[int, str] = {}
-    holder, until_ns, ttl_ns = -1, 0, 0
+    holder, end_ns, ttl_ns = -1, 0, 0
+    number = lease._right.number
     for what, who, seconds in operations:
-        free = holder < 0 or clock.ns >= until_ns
+        free = holder < 0 or clock.ns >= end_ns
         if what == "wait":
             clock.ns += round(seconds * 1e9)
         elif what == "take":
             if free:
                 tokens[who] = lease.take(f"client {who}", seconds)
                 ttl_ns = round(seconds * 1e9)
-                holder, until_ns = who, clock.ns + ttl_ns
+                holder, end_ns = who, clock.ns + ttl_ns
+                number += 1
+                assert lease.renew(tokens[who]).number == number
             else:
                 with pytest.raises(LeaseError):
                     lease.take(f"client {who}", seconds)
@@ -116,13 +129,14 @@ def test_at_most_one_token_counts_and_only_while_it_is_renewed(
                     do(tokens.get(who))
             else:
                 do(tokens[who])
-                until_ns = clock.ns + ttl_ns if what == "renew" else 0
+                end_ns = clock.ns + ttl_ns if what == "renew" else 0
                 holder = who if what == "renew" else -1
-        assert published[-1] == until_ns
+        assert until_ns() == end_ns
+        assert BLOCK.counters["right_number"][0] == number
 
 
 def test_of_many_who_ask_at_once_one_gets_it() -> None:
-    lease = Lease(lambda _: None)
+    lease = Lease(PublishedRight(BLOCK))
     got: list[str] = []
     begin = threading.Barrier(16)
 
@@ -140,3 +154,11 @@ def test_of_many_who_ask_at_once_one_gets_it() -> None:
     for thread in threads:
         thread.join()
     assert len(got) == 1
+
+
+def test_numbers_go_on_where_an_earlier_service_has_left_them() -> None:
+    first, _ = made()
+    number = first.renew(first.take("maria", 2.0)).number
+    second, _ = made()
+    assert second.holder() is None
+    assert second.renew(second.take("maria", 2.0)).number == number + 1

@@ -20,6 +20,7 @@ from websockets.asyncio.client import connect
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.shared_block import RowWriter, SharedBlock
 from cdpr_rt.service.foxglove_view import LiveView, LiveViewError
+from cdpr_rt.service.live_door import MOST_VIEWERS
 
 _PROTOCOL = "foxglove.sdk.v1"
 
@@ -173,6 +174,105 @@ def test_clients_that_talk_nonsense_leave_no_lines_in_the_log(
                 client.settimeout(5.0)
                 assert b"101" not in client.recv(1000)
     assert not caplog.records
+
+
+UPGRADE = (
+    "GET / HTTP/1.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+    f"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: {_PROTOCOL}\r\n"
+)
+FOXGLOVE = "https://app.foxglove.dev"
+
+
+def _asked(view: LiveView, *headers: str) -> str:
+    """Return the first line of the answer to a request for the view with these headers."""
+    port = int(view.told()["url"].rsplit(":", 1)[1])
+    with socket.create_connection(("127.0.0.1", port), 5.0) as client:
+        client.sendall((UPGRADE + "".join(f"{line}\r\n" for line in headers) + "\r\n").encode())
+        return client.recv(4096).decode("latin-1").split("\r\n")[0]
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        ("Host: localhost", "Origin: http://evil.example"),
+        ("Host: localhost", "Origin: null"),
+        ("Host: localhost", "Origin: "),
+        ("Host: localhost", f"Origin: {FOXGLOVE}.evil.example"),
+        ("Host: localhost", f"Origin: {FOXGLOVE}", "Origin: http://evil.example"),
+        ("Host: rebound.evil.example:8765",),
+        ("Host: rebound.evil.example", f"Origin: {FOXGLOVE}"),
+        (f"Host: {socket.gethostname()}.local:8765",),  # whoever answers to it on the network
+        ("Host: ",),
+    ],
+)
+def test_a_page_of_another_host_does_not_look_on(headers: tuple[str, ...]) -> None:
+    view = LiveView(block_with_clock(), "bench", 0, [FOXGLOVE])
+    view.start()
+    try:
+        assert " 403 " in _asked(view, *headers)
+        told = view.told()
+        assert (told["refused"], told["viewers"]) == (1, 0)
+        assert told["refused_last"].startswith(("Origin: ", "Host: "))
+    finally:
+        view.stop()
+
+
+@pytest.mark.parametrize("origin", [(), (f"Origin: {FOXGLOVE}",), (f"origin: {FOXGLOVE.upper()}",)])
+def test_programs_look_on_and_so_do_pages_that_were_named(origin: tuple[str, ...]) -> None:
+    view = LiveView(block_with_clock(), "bench", 0, [f"{FOXGLOVE}/"])
+    view.start()
+    try:
+        for host in ("localhost", "127.0.0.1:8765", "[::1]:1"):
+            assert " 101 " in _asked(view, f"Host: {host}", *origin)
+    finally:
+        view.stop()
+
+
+def test_the_server_behind_the_door_is_not_where_a_page_would_look() -> None:
+    with _running(block_with_clock()) as view:
+        assert view._door is not None
+        host, port = view._door._inner
+        assert host.startswith("127.")
+        assert host != "127.0.0.1"
+        for guess in ("127.0.0.1", "localhost"):
+            with pytest.raises(ConnectionRefusedError):
+                socket.create_connection((guess, port), 5.0)
+
+
+def test_who_says_nothing_makes_room_and_too_many_are_told(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with _running(block_with_clock()) as view:
+        port = int(view.told()["url"].rsplit(":", 1)[1])
+        silent = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MOST_VIEWERS)]
+        assert " 101 " in _asked(view, "Host: localhost")
+        watching = []
+        for _ in range(MOST_VIEWERS):
+            watching.append(socket.create_connection(("127.0.0.1", port), 5.0))
+            watching[-1].sendall(f"{UPGRADE}Host: localhost\r\n\r\n".encode())
+            assert b" 101 " in watching[-1].recv(4096)
+        assert " 503 " in _asked(view, "Host: localhost")
+    for one in (*silent, *watching):  # cut with the view's end
+        one.close()
+    assert not caplog.records
+
+
+def test_there_are_not_more_of_them_where_many_come_at_once() -> None:
+    with _running(block_with_clock()) as view:
+        port = int(view.told()["url"].rsplit(":", 1)[1])
+        request = f"{UPGRADE}Host: localhost\r\n\r\n".encode()
+        watching, answers = [], list[bytes]()
+        for at_once in (MOST_VIEWERS - 1, MOST_VIEWERS - 4):
+            new = [socket.create_connection(("127.0.0.1", port), 5.0) for _ in range(at_once)]
+            for one in new:
+                one.sendall(request)
+            answers += [one.recv(4096) for one in new]
+            watching += new
+        assert sum(b" 101 " in answer for answer in answers) == MOST_VIEWERS
+        assert sum(b" 503 " in answer for answer in answers) == MOST_VIEWERS - 5
+        assert view.told()["viewers"] == MOST_VIEWERS
+    for one in watching:
+        one.close()
 
 
 def test_it_stays_where_no_cycles_run() -> None:

@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 import time
 
 import jsonschema_rs
@@ -35,6 +37,23 @@ def test_any_number_comes_back_to_a_billionth(values: list[float]) -> None:
             assert math.isclose(read, value, rel_tol=1e-13, abs_tol=0.51e-9)
         else:
             assert read is not None and abs(read) > 1e299 and read * value > 0
+
+
+def test_the_kernel_is_ready_before_rows_come() -> None:
+    """In a process of its own, since what other tests have compiled stays compiled."""
+    script = """
+import numpy as np
+from cdpr_rt.runtime.cycle_row import cycle_dtype
+from cdpr_rt.service.recording_json import RowTexts, _write
+texts = RowTexts(2)
+ready = len(_write.signatures)
+texts(np.zeros(300, cycle_dtype(2)))
+print(ready, len(_write.signatures))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout.split() == ["1", "1"], done.stderr
 
 
 def test_numbers_are_as_short_as_they_can_be() -> None:

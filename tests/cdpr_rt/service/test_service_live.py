@@ -118,9 +118,10 @@ def test_a_client_that_does_not_read_is_dropped_and_others_are_not(rig: Rig) -> 
 
 
 def test_pings_whose_answers_nobody_reads_do_not_pile_up(rig: Rig) -> None:
-    flood = socket.create_connection(("127.0.0.1", rig.port))
+    flood = socket.create_connection(("127.0.0.1", rig.guarded_port))
     flood.sendall(
         b"GET /control?client=x&ttl_s=10 HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
+        b"Authorization: Bearer " + KEY + b"\r\n"
         b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
     )
@@ -198,6 +199,8 @@ def test_a_client_that_is_there_but_silent_loses_it(rig: Rig) -> None:
         '{"do": "set", "wanted": 1}',
         '{"do": "renew", "more": 1}',
         "[" * 9000,
+        '{"do": "set", "wanted": {"v": ' + 150 * "[" + 150 * "]" + "}}",
+        '{"do": "set", "wanted": {"v": ' + 900 * "[" + 900 * "]" + "}}",
     ],
 )
 def test_nonsense_is_answered_and_moves_nothing(rig: Rig, text: str) -> None:

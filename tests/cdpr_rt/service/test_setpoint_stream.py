@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import hmac
 import itertools
 import math
 import os
@@ -21,11 +23,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.right import PublishedRight
 from cdpr_rt.runtime.shared_block import SharedBlock
-from cdpr_rt.service.lease import Lease
+from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError, is_loopback
 from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import Standing, StreamSetpoint
+from cdpr_rt.service.stream_packet import (
+    Hello,
+    Standing,
+    StreamSession,
+    StreamSetpoint,
+    seal,
+)
 
 KEY = b"a key that is long enough"
 
@@ -33,16 +42,22 @@ KEY = b"a key that is long enough"
 class Robot:
     """A receiver with what stands behind it."""
 
-    def __init__(self, key: bytes | None = None, host: str = "127.0.0.1") -> None:
+    def __init__(self, key: bytes | None = None, host: str = "127.0.0.1", port: int = 0) -> None:
         self.block = SharedBlock.create(1, 0.1, 1000.0)
-        self.until_ns = 0
-        self.lease = Lease(self._publish)
-        self.stream = SetpointStream(self.block, self.lease, host, 0, key)
+        self.lease = Lease(PublishedRight(self.block))
+        self.stream = SetpointStream(self.block, self.lease, host, port, key)
         self.stream.start()
         self.port = self.stream.port
 
-    def _publish(self, until_ns: int) -> None:
-        self.until_ns = until_ns
+    def give(self) -> StreamSession:
+        """Take the right to move, where nobody has it, and give its holder a session."""
+        with contextlib.suppress(LeaseError):
+            self.token = self.lease.take("console", 10.0)
+        return self.stream.desk.give(self.token)
+
+    @property
+    def until_ns(self) -> int:
+        return int(self.block.counters["right_until_ns"][0])
 
     @property
     def posted(self) -> int:
@@ -81,7 +96,10 @@ def converse(client: StreamClient, what: Callable[[], bool], seconds: float = 5.
 @pytest.mark.parametrize("key", [None, KEY])
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
 def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> None:
-    with robot(key, host) as there, StreamClient(host, there.port, key) as client:
+    with (
+        robot(key, host) as there,
+        StreamClient(host, there.port, key or there.give()) as client,
+    ):
         converse(client, lambda: client.answered >= 5)
         assert client.state is not None
         assert client.state.standing == Standing.ACCEPTED
@@ -94,27 +112,20 @@ def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> No
         assert told["round_trip_s"] is not None
         client.close()
         until(lambda: there.stream.told()["holder"] is None)
-        assert there.until_ns == 0
+        assert (there.until_ns == 0) is (key is not None), "its own right, or the console's"
 
 
-@pytest.mark.parametrize("key", [None, KEY])
-def test_a_client_goes_on_after_the_robot_was_away(
-    key: bytes | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_client_goes_on_after_the_robot_was_away(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cdpr_rt.service.stream_client._SILENCE_S", 0.3)
-    with robot(key) as first:
+    with robot(KEY) as first:
         port = first.port
-        client = StreamClient("127.0.0.1", port, key)
+        client = StreamClient("127.0.0.1", port, KEY)
         converse(client, lambda: client.answered >= 2)
     for _ in range(30):  # nobody listens
         client.send((0.0, 0.0, 0.0))
         client.receive()
         time.sleep(0.01)
-    again = Robot.__new__(Robot)
-    again.block, again.until_ns = SharedBlock.create(1, 0.1, 1000.0), 0
-    again.lease = Lease(again._publish)
-    again.stream = SetpointStream(again.block, again.lease, "127.0.0.1", port, key)
-    again.stream.start()
+    again = Robot(KEY, port=port)
     try:
         converse(client, lambda: again.posted >= 3)
     finally:
@@ -122,15 +133,38 @@ def test_a_client_goes_on_after_the_robot_was_away(
         again.stream.stop()
 
 
-@pytest.mark.parametrize("key", [None, KEY])
-def test_the_second_waits_for_the_first(key: bytes | None) -> None:
-    with robot(key) as there, StreamClient("127.0.0.1", there.port, key) as second:
-        with StreamClient("127.0.0.1", there.port, key) as first:
+def test_the_second_waits_for_the_first() -> None:
+    with robot(KEY) as there, StreamClient("127.0.0.1", there.port, KEY) as second:
+        with StreamClient("127.0.0.1", there.port, KEY) as first:
             converse(first, lambda: first.answered >= 2)
             converse(second, lambda: there.count("busy") > 0)
             assert there.stream.told()["holder"] is not None
         taken = there.count("accepted")
         converse(second, lambda: there.count("accepted") >= taken + 3)
+
+
+def test_nobody_else_on_this_machine_streams_or_gets_the_right_to_move() -> None:
+    """Whoever can reach the port but not the control interface, also as the holder falls silent."""
+    with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as hand:
+        converse(hand, lambda: hand.answered >= 2)
+        there.lease.release(there.token)
+        posted = there.posted
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+            StreamClient("127.0.0.1", there.port, KEY) as guest,
+            StreamClient("127.0.0.1", there.port, StreamSession(5, bytes(32))) as guesser,
+        ):
+            stranger.connect(("127.0.0.1", there.port))
+            for sequence in range(30):
+                stranger.send(StreamSetpoint(5, sequence, sequence, (0.0, 0.0, 0.1)).pack())
+                for one in (guest, guesser):
+                    one.send((0.0, 0.0, 0.1))
+                    assert one.receive() == []
+                time.sleep(0.01)
+            until(lambda: there.count("unsigned") == 30 and there.count("session") > 30)
+            with pytest.raises(BlockingIOError):
+                stranger.recv(1, socket.MSG_DONTWAIT)
+        assert (there.posted, there.lease.holder(), there.until_ns) == (posted, None, 0)
 
 
 def test_a_wrong_key_is_not_answered() -> None:
@@ -140,16 +174,32 @@ def test_a_wrong_key_is_not_answered() -> None:
                 assert not client.send((0.0, 0.0, 0.0))
                 assert client.receive() == []
                 time.sleep(0.01)
-        with StreamClient("127.0.0.1", there.port) as client:
+        guessed = StreamSession(5, KEY)
+        with StreamClient("127.0.0.1", there.port, guessed) as client:
             for _ in range(20):
                 client.send((0.0, 0.0, 0.0))
                 assert client.receive() == []
-        until(lambda: there.count("tag") >= 1 and there.count("size") >= 20)
+        until(lambda: there.count("tag") >= 21)
         assert (there.posted, there.until_ns) == (0, 0)
 
 
+def test_forged_hellos_do_not_keep_out_who_has_the_key() -> None:
+    forged = seal(Hello(7, bytes(16)), b"a key of its own")
+    with robot(KEY) as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger:
+        forger.connect(("127.0.0.1", there.port))
+        for _ in range(10):  # at once more than any limit of tries would allow
+            before = there.count("tag")
+            for _ in range(100):
+                forger.send(forged)
+            until(lambda least=before + 100: there.count("tag") >= least)
+        with StreamClient("127.0.0.1", there.port, KEY) as client:
+            converse(client, lambda: forger.send(forged) > 0 and client.answered >= 5)
+        assert there.posted >= 5
+
+
 def test_elsewhere_than_on_loopback_a_key_is_needed() -> None:
-    block, lease = SharedBlock.create(1, 0.1, 1000.0), Lease(lambda _: None)
+    block = SharedBlock.create(1, 0.1, 1000.0)
+    lease = Lease(PublishedRight(block))
     assert is_loopback("127.0.0.1") and is_loopback("::1") and is_loopback("localhost")
     for host in ("0.0.0.0", "::"):
         with pytest.raises(StreamError, match="no key is shared"):
@@ -164,7 +214,7 @@ def test_elsewhere_than_on_loopback_a_key_is_needed() -> None:
 
 
 def test_an_address_in_use_is_told() -> None:
-    with robot() as there, StreamClient("127.0.0.1", there.port) as client:
+    with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
         converse(client, lambda: client.answered >= 1)  # with the holder's socket in place
         other = SetpointStream(there.block, there.lease, "127.0.0.1", there.port)
         with pytest.raises(StreamError, match="in use"):
@@ -174,13 +224,14 @@ def test_an_address_in_use_is_told() -> None:
 
 FLOOD = """
 import socket, sys, time
-from cdpr_rt.service.stream_packet import StreamSetpoint
+from cdpr_rt.service.stream_packet import StreamSetpoint, seal
 socks = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(8)]
 for sock in socks:
     sock.connect(("127.0.0.1", int(sys.argv[1])))
     sock.setblocking(False)
 parcels = [b"x" * 128, bytes(1400), b"CDPS" + bytes(124)]
-parcels += [StreamSetpoint(5, 1, 1, (0.0, 0.0, 0.0)).pack()]
+setpoint = StreamSetpoint(5, 1, 1, (0.0, 0.0, 0.0))
+parcels += [setpoint.pack(), seal(setpoint, b"a key of its own")]
 print(flush=True)
 while True:
     for sock in socks:
@@ -206,7 +257,7 @@ def flooding(port: int) -> Iterator[None]:
 
 
 def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
-    with robot() as there, StreamClient("127.0.0.1", there.port) as client:
+    with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
         converse(client, lambda: client.answered >= 2)
         with flooding(there.port):
             until(lambda: there.count("magic") > 1000)
@@ -218,7 +269,7 @@ def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
             until(lambda: there.posted >= posted + 60)
             assert share < 0.6
             assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < size_kB + 20_000
-            assert there.count("busy") > 0
+            assert there.count("session") > 0
 
 
 def test_descriptors_beyond_what_select_takes_do_not_end_it() -> None:
@@ -228,7 +279,7 @@ def test_descriptors_beyond_what_select_takes_do_not_end_it() -> None:
     try:
         while not held or held[-1] < 1024:
             held.append(os.dup(0))
-        with robot() as there, StreamClient("127.0.0.1", there.port) as client:
+        with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
             converse(client, lambda: client.answered >= 5)
             assert there.stream.told()["holder"] is not None
     finally:
@@ -258,7 +309,7 @@ HEADED = st.builds(
     ) + rest,
     st.sampled_from([b"CDPS", b"XXXX"]), st.integers(0, 3), st.integers(0, 7),
     st.integers(0, 65535), st.integers(0, 0xFFFFFFFF),
-    st.sampled_from([12, 52, 84, 116, 148, 180]).flatmap(
+    st.sampled_from([12, 44, 52, 84, 116, 148, 180]).flatmap(
         lambda size: st.binary(min_size=size, max_size=size)
     ),
 )  # fmt: skip
@@ -270,6 +321,7 @@ def mangled(data: bytes, cut: int, at: int, bit: int) -> bytes:
     return data[: len(data) - cut] if cut else data
 
 
+Sender = Callable[[bytes | StreamSetpoint], None]
 HOSTILE = (
     st.binary(max_size=300)
     | HEADED
@@ -297,7 +349,10 @@ PLAUSIBLE = st.builds(
 @pytest.fixture(scope="module", params=[None, KEY], ids=["open", "keyed"])
 def besieged(request: pytest.FixtureRequest) -> Iterator[tuple[Robot, StreamClient]]:
     key = request.param
-    with robot(key) as there, StreamClient("127.0.0.1", there.port, key) as client:
+    with (
+        robot(key) as there,
+        StreamClient("127.0.0.1", there.port, key or there.give()) as client,
+    ):
         converse(client, lambda: client.answered >= 2)
         yield there, client
 
@@ -311,6 +366,7 @@ def test_nothing_hostile_gets_through_or_disturbs(
     besieged: tuple[Robot, StreamClient], packets: list[bytes]
 ) -> None:
     there, client = besieged
+    client.receive()  # who hears nothing for 2.5 s greets anew
     holder = there.stream.told()["holder"]
     before = there.posted, there.count("accepted")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as enemy:
@@ -327,13 +383,13 @@ def test_nothing_hostile_gets_through_or_disturbs(
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(packets=st.lists(HOSTILE | PLAUSIBLE, min_size=1, max_size=12))
 def test_whatever_reaches_the_loop_can_be_worked_with(
-    alone: tuple[Robot, socket.socket, Iterator[int]], packets: list[bytes | StreamSetpoint]
+    alone: tuple[Robot, Sender], packets: list[bytes | StreamSetpoint]
 ) -> None:
-    there, sender, numbers = alone
+    """The holder itself signs all of it."""
+    there, send = alone
     total = sum(there.stream.told()["packets"].values()) + len(packets)
     for packet in packets:
-        good = isinstance(packet, StreamSetpoint)
-        sender.send(replace(packet, sequence=next(numbers)).pack() if good else packet)
+        send(packet)
     until(lambda: sum(there.stream.told()["packets"].values()) >= total)
     samples = there.block.samples
     for sample in samples[: min(there.posted, len(samples))]:
@@ -345,9 +401,18 @@ def test_whatever_reaches_the_loop_can_be_worked_with(
 
 
 @pytest.fixture(scope="module")
-def alone() -> Iterator[tuple[Robot, socket.socket, Iterator[int]]]:
+def alone() -> Iterator[tuple[Robot, Sender]]:
     with robot() as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.connect(("127.0.0.1", there.port))
-        sender.send(StreamSetpoint(1, 1, 1, (0.0, 0.0, 0.0)).pack())
-        yield there, sender, itertools.count(2)
+        given, numbers = there.give(), itertools.count(1)
+
+        def send(packet: bytes | StreamSetpoint) -> None:
+            if isinstance(packet, StreamSetpoint):
+                packet = replace(packet, session=given.number, sequence=next(numbers)).pack()
+            elif len(packet) >= HEAD.size:
+                packet = packet[:8] + struct.pack("<I", given.number) + packet[12:]
+            sender.send(packet + hmac.digest(given.key, packet, "sha256"))
+
+        send(StreamSetpoint(1, 1, 1, (0.0, 0.0, 0.0)))
+        yield there, send
         assert there.posted > 30  # some of it was good

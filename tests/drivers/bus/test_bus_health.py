@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import can
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -39,7 +38,7 @@ def test_a_bus_off_and_its_end_are_counted() -> None:
     health.take_error(0x240, bytes([0, 0, 0, 0, 0, 0, 248, 3]))
     assert (health.bus_offs, health.restarts, health.counters) == (1, 0, (248, 3))
     changed_s = health.changed_s
-    assert health.take_message(can.Message(arbitration_id=0x100, is_error_frame=True))
+    assert health.take_error(0x100, b"")
     assert (health.state, health.bus_offs, health.restarts) == (BusState.ACTIVE, 1, 1)
     assert health.changed_s > changed_s > 0.0
 

@@ -204,7 +204,7 @@ def test_trouble_the_adapter_tells_of_reaches_the_acyclic_side_only(start: Start
         message = acyclic.recv(3.0)
         assert message is not None
         assert message.is_error_frame
-        health.take_message(message)
+        health.take_error(message.arbitration_id, bytes(message.data))
 
     cyclic.send(frame(0x201))
     told()

@@ -141,7 +141,7 @@ def test_error_frames_of_a_server() -> None:
     message = bus.recv(2.0)
     assert message is not None
     health = BusHealth()
-    assert health.take_message(message)
+    assert health.take_error(message.arbitration_id, bytes(message.data))
     assert health.state is BusState.BUS_OFF
     bus.shutdown()
     server.close()

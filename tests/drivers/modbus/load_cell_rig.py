@@ -10,12 +10,23 @@ from typing import Any, Self
 
 from sim_bus.physics_board import PhysicsBoard
 
+_STEP_S = 1e-3
+
 
 class LoadCellRig:
     """`cdpr sim tension` and the physics it reads; `tell` breaks and mends things."""
 
-    def __init__(self, sensors: str | Path, folder: Path, axes: int, *options: str) -> None:
-        self.board = PhysicsBoard.create(folder / "board", axes)
+    def __init__(
+        self,
+        sensors: str | Path,
+        folder: Path,
+        axes: int,
+        *options: str,
+        lockstep: bool = False,
+    ) -> None:
+        self.board = PhysicsBoard.create(folder / "board", axes, lockstep=lockstep)
+        self.time_s = 0.0
+        self._axes = [self.board.axis(i) for i in range(axes)]
         self.pull([0.0] * axes)
         command = ["sim", "tension", str(sensors), "--board", str(self.board.path)]
         self.process = subprocess.Popen(
@@ -26,9 +37,12 @@ class LoadCellRig:
         )
         self.port = str(self._answer()["ready"]["port"])
 
-    def pull(self, tensions_N: list[float]) -> None:
-        for i, tension in enumerate(tensions_N):
-            self.board.axis(i).publish(0.0, tension, 0.0, 0.0, False)
+    def pull(self, tensions_N: list[float], seconds: float = 0.4) -> None:
+        """Have the cables carry these tensions for so long, by the time of the board."""
+        for _ in range(round(seconds / _STEP_S)):
+            self.time_s += _STEP_S
+            for axis, tension in zip(self._axes, tensions_N, strict=False):
+                axis.publish(self.time_s, tension, 0.0, 0.0, False)
 
     def tell(self, text: str) -> dict[str, Any]:
         assert self.process.stdin is not None

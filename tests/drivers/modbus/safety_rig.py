@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,10 +14,13 @@ from typing import Any
 
 from pymodbus.client import ModbusTcpClient
 
+from cdpr_rt.clock import PacedClock
 from profiles.safety_io import SHIPPED, SafetyIoProfile, load_safety_io
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.safety_twin import Fault
 
+CLOCK = PacedClock()
+"""Whoever waits by it has the devices asked meanwhile."""
 PANEL = 247
 DEADLINE_S = 10.0
 
@@ -80,11 +82,11 @@ def ready(process: subprocess.Popen[bytes]) -> dict[str, Any]:
 
 def wait_until(done: Callable[[], object], timeout_s: float = DEADLINE_S) -> float:
     """Return how long it took; fails after the time-out."""
-    began = time.monotonic()
+    began_s = CLOCK.now_s
     while not done():
-        assert time.monotonic() - began < timeout_s, "did not come about"
-        time.sleep(0.005)
-    return time.monotonic() - began
+        assert CLOCK.now_s - began_s < timeout_s, "did not come about"
+        CLOCK.sleep(0.005)
+    return CLOCK.now_s - began_s
 
 
 def patient_profile(folder: Path, watchdog_s: float = 1.0) -> Path:

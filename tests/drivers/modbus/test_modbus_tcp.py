@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from cdpr_rt.clock import PacedClock
 from drivers.modbus.tcp import ModbusError, ModbusTcp
 
 Answer = Callable[[bytes], bytes]
@@ -63,7 +64,7 @@ def device() -> Iterator[Babbler]:
 
 @pytest.fixture
 def client(device: Babbler) -> Iterator[ModbusTcp]:
-    opened = ModbusTcp("127.0.0.1", device.port, 1, 0.1)
+    opened = ModbusTcp("127.0.0.1", device.port, 1, 0.1, PacedClock())
     yield opened
     opened.close()
 
@@ -107,7 +108,7 @@ def test_an_echo_of_another_write_is_no_confirmation(device: Babbler, client: Mo
 
 def test_whatever_comes_is_an_answer_or_a_modbus_error(device: Babbler) -> None:
     dice = random.Random(3)
-    client = ModbusTcp("127.0.0.1", device.port, 1, 0.03)
+    client = ModbusTcp("127.0.0.1", device.port, 1, 0.03, PacedClock())
 
     def anything(request: bytes) -> bytes:
         code = request[7]

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from safety_rig import Twin, twin_on_board, wait_until
+from safety_rig import CLOCK, Twin, twin_on_board, wait_until
 
 from drivers.modbus.io_link import IoLink
 from drivers.modbus.safety_io import SafetyIo, SafetyIoError
@@ -47,7 +47,7 @@ def twin(lab: tuple[Twin, PhysicsBoard], winch: BoardAxis) -> Iterator[Twin]:
 
 
 def test_the_contactor_closes_when_asked_and_opens_at_the_end(twin: Twin, winch: BoardAxis) -> None:
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         assert not winch.power_allowed
         assert not io.state.contactor_closed
         io.energise()
@@ -66,7 +66,7 @@ def test_the_contactor_closes_when_asked_and_opens_at_the_end(twin: Twin, winch:
 
 def test_an_open_chain_refuses_power(twin: Twin, winch: BoardAxis) -> None:
     twin.press()
-    with SafetyIo(twin.profile()) as io, pytest.raises(SafetyIoError, match="chain is open"):
+    with SafetyIo(twin.profile(), CLOCK) as io, pytest.raises(SafetyIoError, match="chain is open"):
         io.energise()
     assert not twin.coil(0)
 
@@ -75,7 +75,7 @@ def test_the_emergency_stop_trips_until_it_is_acknowledged(
     twin: Twin, winch: BoardAxis, tmp_path: Path
 ) -> None:
     latch = tmp_path / "trip.json"
-    with SafetyIo(twin.profile(), latch) as io:
+    with SafetyIo(twin.profile(), CLOCK, latch) as io:
         io.energise()
         io.release_brakes()
         io.await_brakes(True)
@@ -87,9 +87,11 @@ def test_the_emergency_stop_trips_until_it_is_acknowledged(
         with pytest.raises(SafetyIoError, match="chain is open"):
             io.acknowledge()
         twin.press(False)
-        time.sleep(0.1)
+        CLOCK.sleep(0.1)
         assert io.alarm()  # stays
-    with SafetyIo(twin.profile(), latch) as later:  # another command, after the buttons were pulled
+    with SafetyIo(
+        twin.profile(), CLOCK, latch
+    ) as later:  # another command, after the buttons were pulled
         with pytest.raises(SafetyIoError, match=r"tripped on .*chain is open.*io ack"):
             later.energise()
         later.acknowledge()
@@ -107,14 +109,14 @@ def test_the_emergency_stop_trips_until_it_is_acknowledged(
     ],
 )
 def test_answers_that_are_no_answers_stop_the_motion(twin: Twin, fault: Fault, text: str) -> None:
-    io = SafetyIo(twin.profile()).open()
+    io = SafetyIo(twin.profile(), CLOCK).open()
     try:
         io.energise()
         twin.break_(fault)
         assert TRIP_S / 2 < wait_until(io.stop_reason) < TRIP_S + SLACK_S
         assert not io.alarm()  # braked under control: nothing says that the power is gone
         twin.break_(Fault(0))
-        time.sleep(0.1)
+        CLOCK.sleep(0.1)
         with pytest.raises(SafetyIoError, match=text):
             io.energise()
     finally:
@@ -122,9 +124,9 @@ def test_answers_that_are_no_answers_stop_the_motion(twin: Twin, fault: Fault, t
         io.close()
 
 
-def test_a_polling_thread_that_hangs_trips_as_well(twin: Twin) -> None:
-    """The thread waits for an answer much longer than the trip time-out allows."""
-    io = SafetyIo(twin.profile(answer_timeout_s=1.5)).open()
+def test_a_poll_that_waits_for_its_answer_trips_as_well(twin: Twin) -> None:
+    """The task waits for an answer much longer than the trip time-out allows."""
+    io = SafetyIo(twin.profile(answer_timeout_s=1.5), CLOCK).open()
     try:
         io.energise()
         twin.break_(Fault.SILENT)
@@ -137,15 +139,15 @@ def test_a_polling_thread_that_hangs_trips_as_well(twin: Twin) -> None:
 
 def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(twin: Twin) -> None:
     hold_interpreter = ctypes.PyDLL(None).usleep  # unlike time.sleep it lets no thread run
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         io.energise()
         assert io.stop_reason() == ""
         hold_interpreter(int(1.5e6 * TRIP_S))
         assert io.stop_reason() == ""
-        asking = time.monotonic() + 2 * TRIP_S
-        while time.monotonic() < asking:
+        asking_s = CLOCK.now_s + 2 * TRIP_S
+        while CLOCK.now_s < asking_s:
             assert io.stop_reason() == ""
-            time.sleep(0.01)
+            CLOCK.sleep(0.01)
         twin.break_(Fault.SILENT)
         hold_interpreter(int(1.5e6 * TRIP_S))
         assert wait_until(io.stop_reason) < TRIP_S + SLACK_S
@@ -154,22 +156,22 @@ def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(twin
 
 def test_rare_questions_are_answered_as_well(twin: Twin) -> None:
     """Cycles that are longer than the trip time-out get the benefit of the doubt only once."""
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         io.energise()
         twin.break_(Fault.SILENT)
         for _ in range(2):
-            time.sleep(1.5 * TRIP_S)
+            CLOCK.sleep(1.5 * TRIP_S)
             io.stop_reason()
         assert "no good poll" in io.stop_reason()
         twin.break_(Fault(0))
 
 
 def test_a_welded_contactor_is_noticed(twin: Twin) -> None:
-    io = SafetyIo(twin.profile()).open()
+    io = SafetyIo(twin.profile(), CLOCK).open()
     io.energise()
     twin.break_(Fault.CONTACTOR_WELDED)
     assert "the contactor is closed (input 1) though output 0 is 0; is it welded?" in io.close()
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         with pytest.raises(SafetyIoError, match="welded"):
             io.energise()
         twin.break_(Fault(0))
@@ -178,14 +180,14 @@ def test_a_welded_contactor_is_noticed(twin: Twin) -> None:
 
 def test_a_contactor_without_feedback_is_noticed(twin: Twin, winch: BoardAxis) -> None:
     twin.break_(Fault.FEEDBACK_STUCK)
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         with pytest.raises(SafetyIoError, match=r"contactor is not closed 0\.\d+ s after output 0"):
             io.energise()
         wait_until(lambda: not twin.coil(0))
 
 
 def test_a_brake_that_does_not_follow_is_noticed(twin: Twin) -> None:
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         io.energise()
         twin.break_(Fault.BRAKES_STUCK)
         io.release_brakes("winch 1")
@@ -195,7 +197,7 @@ def test_a_brake_that_does_not_follow_is_noticed(twin: Twin) -> None:
 
 
 def test_an_output_that_somebody_else_changes_is_noticed(twin: Twin) -> None:
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         io.energise()
         twin.break_(Fault.FEEDBACK_STUCK)  # which would tell otherwise
         twin.set(0, False)
@@ -207,11 +209,11 @@ def test_an_output_that_somebody_else_changes_is_noticed(twin: Twin) -> None:
 def test_a_second_command_does_not_take_the_power_from_the_first(
     twin: Twin, winch: BoardAxis
 ) -> None:
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         io.energise()
         with pytest.raises(SafetyIoError, match="another command uses it"):
-            SafetyIo(twin.profile()).open()
-        time.sleep(0.1)
+            SafetyIo(twin.profile(), CLOCK).open()
+        CLOCK.sleep(0.1)
         assert winch.power_allowed
         assert not io.alarm()
 
@@ -222,13 +224,39 @@ def test_a_poll_that_fails_in_an_unforeseen_way_is_silence_and_power_still_goes(
     def fail(*_: object) -> None:
         raise KeyError("an input that is nowhere")
 
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         io.energise()
         monkeypatch.setattr("drivers.modbus.safety_io.interpret", fail)
         wait_until(io.stop_reason)
         assert "an input that is nowhere" in io.stop_reason()
         monkeypatch.undo()
     assert not winch.power_allowed
+
+
+def test_an_interrupt_that_ends_the_polling_still_ends_in_an_open_contactor(
+    twin: Twin, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), SafetyIo(twin.profile(), CLOCK) as io:
+        io.energise()
+        with monkeypatch.context() as patch:
+            patch.setattr("drivers.modbus.safety_io.interpret", interrupt)
+            CLOCK.sleep(1.0)
+    assert not winch.power_allowed
+    assert not twin.coil(0)
+
+
+def test_a_loop_that_is_busy_for_long_finds_that_the_device_has_opened_the_contactor(
+    twin: Twin, winch: BoardAxis
+) -> None:
+    with SafetyIo(twin.profile(), CLOCK) as io:
+        io.energise()
+        time.sleep(1.3)  # nobody polls; the device waits for 1 s
+        assert not winch.power_allowed
+        CLOCK.sleep(0.2)
+        assert "contactor did not stay closed" in io.alarm()
 
 
 def test_each_place_has_trips_of_its_own() -> None:
@@ -240,7 +268,7 @@ def test_each_place_has_trips_of_its_own() -> None:
 def test_a_damaged_trip_file_refuses_until_it_is_acknowledged(twin: Twin, tmp_path: Path) -> None:
     latch = tmp_path / "trip.json"
     latch.write_text("{")
-    with SafetyIo(twin.profile(), latch) as io:
+    with SafetyIo(twin.profile(), CLOCK, latch) as io:
         with pytest.raises(SafetyIoError, match="is damaged"):
             io.energise()
         io.acknowledge()
@@ -248,7 +276,7 @@ def test_a_damaged_trip_file_refuses_until_it_is_acknowledged(twin: Twin, tmp_pa
 
 
 def test_a_limit_switch_stops_the_motion(twin: Twin, winch: BoardAxis) -> None:
-    with SafetyIo(twin.profile()) as io:
+    with SafetyIo(twin.profile(), CLOCK) as io:
         io.energise()
         winch.publish(0.0, 0.0, math.radians(91.0), 0.0, True)
         wait_until(io.stop_reason)
@@ -256,14 +284,14 @@ def test_a_limit_switch_stops_the_motion(twin: Twin, winch: BoardAxis) -> None:
         assert not io.alarm()
         assert winch.power_allowed  # for the controlled stop
         wait_until(lambda: not winch.power_allowed)  # which may not take for ever
-    with SafetyIo(twin.profile()) as io, pytest.raises(SafetyIoError, match="limit switch"):
+    with SafetyIo(twin.profile(), CLOCK) as io, pytest.raises(SafetyIoError, match="limit switch"):
         io.energise()
 
 
 def test_the_device_drops_its_outputs_when_the_master_falls_silent(
     twin: Twin, winch: BoardAxis
 ) -> None:
-    link = IoLink(twin.profile())
+    link = IoLink(twin.profile(), CLOCK)
     link.set_watchdog()
     link.feed_watchdog()
     link.write(0, True)
@@ -278,13 +306,13 @@ def test_a_device_that_is_not_there_or_another_one_is_said_in_words(twin: Twin) 
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
         with pytest.raises(ModbusError, match=rf"127.0.0.1:{port}: cannot connect: Connection ref"):
-            SafetyIo(twin.profile(port=port)).open()
+            SafetyIo(twin.profile(port=port), CLOCK).open()
         # takes the connection and says nothing
         free.listen()
         with pytest.raises(ModbusError, match=r"no answer within 0\.2 s from unit 1"):
-            SafetyIo(twin.profile(port=port)).open()
+            SafetyIo(twin.profile(port=port), CLOCK).open()
     with pytest.raises(ModbusError, match=r"no-such-host\.invalid:\d+: cannot connect"):
-        SafetyIo(twin.profile(host="no-such-host.invalid")).open()
+        SafetyIo(twin.profile(host="no-such-host.invalid"), CLOCK).open()
     with pytest.raises(ModbusError, match=r"exception 11 \(gateway target .* is the unit id right"):
-        SafetyIo(twin.profile(unit=9)).open()
+        SafetyIo(twin.profile(unit=9), CLOCK).open()
     assert not twin.coil(0)

@@ -50,6 +50,9 @@ def site(request: pytest.FixtureRequest) -> Iterator[Site]:
     try:
         thread.start()
         network.connect(interface="simbus", channel=name)
+        # the first frame on the bus is what the slave is switched on with
+        assert remote.sdo[0x1000].raw
+        network.scanner.reset()
         yield Site(slave, app, od, network, remote)
     finally:
         network.disconnect()

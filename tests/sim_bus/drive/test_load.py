@@ -243,3 +243,20 @@ def test_a_plant_that_contradicts_itself_is_refused(tmp_path: Path) -> None:
         path.write_text(text)
         with pytest.raises(ProfileError, match=named):
             Plant.load_file(path)
+
+
+def test_what_is_on_the_board_beforehand_comes_at_its_bus_time(tmp_path: Path) -> None:
+    rig, board = enabled(tmp_path)
+    drive, axis = rig.drive, board.axis(0)
+    begun_s = drive.axis.time
+    # the second is as near to the drive's time as rounding brings two times
+    for until_s in (begun_s + 0.0105, begun_s + 0.0105 + 1e-13):
+        axis.allow_power((-math.inf, until_s))
+        while drive.axis.time < until_s - 1e-9:
+            assert drive.machine.power_allowed
+            drive.advance(drive.next_event())
+        drive.advance(until_s)
+        assert not drive.machine.power_allowed
+        assert drive.axis.time == pytest.approx(until_s, abs=1e-9)
+        assert drive.next_event() > until_s + 1e-6
+    board.close()

@@ -13,6 +13,7 @@ from drive_rig import Rig
 from sim_bus.plant import Plant
 
 HEADER_BYTES = 1024
+NO_SYNC = 0xFFFFFFFF
 
 
 def read(path: Path) -> tuple[dict[str, object], np.ndarray]:
@@ -35,6 +36,7 @@ def test_one_record_per_sync_that_obeys_newton(tmp_path: Path) -> None:
         times.append(rig.now)
     rig.drive.close()
     header, log = read(path)
+    log = log[log["sync_index"] != NO_SYNC]
     assert header["node_id"] == 5
     assert list(log["sync_index"]) == list(range(len(log)))
     tail = log[-1500:]
@@ -59,14 +61,21 @@ def test_one_record_per_sync_that_obeys_newton(tmp_path: Path) -> None:
     assert np.abs(tail["cogging_Nm"] - expected).max() < 0.03
 
 
-def test_flushed_when_the_syncs_pause(tmp_path: Path) -> None:
+def test_what_happens_when_the_syncs_end_is_in_the_log_at_once(tmp_path: Path) -> None:
+    """The motor turns on by itself; a record is there every 20 ms."""
     path = tmp_path / "truth.bin"
     rig = Rig(truth_log=path)
     rig.enable(10)
-    rig.cycles(20)
-    rig.run(0.3)
+    rig.torque = 200
+    rig.cycles(50)
+    ended_s = rig.now
+    rig.run(0.5)
     _, log = read(path)
-    assert len(log) == rig.drive.sync_count
+    assert np.count_nonzero(log["sync_index"] != NO_SYNC) == rig.drive.sync_count
+    after = log[log["time_s"] > ended_s]
+    assert np.diff(after["time_s"][:20]) == pytest.approx(0.02, abs=1.1e-3)
+    assert (np.diff(after["angle_rad"]) > 0.0).all()
+    assert set(after["sync_index"]) == {NO_SYNC}
     rig.drive.close()
 
 

@@ -58,7 +58,9 @@ def body(
     shape = RobotShape(exits, anchors, mass_kg, home, [weight_N_m] * n)
     robot = CableRobot(shape, whole, [Transmission()] * n)
     for i, own in enumerate(whole.motor_plants(n) if not smooth else [whole.motor] * n):
-        robot.adopt(i, build_motor(Plant.model_validate(own), MotorRatings()))
+        robot.adopt(
+            i, build_motor(Plant.model_validate(own), MotorRatings()), lambda: (servo.OFF, 0.0)
+        )
     if pretension_N:
         robot.motors["cable_start"] *= 1.0 - pretension_N / robot.motors["rigidity"]
     if locked:
@@ -89,7 +91,8 @@ def run(
     robot: CableRobot, seconds: float, torque_units: float | None = None, begin_s: float = 0.0
 ) -> None:
     """Advance all, the power stages off or under one torque command."""
-    kind = servo.OFF if torque_units is None else servo.TORQUE
+    command = servo.OFF if torque_units is None else servo.TORQUE, torque_units or 0.0
+    robot.commands = [lambda: command] * robot.n
     for k in range(1, round(seconds * 1e3) + 1):
         for i in range(robot.n):
-            robot.step(i, begin_s + k * 1e-3, kind, torque_units or 0.0)
+            robot.step(i, begin_s + k * 1e-3)

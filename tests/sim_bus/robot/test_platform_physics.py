@@ -9,6 +9,7 @@ import pytest
 from body_lab import ANCHORS_m, EXITS_m, body, energy_J, free_length_m, run
 from scipy.optimize import brentq
 
+from sim_bus import servo
 from sim_bus.rotor import cable_force
 
 ROOM_EXITS_m = [(x, y, z) for z in (0.0, 3.0) for x in (-2.5, 2.5) for y in (-2.0, 2.0)]
@@ -26,6 +27,21 @@ def test_energy_stays(locked: bool) -> None:
     moved = 0.5 * 4.0 * (0.3**2 + 0.1**2)
     assert highest - begin < 0.05 * moved
     assert begin - lowest < 0.05 * moved
+
+
+@pytest.mark.parametrize("order", [(1, 2, 0), (2, 1, 0)])
+def test_it_does_not_matter_which_drive_asks_first(order: tuple[int, ...]) -> None:
+    """A command acts from the same instant on, whichever bus comes first."""
+    states = []
+    torque = [0.0, 0.0, 0.0]
+    for turn in ((0, 1, 2), order):
+        robot = body(smooth=False)
+        robot.commands = [lambda i=i: (servo.TORQUE, torque[i]) for i in range(3)]
+        for k in range(1, 50):
+            torque[:] = 5.0 * k, 300.0 - 4.0 * k, 100.0 * (k % 2)
+            samples = {i: robot.step(i, k * 1e-3) for i in turn}
+        states.append((robot.platform.tobytes(), robot.motors.tobytes(), sorted(samples.items())))
+    assert states[0] == states[1]
 
 
 def test_damping_and_friction_only_take_energy() -> None:

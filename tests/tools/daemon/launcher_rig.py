@@ -16,8 +16,10 @@ import time
 from pathlib import Path
 
 from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.runtime.stop_requests import CUT_SHORT
 from tools.daemon import launcher
 from tools.daemon.child import end_with
+from tools.daemon.loop_file import POWER_OFF_SIGNAL
 from tools.daemon.notify import ServiceManager
 from tools.daemon.settings import RunSettings
 
@@ -61,9 +63,9 @@ def _tell_pid(folder: Path, who: str) -> None:
     fresh.rename(folder / f"{who}.pid")
 
 
-def _asked_to_end() -> int:
+def _asked(number: signal.Signals) -> int:
     reader, writer = os.pipe2(os.O_NONBLOCK)
-    signal.signal(signal.SIGTERM, lambda *_: os.write(writer, b"."))
+    signal.signal(number, lambda *_: os.write(writer, b"."))
     return reader
 
 
@@ -74,19 +76,23 @@ def loop() -> None:
     plan = json.loads((folder / "plan.json").read_text())
     _tell_pid(folder, "loop")
     time.sleep(plan.get("loading_s", 0.0))
-    end = _asked_to_end()
+    end, power_off = _asked(signal.SIGTERM), _asked(POWER_OFF_SIGNAL)
     end_with(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)
+    block.write_description({"lowering_s": plan.get("lowering_s", 0.0), "master_heartbeat_s": 0.1})
+    block.counters["loop_pid"] = os.getpid()
     if "refuse" in plan:
         sys.exit(plan["refuse"])
     block.counters["loop_alive_ns"] = time.monotonic_ns()  # a test may stop it from here on
-    block.write_status({"state": "ready", "reason": ""})
+    block.write_status({"state": "ready", "reason": "", "driving": "stopping_s" in plan})
     while not select.select([end], [], [], 0.02)[0] and not (folder / "shutdown").exists():
         block.counters["loop_alive_ns"] = time.monotonic_ns()
         if (folder / "fault").exists():
             (folder / "fault").unlink()
             block.write_status({"state": "fault", "reason": "left: too fast", "since_ns": 1})
-    time.sleep(plan.get("stopping_s", 0.0))
+    if select.select([power_off], [], [], plan.get("stopping_s", 0.0))[0]:
+        _note(folder, "power taken")
+        block.write_status({"state": "unconfigured", "reason": CUT_SHORT})
     _note(folder, "loop stopped")
 
 
@@ -102,7 +108,7 @@ def service() -> None:
         _tell_pid(folder, "service")
         os.kill(os.getpid(), signal.SIGSTOP)
     _tell_pid(folder, "service")
-    end = _asked_to_end()
+    end = _asked(signal.SIGTERM)
     end_with(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)
     settings.socket.unlink(missing_ok=True)

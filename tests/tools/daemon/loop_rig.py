@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -13,8 +14,10 @@ from cdpr_rt.runtime import procedures
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.loop import ControlLoop
 from cdpr_rt.runtime.programs.base import Program
+from cdpr_rt.runtime.right import LONGEST_S, PublishedRight
 from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
 from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.lease import Lease, LeaseError
 from profiles import load_robot
 from tools.daemon.loop_process import loop_parts
 from tools.daemon.machine import RobotMachine
@@ -24,7 +27,8 @@ from tools.daemon.settings import RunSettings
 class LoopRig:
     """One loop on the buses of `url`, or of several; nothing moves unless the test turns it.
 
-    `programs` are run besides the daemon's own; the rest are settings.
+    `programs` are run besides the daemon's own; the rest are settings. The right to move is held
+    from the beginning, by a clock that only the test moves.
     """
 
     def __init__(
@@ -33,14 +37,16 @@ class LoopRig:
         self.robot = load_robot(path)
         n, rate_Hz = len(self.robot.axes), 1.0 / self.robot.sync_period_s
         self.block = SharedBlock.create(n, 20.0, rate_Hz)
-        self.give_lease(1000.0)
+        self.now_ns = 1_000_000_000
+        self.lease = Lease(PublishedRight(self.block), lambda: self.now_ns)
+        self.take_right()
         settings = RunSettings(
             robot=str(path), name="rig", buses=tuple(url.split()), socket=Path("unused"), **more
         )
         self.machine = RobotMachine(self.robot, settings)
         parts = loop_parts(self.robot, self.block)
         parts = replace(parts, programs={**parts.programs, **(programs or {})})
-        self.loop = ControlLoop(self.block, self.machine, parts)
+        self.loop = ControlLoop(self.block, self.machine, parts, lambda: self.now_ns)
         self._rows = RowReader(self.block)
 
     def boot(self) -> None:
@@ -48,8 +54,14 @@ class LoopRig:
         self.loop.begin(procedures.start_up(self.loop))
         self.turn_until(lambda: not self.loop.busy)
 
-    def give_lease(self, seconds: float) -> None:
-        self.block.counters["lease_ns"] = time.monotonic_ns() + round(seconds * 1e9)
+    def take_right(self) -> None:
+        """Take the right to move; orders are given with it from now on."""
+        self.token = self.lease.take("test", LONGEST_S)
+        self.right = self.lease.renew(self.token).number
+
+    def drop_right(self) -> None:
+        with contextlib.suppress(LeaseError):
+            self.lease.release(self.token)
 
     def turn_until(self, done: Callable[[], bool], seconds: float = 30.0) -> None:
         deadline = time.monotonic() + seconds
@@ -73,7 +85,8 @@ class LoopRig:
 
     def order(self, do: Any, **what: Any) -> dict[str, Any]:
         """Post a command and turn until it is answered."""
-        number = self.block.post_command({"do": do, "client": "test", **what})
+        command = {"do": do, "client": "test", "right": self.right, **what}
+        number = self.block.post_command(command)
         answers: list[dict[str, Any]] = []
 
         def answered() -> bool:
@@ -107,6 +120,7 @@ class LoopRig:
     def close(self) -> None:
         self.loop.request_stop()
         self.turn_until(lambda: self.loop.ended)
+        self.machine.clock.close()
 
 
 @contextmanager

@@ -114,7 +114,7 @@ def test_enabling_holds_and_disabling_takes_the_power(ready: LoopRig) -> None:
 
 
 def test_who_does_not_hold_the_right_to_move_moves_nothing(ready: LoopRig) -> None:
-    ready.give_lease(-1.0)
+    ready.drop_right()
     try:
         for order in ({"do": "enable"}, {"do": "enable", "program": "jog"}):
             answer = ready.order(**order)
@@ -122,12 +122,12 @@ def test_who_does_not_hold_the_right_to_move_moves_nothing(ready: LoopRig) -> No
             assert "right to move" in answer["text"]
         assert ready.state is LoopState.READY
     finally:
-        ready.give_lease(1000.0)
+        ready.take_right()
 
 
 def test_a_lease_that_runs_out_in_motion_ends_in_a_hold(jogging: LoopRig) -> None:
     try:
-        jogging.give_lease(-1.0)
+        jogging.drop_right()
         rows = jogging.run(1.0)
         assert jogging.state is LoopState.ACTIVE
         status = jogging.status
@@ -137,7 +137,7 @@ def test_a_lease_that_runs_out_in_motion_ends_in_a_hold(jogging: LoopRig) -> Non
         jogging.obeyed("hold")  # anybody may
         assert not jogging.order("set", wanted={})["ok"]
     finally:
-        jogging.give_lease(1000.0)
+        jogging.take_right()
 
 
 def test_programs_follow_each_other_without_a_bump(ready: LoopRig) -> None:
@@ -180,6 +180,34 @@ def test_no_cycle_has_two_commands_whatever_happens(ready: LoopRig) -> None:
         each = Counter(cycle for cycle, _ in controlwords(log, node))
         assert len(each) > 200
         assert set(each.values()) == {1}
+
+
+def test_an_emergency_stop_takes_the_power_in_the_next_cycle_and_latches(jogging: LoopRig) -> None:
+    with log_of(jogging) as log:
+        jogging.loop.request_power_off()
+        jogging.turn(2)
+        assert not jogging.loop.driving
+    words = [word for _, word in controlwords(log, 1)]
+    assert words[-1] & 0x0F == 0  # disable voltage, no quick stop and no braking before
+    jogging.turn_until(lambda: jogging.state is LoopState.FAULT and not jogging.loop.busy)
+    assert jogging.status["reason"] == "emergency stop by cdpr estop"
+    assert not jogging.order("enable")["ok"]
+    jogging.obeyed("acknowledge")
+
+
+def test_an_emergency_stop_without_power_latches_once_and_for_all_states(ready: LoopRig) -> None:
+    ready.loop.request_power_off()
+    ready.turn_until(lambda: ready.state is LoopState.FAULT and not ready.loop.busy)
+    ready.loop.request_power_off()  # it is latched already
+    ready.turn(5)
+    number = ready.block.post_command({"do": "acknowledge", "client": "test"})
+    ready.turn(1)
+    ready.loop.request_power_off()  # while it is being acknowledged
+    ready.turn_until(lambda: ready.block.take_reply() is not None)
+    ready.turn_until(lambda: ready.state is LoopState.FAULT and not ready.loop.busy)
+    assert ready.status["reason"] == "emergency stop by cdpr estop"
+    assert number
+    ready.obeyed("acknowledge")
 
 
 def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -> None:

@@ -70,7 +70,7 @@ def test_brakes_open_behind_power_and_close_before_it_goes(
     assert rig.state is LoopState.READY, rig.status
     assert winch.power_allowed
     assert not winch.brake_released
-    number = rig.block.post_command({"do": "enable"})
+    number = rig.block.post_command({"do": "enable", "right": rig.right})
     wait(rig, lambda: winch.brake_released)
     assert rig.loop.driving  # it was held before the brake let go
     wait(rig, lambda: not rig.loop.busy)
@@ -88,7 +88,7 @@ def test_an_emergency_stop_takes_the_torque_at_once(
     lab: tuple[LoopRig, Twin, BoardAxis],
 ) -> None:
     rig, twin, winch = lab
-    rig.block.post_command({"do": "enable"})
+    rig.block.post_command({"do": "enable", "right": rig.right})
     wait(rig, lambda: rig.loop.driving and not rig.loop.busy)
     rig.block.take_reply()
     jog(rig)
@@ -119,30 +119,32 @@ def test_a_brake_that_does_not_open_ends_in_a_fault(
 ) -> None:
     rig, twin, winch = lab
     twin.break_(Fault.BRAKES_STUCK)
-    rig.block.post_command({"do": "enable"})
+    rig.block.post_command({"do": "enable", "right": rig.right})
     wait(rig, lambda: rig.state is LoopState.FAULT)
     wait(rig, lambda: not rig.loop.busy)
     assert "brake" in rig.status["reason"]
     assert not winch.state().power_on
-    twin.mend()
+    twin.break_(Fault(0))
     answer = rig.block.take_reply()
     assert answer is not None
     assert not answer["ok"]
     rig.obeyed("acknowledge")
 
 
-def test_who_asks_twice_to_end_gets_the_brakes_at_once(
+def test_power_that_is_taken_at_once_while_it_ends_has_the_brakes_applied(
     lab: tuple[LoopRig, Twin, BoardAxis],
 ) -> None:
     rig, _, winch = lab
-    rig.block.post_command({"do": "enable"})
+    rig.block.post_command({"do": "enable", "right": rig.right})
     wait(rig, lambda: rig.loop.driving and not rig.loop.busy)
     jog(rig)
     rig.loop.request_stop()
     rig.turn(10)
     assert rig.loop.driving  # it brakes under its controller
-    rig.loop._stopping_since_s -= 2.0
     rig.loop.request_stop()
+    rig.turn(2)
+    assert rig.loop.driving  # who asks for the same again changes nothing
+    rig.loop.request_power_off()
     rig.turn(2)
     assert not rig.loop.driving
     assert rig.machine._safety is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tools.daemon.client import NoDaemonError, axis_values, key_values, open_daemon
+from tools.daemon.client import CutOffError, NoDaemonError, axis_values, key_values, open_daemon
 from tools.errors import BadInputError
 
 
@@ -51,6 +52,38 @@ def test_what_a_killed_daemon_left_behind_is_none(listening: list[Path], folder:
     assert where(None) == str(listening[1])
     with pytest.raises(NoDaemonError, match="no daemon runs for dead"):
         where("dead")
+
+
+@pytest.mark.parametrize(("path", "tries"), [("/hold", 3), ("/disable", 3), ("/check", 1)])
+def test_a_stop_that_is_cut_off_is_asked_for_again(
+    listening: list[Path], path: str, tries: int
+) -> None:
+    """Two connections are ended before the answer, as where too many have one."""
+    asked: list[bytes] = []
+    body = b'{"text": "", "state": "active"}'
+    head = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body)
+
+    def serve() -> None:
+        for number in range(tries):
+            connection, _ = served.accept()
+            with connection:
+                asked.append(connection.recv(1 << 16).split(b"\r\n")[0])
+                if number == 2:
+                    connection.sendall(head + body)
+
+    place = listening[0].with_name("cut.sock")
+    with socket.socket(socket.AF_UNIX) as served, open_daemon(None, place, None, None) as daemon:
+        served.bind(str(place))
+        served.listen()
+        thread = threading.Thread(target=serve)
+        thread.start()
+        if tries > 1:
+            assert daemon.post(path)["state"] == "active"
+        else:
+            with pytest.raises(CutOffError):
+                daemon.post(path)
+        thread.join()
+    assert asked == [f"POST {path} HTTP/1.1".encode()] * tries
 
 
 def test_none_at_all(folder: Path) -> None:

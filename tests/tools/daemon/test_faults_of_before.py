@@ -77,7 +77,9 @@ def test_a_drive_that_restarted_needs_a_new_boot(lab: tuple[Path, str]) -> None:
 
 def test_who_asks_for_hold_while_the_power_comes_gets_no_motion(lab: tuple[Path, str]) -> None:
     with opened(*lab) as rig:
-        rig.block.post_command({"do": "enable", "program": "jog", "wanted": JOG})
+        rig.block.post_command(
+            {"do": "enable", "right": rig.right, "program": "jog", "wanted": JOG}
+        )
         rig.turn(2)
         assert rig.loop.busy
         rig.obeyed("hold")

@@ -10,11 +10,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import launcher_rig
 import pytest
+
+from tools.daemon.loop_file import LoopFile
 
 TIMEOUT_S = 60.0
 
@@ -48,10 +51,22 @@ class Daemon:
                 return told
         raise AssertionError(f"the launcher ended without a word of {key}")
 
-    def heard(self, wanted: str) -> None:
-        """Wait until systemd hears `wanted`."""
-        while wanted not in self.manager.recv(4096).decode().split("\n"):
-            pass
+    def heard(self, wanted: str) -> list[str]:
+        """Wait until systemd hears `wanted`; return all that it has heard until then."""
+        told, end = list[str](), time.monotonic() + TIMEOUT_S
+        self.manager.settimeout(TIMEOUT_S)
+        while wanted not in told:
+            assert time.monotonic() < end, told
+            told += self.manager.recv(4096).decode().split("\n")
+        return told
+
+    def stuff(self) -> None:
+        """Leave systemd's queue no room for a word."""
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
+            other.setblocking(False)
+            with suppress(BlockingIOError):
+                while True:
+                    other.sendto(b"X_OTHER=1", str(self.folder / "notify"))
 
     def fed(self, seconds: float) -> int:
         """Return how often the watchdog is fed within `seconds`."""
@@ -81,7 +96,12 @@ Start = Callable[..., Daemon]
 def start(tmp_path: Path) -> Iterator[Start]:
     daemons = []
 
-    def run(plan: dict[str, Any] | None = None, watchdog_s: float = 0.0) -> Daemon:
+    def run(
+        plan: dict[str, Any] | None = None,
+        watchdog_s: float = 0.0,
+        before: Callable[[Path], None] = Path.exists,
+    ) -> Daemon:
+        before(tmp_path)
         daemons.append(Daemon(tmp_path, plan or {}, watchdog_s))
         return daemons[-1]
 
@@ -122,6 +142,22 @@ def test_it_tells_when_both_are_up_and_ends_the_loop_before_the_service(start: S
     assert daemon.ends() == 0
     # the recording has the controlled stop to its end
     assert daemon.log() == ["loop stopped", "service stopped"]
+
+
+def test_what_systemd_has_no_room_for_is_told_until_it_is_taken(start: Start) -> None:
+    daemon = start({"stopping_s": 1.0}, watchdog_s=0.4)
+    daemon.stuff()  # before anything is told: the stand-ins take their time to load
+    daemon.line("ready")
+    (daemon.folder / "fault").touch()
+    assert daemon.line("told")["told"] == "fault: left: too fast"
+    told = daemon.heard("STATUS=fault: left: too fast")
+    assert told.count("READY=1") == 1
+    assert "STATUS=ready" not in told  # only the newest is worth a word
+    assert daemon.fed(0.8) >= 2
+    daemon.stuff()
+    daemon.process.terminate()
+    daemon.heard("STOPPING=1")
+    assert daemon.ends() == 0
 
 
 @pytest.mark.parametrize(
@@ -206,6 +242,72 @@ def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) ->
     assert daemon.ends() == 1
     assert time.monotonic() - began < 15.0
     assert daemon.log() == ["service stopped"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_request_to_end_takes_the_power_at_once(
+    start: Start, number: signal.Signals
+) -> None:
+    daemon = start({"stopping_s": 30.0, "lowering_s": 20.0})
+    daemon.line("ready")
+    daemon.process.send_signal(number)
+    daemon.process.send_signal(number)  # passed on by a program in between, it is the same one
+    told = daemon.line("told")["told"]
+    assert "the platform is let down" in told
+    assert "up to 50 s" in told
+    assert "A second Ctrl-C takes the power at once" in told
+    time.sleep(0.5)
+    daemon.process.send_signal(signal.SIGHUP)  # a terminal that closes is not impatient
+    time.sleep(0.5)
+    assert not (daemon.folder / "log").exists()
+    daemon.process.send_signal(number)
+    assert daemon.line("told")["told"] == "the power is taken at once"
+    assert "the power was taken at once" in daemon.line("reason")["reason"]
+    assert daemon.ends() == 1
+    assert daemon.log() == ["power taken", "loop stopped", "service stopped"]
+
+
+def test_the_loop_is_named_beside_the_socket_for_this_user_while_it_runs(start: Start) -> None:
+    daemon = start()
+    daemon.line("ready")
+    path = daemon.folder / "control.loop"
+    named = LoopFile.read(path)
+    assert (named.pid, named.drives_stop_s) == (daemon.pid("loop"), 0.2)
+    assert path.stat().st_mode & 0o777 == 0o600
+    pidfd = named.open()
+    assert pidfd is not None
+    os.close(pidfd)
+    # another process that has got the same number is not it
+    assert named.model_copy(update={"started": named.started + 1}).open() is None
+    daemon.process.terminate()
+    assert daemon.ends() == 0
+    assert named.open() is None
+    assert not path.exists()
+
+
+def test_a_loop_that_cannot_be_named_ends_the_daemon_before_it_is_ready(start: Start) -> None:
+    def in_the_way(folder: Path) -> None:
+        (folder / "control.loop").mkdir()
+        (folder / "control.loop.new").mkdir()  # that is nobody's name: it is in nobody's way
+
+    daemon = start(before=in_the_way)
+    reason = daemon.line("reason")["reason"]
+    path = daemon.folder / "control.loop"
+    assert reason == f"{path}: cannot be written, for `cdpr estop`: Is a directory"
+    assert daemon.ends() == 2
+    assert sorted(daemon.log()) == ["loop stopped", "service stopped"]
+    assert not list(daemon.folder.glob(".control*"))
+
+
+def test_what_another_daemon_has_written_there_since_is_left(start: Start) -> None:
+    daemon = start()
+    daemon.line("ready")
+    path = daemon.folder / "control.loop"
+    other = LoopFile.read(path).model_copy(update={"pid": os.getpid()})
+    other.write(path)
+    daemon.process.terminate()
+    assert daemon.ends() == 0
+    assert LoopFile.read(path) == other
 
 
 def test_who_ends_it_while_the_loop_loads_is_told_of_no_failure(start: Start) -> None:

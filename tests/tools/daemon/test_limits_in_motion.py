@@ -206,9 +206,9 @@ def test_lengths_that_are_none_are_refused(ready: WildRig, wanted: dict[str, Any
 
 def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> None:
     estimator = ready.loop.parts.estimator
-    ready.give_lease(-1.0)
+    ready.drop_right()
     assert not ready.order("lengths", wanted={"cable_length_m": [None, 1.0]})["ok"]
-    ready.give_lease(1000.0)
+    ready.take_right()
     ready.obeyed("lengths", wanted={"cable_length_m": [None, 1.0]})
     ready.turn(1)
     length_m = ready.rows()["cable_length_m"][-1]
@@ -273,7 +273,8 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[WildRig, 
     path = robot_file(folder, [("can0", 1), ("can0", 2)], period_s=PERIOD_S)
     top, limits = TIGHT.split("\n[limits]", 1)
     path.write_text(top + "\n" + path.read_text() + "\n[limits]" + limits)
-    with LoadCellRig(folder / "cells.toml", folder, 2) as cells, simulated(path) as url:
+    cells_file = folder / "cells.toml"
+    with LoadCellRig(cells_file, folder, 2, lockstep=True) as cells, simulated(path) as url:
         cells.pull([30.0, 30.0])
         made = WildRig(path, url, tension_port=cells.port)
         made.boot()
@@ -287,7 +288,7 @@ def until_read(rig: WildRig, tension_N: float) -> None:
     rig.turn_until(lambda: abs(told.tension_N[1] - tension_N) < 2.0)
 
 
-# an amplifier settles in its own time, and bus time in lockstep is faster than it
+# whichever a tension that falls comes to first
 FALLEN = ("tension_low", "slack", "broken_cable")
 
 

@@ -73,6 +73,24 @@ def test_a_program_that_cannot_tell_of_itself_goes_on(rig: LoopRig) -> None:
     rig.obeyed("hold")
 
 
+@pytest.mark.parametrize("what", ["reason", "safety", "everything"])
+def test_a_status_that_cannot_be_written_ends_no_loop(
+    rig: LoopRig, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    before = rig.status["state"]
+    if what == "reason":
+        rig.loop.life.blame("\u00e9" * 20000)
+    elif what == "safety":
+        monkeypatch.setattr(RobotMachine, "safety", "x" * 20000)
+    else:
+        monkeypatch.setattr(rig.loop.block, "_status", rig.loop.block._status[:16])
+    rig.loop.status.touch()
+    rig.turn(3)
+    if what != "everything":
+        assert rig.block.status()["state"] == before
+    rig.obeyed("hold")
+
+
 def test_long_words_are_answered(rig: LoopRig) -> None:
     answer = rig.order("\u00e9" * 665)
     assert not answer["ok"]

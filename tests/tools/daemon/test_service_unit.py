@@ -47,6 +47,8 @@ def test_the_unit_starts_what_was_asked_for_with_paths_that_hold_anywhere(tmp_pa
     assert words[words.index("--socket") + 1] == "/run/cdpr-rt/spatial-8.sock"
     assert words[words.index("--live") + 1] == "0"
     assert "--read-only" in words
+    assert _value(made.stdout, "RuntimeDirectoryMode") == "0700"
+    assert _value(made.stdout, "UMask") == "0077"
     assert _value(made.stdout, "User") == "robot"
     # the kernel's names of the robot's interfaces, so that it starts when they are there
     assert "sys-subsystem-net-devices-can1.device" in _value(made.stdout, "Wants")
@@ -111,6 +113,11 @@ def test_a_key_is_long_enough_and_its_owners_alone(tmp_path: Path) -> None:
         key.write_bytes(short)
         with pytest.raises(BadInputError, match="allowed: 16"):
             read_key(key)
+    key.write_bytes(b"k" * 4096)
+    assert read_key(key) == b"k" * 4096
+    key.write_bytes(b"k" * 4097)  # cut short it would be another key than its owner's
+    with pytest.raises(BadInputError, match="allowed: up to 4096 bytes"):
+        read_key(key)
 
 
 @given(st.text(alphabet="0123456789abcdef:.[]-", max_size=24))

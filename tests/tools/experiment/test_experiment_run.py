@@ -120,7 +120,7 @@ def test_the_operator_alone_as_one_line_of_json() -> None:
         (["--operator", "mood=2"], "--operator mood=2: allowed: NAME=VALUE, reaction_s"),
         (["--operator", "tolerance_m=0"], "allowed: a number above 0"),
         (["--again"], "--again: needs --out"),
-        (["--again", "--out", "no-such-folder"], "not of an experiment"),
+        (["--again", "--out", "no-such-folder"], "no-such-folder/experiment.json: cannot be read"),
         (["--plant", "no-such-plant.toml"], "no-such-plant.toml"),
         (["winch-mpp0923d", "--perfect-robot"], "has no platform in a plane"),
     ],

@@ -94,8 +94,12 @@ def test_no_script_leads_further_than_its_packets_may_say(tmp_path: Path) -> Non
 
 def test_what_is_no_script_is_refused(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
-    for name in ("binary", "missing", "."):
-        with pytest.raises(BadInputError, match="cannot be read"):
+    for name, told in (
+        ("binary", "binary: is not UTF-8 text"),
+        ("missing", "missing: cannot be read: No such file"),
+        (".", "is no regular file"),
+    ):
+        with pytest.raises(BadInputError, match=f"--script .*{told}"):
             read_script(tmp_path / name)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from cdpr_rt.runtime.right import PublishedRight
 from cdpr_rt.runtime.shared_block import SAMPLES, SharedBlock
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.runtime.stream_buttons import CLUTCH, confirmation
@@ -29,7 +30,7 @@ class Robot:
 
     def __init__(self) -> None:
         self.block = SharedBlock.create(3, 0.1, 1000.0)
-        self.lease = Lease(lambda until_ns: None)
+        self.lease = Lease(PublishedRight(self.block))
         self.token = self.lease.take("the operator", 2.0)
         self.stream = SetpointStream(self.block, self.lease)
         self.stream.start()
@@ -62,7 +63,8 @@ def lead(
 ) -> tuple[Session, End]:
     """Lead to the end; have something happen after some seconds."""
     timer = threading.Timer(*after) if after else None
-    with StreamClient("127.0.0.1", robot.stream.port, token=robot.token) as stream:
+    given = robot.stream.desk.give(robot.token)
+    with StreamClient("127.0.0.1", robot.stream.port, given) as stream:
         session = Session(stream, device, SCALE, POSE)
         if timer:
             timer.start()

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import UNKNOWN_POSE, Standing, StreamAnswer
+from cdpr_rt.service.stream_packet import UNKNOWN_POSE, Standing, StreamAnswer, StreamSession
 from tools.teleop import view as view_module
 from tools.teleop.canvas import Canvas
 from tools.teleop.hand import Hand
@@ -37,7 +37,7 @@ def seen(
     silent_s: float = 0.0,
 ) -> list[str]:
     """Return the lines shown of a robot that has answered once."""
-    with StreamClient("127.0.0.1", 9) as stream:
+    with StreamClient("127.0.0.1", 9, StreamSession(1, bytes(32))) as stream:
         stream.state = StreamAnswer(
             1, Standing.ACCEPTED, 1, 0, 0, LoopState.ACTIVE, 3, pose=pose, pose_setpoint=pose
         )

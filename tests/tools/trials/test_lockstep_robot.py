@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.service.stream_packet import Standing
+from cdpr_rt.service.stream_packet import Standing, StreamSession
 from tools.errors import WorkFailedError
 from tools.trials.lockstep import LockstepRobot, OrderRefusedError
 from tools.trials.pose_log import read_pose_log
-from tools.trials.stream import Hand, answer_of
+from tools.trials.stream import Hand
 
 HEIGHT = 1.5
 
@@ -52,7 +52,10 @@ def test_truth_is_that_of_the_last_sync(robot):
     assert log[-1] == record
     rows = robot.run(0.1)
     true = read_pose_log(robot.truth_log)["motor_rad"][-rows.size :]
-    np.testing.assert_allclose(rows["position_rad"] - true, np.tile(turned, (100, 1)), atol=4e-3)
+    # the encoder is noisy and half a millisecond behind
+    off = rows["position_rad"] - true
+    np.testing.assert_allclose(off, np.tile(off.mean(axis=0), (100, 1)), atol=4e-3)
+    np.testing.assert_allclose(turned, off.mean(axis=0), atol=4e-3)
     robot.finish()
 
 
@@ -85,18 +88,18 @@ def test_a_right_runs_out_by_the_time_of_the_bus(robot):
 def test_a_stream_s_packets_are_taken_as_the_daemon_takes_them(robot):
     robot.carry_out("pose", position_m=[0.0, HEIGHT])
     robot.program("pose", stream=True)
-    hand = Hand(token=robot.right.token)
-    stranger = Hand(session=7)
+    hand = robot.stream.hand()
+    stranger = Hand(StreamSession(7, bytes(32)))
     answers = []
     for step in range(50):
         place = (0.0, 0.002 * step, 0.0)
-        answers.append(answer_of(robot.stream.take(hand.packet(robot.now_s, place, 1.0))))
+        answers.append(hand.answer_of(robot.stream.take(hand.packet(robot.now_s, place))))
         assert robot.stream.take(b"nonsense") is None
         robot.turn(20)
     assert {answer.standing for answer in answers} == {Standing.ACCEPTED}
     assert answers[-1].pose[1] > HEIGHT + 0.05
-    refused = robot.stream.take(stranger.packet(robot.now_s, (0.0, 0.0, 0.0)), ("127.0.0.1", 9))
-    assert answer_of(refused).standing is Standing.BUSY
+    packet = stranger.packet(robot.now_s, (0.0, 0.0, 0.0))
+    assert robot.stream.take(packet, ("127.0.0.1", 9)) is None
     robot.run(1.5)
     assert robot.truth()["position_m"][1] == pytest.approx(HEIGHT + 0.098, abs=5e-3)
     assert robot.truth()["velocity_m_s"][1] == pytest.approx(0.0, abs=5e-3)

@@ -1,0 +1,263 @@
+"""Simulated Modbus devices in lockstep: what they answer depends on bus time and nothing else.
+
+The bus here is the test's own, a mock of a simulated bus that this process leads: it moves the
+physics board in steps of 1 ms as the simulated drives do. The devices are real processes behind
+real lines; some of them are stopped (SIGSTOP) by the wall while they are asked.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from load_cell_rig import LoadCellRig
+from safety_rig import Twin, board_file, patient_profile, ready, start
+
+from cdpr_rt.clock import LockstepClock
+from drivers.modbus.rail import ModbusRailAxis
+from drivers.modbus.safety_io import SafetyIo, SafetyIoError
+from drivers.modbus.tension import TensionSampler
+from drivers.rail import Conditions, move
+from profiles.rail import SHIPPED, load_rail
+from profiles.tension_sensor import load_tension_sensors
+from sim_bus.physics_board import BoardAxis, PhysicsBoard
+from sim_bus.safety_twin import Fault
+
+STEP_S = 1e-3
+HELD_UP_S = 0.6  # much longer than any of the lines' time-outs
+
+
+class BoardBus:
+    """Bus time that goes on in steps, with what lies on the board at each."""
+
+    def __init__(self, board: PhysicsBoard, tension_N: Callable[[float], float]) -> None:
+        self.now_s, self.next_s, self.gone = 0.0, math.inf, False
+        self._axes = [board.axis(i) for i in range(board.axes)]
+        self._tension_N = tension_N
+        self._steps = 0
+        self.seen: list[tuple[int, bool, bool]] = []
+        """Step, power and brake of the first axis, wherever one has changed."""
+        self._publish()
+
+    def go(self, until_s: float) -> bool:
+        while (self._steps + 1) * STEP_S <= until_s + 1e-9:
+            self._steps += 1
+            self.now_s = self._steps * STEP_S
+            self._publish()
+        self.now_s = max(self.now_s, until_s)
+        return False
+
+    def _publish(self) -> None:
+        for axis in self._axes:
+            axis.publish(self.now_s, self._tension_N(self.now_s), 0.0, 0.0, False)
+        first: BoardAxis = self._axes[0]
+        state = first.allows_power(self.now_s), first.releases_brake(self.now_s)
+        if not self.seen or self.seen[-1][1:] != state:
+            self.seen.append((self._steps, *state))
+
+
+@contextmanager
+def held_up(process: subprocess.Popen[bytes] | subprocess.Popen[str]) -> Iterator[None]:
+    """Stop a process for a while, from now on."""
+    os.kill(process.pid, signal.SIGSTOP)
+    going_on = threading.Timer(HELD_UP_S, os.kill, (process.pid, signal.SIGCONT))
+    going_on.start()
+    try:
+        yield
+    finally:
+        going_on.join()
+
+
+def pulled(time_s: float) -> float:
+    """A tension that never stands still."""
+    return 40.0 + 30.0 * math.sin(9.0 * time_s) + 5.0 * math.sin(120.0 * time_s)
+
+
+def readings(folder: Path, *, disturbed: bool) -> list[tuple[float, ...]]:
+    """Return what three cells tell in each of 400 cycles."""
+    folder.mkdir()
+    whole = load_tension_sensors("rtu-load-cells-8")
+    profile = whole.model_copy(update={"sensors": whole.sensors[:3]})
+    told: list[tuple[float, ...]] = []
+    with LoadCellRig("rtu-load-cells-8", folder, 8, lockstep=True) as rig:
+        bus = BoardBus(rig.board, pulled)
+        clock = LockstepClock([bus])
+        with TensionSampler(profile, rig.port, clock) as sampler:
+            for cycle in range(400):
+                if disturbed and cycle in (50, 333):
+                    with held_up(rig.process):
+                        clock.sleep(2 * profile.period_s)
+                elif cycle in (50, 333):
+                    clock.sleep(2 * profile.period_s)
+                clock.stand_until(bus.now_s + 2 * STEP_S)
+                sampler.exchange.update()
+                feedback = sampler.exchange.feedback
+                told.append((*feedback.tension_N, *feedback.time_s, *feedback.age_s))
+            assert sampler.errors == ["", "", ""]
+    return told
+
+
+def test_load_cells_read_the_same_however_long_their_process_is_held_up(tmp_path: Path) -> None:
+    calm = readings(tmp_path / "calm", disturbed=False)
+    assert readings(tmp_path / "disturbed", disturbed=True) == calm
+    # each is that of the instant at which it was asked for, behind a filter of 15 Hz
+    asked = {row[3]: row[0] for row in calm if math.isfinite(row[3])}
+    assert len(asked) > 15
+    smooth = [tension - 40.0 - 30.0 * math.sin(9.0 * (t - 0.021)) for t, tension in asked.items()]
+    assert max(map(abs, smooth[2:])) < 6.0
+    # and it takes its time on the wire before anybody has it
+    ages = [row[6] for row in calm if math.isfinite(row[6])]
+    assert min(ages) > 19 * 11 / 115200
+
+
+def test_a_cell_that_says_nothing_is_found_silent_in_bus_time(tmp_path: Path) -> None:
+    profile = load_tension_sensors("rtu-load-cell-1")
+    with LoadCellRig("rtu-load-cell-1", tmp_path, 1, lockstep=True) as rig:
+        clock = LockstepClock([BoardBus(rig.board, pulled)])
+        with TensionSampler(profile, rig.port, clock) as sampler:
+            sampler.await_readings(1.0)
+            for fault, said in (("silent", "no answer"), ("truncated", "cut off after 8 of 11")):
+                rig.tell(f"{fault} 1")
+                clock.sleep(profile.stale_after_s + 3 * profile.period_s)
+                sampler.exchange.update()
+                assert "stale" in sampler.exchange.reason()
+                assert said in sampler.errors[0]
+                rig.tell("mend 1")
+                clock.sleep(2 * profile.period_s)
+                sampler.exchange.update()
+                assert sampler.exchange.reason() == ""
+
+
+@contextmanager
+def safety_lab(folder: Path) -> Iterator[tuple[Twin, BoardBus, LockstepClock]]:
+    folder.mkdir()
+    with board_file() as path, PhysicsBoard.create(path, 2, lockstep=True) as board:
+        bus = BoardBus(board, lambda _: 0.0)
+        twin = Twin(patient_profile(folder), "--board", path)
+        bus.seen.clear()
+        try:
+            yield twin, bus, LockstepClock([bus])
+        finally:
+            twin.close()
+
+
+def session(folder: Path, *, disturbed: bool) -> list[tuple[int, bool, bool]]:
+    """Return when power and brake came and went in a session with a safety I/O."""
+    with safety_lab(folder) as (twin, bus, clock), SafetyIo(twin.profile(), clock) as io:
+        io.energise()
+        if disturbed:
+            with held_up(twin.process):
+                io.release_brakes("winch 1")
+                io.await_brakes(True, "winch 1")
+        else:
+            io.release_brakes("winch 1")
+            io.await_brakes(True, "winch 1")
+        for _ in range(100):
+            clock.stand_until(clock.now_s + 2 * STEP_S)
+            assert (io.alarm(), io.stop_reason()) == ("", "")
+        io.close()
+        return bus.seen
+
+
+def test_contactor_and_brake_follow_in_bus_time_however_long_the_device_is_held_up(
+    tmp_path: Path,
+) -> None:
+    calm = session(tmp_path / "calm", disturbed=False)
+    assert [seen[1:] for seen in calm] == [
+        (False, False),
+        (True, False),
+        (True, True),
+        (True, False),
+        (False, False),
+    ]
+    assert session(tmp_path / "disturbed", disturbed=True) == calm
+
+
+def test_the_devices_own_watchdog_counts_bus_time(tmp_path: Path) -> None:
+    with safety_lab(tmp_path / "lab") as (twin, bus, clock):
+        io = SafetyIo(twin.profile(), clock).open()
+        io.energise()
+        fed_s = io.state.at_s
+        time.sleep(1.5)  # by the wall: the device has 1 s
+        bus.go(fed_s + 0.9)  # nobody asks meanwhile
+        assert bus.seen[-1][1]
+        bus.go(fed_s + 1.1)
+        assert not bus.seen[-1][1]
+        dropped_s = bus.seen[-1][0] * STEP_S
+        assert fed_s + 1.0 + 0.015 <= dropped_s <= fed_s + 1.0 + 0.015 + 0.1
+        clock.sleep(0.1)
+        assert "the device's own watchdog" in io.alarm() or "did not stay closed" in io.alarm()
+        io.close()
+
+
+def answer_to_a_stranger(twin: Twin) -> bytes:
+    """Return what comes where the discrete inputs 0 to 7 are asked for."""
+    with socket.create_connection(("127.0.0.1", twin.port), 10.0) as stranger:
+        stranger.sendall(bytes.fromhex("0001 0000 0006 01 02 0000 0008"))
+        return stranger.recv(100)
+
+
+@pytest.mark.parametrize("fault", [Fault.SILENT, Fault.TRUNCATED])
+def test_a_safety_io_that_falls_silent_trips_in_bus_time(tmp_path: Path, fault: Fault) -> None:
+    with safety_lab(tmp_path / "lab") as (twin, _, clock):
+        io = SafetyIo(twin.profile(), clock).open()
+        io.energise()
+        twin.break_(fault)
+        assert answer_to_a_stranger(twin).endswith(bytes.fromhex("0000 ffff 0002 0000"))
+        began_s = clock.now_s
+        while not io.stop_reason():
+            clock.stand_until(clock.now_s + STEP_S)
+            assert clock.now_s < began_s + 1.0
+        assert 0.4 - 0.05 < clock.now_s - began_s < 0.4 + 0.2
+        assert "no good poll" in io.stop_reason()
+        twin.break_(Fault(0))
+        io.close()
+        with pytest.raises(SafetyIoError, match="no good poll"):
+            io.release_brakes()
+
+
+def travel(folder: Path, *, disturbed: bool) -> list[tuple[float, float]]:
+    """Return where the carriage was when, in a move by a Modbus rail."""
+    folder.mkdir()
+    profile = folder / "rail.toml"
+    told: list[tuple[float, float]] = []
+    with board_file() as path, PhysicsBoard.create(path, 1, lockstep=True) as board:
+        bus = BoardBus(board, lambda _: 0.0)
+        process = start("rail", "rail-modbus", "--port", "0", "--board", path)
+        text = (SHIPPED / "rail-modbus.toml").read_text()
+        profile.write_text(text.replace("port = 502", f"port = {ready(process)['port']}"))
+        rail, clock = load_rail(profile), LockstepClock([bus])
+        axis = ModbusRailAxis(rail, clock)
+        axis.open()
+
+        def progress(position_m: float) -> None:
+            told.append((clock.now_s, position_m))
+            if disturbed and len(told) == 20:
+                os.kill(process.pid, signal.SIGSTOP)
+                threading.Timer(HELD_UP_S, os.kill, (process.pid, signal.SIGCONT)).start()
+
+        conditions = Conditions(lambda: "", lambda: "", lambda: False, progress)
+        done = move(rail, axis, clock, 0.02, conditions)
+        told.append((done.from_m, done.to_m))
+        axis.close()
+        process.communicate(b"", timeout=10)
+    return told
+
+
+def test_a_rail_moves_in_bus_time_however_long_its_process_is_held_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    calm = travel(tmp_path / "calm", disturbed=False)
+    assert len(calm) > 25
+    assert calm[-1] == pytest.approx((0.0, 0.02), abs=1e-4)
+    assert travel(tmp_path / "disturbed", disturbed=True) == calm

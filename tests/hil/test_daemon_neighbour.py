@@ -1,0 +1,143 @@
+"""Another user of the machine beside a real daemon: what it may see, and what it cannot do.
+
+Run by root, what is tried is tried as uid 65534, without groups. Run by anybody else, nobody else
+can be played: whose a file is, and its permissions, stand in for the attempt.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from daemon_lab import KEY, with_key
+from daemon_rig import RealDaemon, until
+from test_daemon_stream import port_of
+
+from cdpr_rt.service.stream_packet import StreamSetpoint
+from tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
+
+NOBODY = 65534
+IS_ROOT = os.geteuid() == 0
+
+
+@pytest.fixture(scope="module")
+def daemon() -> Iterator[RealDaemon]:
+    """A daemon whose files lie in a folder that everybody may look into."""
+    folder = Path(tempfile.mkdtemp(prefix="cdpr-neighbour-"))
+    folder.chmod(0o755)
+    before = os.umask(0o000)
+    try:
+        options = ("--stream", "127.0.0.1:0", "--live", "0", "--record", str(folder / "rec"))
+        made = RealDaemon(folder, *with_key(folder), *options)
+        try:
+            yield made
+        finally:
+            assert made.end() == 0, made.errors()
+    finally:
+        os.umask(before)
+        shutil.rmtree(folder)
+
+
+def as_nobody(attempt: Callable[[], object]) -> str:
+    """Return what an unprivileged user gets for it: a result, or the name of an error."""
+    reader, writer = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            if IS_ROOT:
+                os.setgroups([])
+                os.setresgid(NOBODY, NOBODY, NOBODY)
+                os.setresuid(NOBODY, NOBODY, NOBODY)
+            told = repr(attempt())
+        except BaseException as error:
+            told = type(error).__name__
+        os.write(writer, told.encode()[:4000])
+        os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        told = pipe.read().decode()
+    os.waitpid(pid, 0)
+    return told
+
+
+def is_denied(path: Path, attempt: Callable[[], object]) -> bool:
+    """Whether another user may not do what `path` gives way to."""
+    if IS_ROOT:
+        return as_nobody(attempt) == "PermissionError"
+    held = path.stat()
+    return held.st_uid == os.geteuid() and not held.st_mode & 0o077
+
+
+def connect(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as sock:
+        sock.connect(str(path))
+
+
+def loop_of(daemon: RealDaemon) -> LoopFile:
+    return LoopFile.read(daemon.socket.with_suffix(".loop"))
+
+
+def test_what_the_daemon_writes_and_listens_at_is_closed_to_others(daemon: RealDaemon) -> None:
+    folder = daemon.socket.parent
+    until(lambda: any((folder / "rec").iterdir()))
+    (recording,) = (folder / "rec").iterdir()
+    assert is_denied(daemon.socket, lambda: connect(daemon.socket))
+    for path in (recording, daemon.socket.with_suffix(".loop"), folder / "key"):
+        assert is_denied(path, path.read_bytes), path
+    assert is_denied(folder / "rec", lambda: list((folder / "rec").iterdir()))
+
+
+def test_its_processes_are_neither_stopped_nor_looked_into(daemon: RealDaemon) -> None:
+    loop = loop_of(daemon)
+    for pid in (loop.pid, daemon.children()["service"], daemon.process.pid):
+        proc = Path(f"/proc/{pid}")
+        for number in (POWER_OFF_SIGNAL, signal.SIGTERM, signal.SIGKILL):
+            assert is_denied(proc / "environ", lambda p=pid, n=number: os.kill(p, n))
+        for name in ("environ", "mem"):
+            assert is_denied(proc / name, (proc / name).read_bytes)
+        assert is_denied(proc / "fd", lambda p=proc: list((p / "fd").iterdir()))
+        # everybody may read this: the key is not in it
+        assert KEY not in as_nobody((proc / "cmdline").read_bytes)
+    shared = Path(f"/proc/{loop.pid}/fd/{loop.block_fd}")
+    assert is_denied(shared.parent, lambda: os.open(shared, os.O_RDONLY))
+    assert daemon.status()["state"] == "ready"
+
+
+def test_without_the_key_it_reads_the_status_and_nothing_more(daemon: RealDaemon) -> None:
+    url = f"http://{daemon.status()['parts']['service']['http']}"
+
+    def ask() -> object:
+        with httpx.Client(base_url=url) as client:
+            asked = [("POST", path) for path in ("/control", "/stream", "/enable", "/disable")]
+            asked += [("GET", "/status"), ("GET", "/events"), ("GET", "/description")]
+            return [client.request(*one).status_code for one in asked]
+
+    assert json.loads(as_nobody(ask)) == [401, 401, 401, 401, 200, 401, 401]
+
+
+def test_set_points_without_key_or_session_are_counted_and_not_answered(
+    daemon: RealDaemon,
+) -> None:
+    port = port_of(daemon)
+
+    def send() -> object:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            sock.connect(("127.0.0.1", port))
+            for k in range(30):
+                sock.send(StreamSetpoint(9, k, k, (0.01 * k, 0.0, 0.0)).pack())
+                time.sleep(0.01)
+            sock.settimeout(0.3)
+            return sock.recv(4096)
+
+    assert as_nobody(send) == "TimeoutError"
+    assert daemon.status()["parts"]["stream"]["packets"]["unsigned"] == 30
+    assert not daemon.status()["control"]["held"]

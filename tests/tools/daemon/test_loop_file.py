@@ -1,0 +1,184 @@
+"""What names a loop is believed of its owner's own processes, and of nobody's but his."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tools.daemon.estop import EmergencyStop, Outcome
+from tools.daemon.loop_file import LoopFile, started
+from tools.daemon.paths import find_loop_files, find_sockets, is_trusted, left_out
+from tools.errors import WorkFailedError
+
+NOBODY = 65534
+OBEYS = "import signal, sys; signal.signal(signal.SIGUSR1, print); print(1, flush=True); input()"
+DOES_NOT = "print(1, flush=True); input()"
+
+
+def cdpr(*arguments: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-P", "-m", "tools.cli", *map(str, arguments)]
+    return subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={**os.environ, **env},
+        stdin=subprocess.DEVNULL,
+    )
+
+
+@pytest.fixture
+def process(request: pytest.FixtureRequest) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-c", request.param]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as made:
+        assert made.stdout is not None
+        assert made.stdout.readline() == b"1\n"
+        yield made
+        made.kill()
+
+
+def named(of: int, **other: Any) -> dict[str, Any]:
+    told = {"robot": "r", "uid": os.geteuid(), "pid": of, "started": started(of)}
+    return {**told, "block_fd": 0, "drives_stop_s": 0.2, **other}
+
+
+def stopped(path: Path) -> Outcome:
+    with closing(EmergencyStop(path)) as stop:
+        return stop.outcome()
+
+
+def give_away(path: Path) -> None:
+    """Make it nobody's; where the tests do not run as root, open to all stands in for that."""
+    if os.geteuid() == 0:
+        os.chown(path, NOBODY, NOBODY)
+    else:
+        path.chmod(0o777)
+
+
+@pytest.mark.parametrize("process", [DOES_NOT], indirect=True)
+def test_a_process_that_the_signal_would_end_is_let_be(
+    tmp_path: Path, process: subprocess.Popen[bytes]
+) -> None:
+    path = tmp_path / "r.loop"
+    path.write_text(json.dumps(named(process.pid)))
+    outcome = stopped(path)
+    assert not outcome.confirmed
+    assert f"process {process.pid} is no loop of user {os.geteuid()}" in outcome.text
+    assert process.poll() is None
+
+
+@pytest.mark.parametrize("process", [OBEYS], indirect=True)
+def test_a_process_of_another_user_than_the_file_is_let_be(
+    tmp_path: Path, process: subprocess.Popen[bytes]
+) -> None:
+    path = tmp_path / "r.loop"
+    path.write_text(json.dumps(named(process.pid)))
+    found = LoopFile.read(path)
+    assert found.runs()
+    with pytest.raises(WorkFailedError, match="is no loop of user 65534"):
+        found.model_copy(update={"uid": NOBODY}).runs()
+    path.write_text(json.dumps(named(process.pid, uid=NOBODY)))
+    with pytest.raises(WorkFailedError, match="does not name a loop: it is of user"):
+        LoopFile.read(path)
+    assert is_trusted(path, os.geteuid())
+    assert not is_trusted(path, NOBODY)
+    assert not is_trusted(tmp_path / "gone" / "r.loop", NOBODY)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"pid": 10**20}, "allowed: 64 bits"),
+        ({"pid": 2**22 + 1}, "less than or equal to 4194304"),
+        ({"pid": 1}, "greater than 1"),
+        ({"started": -1}, "greater than or equal to 0"),
+        ({"drives_stop_s": float("inf")}, "allowed: a finite number"),
+        ({"block_fd": 2**63}, "less than or equal to 1048576"),
+        ({"more": 1}, "Extra inputs are not permitted"),
+        ("[" * 2000, "is too deep"),
+        ("{}", "Field required"),
+        (" " * 5000, "is not valid JSON"),
+    ],
+    ids=map(str, range(9)),  # texts name the process that runs the tests
+)
+def test_a_file_that_no_daemon_wrote_is_refused_in_words(
+    tmp_path: Path, change: str | dict[str, Any], told: str
+) -> None:
+    path = tmp_path / "r.loop"
+    text = change if isinstance(change, str) else json.dumps(named(os.getpid()) | change)
+    path.write_text(text)
+    outcome = stopped(path)
+    assert not outcome.confirmed
+    assert told in outcome.text
+
+
+def test_a_pipe_or_a_link_in_its_place_keeps_nobody_waiting(tmp_path: Path) -> None:
+    path, other = tmp_path / "r.loop", tmp_path / "other"
+    os.mkfifo(path)
+    assert "is no regular file" in stopped(path).text
+    path.unlink()
+    other.write_text(json.dumps(named(os.getpid())))
+    path.symlink_to(other)
+    assert "cannot be read" in stopped(path).text
+
+
+def test_a_robots_name_cannot_write_to_the_terminal(tmp_path: Path) -> None:
+    path = tmp_path / "r.loop"
+    path.write_text(json.dumps(named(os.getpid(), robot="\x1b[2J")))
+    assert LoopFile.read(path).robot == r"\x1b[2J"
+
+
+@pytest.mark.parametrize("process", [OBEYS], indirect=True)
+def test_a_folder_that_another_has_made_is_not_looked_into(
+    tmp_path: Path, process: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    folder = tmp_path / "cdpr-rt"
+    folder.mkdir(mode=0o700)
+    (folder / "r.loop").write_text(json.dumps(named(process.pid)))
+    assert find_loop_files("r") == [folder / "r.loop"]
+    assert left_out() == ""
+    give_away(folder)
+    assert find_loop_files("r") == find_sockets("r") == []
+    for command in (("estop",), ("estop", "r"), ("status",), ("disable",)):
+        told = cdpr(*command)
+        assert told.returncode == 1
+        assert f"{folder} is open to others or not this user's" in told.stderr
+        assert "Traceback" not in told.stderr
+    assert process.poll() is None
+
+
+def test_a_strangers_socket_is_not_spoken_to(tmp_path: Path) -> None:
+    if os.geteuid() == 0:  # nobody else can make another's socket in a folder of this user's
+        path = tmp_path / "r.sock"
+        path.touch()
+        os.chown(path, NOBODY, NOBODY)
+        told = cdpr("disable", "--socket", path)
+        assert told.returncode == 2
+        assert f"{path}: was put there by user {NOBODY}, not by you" in told.stderr
+    told = cdpr("disable", "--socket", tmp_path / "none.sock")
+    assert told.returncode == 1
+    assert "no daemon answers" in told.stderr
+
+
+@pytest.mark.parametrize("process", [OBEYS], indirect=True)
+def test_a_second_daemon_does_not_take_the_place_of_one_whose_service_is_starting(
+    tmp_path: Path, process: subprocess.Popen[bytes]
+) -> None:
+    run = ("run", "bench-2", "--bus", "simbus:", "--no-record", "--socket")
+    told = cdpr(*run, tmp_path / "r.loop")
+    assert told.returncode == 2
+    assert "r.loop: allowed: a name that ends in .sock" in told.stderr
+    (tmp_path / "r.loop").write_text(json.dumps(named(process.pid)))
+    told = cdpr(*run, tmp_path / "r.sock")
+    assert told.returncode == 2
+    assert "a daemon runs there already" in told.stderr

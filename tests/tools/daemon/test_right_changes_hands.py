@@ -1,0 +1,310 @@
+"""A thousand takings of the right to move: no cycle moves under a right that is another's by then.
+
+Two clients move axis 0, one forwards and one backwards, so that each set-point tells whose it is.
+An attacker wants axis 1 to move. All goes through the lease, the desk of the set-point stream and
+the shared memory to the loop and its simulated drives; only time is the test's.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.service.lease import LeaseError
+from cdpr_rt.service.stream_desk import StreamDesk
+from cdpr_rt.service.stream_packet import Bye, StreamSession, StreamSetpoint, seal
+from tests.tools.daemon.loop_rig import LoopRig, opened
+from tests.tools.robot_rig import robot_file, simulated
+
+PERIOD_S = 2e-3
+PERIOD_NS = round(PERIOD_S * 1e9)
+TAKINGS = 1000
+SEED = 20260
+TTL_S = 0.5
+SPEED_rad_s = 0.5
+STEP_rad_s = 1.0 / 13.0
+"""What an axis may gain in a cycle; who arrives may correct his place by no more."""
+KEPT = 64
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LoopRig]:
+    drives = [("can0", 1), ("can0", 2)]
+    folder = tmp_path_factory.mktemp("robot")
+    path = robot_file(folder, drives, period_s=PERIOD_S)
+    with simulated(path) as url, opened(path, url) as made:
+        yield made
+
+
+JOG = {"velocity_rad_s": [2.0, 2.0], "timeout_s": 2.0}
+
+
+def change_hands(rig: LoopRig) -> int:
+    """Have another take the right before the loop looks again; return the number that was."""
+    before = rig.right
+    rig.drop_right()
+    rig.take_right()
+    return before
+
+
+def test_motion_ends_when_the_right_changes_hands_between_two_looks(rig: LoopRig) -> None:
+    rig.obeyed("enable", program="jog", wanted=JOG)
+    rig.run(0.4)
+    before = change_hands(rig)
+    rows = rig.run(0.2)
+    assert np.all(np.diff(rows["setpoint_velocity_rad_s"], axis=0) <= 0.0)
+    assert np.all(rows["setpoint_velocity_rad_s"][-1] == 0.0)
+    assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
+    assert rig.status["reason"] == "jog: the right to move has changed hands; held"
+    for do in ("program", "set"):
+        answer = rig.order(do, program="jog", wanted=JOG, right=before)
+        assert answer["text"] == f"{do}: the right to move is somebody else's by now"
+    rig.obeyed("program", program="jog", wanted=JOG)
+    rig.obeyed("disable")
+
+
+def test_enabling_for_somebody_who_has_lost_the_right_ends_in_a_hold(rig: LoopRig) -> None:
+    what = {"do": "enable", "program": "jog", "wanted": JOG, "right": rig.right}
+    number = rig.block.post_command(what)
+    rig.turn_until(lambda: rig.state is LoopState.ACTIVE)
+    assert not rig.loop.driving
+    change_hands(rig)
+    rig.turn_until(lambda: not rig.loop.busy)
+    answer = rig.block.take_reply()
+    assert answer is not None
+    assert (answer["to"], answer["ok"]) == (number, False)
+    assert answer["text"] == "jog: the right to move is somebody else's by now; held"
+    assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
+    # cogging moves an axis without power: the hold brakes what it finds, and nothing is added to it
+    speeds = np.abs(rig.run(0.2)["setpoint_velocity_rad_s"])
+    assert np.all(np.diff(speeds, axis=0) <= 0.0)
+    assert np.all(speeds[0] < 0.5 * np.array(JOG["velocity_rad_s"]))
+    assert np.all(speeds[-1] == 0.0)
+    rig.obeyed("disable")
+
+
+@dataclass
+class Client:
+    """One that takes the right, and does not know when it has lost it."""
+
+    name: str
+    sign: int
+    port: int
+    token: str = ""
+    session: StreamSession | None = None
+    sequence: int = 0
+    place_m: float = 0.0
+
+
+@dataclass
+class Scene:
+    """Who holds the right by the test's own account, and what has been said on the way there."""
+
+    rig: LoopRig
+    chance: random.Random
+    holder: Client | None = None
+    number: int = 0
+    until_ns: int = 0
+    ordered: bool = False
+    """Whether the holder has asked for motion under the present taking."""
+    tokens: list[str] = field(default_factory=list)
+    orders: list[dict[str, Any]] = field(default_factory=list)
+    packets: list[tuple[bytes, int]] = field(default_factory=list)
+    in_between: Callable[[], object] | None = None
+    """What happens while the loop looks who holds the right."""
+    speed: float = 0.0
+    driven: int = 0
+    stopped: int = 0
+    """Cycles that moved on the holder's behalf; takings that have stopped somebody's motion."""
+
+    def __post_init__(self) -> None:
+        self.desk = StreamDesk(self.rig.block, self.rig.lease)
+        self.rig.loop.right._clock_ns = self.clock_ns
+
+    def clock_ns(self) -> int:
+        in_between, self.in_between = self.in_between, None
+        if in_between is not None:
+            in_between()
+        return self.rig.now_ns
+
+    # -- the right
+
+    def take(self, client: Client, lapsed: bool) -> None:
+        """End what holds, by its release or by its silence, and have `client` take the right."""
+        if self.holder is not None and not lapsed:
+            self.rig.lease.release(self.holder.token)
+        elif self.holder is not None:
+            self.rig.now_ns = self.until_ns + self.chance.randrange(2)
+        client.token = self.rig.lease.take(client.name, TTL_S)
+        client.session = None
+        self.holder, self.ordered = client, False
+        self.number += 1
+        self.until_ns = self.rig.now_ns + round(TTL_S * 1e9)
+        self.tokens = [*self.tokens[-KEPT:], client.token]
+
+    def asked(self, client: Client, do: str, **what: Any) -> dict[str, Any] | None:
+        """Return the command that the service makes of an order; None where it refuses it."""
+        try:
+            number = self.rig.lease.renew(client.token).number
+        except LeaseError:
+            assert client is not self.holder
+            return None
+        assert client is self.holder
+        self.until_ns = self.rig.now_ns + round(TTL_S * 1e9)
+        command = {"do": do, "client": client.name, "right": number, **what}
+        self.orders = [*self.orders[-KEPT:], command]
+        return command
+
+    def send(self, client: Client) -> None:
+        """Stream the next set-point, where the client has been given a session."""
+        session = client.session
+        if session is None:
+            return
+        client.sequence += 1
+        client.place_m += client.sign * 2e-5
+        packet = StreamSetpoint(
+            session.number, client.sequence, self.rig.now_ns, (client.place_m, 0.0, 0.0)
+        )
+        data = seal(packet, session.key)
+        self.packets = [*self.packets[-KEPT:], (data, client.port)]
+        posted = int(self.rig.block.counters["samples"][0])
+        self.desk.take(data, ("127.0.0.1", client.port), self.rig.now_ns)
+        if int(self.rig.block.counters["samples"][0]) > posted:
+            self.until_ns = self.rig.now_ns + round(TTL_S * 1e9)
+
+    # -- cycles
+
+    def turn(self) -> None:
+        """Run one cycle and judge what it has commanded."""
+        loop = self.rig.loop
+        self.rig.now_ns += PERIOD_NS
+        loop.turn()
+        if self.in_between is not None:  # nobody has looked meanwhile
+            self.clock_ns()
+        while self.rig.block.take_reply() is not None:
+            pass
+        assert (loop.life.state, loop.driving) == (LoopState.ACTIVE, True), loop.life.reason
+        before, self.speed = self.speed, float(loop.setpoint.velocity_rad_s[0])
+        assert loop.setpoint.velocity_rad_s[1] == 0.0, "the attacker's axis"
+        if abs(self.speed) <= STEP_rad_s:
+            return
+        brakes = before * self.speed > 0.0 and abs(self.speed) < abs(before)
+        if not brakes:
+            holds = self.holder is not None and self.rig.now_ns < self.until_ns
+            assert holds and self.ordered, f"{self.speed} rad/s are nobody's"
+            assert self.holder is not None
+            assert self.speed * self.holder.sign > 0.0, f"{self.speed} rad/s, {self.holder.name}"
+            assert loop.right.mover == self.number
+            self.driven += 1
+
+
+def moves(scene: Scene, client: Client) -> None:
+    """Have a client who believes to hold the right ask for motion, in one way or another."""
+    chance = scene.chance
+    speed = client.sign * SPEED_rad_s * chance.uniform(0.5, 1.0)
+    jog = {"velocity_rad_s": [speed, 0.0], "timeout_s": 2.0}
+    (way,) = chance.choices(("jog", "stream", "set", "enable"), (4, 4, 2, 1))
+    if way == "stream" and client is scene.holder:
+        client.session = scene.desk.give(client.token)
+        client.sequence, client.place_m = 0, 0.0
+        command = scene.asked(client, "program", program="follow")
+    elif way == "set":
+        command = scene.asked(client, "set", wanted=jog)
+    else:
+        do = "enable" if way == "enable" else "program"
+        command = scene.asked(client, do, program="jog", wanted=jog)
+    if command is None:
+        return
+    if chance.random() < 0.2:  # it changes hands between the service's look and the loop's
+        late, other = client, chance.choice([one for one in CLIENTS if one is not client])
+        scene.take(other, lapsed=chance.random() < 0.5)
+        assert scene.holder is not late
+    else:
+        scene.ordered = True
+    scene.rig.block.post_command(command)
+
+
+def attacks(scene: Scene) -> None:
+    """Guess, replay and forge; nothing of it may move axis 1, or axis 0 under another's right."""
+    scene.chance.choice((guesses, replays_orders, makes_orders, replays_packets, forges))(scene)
+
+
+def guesses(scene: Scene) -> None:
+    held = None if scene.holder is None else scene.holder.token
+    for token in (scene.chance.randbytes(18).hex(), "", scene.chance.choice(scene.tokens)):
+        for use in (scene.rig.lease.renew, scene.rig.lease.release, scene.desk.give):
+            if token != held:
+                with pytest.raises(LeaseError):
+                    use(token)
+
+
+def replays_orders(scene: Scene) -> None:
+    past = [order for order in scene.orders if order["right"] != scene.number]
+    for order in scene.chance.sample(past, min(2, len(past))):
+        scene.rig.block.post_command(order)
+
+
+def makes_orders(scene: Scene) -> None:
+    wanted = {"velocity_rad_s": [0.0, SPEED_rad_s], "timeout_s": 2.0}
+    number = scene.chance.choice((scene.number - 1, 0, -1, 1 << 62, True, "1", None))
+    do = scene.chance.choice(("program", "set", "enable"))
+    order = {"do": do, "program": "jog", "wanted": wanted, "right": number}
+    scene.rig.block.post_command(order)
+
+
+def replays_packets(scene: Scene) -> None:
+    for data, port in scene.chance.sample(scene.packets, min(8, len(scene.packets))):
+        address = "127.0.0.1", scene.chance.choice((port, ATTACKER.port))
+        scene.desk.take(data, address, scene.rig.now_ns)
+
+
+def forges(scene: Scene) -> None:
+    sessions = [one.session.number for one in CLIENTS if one.session is not None]
+    session = scene.chance.choice([scene.chance.randrange(1, 1 << 32), *sessions])
+    packet = StreamSetpoint(session, scene.chance.randrange(1 << 20), 1, (0.0, 0.1, 0.0))
+    for forged in (packet.pack(), *(seal(packet, key) for key in (bytes(32), b""))):
+        assert scene.desk.take(forged, ("127.0.0.1", ATTACKER.port), scene.rig.now_ns) is None
+    goodbye = seal(Bye(session, 1 << 30), bytes(32))
+    scene.desk.take(goodbye, ("127.0.0.1", ATTACKER.port), scene.rig.now_ns)
+
+
+CLIENTS = Client("forwards", 1, 4001), Client("backwards", -1, 4002)
+ATTACKER = Client("attacker", 0, 666)
+
+
+def test_no_motion_goes_on_under_somebody_elses_right(rig: LoopRig) -> None:
+    print(f"seed {SEED}")
+    rig.obeyed("enable")
+    scene = Scene(rig, random.Random(SEED), number=rig.right)
+    rig.run(0.5)
+    rig.drop_right()
+    chance = scene.chance
+    while scene.number < TAKINGS:
+        nobody_moved = abs(scene.speed) <= STEP_rad_s
+        client = ATTACKER if chance.random() < 0.1 else chance.choice(CLIENTS)
+        lapsed = chance.random() < 0.5
+        if chance.random() < 0.4:
+            scene.in_between = lambda client=client, lapsed=lapsed: scene.take(client, lapsed)
+        else:
+            scene.take(client, lapsed)
+        scene.stopped += not nobody_moved
+        for _ in range(chance.randrange(1, 24)):
+            scene.turn()
+            for one in CLIENTS:  # who has lost it goes on as if nothing had been
+                scene.send(one)
+                if chance.random() < (0.1 if scene.ordered else 0.5):
+                    moves(scene, one)
+            if chance.random() < 0.15:
+                attacks(scene)
+    counts = rig.loop.parts.programs["follow"].progress()
+    print(f"{scene.number} takings, {scene.stopped} in motion, {scene.driven} cycles moved")
+    print(f"packets {dict(scene.desk.counts)}, samples {counts}")
+    assert scene.driven > TAKINGS
+    assert scene.stopped > TAKINGS // 8
+    assert np.ptp(rig.rows()["setpoint_rad"][:, 1]) < 0.02

@@ -1,0 +1,412 @@
+"""Files that were damaged or made up: each is used, or refused in our own words; never more."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, seed, settings
+from hypothesis import strategies as st
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.measurement import recording
+from cdpr_rt.rawlog import RawLogWriter, read_raw_log
+from cdpr_rt.recorder import column_names
+from cdpr_rt.runtime.last_lengths import LastLengths
+from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
+from cdpr_rt.tuning import design_pid
+from drivers.data_sheet import load_dictionary
+from drivers.errors import DriverError
+from profiles import load_motor, load_robot
+from profiles.catalogue import SHIPPED
+from profiles.eds_check import read_eds
+from profiles.errors import ProfileError
+from profiles.motor import Motor
+from profiles.motor_bounds import MotorBounds
+from profiles.rail import load_rail
+from profiles.reader import dotted
+from profiles.safety_io import load_safety_io
+from profiles.tension_sensor import load_tension_sensors
+from profiles.winch_calibration import load_winch_calibration
+from sim_bus.canopen.od import ObjectDictionary
+from sim_bus.drive import SimDrive
+from sim_bus.errors import SimulatorError
+from sim_bus.plant import Plant
+from sim_bus.robot_plant import RobotPlant
+from sim_bus.safety_plant import SafetyPlant
+from sim_bus.tension_twin import AmplifierPlant
+from tests.cdpr_here import cdpr_here
+from tests.profiles.test_robot_limits import calibration
+from tests.tools.motor_profiles import leave_profiles, profile_of
+from tools.bus_fit import require_fit
+from tools.commissioned import load_profile
+from tools.commissioning import Paths
+from tools.errors import BadInputError, CommandError
+from tools.kept import kept
+from tools.report import tables, words
+from tools.results import read_run
+from tools.teleop.script import read_script
+from tools.trials.trial import Asked
+
+OURS = (ControlError, DriverError, ProfileError, SimulatorError, CommandError)
+CPU_S = 1.0
+LONGEST_CHARS = 3000
+SEED = 20260101
+HOSTILE = (
+    *("nan", "inf", "-inf", "NaN", "Infinity", "1e999", "-1e999", "1e308", "-1e308", "1e-320"),
+    *("0", "-0.0", "-1", "1e6", "-1e6", "1e30", "4294967296", "9" * 30, "1" * 6000),
+    *("true", "null", '""', '"x"', '"\x1b[2J"', "[]", "{}", "0x" + "f" * 90),
+    *("[" * 3000, "{a=" * 3000, "]" * 3000, ".a" * 3000, "[a" + ".a" * 3000 + "]", "a" * 3000),
+    *("\x00", "\n", '"""', "'", "\\", "#", ",", "=", "é", "1979-05-27T07:32:00Z", "$NODEID+0x180"),
+    *("../../etc/passwd", "/dev/zero", "~nobody/x.toml", "\\u0000.toml"),
+)
+NUMBER = re.compile(rb"-?[0-9][0-9.e+-]*")
+LINE = re.compile(rb"[^\n]*\n")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of file: which it is, and what reads it."""
+
+    path: Path
+    use: Callable[[], object]
+
+
+def spoil(data: bytes, chance: random.Random) -> bytes:
+    """Return a file with one to three things changed in it."""
+    for _ in range(chance.choice((1, 1, 1, 2, 3))):
+        token = chance.choice(HOSTILE).encode("utf-8")
+        spans = [m.span() for m in NUMBER.finditer(data)]
+        lines = [m.span() for m in LINE.finditer(data)]
+        what = chance.randrange(8)
+        at = chance.randrange(len(data) + 1)
+        if what <= 2 and spans:
+            low, high = chance.choice(spans)
+        elif what == 3 and lines:
+            low, high = chance.choice(lines)
+            token = data[low:high] * chance.choice((0, 2, 300))
+        elif what == 4:
+            low, high = at, min(len(data), at + chance.choice((1, 10, 1000)))
+            token = chance.randbytes(high - low)
+        elif what == 5:
+            low, high, token = at, len(data), b""
+        else:
+            low, high = at, at
+        data = data[:low] + token + data[high:]
+    return data
+
+
+def use_robot(path: Path) -> None:
+    robot = load_robot(path)
+    require_fit(robot)
+    described(limits_of(robot), len(robot.axes))
+    winches_of(robot.axes)
+
+
+def use_lengths(path: Path) -> None:
+    last = LastLengths(path)
+    last.load(3, 3.0)
+    if last.lengths is None:
+        assert last.why
+    else:
+        assert (last.lengths.cable_length_m > 0.0).all()
+        assert np.isfinite(last.lengths.cable_length_m).all()
+
+
+def tell_of_run(run: dict[str, Any]) -> None:
+    assert words.loop_words(run["pid"][0])
+    assert tables.bus(run["bus"])
+
+
+def use_store(path: Path) -> None:
+    SimDrive(SHIPPED / "drives" / "generic-cia402.eds", 1, Plant(), store=path).close()
+
+
+def toml_of(motor: Motor) -> str:
+    lines = (f"{k} = {json.dumps(v)}" for k, v in motor.model_dump().items() if v is not None)
+    return "\n".join(lines) + "\n"
+
+
+def raw_log(path: Path) -> Path:
+    names = column_names(1)
+    meta = {"period_s": 0.01, "measured_from_s": 0.0, "measured_until_s": 1.0, "first_cycle": 0}
+    log = RawLogWriter(path, names, meta)
+    log.write(np.ones((60, len(names))))
+    log.close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Kind]:
+    """Return a sound file of each kind, which has just been used."""
+    folder = tmp_path_factory.mktemp("files")
+    for sub in ("robots", "winches", "drives", "cables", "safety_io", "tension_sensors", "rails"):
+        for path in (SHIPPED / sub).iterdir():
+            shutil.copy(path, folder / path.name)
+    (folder / "my-motor.toml").write_text(toml_of(load_motor("MPP0923D")))
+    winch = folder / "winch-mpp0923d.toml"
+    winch.write_text(winch.read_text().replace('"MPP0923D"', '"my-motor"'))
+    robot = folder / "planar-3.toml"
+    (folder / "known.toml").write_text(calibration().to_toml())
+    text = robot.read_text().replace("node_id = 1", 'node_id = 1\ncalibration = "known.toml"')
+    robot.write_text(text)
+    axis = load_robot(robot).axes[0]
+    bounds = MotorBounds(axis.winch.motor)
+    cogging = folder / "cogging-profile.json"
+    profile_of(axis.winch, Plant(), 1).save(cogging)
+    lengths = folder / "lengths.json"
+    at_index = [0.1, None, 0.2]
+    stopped = {"stopped": True, "date": "2026", "cable_length_m": [1.0, 2.0, 3.0]}
+    lengths.write_text(json.dumps({**stopped, "cable_at_index_m": at_index}))
+    store = folder / "store.json"
+    store.write_text('{"node_id": 5, "bitrate": 500000, "values": {"101700": 100}}')
+    run = Paths(folder).run
+    run.write_text(json.dumps({
+        "winch": "w", "date": "2026", "drive": {"serial": 1}, "encoder_counts_per_turn": 8192,
+        "rated_torque_Nm": 3.0, "inertia_kg_m2": 1e-4, "latency_s": 2e-3, "bandwidth_Hz": 12.0,
+        "bandwidths_Hz": [12.0], "pid": [asdict(design_pid(1e-4, 2e-3, 12.0, 1e-3))],
+        "bus": {"url": "simbus:", "period_s": 1e-3, "cycles": 5000, "wall_s": 2.5},
+    }))  # fmt: skip
+    asked = folder / "trial.json"
+    asked.write_text(json.dumps(asdict(Asked("line", "r", None, 1, 2.0, None, True))))
+    script = folder / "script.txt"
+    script.write_text("0 0 0 clutch\n1.5 10 -20\n2 20 0 confirm\n")
+    plant, robot_plant = folder / "plant.toml", folder / "robot-plant.toml"
+    plant.write_text(
+        "seed = 3\n[motor]\ninertia_kg_m2 = 1e-4\n[[cogging]]\norder = 4\namplitude_Nm = 0.06\n"
+        "[friction]\ncoulomb_Nm = 0.08\n[load]\nkind = 'hung_mass'\nmass_kg = 5.0\n"
+        "[limits]\nnegative_deg = -90.0\n"
+    )
+    robot_plant.write_text(
+        "seed = 3\n[geometry]\nexit_errors_m = [[0.0, 0.01], [0.0, 0.0], [0.0, 0.0]]\n"
+        "[platform]\ncentre_of_mass_m = [0.0, 0.1]\n[start]\nposition_m = [0.0, 1.3]\n"
+        "[floor]\nheight_m = 1.2\n[motor.friction]\ncoulomb_Nm = 0.08\n"
+    )
+    safety, tension = folder / "safety-plant.toml", folder / "tension-plant.toml"
+    safety.write_text("")
+    tension.write_text("")
+    eds = folder / "generic-cia402.eds"
+    sensors, io, rail = "rtu-load-cells-8.toml", "modbus-remote-io.toml", "rail-modbus.toml"
+    raw = raw_log(folder / "pass.raw")
+    found = {
+        "robot": Kind(robot, lambda: use_robot(robot)),
+        "winch": Kind(winch, lambda: use_robot(robot)),
+        "motor": Kind(folder / "my-motor.toml", lambda: use_robot(robot)),
+        "drive": Kind(folder / "generic-cia402.toml", lambda: use_robot(robot)),
+        "cable": Kind(folder / "dyneema-4.8mm.toml", lambda: use_robot(robot)),
+        "calibration": Kind(folder / "known.toml", lambda: use_robot(robot)),
+        "calibration alone": Kind(
+            folder / "known.toml", lambda: load_winch_calibration(folder / "known.toml")
+        ),
+        "cogging profile": Kind(cogging, lambda: load_profile(cogging, bounds)),
+        "lengths": Kind(lengths, lambda: use_lengths(lengths)),
+        "stored parameters": Kind(store, lambda: use_store(store)),
+        "run": Kind(run, lambda: tell_of_run(read_run(Paths(folder)))),
+        "trial": Kind(asked, lambda: kept(asked, Asked)),
+        "script": Kind(script, lambda: read_script(script)),
+        "plant": Kind(plant, lambda: Plant.load_file(plant)),
+        "robot's plant": Kind(robot_plant, lambda: RobotPlant.load_file(robot_plant)),
+        "safety plant": Kind(safety, lambda: SafetyPlant.load_file(safety)),
+        "tension plant": Kind(tension, lambda: AmplifierPlant.load_file(tension)),
+        "tension sensors": Kind(folder / sensors, lambda: load_tension_sensors(folder / sensors)),
+        "safety I/O": Kind(folder / io, lambda: load_safety_io(folder / io)),
+        "rail": Kind(folder / rail, lambda: load_rail(folder / rail)),
+        "EDS, checked": Kind(eds, lambda: read_eds(eds)),
+        "EDS, the master's": Kind(eds, lambda: load_dictionary(eds, 5)),
+        "EDS, the simulator's": Kind(eds, lambda: ObjectDictionary.from_eds(eds, 5)),
+        "raw log": Kind(raw, lambda: recording(read_raw_log(raw))),
+    }
+    for kind in found.values():
+        kind.use()
+    return found
+
+
+NAMES = (
+    *("robot", "winch", "motor", "drive", "cable", "calibration", "calibration alone"),
+    *("cogging profile", "lengths", "stored parameters", "run", "trial", "script"),
+    *("plant", "robot's plant", "safety plant", "tension plant", "tension sensors", "safety I/O"),
+    *("rail", "EDS, checked", "EDS, the master's", "EDS, the simulator's", "raw log"),
+)
+
+
+def refused(kind: Kind) -> str:
+    """Use a file; return why it was refused, "" where it was not."""
+    began = time.process_time()
+    reason = ""
+    try:
+        kind.use()
+    except OURS as error:
+        reason = str(error)
+        assert reason
+    # time of the processor, so that it does not matter what else the machine does
+    assert time.process_time() - began < CPU_S
+    assert len(reason) < LONGEST_CHARS
+    assert "\x1b" not in reason
+    return reason
+
+
+@pytest.mark.parametrize("name", NAMES)
+@seed(SEED)
+@settings(max_examples=25, deadline=None, database=None)
+@given(number=st.integers(0, 2**32 - 1))
+def test_a_spoilt_file_is_used_or_refused(kinds: dict[str, Kind], name: str, number: int) -> None:
+    kind = kinds[name]
+    sound = kind.path.read_bytes()
+    try:
+        kind.path.write_bytes(spoil(sound, random.Random(number)))
+        refused(kind)
+    finally:
+        kind.path.write_bytes(sound)
+
+
+# -- whole commands
+
+
+@pytest.fixture
+def learnt(tmp_path: Path) -> Path:
+    """Return a folder of the cogging profiles of planar-3's motors."""
+    return leave_profiles(load_robot("planar-3"), [Plant()] * 3, tmp_path / "learnt")
+
+
+def said(done: subprocess.CompletedProcess[str]) -> str:
+    """Return the one line in which a command has refused its input."""
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("cdpr: ")
+    assert done.stderr.count("\n") == 1
+    return done.stderr
+
+
+def test_no_daemon_starts_with_a_cogging_profile_that_would_run_its_motors_away(
+    learnt: Path,
+) -> None:
+    path = learnt / "lower" / "cogging-profile.json"
+    table = json.loads(path.read_text())
+    table["better"]["table_Nm"][0][7] = 1e6
+    path.write_text(json.dumps(table))
+    told = said(cdpr_here("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt))
+    assert f"axis lower: {path}: better.table_Nm[0]: value 1e+06; allowed: -0.75 to 0.75" in told
+    out = learnt / "out"
+    told = said(
+        cdpr_here("cogging", "validate", "winch-mpp0923d", path, "--bus", "simbus:", "--out", out)
+    )
+    assert f"{path}: better.table_Nm[0]: value 1e+06" in told
+    assert not out.exists()
+
+
+def test_cogging_profiles_of_tables_that_differ_in_length_are_refused(learnt: Path) -> None:
+    path = learnt / "lower" / "cogging-profile.json"
+    table = json.loads(path.read_text())
+    table["better"]["table_Nm"] = [row[::2] for row in table["better"]["table_Nm"]]
+    path.write_text(json.dumps(table))
+    told = said(cdpr_here("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt))
+    assert "better.table_Nm of 512 and 256 values; allowed: as many for every axis" in told
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("pid", 0, "phase_margin_deg"), "5"),
+        (("pid", 0, "sensitivity_peak"), None),
+        (("pid", 0), {}),
+        (("pid",), []),
+        (("drive",), "mine"),
+        (("drive", "vendor_id"), "7"),
+        (("drive", "revision"), -1),
+        (("bus", "cycles"), 1.5),
+        (("bus", "wall_s"), "2"),
+        (("torque_step_Nm",), "2"),
+    ],
+)
+def test_a_report_names_what_is_wrong_with_its_run(
+    kinds: dict[str, Kind], keys: tuple[str | int, ...], value: object
+) -> None:
+    path = kinds["run"].path
+    sound = path.read_bytes()
+    table = inner = json.loads(sound)
+    for key in keys[:-1]:
+        inner = inner[key]
+    inner[keys[-1]] = value
+    try:
+        path.write_text(json.dumps(table))
+        with pytest.raises(BadInputError, match=re.escape(f"{path}: {dotted(keys)}")):
+            read_run(Paths(path.parent))
+    finally:
+        path.write_bytes(sound)
+
+
+def make_deep(path: Path) -> None:
+    path.write_text("a = " + "[" * 200_000)
+
+
+def make_long(path: Path) -> None:
+    path.write_text("a = " + "1" * 6000)
+
+
+def make_pipe(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+
+
+def make_device(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    path.symlink_to("/dev/zero")
+
+
+def make_huge(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (make_deep, "line 1: is too deep; allowed: 16 levels"),
+        (make_long, "line 1: a number of 6000 digits; allowed: 99"),
+        (make_pipe, "is no regular file; allowed: a file, or a link to one"),
+        (make_device, "is no regular file; allowed: a file, or a link to one"),
+        (make_huge, "is too long; allowed: up to"),
+    ],
+)
+def test_what_is_no_file_of_ours_is_refused_by_every_command_that_reads_it(
+    tmp_path: Path, learnt: Path, make: Callable[[Path], None], told: str
+) -> None:
+    robot, plant = tmp_path / "robot.toml", tmp_path / "plant.toml"
+    profile = learnt / "lower" / "cogging-profile.json"
+    asked = tmp_path / "trial"
+    asked.mkdir()
+    for path in (robot, plant, profile, asked / "trial.json"):
+        make(path)
+    for path, command in (
+        (robot, ("run", robot, "--bus", "simbus:")),
+        (robot, ("bus", "budget", robot)),
+        (robot, ("robot", "show", robot)),
+        (plant, ("sim", "up", "winch-mpp0923d", "--bus", "simbus:x", "--plant", plant)),
+        (plant, ("sim", "up", "planar-3", "--bus", "simbus:x", "--plant", plant)),
+        (profile, ("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt)),
+        (asked / "trial.json", ("robot", "trial", "planar-3", "line", "--again", "--out", asked)),
+    ):
+        answer = said(cdpr_here(*command))
+        assert str(path) in answer
+        assert told in answer
+
+
+@pytest.mark.parametrize("command", [("drive", "import"), ("log", "info"), ("bus", "replay")])
+def test_a_pipe_in_place_of_a_file_keeps_nobody_waiting(
+    tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    path = tmp_path / "file.eds"
+    make_pipe(path)
+    done = cdpr_here(*command, path)
+    assert done.returncode in (1, 2)
+    assert "is no regular file" in done.stderr

@@ -1,0 +1,188 @@
+"""Takes the power from a robot by its loop's process alone, whatever the daemon's service does."""
+
+from __future__ import annotations
+
+import os
+import pwd
+import select
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from cdpr_rt.runtime.shared_block import SharedBlock, SharedBlockError
+from cdpr_rt.runtime.states import LoopState
+from drivers.cia402 import POWER_OFF, state_of
+from profiles.errors import brief
+from tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
+from tools.errors import WorkFailedError
+
+_LOOK_S = 0.02
+# the drives are asked over and over, and once more by SDO, where one does not confirm
+_CONFIRM_S: Final = 15.0
+# the loop turns at every cycle, or some ten times a second where no cycles run
+_STALLED_S: Final = 1.0
+_KILLED_S: Final = 2.0
+_UNHEARD_S: Final = 1.0
+# a daemon that only listens hears of what was told to the master in the same breath
+_LISTENS_S: Final = 2.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What has become of one robot's power."""
+
+    robot: str
+    confirmed: bool
+    """Whether every drive has said that it has no power."""
+    text: str
+
+
+class EmergencyStop:
+    """One robot's loop, told to take the power as soon as this is made; `outcome` waits for it."""
+
+    def __init__(self, path: Path) -> None:
+        """Tell the loop that the file at `path` names."""
+        self._robot = path.stem
+        self._pidfd = -1
+        self._block: SharedBlock | None = None
+        self._known: Outcome | None = self._tell(path)
+        self._asked_ns = time.monotonic_ns()
+
+    def _tell(self, path: Path) -> Outcome | None:
+        """Send the signal; return what is known without waiting, None where there is to wait."""
+        try:
+            found = self._found = LoopFile.read(path)
+            self._robot = found.robot
+            pidfd = found.open()
+        except WorkFailedError as error:
+            return self._failed(str(error))
+        if pidfd is None:
+            return self._failed(f"its loop has ended; {_by_themselves(found)}")
+        self._pidfd = pidfd
+        try:  # to one that only listens as well: only its memory says so, and it lets it be
+            signal.pidfd_send_signal(pidfd, POWER_OFF_SIGNAL)
+        except PermissionError:
+            whose = _user(found.uid)
+            return self._failed(f"its loop is {whose}'s: `sudo -u {whose} cdpr estop` may stop it")
+        except ProcessLookupError:
+            return self._failed(f"its loop has ended; {_by_themselves(found)}")
+        return None
+
+    def close(self) -> None:
+        """Let go of the process."""
+        if self._pidfd >= 0:
+            os.close(self._pidfd)
+            self._pidfd = -1
+
+    def outcome(self) -> Outcome:
+        """Wait until every drive has said that it has no power, or it is known that none will.
+
+        A loop that does not turn is killed: its drives stop by themselves without its heartbeat.
+        One that only listens is left alone.
+        """
+        if self._known is not None:
+            return self._known
+        try:
+            block = self._block = _attach(self._found)
+        except (OSError, SharedBlockError) as error:
+            return self._failed(f"what its drives say cannot be seen: {error}")
+        while not (off := self._power_is_off()):
+            if self._ended(_LOOK_S):
+                return self._failed("its loop has ended; " + _by_themselves(self._found))
+            alive_ns = int(block.counters["loop_alive_ns"][0])
+            stalled = self._since_s(max(alive_ns, self._asked_ns)) > _STALLED_S
+            if stalled and not self._listens():
+                return self._kill()
+            if doubt := self._doubt():
+                return self._failed(f"{doubt} ({self._told()})")
+        return Outcome(self._robot, True, off)
+
+    def _doubt(self) -> str:
+        """Return why nothing more is to be waited for, empty until then."""
+        since_s = self._since_s(self._asked_ns)
+        if self._listens():
+            waits = since_s <= _LISTENS_S
+            return "" if waits else "this daemon only listens: stop the master that runs its drives"
+        if since_s > _UNHEARD_S and not self._cycling():
+            return "its drives are not heard, and are not given power"
+        if since_s > _CONFIRM_S:
+            return f"not every drive has confirmed within {_CONFIRM_S:g} s that its power is off"
+        return ""
+
+    def _kill(self) -> Outcome:
+        signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
+        killed = "was killed" if self._ended(_KILLED_S) else "does not even end when it is killed"
+        return self._failed(
+            f"its loop has not turned for {_STALLED_S:g} s and {killed}; "
+            + _by_themselves(self._found)
+        )
+
+    def _failed(self, text: str) -> Outcome:
+        return Outcome(self._robot, False, text)
+
+    def _ended(self, within_s: float) -> bool:
+        return bool(select.select([self._pidfd], [], [], within_s)[0])
+
+    @staticmethod
+    def _since_s(then_ns: int) -> float:
+        return (time.monotonic_ns() - then_ns) * 1e-9
+
+    def _cycling(self) -> bool:
+        """Whether a cycle has begun since the power was to be taken."""
+        block = self._block
+        assert block is not None  # attached
+        rows = int(block.counters["rows"][0])
+        return (
+            rows > 0 and int(block.rows[(rows - 1) % block.capacity]["stamp_ns"]) > self._asked_ns
+        )
+
+    def _power_is_off(self) -> str:
+        """Return in words that every drive says so in a cycle begun since; empty until then."""
+        block = self._block
+        assert block is not None  # attached
+        if not self._cycling():
+            return ""
+        row = block.rows[(int(block.counters["rows"][0]) - 1) % block.capacity]
+        off = all(state_of(int(word)) in POWER_OFF for word in row["statusword"])
+        if row["state"] == LoopState.ACTIVE or not off or not row["alive"].all():
+            return ""
+        return f"power is off, every drive says so ({self._told()})"
+
+    def _listens(self) -> bool:
+        """Whether the loop only listens, and commands no drive."""
+        assert self._block is not None  # attached
+        try:
+            return self._block.status().get("read_only") is True
+        except SharedBlockError:  # it died in the middle of writing
+            return False
+
+    def _told(self) -> str:
+        assert self._block is not None  # attached
+        try:
+            told = self._block.status()
+        except SharedBlockError as error:
+            return str(error)
+        state, reason = str(told.get("state")), told.get("reason")
+        return brief(f"{state}: {reason}" if reason else state)
+
+
+def _attach(found: LoopFile) -> SharedBlock:
+    # who looks on must not be able to write, and what is no memory must not keep anybody waiting
+    flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+    return SharedBlock.attach(os.open(f"/proc/{found.pid}/fd/{found.block_fd}", flags))
+
+
+def _by_themselves(found: LoopFile) -> str:
+    return (
+        "drives that had power from it stop by themselves, without its heartbeat, within "
+        f"{found.drives_stop_s:g} s: look whether they have"
+    )
+
+
+def _user(uid: int) -> str:
+    try:
+        return pwd.getpwuid(uid).pw_name
+    except KeyError:
+        return f"#{uid}"

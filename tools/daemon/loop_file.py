@@ -1,0 +1,134 @@
+"""The file that names a daemon's loop, so that its process can be told to take the power at once.
+
+It lies beside the daemon's socket. The launcher writes it once the loop obeys `POWER_OFF_SIGNAL`.
+What it says is believed of its owner's own processes only: who reads it may be root.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from profiles.bounded_input import open_regular, parse_json
+from profiles.errors import ProfileError, brief
+from tools.daemon.paths import LOOP_SUFFIX, is_trusted
+from tools.errors import WorkFailedError
+
+POWER_OFF_SIGNAL: Final = signal.SIGUSR1
+"""Has a loop take torque and power from its drives at once and latch a fault."""
+_MOST_BYTES = 4096
+_MOST_PID = 1 << 22
+_MOST_FD = 1 << 20
+
+
+class LoopFile(BaseModel):
+    """Which process runs a robot's loop, and where its shared memory is."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    robot: Annotated[str, AfterValidator(brief)]
+    uid: int = Field(ge=0)
+    """Whose process and whose file it is."""
+    pid: int = Field(gt=1, le=_MOST_PID)
+    started: int = Field(ge=0)
+    """When it was started, in clock ticks since the machine was: no other process has both."""
+    block_fd: int = Field(ge=0, le=_MOST_FD)
+    """The descriptor of the shared memory, in that process."""
+    drives_stop_s: float = Field(ge=0.0, allow_inf_nan=False)
+    """Within what time the drives stop by themselves once the loop is silent."""
+
+    @staticmethod
+    def beside(socket: Path) -> Path:
+        """Return where the file of the daemon with this socket lies."""
+        return socket.with_suffix(LOOP_SUFFIX)
+
+    def write(self, path: Path) -> None:
+        """Put the file there, for this user only, whole or not at all. Raises OSError."""
+        fd, fresh = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)  # mode 0600
+        try:
+            with os.fdopen(fd, "w") as file:
+                file.write(self.model_dump_json())
+            Path(fresh).replace(path)
+        except OSError:
+            Path(fresh).unlink()
+            raise
+
+    def remove(self, path: Path) -> None:
+        """Take the file away where it still says this and not what another daemon wrote."""
+        with suppress(WorkFailedError, OSError):
+            if LoopFile.read(path) == self:
+                path.unlink()
+
+    @classmethod
+    def read(cls, path: Path) -> LoopFile:
+        """Return what is in the file; raises WorkFailedError, also for a stranger's."""
+        try:
+            with os.fdopen(open_regular(path, links=False), "rb") as file:
+                owner = os.fstat(file.fileno()).st_uid
+                data = file.read(_MOST_BYTES)
+            if not is_trusted(path, owner):
+                raise WorkFailedError(f"{path}: was put there by user {owner}: it is not believed")
+            found = cls.model_validate(parse_json(data, path))
+        except ProfileError as error:
+            raise WorkFailedError(str(error)) from None
+        except OSError as error:
+            raise WorkFailedError(f"{path}: cannot be read: {error.strerror}") from None
+        except ValidationError as error:
+            what = error.errors()[0]["msg"]
+            raise WorkFailedError(f"{path}: does not name a loop: {what}") from None
+        if found.uid != owner:
+            raise WorkFailedError(f"{path}: does not name a loop: it is of user {owner}")
+        return found
+
+    def open(self) -> int | None:
+        """Return a pidfd of the process, None where it has ended.
+
+        Raises WorkFailedError where it is another user's, or `POWER_OFF_SIGNAL` would end it.
+        """
+        try:
+            pidfd = os.pidfd_open(self.pid)
+        except ProcessLookupError:
+            return None
+        # looked at while the pidfd holds the process
+        is_it, obeys = started(self.pid) == self.started, self._obeys()
+        if is_it and obeys:
+            return pidfd
+        ended = not is_it or bool(select.select([pidfd], [], [], 0.0)[0])
+        os.close(pidfd)
+        if ended:
+            return None
+        raise WorkFailedError(
+            f"process {self.pid} is no loop of user {self.uid}: nothing was sent to it"
+        )
+
+    def runs(self) -> bool:
+        """Whether the process runs; raises WorkFailedError as `open` does."""
+        if (pidfd := self.open()) is None:
+            return False
+        os.close(pidfd)
+        return True
+
+    def _obeys(self) -> bool:
+        """Whether the process is all its user's and has a handler for the signal."""
+        try:
+            lines = Path(f"/proc/{self.pid}/status").read_text().splitlines()
+        except OSError:
+            return False
+        told = dict(line.split(":\t", 1) for line in lines if ":\t" in line)
+        caught = int(told["SigCgt"], 16) >> (POWER_OFF_SIGNAL - 1) & 1
+        return set(told["Uid"].split()) == {str(self.uid)} and bool(caught)
+
+
+def started(pid: int) -> int:
+    """Return when a process was started, in clock ticks since the machine was; 0 for none."""
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
+    except OSError:
+        return 0
