@@ -13,7 +13,7 @@ demo: $(STAMP)  ## commission one simulated winch on the embedded bus
 	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo --overwrite
 
 test: $(STAMP) check  ## every test; needs nothing but Python
-	$(BIN)/python -m pytest --cache-clear -n $(JOBS) --dist loadscope --no-loadscope-reorder \
+	$(BIN)/python -m pytest --cache-clear -n $(JOBS) --max-worker-restart 0 --dist loadscope --no-loadscope-reorder \
 	  || { echo "once more, alone, what failed beside other tests:"; \
 	       $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; }
 

@@ -45,7 +45,10 @@ class StopRequest:
 
 @contextmanager
 def stop_on_signals() -> Iterator[StopRequest]:
-    """Yield what tells whether the user wants an end; asked a second time it is an interrupt."""
+    """Yield what tells whether the user wants an end; asked a second time it is an interrupt.
+
+    After a Ctrl-C in the block further ones change nothing: the command ends already.
+    """
     wanted = StopRequest()
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, wanted.note) for number in numbers}
@@ -54,3 +57,5 @@ def stop_on_signals() -> Iterator[StopRequest]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        if wanted():
+            signal.signal(signal.SIGINT, signal.SIG_IGN)

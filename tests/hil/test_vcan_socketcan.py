@@ -94,7 +94,7 @@ def test_error_frames_tell_the_health_and_disturb_no_cycle() -> None:
         message = acyclic.recv(2.0)
         assert message is not None
         assert message.is_error_frame
-        assert health.take_message(message)
+        assert health.take_error(message.arbitration_id, message.data)
         assert health.state is state
     assert (health.bus_offs, health.restarts) == (1, 1)
     with pytest.raises(BlockingIOError):

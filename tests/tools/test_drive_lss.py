@@ -166,7 +166,7 @@ def test_a_store_that_is_damaged_is_told(tmp_path: Path) -> None:
         [*command, "--store", str(tmp_path)], capture_output=True, text=True, check=False
     )
     assert ended.returncode == 2
-    assert "drive-1.json: not a parameter file" in ended.stderr
+    assert "drive-1.json: is not valid JSON" in ended.stderr
 
 
 def test_a_driven_drive_is_left_alone() -> None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import os
 import signal
+import subprocess
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cdpr_rt.clock import Clock, LockstepClock, PacedClock
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import RawLogWriter
 from profiles import load_winch
@@ -33,19 +35,41 @@ def ignored(number: int) -> Iterator[None]:
 def test_only_enter_alone_raises_the_mass(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    answers = io.StringIO("no\nwait\n\nfor the next\n")
-    monkeypatch.setattr("sys.stdin", answers)
-    by_prompt(5.0)
-    assert answers.read() == "for the next\n"
-    told = capsys.readouterr().err
-    assert told.count("Hang 5 kg") == 3 and told.count("Enter alone") == 2
-    monkeypatch.setattr("sys.stdin", io.StringIO(""))
-    with pytest.raises(BadInputError, match="nobody has hung 2 kg; the drive is without power"):
-        by_prompt(2.0)
+    outlet, inlet = os.pipe()
+    os.write(inlet, b"no\nwait\n\nfor the next\n")
+    os.close(inlet)
+    with os.fdopen(outlet) as answers:
+        monkeypatch.setattr("sys.stdin", answers)
+        by_prompt(5.0, LockstepClock())
+        assert answers.read() == "for the next\n"
+        told = capsys.readouterr().err
+        assert told.count("Hang 5 kg") == 3 and told.count("Enter alone") == 2
+        with pytest.raises(BadInputError, match="nobody has hung 2 kg; the drive is without power"):
+            by_prompt(2.0, LockstepClock())
 
 
+def test_a_question_left_open_does_not_spoil_the_end_of_the_process() -> None:
+    ask = "from cdpr_rt.clock import PacedClock as C; from tools.tension.masses import by_prompt"
+    catch = "\ntry: by_prompt(5.0, C())\nexcept Exception as error: print(error)"
+    with subprocess.Popen(
+        [sys.executable, "-c", ask + catch],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stderr is not None and process.stdout is not None
+        assert process.stderr.read(9) == "Hang 5 kg"
+        process.send_signal(signal.SIGINT)
+        assert "nobody has hung 5 kg" in process.stdout.read()
+        assert process.wait(30) == 0
+
+
+@pytest.mark.parametrize("clock", [LockstepClock, PacedClock])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_question(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+def test_a_signal_ends_the_question(
+    monkeypatch: pytest.MonkeyPatch, number: int, clock: Callable[[], Clock]
+) -> None:
     outlet, inlet = os.pipe()
     too_late = threading.Timer(10.0, os.write, (inlet, b"\n"))
     sent = threading.Timer(0.1, os.kill, (os.getpid(), number))
@@ -53,9 +77,12 @@ def test_a_signal_ends_the_question(monkeypatch: pytest.MonkeyPatch, number: int
         monkeypatch.setattr("sys.stdin", answers)
         too_late.start()
         sent.start()
-        with pytest.raises(BadInputError, match="nobody has hung 5 kg"):
-            by_prompt(5.0)
-        too_late.cancel()
+        try:
+            with pytest.raises(BadInputError, match="nobody has hung 5 kg"):
+                by_prompt(5.0, clock())
+        finally:  # a signal that comes later ends the test run
+            sent.join()
+            too_late.cancel()
     os.close(inlet)
 
 

@@ -11,9 +11,10 @@ import typer
 from cdpr_rt.controllers.pid import Pid
 from cdpr_rt.trajectory import Leg
 from cdpr_rt.tuning import stiffest_pid
-from drivers.cia402 import fault_text, mode_bits, mode_name, state_of, supported_modes
+from drivers.cia402 import State, fault_text, mode_bits, mode_name, state_of, supported_modes
 from drivers.errors import SdoError
-from profiles import load_winch
+from drivers.network import CanNetwork
+from profiles import Winch, load_winch
 from tools.commands import drive_configure, drive_setup
 from tools.commands.options import (
     BusOption,
@@ -35,6 +36,7 @@ app = typer.Typer(help="One drive on the bus.", no_args_is_help=True)
 _JOG_RAMP_S = 0.5
 _JOG_HZ = (20.0, 15.0, 12.0, 8.0, 5.0)
 _TORQUE_SHARE = 0.25
+_START_UP_LOOK_S = 0.01
 # a motor that turns the wrong way is to be stopped before half a turn
 _JOG_ERROR_RAD = 2.5
 _JOG_SPEEDS, _JOG_LEAST_RAD_S = 4.0, 40.0
@@ -76,7 +78,7 @@ def info(
             "product_code": product,
             "revision": revision,
             "serial": serial,
-            "state": state_of(network.read_int(node, 0x6041)).label,
+            "state": _state(network, profile).label,
             "error": fault_text(network.read_int(node, 0x603F)),
             "mode": mode_name(network.read_int(node, 0x6061)),
             "supported_modes": [
@@ -96,6 +98,17 @@ def info(
         shown = ", ".join(value) if isinstance(value, list) else shown
         out.say(f"{key:24}{shown}")
     out.result({"ok": True, **told})
+
+
+def _state(network: CanNetwork, profile: Winch) -> State:
+    """Return the drive's state, once it has started up if it does so within the usual time."""
+    clock = network.clock
+    until_s = clock.now_s + profile.drive.state_timeout_s
+    while True:
+        state = state_of(network.read_int(profile.node_id, 0x6041))
+        if state is not State.NOT_READY or clock.now_s >= until_s:
+            return state
+        clock.sleep(_START_UP_LOOK_S)
 
 
 @app.command()

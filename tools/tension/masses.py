@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import signal
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -82,15 +84,30 @@ def by_prompt(mass_kg: float, clock: Clock) -> None:
         f"Hang {mass_kg:g} kg on the cable, standing on its support, take up the slack, and "
         "press Enter (Ctrl-C ends)"
     )
-    ask = partial(typer.prompt, question, default="", show_default=False, err=True)
     try:
-        while clock.aside(ask):  # a person takes their time; the safety I/O is asked meanwhile
+        # a person takes their time; the safety I/O is asked meanwhile
+        while clock.aside(partial(_typed, question)):
             typer.echo("Enter alone, please.", err=True)
-    except (typer.Abort, KeyboardInterrupt):
+    except (EOFError, KeyboardInterrupt):
         raise BadInputError(f"nobody has hung {mass_kg:g} kg; the drive is without power") from None
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _typed(question: str) -> str:
+    """Ask, and return the line that is typed; raises EOFError where no more can come.
+
+    Not by `input`: a thread that is still there when the process ends would hold the buffer's lock.
+    """
+    typer.echo(f"{question}: ", nl=False, err=True)
+    line = b""
+    while not line.endswith(b"\n"):
+        byte = os.read(sys.stdin.fileno(), 1)
+        if not byte:
+            raise EOFError
+        line += byte
+    return line.decode(errors="replace").strip()
 
 
 def on_board(board: Path) -> Hang:

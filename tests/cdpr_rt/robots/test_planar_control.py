@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tracemalloc
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -50,7 +51,7 @@ class Physics:
         )
         self.robot = CableRobot(shape, plant, [transmission_of(a.winch) for a in ROBOT.axes])
         for i, motor in enumerate(plant.motor_plants(3)):
-            self.robot.adopt(i, build_motor(motor, MotorRatings()))
+            self.robot.adopt(i, build_motor(motor, MotorRatings()), self._asks(i))
         estimator = Estimator(3, PERIOD_S, winches_of(ROBOT.axes))
         self.control = PlanarControl(PLATFORM, list(ROBOT.axes), LOW_N, HIGH_N, TORQUE_Nm, PERIOD_S)
         parts = PlatformParts(PLATFORM, self.control, estimator, PERIOD_S, HIGH_N)
@@ -72,11 +73,13 @@ class Physics:
         self.tension_N: list[np.ndarray] = []
         self.true_m: list[np.ndarray] = []
 
+    def _asks(self, i: int) -> Callable[[], tuple[int, float]]:
+        return lambda: (servo.TORQUE, float(np.round(self._acting[i] / RATED_Nm * 1000)))
+
     def cycle(self) -> None:
         self._now_s += PERIOD_S
-        permille = np.round(self._acting / RATED_Nm * 1000)
         for i in range(3):
-            sample = self.robot.step(i, self._now_s, servo.TORQUE, float(permille[i]))
+            sample = self.robot.step(i, self._now_s)
             self.feedback.position_rad[i] = sample[1] * COUNT_rad
         self._acting = self.torque.copy()
         self.feedback.cycle += 1
