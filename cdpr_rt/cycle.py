@@ -40,7 +40,7 @@ class Cycle:
     """Exchanges a device once a cycle and sends one command in each.
 
     On a lockstep device the next SYNC goes out as soon as `exchange` is called; otherwise each has
-    an absolute deadline. After `exchange` a cycle is open until `transmit` or `release`.
+    an absolute deadline.
     """
 
     def __init__(self, device: AxisDevice, watches: Sequence[Watch] = ()) -> None:
@@ -56,8 +56,6 @@ class Cycle:
         self._first = True
         self._deadline_s = 0.0
         self._fresh = True
-        self._open = False
-        self._released = True
 
     def begin(self) -> None:
         """Tell that no cycles have run for a while: the next one is not late by it."""
@@ -68,24 +66,12 @@ class Cycle:
         if not self.device.lockstep:
             self._await_deadline()
         self._take_time()
-        self._open, self._released = True, False
         self.device.sync()
         return self.device.receive()
 
     def transmit(self) -> None:
         """Send the command as it stands, and close the cycle."""
-        self._open = self._released = False
         self.device.transmit()
-
-    def release(self) -> None:
-        """Have the last command be one without torque: in this cycle, or in one of its own."""
-        if self._released:
-            return
-        if not self._open:
-            self.exchange()
-        self.device.command.torque_Nm[:] = 0.0
-        self.transmit()
-        self._released = True
 
     def device_alarm(self) -> str:
         """Return why the drives must not go on being driven, or an empty text."""

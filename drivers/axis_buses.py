@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from drivers.axis_group import AxisGroup
 from drivers.axis_layout import AxisConfig
 from drivers.axis_state import StateArrays
 from drivers.cia402 import POWER_OFF, State
-from drivers.errors import BusError, DriveFaultError, DriverError, ModeRefusedError
+from drivers.errors import BusError, DriverError, ModeRefusedError
 from drivers.network import CanNetwork
 
 _STOP_TIMEOUT_S = 1.0
@@ -38,8 +37,7 @@ class AxisBuses:
 
     Where the axes are numbered bus by bus, the arrays of each bus are slices of the whole, and
     nothing is copied; otherwise their values are moved once a cycle. What goes wrong on one bus
-    keeps none of the others from being exchanged, or from being switched off at the end. As a
-    context manager it leaves the drives without power, however the block ends.
+    keeps none of the others from being exchanged, or from being switched off at the end.
 
     Raises BusError when some buses keep time in lockstep and some do not, and DriverError for a PDO
     map that does not serve torque control.
@@ -274,22 +272,6 @@ class AxisBuses:
                 return
             if not self.lockstep:
                 self.clock.sleep(self.period_s)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        doubt = self.close()
-        if not doubt:
-            return
-        if error is None:
-            raise DriveFaultError(doubt)
-        error.add_note(doubt)
 
 
 def _has_power(group: AxisGroup) -> bool:

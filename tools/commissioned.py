@@ -131,16 +131,15 @@ def compensation_of(
 
 
 def refuse_strangers(
-    robot: Robot, profiles: Sequence[CoggingProfile | None], reports: Mapping[int, BootReport]
+    robot: Robot, profiles: Sequence[CoggingProfile | None], reports: Sequence[BootReport]
 ) -> None:
     """Raise CoggingProfileError, naming the axis, where a profile is of another drive.
 
     BadInputError where a winch's calibration is, as the torque constant of its drive is in it; of
-    drives without a serial number (0) nothing can be said. `reports` are those of the axes that
-    have booted, by their numbers.
+    drives without a serial number (0) nothing can be said.
     """
     bounds = _bounds(robot)
-    for i, report in reports.items():
+    for i, report in enumerate(reports):
         profile, axis = profiles[i], robot.axes[i]
         of = 0 if axis.calibration is None else axis.calibration.drive_serial
         if of and report.serial not in (0, of):

@@ -45,7 +45,6 @@ from tools.bus_fit import require_fit
 from tools.commissioned import identity_of
 from tools.consent import require_consent
 from tools.daemon.machine import RobotMachine
-from tools.daemon.settings import RunSettings
 from tools.errors import BadInputError
 from tools.output import Output
 from tools.robot_buses import asks_for_own_simulator
@@ -288,14 +287,7 @@ def _open(
     reset: bool = False,
 ) -> Session:
     """Return the robot, booted and checked; `stack` leaves it without power."""
-    settings = RunSettings(
-        robot=robot.reference,
-        name=robot.profile,
-        buses=tuple(buses),
-        safety_io=safety_io,
-        socket=Path("unused"),
-    )
-    machine = RobotMachine(robot, settings)
+    machine = RobotMachine(robot, buses, safety_io)
     stack.callback(machine.clock.close)
     n, period_s = len(robot.axes), robot.sync_period_s
     rehearse(n, period_s)  # compiling keeps a poll waiting

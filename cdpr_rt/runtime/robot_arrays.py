@@ -34,18 +34,14 @@ def can_lower(robot: Robot) -> bool:
     return platform is not None and platform.is_planar and len(robot.axes) == _PLANAR_CABLES
 
 
-def limits_of(robot: Robot, booted: Sequence[int] | None = None) -> Limits:
-    """Return the limits of a robot's axes, those without a figure in its file filled in.
-
-    `booted` are the numbers of the axes that are run, in the robot's file; all if left out.
-    """
-    numbers = range(len(robot.axes)) if booted is None else booted
-    axes, told = [robot.axes[i] for i in numbers], robot.limits
+def limits_of(robot: Robot) -> Limits:
+    """Return the limits of a robot's axes, those without a figure in its file filled in."""
+    axes, told = robot.axes, robot.limits
 
     def each(values: tuple[float, ...] | None, otherwise: FloatArray | float) -> FloatArray:
         if values is None:
             return np.broadcast_to(otherwise, (len(axes),)).astype(float)
-        return np.array([values[i if len(values) > 1 else 0] for i in numbers])
+        return np.broadcast_to(np.array(values), (len(axes),)).astype(float)
 
     motors = [axis.winch.motor for axis in axes]
     torque_Nm = each(told.torque_Nm, np.array([motor.rated_torque_Nm for motor in motors]))

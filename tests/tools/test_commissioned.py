@@ -106,7 +106,7 @@ def test_another_drive_is_refused_by_its_serial_number(robot: Robot, learnt: Pat
         serial=1,
         counts_per_turn=8192,
     )
-    reports = {i: replace(same, node_id=i + 1, serial=i + 1) for i in range(3)}
+    reports = [replace(same, node_id=i + 1, serial=i + 1) for i in range(3)]
     refuse_strangers(found, profiles, reports)
     reports[1] = replace(reports[1], serial=77)
     with pytest.raises(CoggingProfileError, match=r"axis upper right: .*serial = 2, .* has 77"):
@@ -123,7 +123,7 @@ def test_a_calibration_of_a_winch_with_another_drive_is_refused(
     axes = (replace(robot.axes[0], calibration=calibration()), *robot.axes[1:])
     told = r"axes\[0\]\.calibration: .*serial 1, that of axis upper left has 77; calibrate it anew"
     with pytest.raises(BadInputError, match=told) if refused else nullcontext():
-        refuse_strangers(replace(robot, axes=axes), (None,) * 3, {0: report})
+        refuse_strangers(replace(robot, axes=axes), (None,) * 3, [report])
 
 
 def test_motors_to_commission_are_named(robot: Robot, tmp_path: Path) -> None:

@@ -195,7 +195,7 @@ def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path
         right.close()
 
 
-def test_a_mandatory_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Path):
+def test_a_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Path):
     drives, winches = (Path(profiles.__file__).parent / kind for kind in ("drives", "winches"))
     drive = (drives / "generic-cia402.toml").read_text()
     other = drive.replace("revision = 0x00010000", "revision = 0x00020000")
@@ -211,7 +211,7 @@ def test_a_mandatory_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Pa
             pytest.raises(WorkFailedError, match=r"on bus b: node 1 did not boot \(step N\)"),
             open_robot(load_robot(path), [url], OUT),
         ):
-            pytest.fail("opened without a mandatory drive")
+            pytest.fail("opened without a drive")
 
 
 def test_drives_of_different_makes_run_side_by_side(tmp_path: Path):

@@ -13,7 +13,6 @@ from drivers.cia402 import POWER_OFF, State
 from drivers.errors import BusError, DriverError
 from drivers.listening import HeardBus, ListeningDevice, heard_axis
 from profiles import Robot
-from tools.daemon.settings import RunSettings
 from tools.robot_buses import robot_urls
 
 _MASTER_S: Final = 1.0
@@ -21,7 +20,7 @@ _NOTICE: Final = "read-only: nothing is sent; another master runs the drives"
 
 
 class ListeningMachine:
-    """All axes of `robot`, heard on the buses that `settings` name; implements `Machine`.
+    """All axes of `robot`, heard on the buses given with --bus; implements `Machine`.
 
     What would have to be sent is refused, or left undone where it is part of an ending.
     """
@@ -34,10 +33,10 @@ class ListeningMachine:
     safety = ""
     """The other master's affair."""
 
-    def __init__(self, robot: Robot, settings: RunSettings) -> None:
+    def __init__(self, robot: Robot, buses: Sequence[str]) -> None:
         self.clock = PacedClock()
         self._robot = robot
-        self._urls = robot_urls(robot, settings.buses)
+        self._urls = robot_urls(robot, buses)
         self._device: ListeningDevice | None = None
         self._patient_until_s = 0.0
 

@@ -16,6 +16,7 @@ from cdpr_rt.rehearsal import rehearse_judgement
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.loop import ControlLoop
 from cdpr_rt.runtime.loop_parts import LoopParts
+from cdpr_rt.runtime.machine import Machine
 from cdpr_rt.runtime.programs.lower import lowering_s
 from cdpr_rt.runtime.programs.model import model_of
 from cdpr_rt.runtime.programs.registry import (
@@ -46,8 +47,11 @@ def main() -> int:
     try:
         robot = with_commissioned(load_robot(settings.robot), settings.commissioned)
         require_fit(robot)
-        kind = ListeningMachine if settings.read_only else RobotMachine
-        machine = kind(robot, settings)
+        machine: Machine
+        if settings.read_only:
+            machine = ListeningMachine(robot, settings.buses)
+        else:
+            machine = RobotMachine(robot, settings.buses, settings.safety_io, settings.tension_port)
         parts = loop_parts(robot, block)
     except (ProfileError, CommandError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)

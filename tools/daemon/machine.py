@@ -26,7 +26,6 @@ from drivers.network import CanNetwork
 from profiles import Robot
 from profiles.errors import ProfileError
 from tools.commissioned import load_profiles, refuse_strangers
-from tools.daemon.settings import RunSettings
 from tools.daemon.tensions import RobotTensions
 from tools.errors import CommandError
 from tools.robot_boot import boot_notes, boot_robot, device_of, faults_text, open_networks
@@ -55,19 +54,29 @@ def _told(
 
 
 class RobotMachine:
-    """All axes of `robot` on the buses that `settings` name; implements `Machine`."""
+    """All axes of `robot` on the buses given with --bus; implements `Machine`.
+
+    There is power only while the `safety_io` allows it: the robot's own where none is named, unless
+    all buses are simulated. Tensions are measured where their sensors are at a `tension_port`.
+    """
 
     failures: tuple[type[Exception], ...] = (BusError,)
     read_only = False
 
-    def __init__(self, robot: Robot, settings: RunSettings) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        buses: Sequence[str],
+        safety_io: str | None = None,
+        tension_port: str | None = None,
+    ) -> None:
         self._robot = robot
         self._profiles = load_profiles(robot)
-        self._urls = robot_urls(robot, settings.buses)
+        self._urls = robot_urls(robot, buses)
         self.clock = open_clock(self._urls.values())
         real = not all(url.is_simulated for url in self._urls.values())
-        self._tensions = RobotTensions(robot, settings.tension_port)
-        self._reference = settings.safety_io or (robot.safety_io if real else None)
+        self._tensions = RobotTensions(robot, tension_port)
+        self._reference = safety_io or (robot.safety_io if real else None)
         self._device: AxisBuses | None = None
         self.watches: Sequence[Watch] = ()
         self.notices: Sequence[str] = ()
@@ -88,14 +97,9 @@ class RobotMachine:
             self._tensions.open(stack, self.clock)
             networks = open_networks(stack, self._robot, self._urls, self.clock)
             torque_Nm = np.asarray(limits_of(self._robot).torque_Nm).tolist()
-            booted, absent = boot_robot(stack, self._robot, networks, torque_Nm)
-            if absent:
-                raise MachineError(
-                    "; ".join(f"axis {i}: {reason}" for i, reason in absent.items())
-                    + " (the daemon runs all axes of a robot or none)"
-                )
-            refuse_strangers(self._robot, self._profiles, booted)
-            device = device_of(self._robot, networks, booted, torque_Nm)
+            reports = boot_robot(stack, self._robot, networks, torque_Nm)
+            refuse_strangers(self._robot, self._profiles, reports)
+            device = device_of(self._robot, networks, reports, torque_Nm)
             stack.callback(device.close)
             # the supervisor judges silence before the device does
             device.tolerate_silence(self._robot.limits.missed_cycles + 1)
@@ -106,8 +110,8 @@ class RobotMachine:
             for network in networks.values():
                 network.start_heartbeat()
             self._stack = stack.pop_all()
-        self.networks, self.reports = networks, list(booted.values())
-        notices = [*boot_notes(self._robot, booted, absent), self._tensions.missing(self._robot)]
+        self.networks, self.reports = networks, reports
+        notices = [*boot_notes(self._robot, reports), self._tensions.missing(self._robot)]
         notices += [*unsought, self._idle_brakes()]
         self.notices = [notice for notice in notices if notice]
         self.watches = () if self._safety is None else (self._safety.io,)

@@ -32,7 +32,6 @@ from profiles.robot import watched_by_heartbeat
 from tools.commissioned import with_commissioned, without_commissioned
 from tools.daemon.loop_process import description, loop_parts
 from tools.daemon.machine import RobotMachine
-from tools.daemon.settings import RunSettings
 from tools.errors import WorkFailedError
 from tools.robot_buses import robot_urls
 from tools.simulator import OwnSimulator
@@ -122,10 +121,7 @@ class LockstepRobot:
         stack.callback(os.close, block.fd)
         block.counters["start_monotonic_ns"] = time.monotonic_ns()
         block.counters["start_realtime_ns"] = time.time_ns()
-        settings = RunSettings(
-            robot=self._reference, name=robot.profile, buses=(bus,), socket=Path("unused")
-        )
-        self.machine = RobotMachine(robot, settings)
+        self.machine = RobotMachine(robot, [bus])
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
         parts = loop_parts(robot, block)

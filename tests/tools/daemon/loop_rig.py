@@ -21,14 +21,13 @@ from cdpr_rt.service.lease import Lease, LeaseError
 from profiles import load_robot
 from tools.daemon.loop_process import loop_parts
 from tools.daemon.machine import RobotMachine
-from tools.daemon.settings import RunSettings
 
 
 class LoopRig:
     """One loop on the buses of `url`, or of several; nothing moves unless the test turns it.
 
-    `programs` are run besides the daemon's own; the rest are settings. The right to move is held
-    from the beginning, by a clock that only the test moves.
+    `programs` are run besides the daemon's own; the rest is for the machine. The right to move
+    is held from the beginning, by a clock that only the test moves.
     """
 
     def __init__(
@@ -40,10 +39,7 @@ class LoopRig:
         self.now_ns = 1_000_000_000
         self.lease = Lease(PublishedRight(self.block), lambda: self.now_ns)
         self.take_right()
-        settings = RunSettings(
-            robot=str(path), name="rig", buses=tuple(url.split()), socket=Path("unused"), **more
-        )
-        self.machine = RobotMachine(self.robot, settings)
+        self.machine = RobotMachine(self.robot, url.split(), **more)
         parts = loop_parts(self.robot, self.block)
         parts = replace(parts, programs={**parts.programs, **(programs or {})})
         self.loop = ControlLoop(self.block, self.machine, parts, lambda: self.now_ns)
