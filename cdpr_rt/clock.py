@@ -169,7 +169,9 @@ class Clock(ABC):
 
     def turn(self) -> None:
         """Give every task that can go on its turn, without waiting; for once a cycle."""
-        self._tick()
+        now_s = self.now_s
+        for source in self._sources:
+            source.tick(now_s)
         if self._tasks:
             self._advance()
             # what they have sent is answered before the next SYNC goes out on any bus
@@ -263,7 +265,10 @@ class LockstepClock(Clock):
     @property
     def now_s(self) -> float:
         """The time of the buses, the earliest where a stranger's frame has held one of them up."""
-        return min([bus.now_s for bus in self._buses if not bus.gone], default=self._alone_s)
+        buses = self._buses
+        if len(buses) == 1 and not buses[0].gone:
+            return buses[0].now_s
+        return min([bus.now_s for bus in buses if not bus.gone], default=self._alone_s)
 
     def stand_until(self, until_s: float) -> None:
         """Have time go on until then."""

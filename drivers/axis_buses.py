@@ -65,11 +65,15 @@ class AxisBuses:
             for group in self.groups:
                 group.close()
             raise
+        self._names = {group: bus.name for group, bus in zip(self.groups, buses, strict=True)}
         self.axes = tuple(group.axes[i] for group, i in self._in_order())
         self.feedback, self.command = room.feedback(), room.command()
         self._moves = Moves(order, self.feedback, self.command)
         if self._moves.needed:
             self.feedback, self.command = self._moves.feedback, self._moves.command
+        self._only = self.groups[0] if len(self.groups) == 1 and not self._moves.needed else None
+        if self._only is not None:  # it counts the cycles
+            self.feedback, self.command = self._only.feedback, self._only.command
         self.transmits = 0
         """How often commands went out on all buses."""
         self._answers = AnswerWait(self.groups[0].paced_wait_s)
@@ -95,12 +99,20 @@ class AxisBuses:
     def sync(self) -> None:
         """Send the SYNC that opens the cycle, on one bus right after the other.
 
-        A bus that fails is told by `receive`, after the others' answers have been taken in.
+        Which of several has failed is told by `receive`, once the others have answered.
         """
-        self.feedback.cycle += 1
-        self.feedback.time_s = self.feedback.cycle * self.period_s
         self._failure = None
         self._sync_s = time.monotonic()
+        if self._only is not None:
+            self._lost[0] = False
+            try:
+                self._only.sync()
+            except BusError as error:
+                self._lose(0, error)
+                raise
+            return
+        self.feedback.cycle += 1
+        self.feedback.time_s = self.feedback.cycle * self.period_s
         for i, group in enumerate(self.groups):
             self._lost[i] = False
             try:
@@ -110,6 +122,12 @@ class AxisBuses:
 
     def receive(self) -> int:
         """Wait for the answers on all buses and decode them; return how many axes answered."""
+        if self._only is not None and self.lockstep:
+            try:
+                return self._only.receive()
+            except BusError as error:
+                self._lose(0, error)
+                raise
         if self.lockstep:
             return self._receive(0.0)
         self._answers.sleep(self._sync_s)
@@ -144,6 +162,10 @@ class AxisBuses:
 
     def transmit(self) -> None:
         """Send controlwords and torques on all buses, to act from the next SYNC on."""
+        if self._only is not None:
+            self._only.transmit()
+            self.transmits += 1
+            return
         if self._moves.needed:
             self._moves.scatter()
         failure: BusError | None = None
@@ -160,10 +182,10 @@ class AxisBuses:
 
     def alarm(self) -> str:
         """Return why no drive on any bus must go on being driven, or an empty text."""
-        for group, bus in zip(self.groups, self.buses, strict=True):
+        for group in self.groups:
             text = group.alarm()
             if text:
-                return f"bus {bus.name}: {text}"
+                return f"bus {self._names[group]}: {text}"
         return ""
 
     @property

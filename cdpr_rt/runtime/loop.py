@@ -77,7 +77,7 @@ class ControlLoop:
         self._program_error, self._punctual = "", False
         self._rows = CycleRows(block)
         self._asked: FloatArray = np.zeros(block.n)
-        self._alive = block.counters["loop_alive_ns"]
+        self._alive = block.counters["loop_alive_ns"].data
         self.right = RightToMove(block, clock_ns)
         self._orders = Orders(self)
         self.status = StatusPage(self)
@@ -109,7 +109,8 @@ class ControlLoop:
             self.machine.clock.sleep(_TURN_S)
         self._requests.watch()
         self._orders.take()
-        self._advance()
+        if self._procedure is not None:
+            self._advance(self._procedure)
         self.status.look()
 
     def request_stop(self) -> None:
@@ -160,7 +161,8 @@ class ControlLoop:
             cycle.elapsed_s,
             self.program.controller.compensation_Nm,
         )
-        self._watch_right()
+        if self.program.needs_lease:
+            self._watch_right()
         program, self._program_error = self.program, ""
         try:
             program.update(feedback, self.setpoint, torque)
@@ -204,14 +206,17 @@ class ControlLoop:
         reaction = 0
         if self.driving:
             estimate = self.parts.estimator.estimate
-            supervisor.check(cycle.device.feedback, estimate, self.setpoint, torque)
-            reaction = supervisor.compare_lengths(self.parts.lengths_disagree_m())
+            reaction = supervisor.check(cycle.device.feedback, estimate, self.setpoint, torque)
+            if self.parts.lengths_disagree_m is not None:
+                reaction = supervisor.compare_lengths(self.parts.lengths_disagree_m())
         else:
             torque[:] = 0.0
         # in a fault the drives' complaints are known, and putting them in words takes its time
         known = self.life.state is LoopState.FAULT or self.lowering_blind
-        failure = self.lost_bus or ("" if known else cycle.device_alarm())
-        alarm, stop = cycle.watch_alarm(), cycle.stop_reason()
+        failure = self.lost_bus or ("" if known else cycle.device.alarm())
+        alarm = stop = ""
+        if cycle.watches:
+            alarm, stop = cycle.watch_alarm(), cycle.stop_reason()
         if failure or alarm or stop:
             if not self.driving:
                 supervisor.reset()
@@ -336,7 +341,7 @@ class ControlLoop:
 
     def _watch_right(self) -> None:
         """Hold in place of a motion that is nobody's any more, or that of a past holder."""
-        if not self.driving or self.reacting or not self.program.needs_lease:
+        if not self.driving or self.reacting:
             return
         lost = self.right.lost()
         if lost:
@@ -357,10 +362,7 @@ class ControlLoop:
             self._orders.done(f"given up: {self.life.reason or 'something else came first'}")
         self.status.touch()
 
-    def _advance(self) -> None:
-        procedure = self._procedure
-        if procedure is None:
-            return
+    def _advance(self, procedure: Iterator[None]) -> None:
         try:
             next(procedure)
             return

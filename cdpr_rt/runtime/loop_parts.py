@@ -22,8 +22,8 @@ class LoopParts:
     """
     supervisor: Supervisor
     estimator: Estimator
-    lengths_disagree_m: Callable[[], float] = float
-    """Returns by how much the cables' lengths contradict each other, 0 where nobody knows."""
+    lengths_disagree_m: Callable[[], float] | None = None
+    """Returns by how much the cables' lengths contradict each other, where that can be known."""
     lowering_s: float = 0.0
     """The longest that letting a platform down may take."""
     last: LastLengths | None = None

@@ -30,6 +30,11 @@ class Orders:
     def __init__(self, loop: ControlLoop) -> None:
         self._loop = loop
         self._counters = loop.block.counters
+        # looked at every cycle, and faster to read so
+        queues = ("urgent", "urgent_taken", "commands", "commands_taken")
+        self._urgent, self._urgent_taken, self._commands, self._commands_taken = (
+            self._counters[name].data for name in queues
+        )
         self._pending: list[int] = []
         """Numbers of the commands that are answered when the present procedure ends."""
         self._doing: dict[str, Callable[[Order], Iterator[None] | None]] = {
@@ -47,17 +52,16 @@ class Orders:
 
     def take(self) -> None:
         """Look at one stop, then at one command, if there are any."""
-        self._take("urgent", self._loop.block.take_urgent)
-        self._take("commands", self._loop.block.take_command)
+        if self._urgent[0] != self._urgent_taken[0]:
+            self._take(self._urgent_taken, self._loop.block.take_urgent)
+        if self._commands[0] != self._commands_taken[0]:
+            self._take(self._commands_taken, self._loop.block.take_command)
 
-    def _take(self, queue: str, take: Callable[[], Order | None]) -> None:
-        counters = self._counters
-        if counters[queue][0] == counters[f"{queue}_taken"][0]:
-            return
+    def _take(self, taken: memoryview, take: Callable[[], Order | None]) -> None:
         try:
             order = take()
         except (ValueError, RecursionError):  # no JSON: nobody can be answered
-            counters[f"{queue}_taken"][0] += 1
+            taken[0] += 1
             return
         if isinstance(order, dict):
             self._obey(order)

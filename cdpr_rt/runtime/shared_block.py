@@ -293,7 +293,7 @@ class RowWriter:
 
     def __init__(self, block: SharedBlock) -> None:
         self._rows = block.rows
-        self._counter = block.counters["rows"]
+        self._counter = block.counters["rows"].data
         self._capacity = block.capacity
         self._written = int(self._counter[0])
 

@@ -91,7 +91,7 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
         programs=programs,
         supervisor=Supervisor(supervised(limits, robot), n, period_s, names),
         estimator=estimator,
-        lengths_disagree_m=float if platform is None else platform.lengths_disagree_m,
+        lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
         lowering_s=0.0 if platform is None else lowering_s(platform.platform),
         last=None if platform is None else platform.last,
         punctual=stay_punctual,
