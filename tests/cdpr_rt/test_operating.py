@@ -14,9 +14,10 @@ from operating_rig import DAMPING, INERTIA, Inertias, controller, leg, log, powe
 
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.errors import InterruptedMotionError, RawLogError, TripError
+from cdpr_rt.exchange import Setpoint
 from cdpr_rt.rawlog import read_raw_log
 from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.trajectory import Leg
+from cdpr_rt.trajectory import Hold, Leg
 
 
 class At:
@@ -291,6 +292,24 @@ def test_a_reason_to_stop_brakes_the_motion_first(tmp_path: Path) -> None:
     velocity = read_raw_log(tmp_path / "a.raw").column("setpoint_velocity_rad_s")
     assert len(velocity) == 200 + 100
     assert abs(velocity[-1]) < 0.05
+
+
+def test_a_braking_motion_may_take_its_time(tmp_path: Path) -> None:
+    """As a mass that is lowered to where it hung."""
+
+    class Slow(Leg):
+        def brake(self, time_s: float) -> Leg:
+            self.fill(time_s, now := Setpoint(2))
+            return Hold(now.position_rad, 14.0)
+
+    device, writer = Inertias(), log(tmp_path / "a.raw")
+    watch = At(device, stop="no good poll")
+    with powered(device, watch) as rig:
+        watch.cycle = rig.began + 200
+        with pytest.raises(TripError, match="no good poll"):
+            rig.follow(Slow(np.zeros(2), np.array([1.0, -1.0]), 0.5, 0.1), log=writer)
+    writer.close()
+    assert len(read_raw_log(tmp_path / "a.raw").rows) == 200 + 7000
 
 
 def test_a_watch_ends_waiting_as_well() -> None:

@@ -18,9 +18,10 @@ from cdpr_rt.clock import Clock, LockstepClock, PacedClock
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.rawlog import RawLogWriter
 from profiles import load_winch
+from tests.cdpr_rt.operating_rig import Inertias, powered
 from tools.errors import BadInputError
 from tools.tension.calibration import recorded_winch
-from tools.tension.masses import by_prompt, check_masses, mass_points
+from tools.tension.masses import by_prompt, check_masses, have_hung, mass_points
 
 
 @contextmanager
@@ -83,6 +84,27 @@ def test_a_signal_ends_the_question(
         finally:  # a signal that comes later ends the test run
             sent.join()
             too_late.cancel()
+    os.close(inlet)
+
+
+def test_a_signal_ends_the_question_while_cycles_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    outlet, inlet = os.pipe()
+    too_late = threading.Timer(10.0, os.write, (inlet, b"\n"))
+    sent = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    with os.fdopen(outlet) as answers, ignored(signal.SIGINT), powered(Inertias(False)) as rig:
+        monkeypatch.setattr("sys.stdin", answers)
+        rig.operator.disable()
+        began = rig.device.feedback.cycle
+        too_late.start()
+        sent.start()
+        try:
+            with pytest.raises(BadInputError, match="nobody has hung 5 kg"):
+                have_hung(rig.operator, 5.0, by_prompt)
+        finally:
+            sent.join()
+            too_late.cancel()
+        assert rig.device.feedback.cycle > began + 100
+        assert not rig.loop.works_slowly
     os.close(inlet)
 
 

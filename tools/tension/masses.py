@@ -17,6 +17,7 @@ from cdpr_rt.clock import Clock
 from cdpr_rt.errors import TripError
 from cdpr_rt.raw_rows import column_names
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
+from cdpr_rt.runtime.operating import Operator
 from cdpr_rt.tension_gain import (
     LEAST_LEVELS,
     LEAST_SPAN,
@@ -139,7 +140,7 @@ def measure_masses(
     """
     recorded = []
     for mass_kg in masses_kg:
-        _have_hung(session, mass_kg, hang)
+        have_hung(session, mass_kg, hang)
         path = folder / _file_name(mass_kg)
         with out.progress(f"raising and lowering {mass_kg:g} kg", plan.duration_s) as advance:
             _hoist(session, path, plan, mass_kg, gravity, advance)
@@ -161,7 +162,7 @@ def _refuse_another_mass(points: Sequence[TorquePoint], mass_kg: float, gain_m2_
         )
 
 
-def _have_hung(session: Session, mass_kg: float, hang: Hang) -> None:
+def have_hung(session: Operator, mass_kg: float, hang: Hang) -> None:
     """Have a mass hung; cycles go on meanwhile, so that what guards the winch is asked."""
     try:
         session.beside(lambda: hang(mass_kg, session.device.clock))
