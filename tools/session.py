@@ -55,6 +55,7 @@ from tools.tension.session_watch import Watching, no_watches
 
 _RING_S: Final = 8.0
 _INDEX_TIMEOUT_S: Final = 30.0
+_BRIDGED_CYCLES: Final = 2
 # whatever ends a motion takes the torque at once, as nothing is held up by it; a watch may brake it
 _REACTIONS: Final[Mapping[Limit, Reaction]] = {
     limit: Reaction.TORQUE_OFF
@@ -308,6 +309,7 @@ def _open(
     session.boot_s = machine.clock.now_s - begun_s
     stack.callback(stop_requested.closing)  # before what is closed above
     stop_requested.energised = True
+    session.device.tolerate_silence(_BRIDGED_CYCLES)
     machine.watches = (*machine.watches, *watches)
     session.check(reset)
     for notice in (*machine.notices, *loop.notices):
