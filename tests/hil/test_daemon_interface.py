@@ -227,8 +227,7 @@ def test_a_service_that_comes_back_needs_the_keys_file_no_more(daemon: RealDaemo
     os.kill(service, signal.SIGKILL)
     try:
         until(lambda: daemon.children().get("service") not in (None, service))
-        daemon.wait_for("ready")
-        address = f"http://{daemon.status()['parts']['service']['http']}"
+        address = f"http://{until(daemon.status)['parts']['service']['http']}"
         wrong = {"Authorization": f"Bearer {text}x"}
         assert httpx.get(f"{address}/events", headers=RIGHT).status_code == 200
         assert httpx.get(f"{address}/events", headers=wrong).status_code == 401
