@@ -54,16 +54,19 @@ def _told(
 
 
 class RobotMachine:
-    """All axes of `robot` on the buses that `settings` name; implements `Machine`."""
+    """All axes of `robot` on the buses that `settings` name; implements `Machine`.
+
+    Simulated ones in lockstep go on no faster than in `real_time`, as people move the robot.
+    """
 
     failures: tuple[type[Exception], ...] = (BusError,)
     read_only = False
 
-    def __init__(self, robot: Robot, settings: RunSettings) -> None:
+    def __init__(self, robot: Robot, settings: RunSettings, *, real_time: bool = True) -> None:
         self._robot = robot
         self._profiles = load_profiles(robot)
         self._urls = robot_urls(robot, settings.buses)
-        self.clock = open_clock(self._urls.values())
+        self.clock = open_clock(self._urls.values(), real_time=real_time)
         real = not all(url.is_simulated for url in self._urls.values())
         self._tensions = RobotTensions(robot, settings.tension_port)
         self._reference = settings.safety_io or (robot.safety_io if real else None)
