@@ -264,7 +264,7 @@ class Server(uvicorn.Server):
             )
         )
         self._listener = listener
-        self._knows = app.knows
+        self._app = app
         self._turns, self._tell = turns, tell
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -280,7 +280,7 @@ class Server(uvicorn.Server):
             )
             return protocol
 
-        shared = self._knows, self._turns, self._tell
+        shared = self._app.knows, self._app.stops_for_all, self._turns, self._tell
         receptions: Any = [Reception(one, factory, *shared) for one in sockets]
         self.servers = receptions
         self.started = True
