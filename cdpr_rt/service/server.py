@@ -300,12 +300,15 @@ def listen_unix(path: Path) -> socket.socket:
 
     What a daemon that was killed has left there is replaced, a daemon that answers is not.
     """
-    if path.exists() or path.is_symlink():
-        if not stat.S_ISSOCK(path.lstat().st_mode):
-            raise ListenError(f"socket {path}: is something else than a socket")
-        if _answers(path):
-            raise ListenError(f"socket {path}: another daemon listens there")
-        path.unlink()
+    try:
+        if path.exists() or path.is_symlink():
+            if not stat.S_ISSOCK(path.lstat().st_mode):
+                raise ListenError(f"socket {path}: is something else than a socket")
+            if _answers(path):
+                raise ListenError(f"socket {path}: another daemon listens there")
+            path.unlink()
+    except OSError as error:  # somebody else's, in a folder where all may write
+        raise ListenError(f"socket {path}: {error.strerror or error}") from None
     listener = socket.socket(socket.AF_UNIX)
     mask = os.umask(0o177)
     try:
