@@ -106,7 +106,7 @@ class LoopRig:
     def misbehave(self, axis: int, sub: int, value: int) -> None:
         """Have a drive do something on purpose (2F00h), told between two cycles."""
         where = self.robot.axes[axis]
-        self.machine._networks[where.bus].write(where.node_id, 0x2F00, sub, value)
+        self.machine.networks[where.bus].write(where.node_id, 0x2F00, sub, value)
 
     @property
     def state(self) -> LoopState:
