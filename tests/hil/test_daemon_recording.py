@@ -107,7 +107,9 @@ def test_no_cycle_is_missing_from_the_first_to_the_last(recorded: list[Path]) ->
     assert cycles.size > 200
     assert (np.diff(cycles) == 1).all()
     assert np.allclose(np.diff([row["time_s"] for row in rows]), PERIOD_s, atol=1e-6)
-    stamps = np.array([row["stamp_ns"] for row in rows])
+    timings = [row for path in recorded for _, row in messages(path, "/timing")]
+    assert [row["cycle"] for row in timings] == cycles.tolist()
+    stamps = np.array([row["stamp_ns"] for row in timings])
     assert (np.diff(stamps) > 0).all()
 
 
