@@ -46,8 +46,11 @@ def main() -> int:
     try:
         robot = with_commissioned(load_robot(settings.robot), settings.commissioned)
         require_fit(robot)
-        kind = ListeningMachine if settings.read_only else RobotMachine
-        machine = kind(robot, settings)
+        machine = (
+            ListeningMachine(robot, settings)
+            if settings.read_only
+            else RobotMachine(robot, settings, real_time=True)
+        )
         parts = loop_parts(robot, block)
     except (ProfileError, CommandError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)

@@ -57,13 +57,13 @@ def _told(
 class RobotMachine:
     """All axes of `robot` on the buses that `settings` name; implements `Machine`.
 
-    Simulated ones in lockstep go on no faster than in `real_time`, as people move the robot.
+    Simulated ones in lockstep go on as fast as they can, in `real_time` no faster than the wall.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)
     read_only = False
 
-    def __init__(self, robot: Robot, settings: RunSettings, *, real_time: bool = True) -> None:
+    def __init__(self, robot: Robot, settings: RunSettings, *, real_time: bool = False) -> None:
         self._robot = robot
         self._profiles = load_profiles(robot)
         self._urls = robot_urls(robot, settings.buses)

@@ -125,7 +125,7 @@ class LockstepRobot:
         settings = RunSettings(
             robot=self._reference, name=robot.profile, buses=(bus,), socket=Path("unused")
         )
-        self.machine = RobotMachine(robot, settings, real_time=False)
+        self.machine = RobotMachine(robot, settings)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
         parts = loop_parts(robot, block)

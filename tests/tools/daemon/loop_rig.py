@@ -43,7 +43,7 @@ class LoopRig:
         settings = RunSettings(
             robot=str(path), name="rig", buses=tuple(url.split()), socket=Path("unused"), **more
         )
-        self.machine = RobotMachine(self.robot, settings, real_time=False)
+        self.machine = RobotMachine(self.robot, settings)
         parts = loop_parts(self.robot, self.block)
         parts = replace(parts, programs={**parts.programs, **(programs or {})})
         self.loop = ControlLoop(self.block, self.machine, parts, lambda: self.now_ns)
