@@ -1,1 +1,1 @@
-"""Runtime of the controller: executive, controllers, identification; knows no bus."""
+"""Runtime of the controller: control loop, controllers, identification; knows no bus."""

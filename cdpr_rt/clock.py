@@ -18,6 +18,8 @@ from cdpr_rt.task import Condition, Task
 _T = TypeVar("_T")
 _ASIDE_LOOK_S = 0.002
 """How often is looked whether work beside the thread is done."""
+_MADE_UP_S = 0.02
+"""Of what simulated time has fallen behind the wall's, so much is made up for."""
 _LONGEST_GRANT_S = 0.1
 """Bus time goes on by so much at a time, so that a request to end is seen between."""
 
@@ -253,14 +255,18 @@ class LockstepClock(Clock):
     """The time of simulated buses which this process leads; it goes on only where somebody waits.
 
     All buses are kept at the same instant. Without any, time passes as soon as it is waited for.
+    With `real_time` it goes no faster than the wall's: a process that was held up finds it slower,
+    never later.
     """
 
     lockstep = True
 
-    def __init__(self, buses: Sequence[LedBus] = ()) -> None:
+    def __init__(self, buses: Sequence[LedBus] = (), *, real_time: bool = False) -> None:
         super().__init__()
         self._buses = list(buses)
         self._alone_s = 0.0
+        self._real_time = real_time
+        self._wall_ahead_s = -math.inf
 
     @property
     def now_s(self) -> float:
@@ -274,6 +280,21 @@ class LockstepClock(Clock):
         """Have time go on until then."""
         self.wait(None, until_s)
 
+    def turn(self) -> None:
+        """See `Clock.turn`; the next cycle is not to be early either."""
+        super().turn()
+        self._await_wall()
+
+    def _await_wall(self) -> None:
+        """Wait until the wall's time has come as far; little of what it is ahead is made up for."""
+        if not self._real_time:
+            return
+        now_s, wall_s = self.now_s, time.monotonic()
+        self._wall_ahead_s = max(self._wall_ahead_s, wall_s - now_s - _MADE_UP_S)
+        left_s = now_s + self._wall_ahead_s - wall_s
+        if left_s > 0.0:
+            time.sleep(left_s)
+
     def _listen(self, until_s: float) -> None:
         buses = self._buses = [bus for bus in self._buses if not bus.gone]
         now_s = self._alone_s = self.now_s
@@ -284,6 +305,7 @@ class LockstepClock(Clock):
             buses[0].go(until_s)
         else:
             self._go_together(until_s)
+        self._await_wall()
         for source in self._sources:
             source.poll()
 

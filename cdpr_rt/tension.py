@@ -93,7 +93,7 @@ class TensionExchange:
 
 
 class TensionWatch:
-    """Brakes a motion whose tensions are too high or not known any more (a watch of the executive).
+    """Brakes a motion whose tensions are too high or not known any more (a watch of the loop).
 
     `stop_above_N` is what no cable may exceed.
     """

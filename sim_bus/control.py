@@ -84,7 +84,7 @@ def status(hub: Hub) -> dict[str, Any]:
         "dropped": hub.dropped,
         "malformed": hub.malformed,
         "truth_log": hub.truth_log,
-        "nodes": [node.node_id for node in hub.nodes],
+        "nodes": [node.node_id for node in hub.nodes if node.node_id],
     }
 
 

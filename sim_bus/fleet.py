@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 from sim_bus.clock import ClockMode
 from sim_bus.control import status
+from sim_bus.frame_log import FrameLog
 from sim_bus.hub import Hub
 from sim_bus.node_protocol import LocalNode
-from sim_bus.server import open_hub, run_until_stopped
+from sim_bus.server import heard_by, open_hub, run_until_stopped
 from sim_bus.watcher import FINE_WAIT_S
 
 
@@ -86,17 +87,24 @@ def serve_fleet(
     *,
     mode: ClockMode = ClockMode.LOCKSTEP,
     until_stdin_ends: bool = False,
+    frame_log: FrameLog | None = None,
 ) -> None:
     """Run the nodes of all `buses` until SIGTERM or SIGINT, then close them.
 
     When all is up, one line of JSON goes to standard output: {"ready": {"robot", "pid", "buses":
     {name: {"bus", and the bus status}}}}. With `until_stdin_ends` the end of standard input stops
-    it too. Raises BusSetupError for a bus that cannot be opened, SimulatorError for a real
-    interface that went away.
+    it too. All frames go to `frame_log`, under the names of the buses. Raises BusSetupError for a
+    bus that cannot be opened, SimulatorError for a real interface that went away.
     """
     with ExitStack() as stack:
         hubs = {
-            bus.name: open_hub(stack, bus.nodes, bus.url, mode=mode, bitrate=bus.bitrate_bit_s)
+            bus.name: open_hub(
+                stack,
+                heard_by(bus.nodes, frame_log, bus.name),
+                bus.url,
+                mode=mode,
+                bitrate=bus.bitrate_bit_s,
+            )
             for bus in buses
         }
         fleet = Fleet(list(hubs.values()))

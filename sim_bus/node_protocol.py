@@ -17,7 +17,7 @@ class LocalNode(Protocol):
 
     @property
     def node_id(self) -> int:
-        """Node id in use."""
+        """Node id in use, 0 for a node that only listens."""
 
     @property
     def sync_period_s(self) -> float:

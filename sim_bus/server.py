@@ -15,12 +15,14 @@ from sim_bus.client import raw_can_socket
 from sim_bus.clock import ClockMode
 from sim_bus.control import status
 from sim_bus.errors import BusSetupError
+from sim_bus.frame_log import FrameLog
 from sim_bus.hub import Hub
 from sim_bus.membership import Gateway
 from sim_bus.node_protocol import LocalNode
 from sim_bus.ready import tell_ready
 
 _PRIORITY = 40
+_CHANNEL = "can0"
 
 
 class Loop(Protocol):
@@ -43,6 +45,7 @@ def serve(
     mode: ClockMode = ClockMode.LOCKSTEP,
     bitrate: int = 1_000_000,
     truth_log: str | None = None,
+    frame_log: FrameLog | None = None,
     until_stdin_ends: bool = False,
     slcan: bool = False,
     socketcand_port: int | None = None,
@@ -53,7 +56,8 @@ def serve(
     up, one line of JSON goes to standard output: {"ready": {"bus", "pid", and the bus status}}; a
     terminal gets a few readable lines instead.
     With `until_stdin_ends` the end of standard input (a pipe whose other end the parent holds)
-    stops it too, so that a simulator never outlives the command that started it.
+    stops it too, so that a simulator never outlives the command that started it. All frames go to
+    `frame_log`, as those of can0.
 
     A simbus can also be reached through a serial CAN adapter (`slcan`) on a pseudo-terminal and by
     the socketcand protocol on a port of 127.0.0.1 (0: any that is free); "ready" then holds
@@ -67,10 +71,16 @@ def serve(
     if not bus.startswith("simbus:") and (slcan or socketcand_port is not None):
         raise BusSetupError(f"bus {bus!r}: --slcan and --socketcand are for simbus:NAME only")
     with ExitStack() as stack:
-        hub = open_hub(stack, nodes, bus, mode=mode, bitrate=bitrate, truth_log=truth_log)
+        heard = heard_by(nodes, frame_log, _CHANNEL)
+        hub = open_hub(stack, heard, bus, mode=mode, bitrate=bitrate, truth_log=truth_log)
         gateways = _open_gateways(stack, hub, slcan, socketcand_port)
         ready = {"bus": bus, "pid": os.getpid(), **gateways, **status(hub)}
         run_until_stopped(hub, ready, mode, until_stdin_ends)
+
+
+def heard_by(nodes: Sequence[LocalNode], log: FrameLog | None, channel: str) -> Sequence[LocalNode]:
+    """Return the nodes of a bus whose frames go to `log` as those of `channel`."""
+    return nodes if log is None else (*nodes, log.ear(channel))
 
 
 def open_hub(

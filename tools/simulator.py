@@ -8,6 +8,7 @@ import select
 import subprocess
 import sys
 import time
+from itertools import count
 from pathlib import Path
 from typing import IO
 
@@ -18,8 +19,15 @@ _START_TIMEOUT_S = 180.0
 _STOP_TIMEOUT_S = 5.0
 
 
+_numbers = count(1)
+
+
 class OwnSimulator:
-    """A running `cdpr sim up`; leaves when its standard input closes, so also when we die."""
+    """A running `cdpr sim up`; leaves when its standard input closes, so also when we die.
+
+    Where the environment has CDPR_SIM_FRAME_LOG=FILE, it logs all frames there, those of further
+    simulators of this process in FILE with -2, -3 and so on at the end of its name.
+    """
 
     def __init__(
         self,
@@ -43,6 +51,8 @@ class OwnSimulator:
             command += ["--truth-log", str(truth_log)]
         if board is not None:
             command += ["--board", str(board)]
+        if log := os.environ.get("CDPR_SIM_FRAME_LOG"):
+            command += ["--frame-log", str(_numbered(Path(log), next(_numbers)))]
         self.bus = bus
         self.process = subprocess.Popen(
             command,
@@ -96,3 +106,7 @@ class OwnSimulator:
             self.process.wait()
         for pipe in (self.process.stdout, self.process.stderr):
             self._pipe(pipe).close()
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path if number == 1 else path.with_stem(f"{path.stem}-{number}")

@@ -53,6 +53,9 @@ _POSES = (
 SCALARS = tuple(name for name, _ in _SCALARS)
 AXES = tuple(name for name, _ in _AXES)
 POSES = tuple(name for name, _ in _POSES)
+FIELDS = (*SCALARS, *AXES, *POSES)
+WALL_TIMES = ("stamp_ns", "lateness_s", "exchange_s", "compute_s", "late_cycles")
+"""What a row tells of the machine that ran the loop; all else follows from the bus."""
 
 
 def cycle_dtype(n: int) -> np.dtype[np.void]:

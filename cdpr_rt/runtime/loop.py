@@ -36,7 +36,7 @@ class ControlLoop:
     Within a cycle nothing is allocated that stays, waited for, or logged. Commands are looked at
     after the cycle's own command has been sent; what takes several cycles is a generator that is
     advanced once a cycle, what waits for answers on a bus a task, which is advanced as often.
-    `clock_ns` is the clock that the right to move runs out by.
+    `clock_ns` is the clock that the right to move runs out by, and the status is renewed by.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class ControlLoop:
         self._alive = block.counters["loop_alive_ns"].data
         self.right = RightToMove(block, clock_ns)
         self._orders = Orders(self)
-        self.status = StatusPage(self)
+        self.status = StatusPage(self, clock_ns)
         self._procedure: Iterator[None] | None = None
         self.lowering_blind = False
         """Whether the winches that are left let the platform down, whatever is known of it."""

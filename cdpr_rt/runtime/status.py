@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +19,9 @@ _MOST_TEXT = 500
 class StatusPage:
     """Writes the status into the shared memory: at a change, and now and then what has grown."""
 
-    def __init__(self, loop: ControlLoop) -> None:
+    def __init__(self, loop: ControlLoop, clock_ns: Callable[[], int]) -> None:
         self._loop = loop
+        self._clock_ns = clock_ns
         self.check: dict[str, Any] = {}
         """What the last check of the bus has seen."""
         self._changed = True
@@ -36,7 +36,7 @@ class StatusPage:
     def look(self) -> None:
         """Publish what has changed; called every turn."""
         life = self._loop.life
-        now_ns = time.monotonic_ns()
+        now_ns = self._clock_ns()
         told = self._told
         if life.state is not told[0] or life.reason is not told[1]:
             self._told = life.state, life.reason

@@ -7,8 +7,8 @@ import re
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -33,6 +33,7 @@ _SYNC_S: Final = 0.4
 """With the interval and a disk at its usual pace, nothing older than a second is ever lost."""
 _MOST_ROWS: Final = 4096
 _MOST_REMARKS: Final = 1000
+_PASSING: Final = ("since_ns", "count", "slowest_exchange_s", "url")
 
 
 class Recorder:
@@ -44,6 +45,8 @@ class Recorder:
     called with it, and nobody else is concerned.
     A recorder that follows on another one of the same block goes on at the first row that was not
     safe yet.
+    It has a thread of its own between `start` and `stop`; or, where what is recorded is to depend
+    on no other clock than the loop's, `look` is called between its `begin` and `finish`.
     """
 
     name = "recording"
@@ -64,18 +67,21 @@ class Recorder:
         self._reserve_bytes = reserve_bytes
         self._ended = ended
         self._wall = WallClock(block)
-        self._texts = RowTexts(block.n)
+        self._texts = RowTexts(block.n, topics.CYCLE_FIELDS)
+        self._timing_texts = RowTexts(block.n, topics.TIMING_FIELDS)
         self._reader = RowReader(block)
         self._reader.next = int(block.counters["recorded"][0])
         self._context = Context()
         self._cycle = self._channel(topics.CYCLE, topics.cycle_schema(block.n))
+        self._timing = self._channel(topics.TIMING, topics.timing_schema())
         self._status = self._channel(topics.STATUS, topics.STATUS_SCHEMA)
         self._description = self._channel(topics.DESCRIPTION, topics.DESCRIPTION_SCHEMA)
         self._event = self._channel(topics.EVENTS, topics.EVENT_SCHEMA)
-        self._remarks: deque[dict[str, Any]] = deque(maxlen=_MOST_REMARKS)
+        self._remarks: deque[tuple[dict[str, Any], int]] = deque(maxlen=_MOST_REMARKS)
         self._seen: dict[str, int] = {}
         self._events = Events()
         self._told_status: dict[str, Any] = {}
+        self._synced_s = time.monotonic()
         self._told_lost = 0
         self._rows = 0
         self._bytes = 0
@@ -87,11 +93,8 @@ class Recorder:
 
     def start(self) -> None:
         """Open the first file and record from now on, until `stop`; see `told` for how it goes."""
-        try:
-            self._open()
-        except (ControlError, OSError) as error:
-            self._fail(str(error))
-        else:
+        self.begin()
+        if not self._error:
             self._thread.start()
 
     def stop(self) -> None:
@@ -100,15 +103,38 @@ class Recorder:
         if self._thread.is_alive():
             self._thread.join()
 
+    def begin(self) -> None:
+        """Open the first file; see `told` for how it goes."""
+        with self._failing():
+            self._open()
+
+    def look(self) -> None:
+        """Record what has come since the last time."""
+        if self._error:
+            return
+        with self._failing():
+            self._take()
+            if time.monotonic() - self._synced_s >= _SYNC_S:
+                self._synced_s = time.monotonic()
+                self._sync()
+
+    def finish(self) -> None:
+        """Record what is left and close the file."""
+        if self._error:
+            return
+        with self._failing():
+            self._take()
+            self._close()
+
     def remark(self, text: str, **values: Any) -> None:
         """Put a text for people among the events, with values that JSON knows; from any thread."""
-        self._remarks.append({"text": text, **values, "stamp_ns": time.monotonic_ns()})
+        self._remarks.append(({"text": text, **values}, time.monotonic_ns()))
 
     def told(self) -> dict[str, Any]:
         """Return how it goes: `recording`, `file`, `rows`, `lost_rows`, `bytes`, `error`."""
         file = self._file
         return {
-            "recording": self._thread.is_alive() and not self._error,
+            "recording": file is not None,
             "file": str(self._path) if self._path else None,
             "rows": self._rows,
             "lost_rows": self._reader.lost,
@@ -119,15 +145,15 @@ class Recorder:
     # -- the thread
 
     def _run(self) -> None:
+        while not self._error and not self._end.wait(_INTERVAL_S):
+            self.look()
+        self.finish()
+
+    @contextmanager
+    def _failing(self) -> Iterator[None]:
+        """End the recording where something fails."""
         try:
-            synced = time.monotonic()
-            while not self._end.wait(_INTERVAL_S):
-                self._take()
-                if time.monotonic() - synced >= _SYNC_S:
-                    synced = time.monotonic()
-                    self._sync()
-            self._take()
-            self._close()
+            yield
         except (ControlError, OSError) as error:
             self._fail(str(error))
         except BaseException as error:
@@ -204,8 +230,7 @@ class Recorder:
         if self._rows == before and (event := self._events.of_state(self._told_status)):
             self._log_event(event, time.monotonic_ns())
         while self._remarks:
-            remark = self._remarks.popleft()
-            self._log_event(remark, int(remark["stamp_ns"]))
+            self._log_event(*self._remarks.popleft())
         if self._reader.lost > self._told_lost:
             lost, self._told_lost = self._reader.lost - self._told_lost, self._reader.lost
             text = f"{lost} rows were overwritten before they could be recorded"
@@ -219,20 +244,26 @@ class Recorder:
             value = read()
         except SharedBlockError:
             return  # its writer ended in the middle of it; its end is told elsewhere
+        is_new_file = name not in self._seen
         self._seen[name] = counter
         now_ns = time.monotonic_ns()
-        channel.log(_text(value), log_time=self._wall(now_ns))
         if name == "description":
+            channel.log(_text(value), log_time=self._wall(now_ns))
             self._events.describe(value)
             return
-        self._told_status = value
+        lasting = _lasting(value)
+        if is_new_file or lasting != self._told_status:
+            channel.log(_text(lasting), log_time=self._wall(now_ns))
+        self._told_status = lasting
         if event := self._events.of_status(value):
             self._log_event(event, now_ns)
 
     def _take_rows(self, rows: Row) -> None:
-        log = self._cycle.base.log
+        log, log_timing = self._cycle.base.log, self._timing.base.log
         stamps = (rows["stamp_ns"] + self._wall.offset_ns).tolist()
-        for text, stamp in zip(self._texts(rows), stamps, strict=True):
+        texts, timings = self._texts(rows), self._timing_texts(rows)
+        for text, timing, stamp in zip(texts, timings, stamps, strict=True):
+            log_timing(timing, stamp)  # first: a file cut short then has it for each of its rows
             log(text, stamp)
         self._rows += rows.size
         for event, stamp_ns in self._events.of_rows(rows):
@@ -245,6 +276,15 @@ class Recorder:
 def reserve_of(disk_bytes: int) -> int:
     """Return what is left free of a disk of this size, for the others on it."""
     return min(_RESERVE_BYTES, disk_bytes // _RESERVE_PART)
+
+
+def _lasting(status: dict[str, Any]) -> dict[str, Any]:
+    """Return a status without what rows tell, and what is another for each process and moment."""
+    return {
+        name: _lasting(value) if isinstance(value, dict) else value
+        for name, value in status.items()
+        if name not in _PASSING
+    }
 
 
 def _text(value: dict[str, Any]) -> bytes:

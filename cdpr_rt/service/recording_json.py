@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from cdpr_rt.exchange import FloatArray
 from cdpr_rt.jit import jit
-from cdpr_rt.runtime.cycle_row import AXES, POSES, SCALARS, Row, cycle_dtype
+from cdpr_rt.runtime.cycle_row import Row, cycle_dtype
 
 _FLOAT, _INTEGER, _BOOLEAN, _NOTHING = 0, 1, 2, 3
 _KINDS: Final = {"f": _FLOAT, "i": _INTEGER, "u": _INTEGER, "b": _BOOLEAN}
@@ -22,12 +23,12 @@ Numbers = NDArray[np.int64]
 
 
 class RowTexts:
-    """Turns rows for n axes into one JSON object each, fields in the order of the row.
+    """Turns the fields `names` of rows for n axes into one JSON object each, in this order.
 
     Numbers are rounded to 1e-9 of their unit; what is not finite becomes null.
     """
 
-    def __init__(self, n: int) -> None:
+    def __init__(self, n: int, names: Sequence[str]) -> None:
         self._fields: list[tuple[str, bool, slice]] = []
         used = {True: 0, False: 0}
         literals: list[str] = []
@@ -35,7 +36,7 @@ class RowTexts:
         columns: list[int] = []
         dtype = cycle_dtype(n)
         before = "{"
-        for name in (*SCALARS, *AXES, *POSES):
+        for name in names:
             kind = _KINDS[dtype[name].base.kind]
             shape = dtype[name].shape
             width = shape[0] if shape else 1

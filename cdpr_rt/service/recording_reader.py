@@ -18,7 +18,7 @@ from pyarrow import json as arrow_json
 from zstandard import ZstdError
 
 from cdpr_rt.service.recording_file import PROFILE, RecordingError
-from cdpr_rt.service.recording_schema import CYCLE, DESCRIPTION, EVENTS, STATUS
+from cdpr_rt.service.recording_schema import CYCLE, DESCRIPTION, EVENTS, MEANING, STATUS, TIMING
 from profiles.bounded_input import open_regular, parse_json
 from profiles.errors import ProfileError
 
@@ -41,6 +41,8 @@ _BROKEN: Final = (
 _MOST_CHUNK_BYTES: Final = 1 << 28
 _TYPES: Final = {"number": pa.float64(), "integer": pa.int64(), "boolean": pa.bool_()}
 _ALWAYS: Final = ("time_s", "stamp_ns")
+
+_PLACES: Final = {name: k for k, name in enumerate(MEANING)}
 
 CLOSED, KILLED, CUT = "closed", "not closed", "cut short"
 
@@ -71,6 +73,8 @@ class RecordingReader:
         file breaks off."""
         self.position = 0
         """Bytes read so far."""
+        self._timings: list[bytes] = []
+        """Messages of rows to come: a chunk may end between the two."""
 
     def cycles(self, fields: Collection[str] | None = None) -> Iterator[Columns]:
         """Yield the rows, some hundred at a time; all fields or only `fields`."""
@@ -132,7 +136,6 @@ class RecordingReader:
     ) -> Columns:
         """Take in one chunk; return the rows in it, nothing where there are none."""
         rows: list[bytes] = []
-        schema_id = 0
         for record in breakup_chunk(chunk, validate_crc=True):
             if isinstance(record, Schema):
                 schemas[record.id] = record
@@ -140,19 +143,26 @@ class RecordingReader:
                 channels[record.id] = record
             elif isinstance(record, Message):
                 channel = channels[record.channel_id]
-                if channel.topic == CYCLE:
-                    rows.append(record.data)
-                    schema_id = channel.schema_id
+                if channel.topic in (CYCLE, TIMING):
+                    (rows if channel.topic == CYCLE else self._timings).append(record.data)
                 else:
                     self._take(channel.topic, record)
         if not rows:
             return {}
-        properties = parse_json(schemas[schema_id].data, "schema")["properties"]
+        parts = {CYCLE: rows}
+        topics = {channel.topic: channel.schema_id for channel in channels.values()}
+        if TIMING in topics:  # one topic held all of it once
+            parts[TIMING] = self._timings[: len(rows)]
+            del self._timings[: len(rows)]
+        known = {
+            topic: parse_json(schemas[topics[topic]].data, "schema")["properties"]
+            for topic in parts
+        }
         for name in (*(fields or ()), *_ALWAYS):
-            if name not in properties:
+            if not any(name in properties for properties in known.values()):
                 version = self.metadata.get("version")
                 raise RecordingError(f"{self.path}: has no {name}; recorded by version {version}")
-        return _columns(rows, properties, fields)
+        return _joined([(parts[topic], known[topic]) for topic in parts], fields)
 
     def _take(self, topic: str, message: Message) -> None:
         if topic not in (DESCRIPTION, STATUS, EVENTS):
@@ -168,6 +178,22 @@ class RecordingReader:
             self.events.append(
                 {"log_time_ns": message.log_time, **value, "text": str(value["text"])}
             )
+
+
+def _joined(
+    parts: list[tuple[list[bytes], dict[str, Any]]], fields: Collection[str] | None
+) -> Columns:
+    """Return the columns of all parts of the same rows; raises ValueError where they are not."""
+    wanted = None if fields is None else {*fields, "cycle"}
+    joined = _columns(*parts[0], wanted)
+    for messages, properties in parts[1:]:
+        if wanted is None or wanted & (properties.keys() - {"cycle"}):
+            columns = _columns(messages, properties, wanted)
+            if not np.array_equal(joined["cycle"], columns["cycle"]):
+                raise ValueError("rows and their timing belong to other cycles")
+            joined |= columns
+    names = sorted(joined, key=lambda name: _PLACES.get(name, len(_PLACES)))
+    return {name: joined[name] for name in names if fields is None or name in fields}
 
 
 def _columns(

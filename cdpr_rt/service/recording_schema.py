@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 from cdpr_rt.limits import Limit
-from cdpr_rt.runtime.cycle_row import AXES, POSES, SCALARS, cycle_dtype
+from cdpr_rt.runtime.cycle_row import FIELDS, WALL_TIMES, cycle_dtype
 from cdpr_rt.runtime.states import LoopState, Reaction
 
-CYCLE, STATUS, DESCRIPTION, EVENTS = "/cycle", "/status", "/description", "/events"
+CYCLE, TIMING, STATUS, DESCRIPTION, EVENTS = (
+    "/cycle", "/timing", "/status", "/description", "/events"
+)  # fmt: skip
+CYCLE_FIELDS: Final = tuple(name for name in FIELDS if name not in WALL_TIMES)
+TIMING_FIELDS: Final = ("cycle", *WALL_TIMES)
 
 _STATES = ", ".join(f"{state.value} {state.label}" for state in LoopState)
 _REACTIONS = ", ".join(f"{reaction.value} {reaction.label}" for reaction in Reaction)
@@ -61,14 +66,26 @@ _KNOWN_OR_NOT = {"type": ["number", "null"]}
 
 
 def cycle_schema(n: int) -> dict[str, Any]:
-    """Return the schema of a row for n axes.
+    """Return the schema of a row for n axes, without what the wall's time is in."""
+    about = "One cycle of the control loop; arrays over the axes, in SI units"
+    return _row_schema("Cycle", about, CYCLE_FIELDS, n)
+
+
+def timing_schema() -> dict[str, Any]:
+    """Return the schema of what the wall's time is in, of one row."""
+    about = "When a cycle of the control loop ran, and how long it took, by the wall's time"
+    return _row_schema("Timing", about, TIMING_FIELDS, 1)
+
+
+def _row_schema(title: str, about: str, names: Sequence[str], n: int) -> dict[str, Any]:
+    """Return the schema of the fields `names` of a row for n axes.
 
     Numbers may be null, which viewers do not expect of a schema: they read the plain `type` beside
     `$ref`, which a validator of this draft has to ignore.
     """
     dtype = cycle_dtype(n)
     properties: dict[str, Any] = {}
-    for name in (*SCALARS, *AXES, *POSES):
+    for name in names:
         one: dict[str, Any] = {"type": _TYPES[dtype[name].base.kind]}
         if one["type"] == "number":
             one["$ref"] = "#/definitions/known_or_not"
@@ -78,8 +95,8 @@ def cycle_schema(n: int) -> dict[str, Any]:
         properties[name] = {**one, "description": MEANING[name]}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
-        "title": "cdpr_rt.Cycle",
-        "description": "One cycle of the control loop; arrays over the axes, in SI units",
+        "title": f"cdpr_rt.{title}",
+        "description": about,
         "type": "object",
         "definitions": {"known_or_not": _KNOWN_OR_NOT},
         "properties": properties,

@@ -120,8 +120,8 @@ class LedBus(Intake):
 class LeadingClock(LockstepClock):
     """The time of simulated buses, by their URLs; they stand still while nobody waits."""
 
-    def __init__(self, buses: Mapping[str, LedBus]) -> None:
-        super().__init__(list(buses.values()))
+    def __init__(self, buses: Mapping[str, LedBus], *, real_time: bool = False) -> None:
+        super().__init__(list(buses.values()), real_time=real_time)
         self._by_url = dict(buses)
         latest_s = max(bus.now_s for bus in buses.values())
         for bus in buses.values():
@@ -166,11 +166,11 @@ class LeadingClock(LockstepClock):
             bus.give_back()
 
 
-def open_clock(urls: Iterable[BusUrl]) -> Clock:
+def open_clock(urls: Iterable[BusUrl], *, real_time: bool = False) -> Clock:
     """Return the clock of the robot on these buses.
 
     That of simulated buses in lockstep which nobody else leads is theirs, and this process leads
-    them from now on; any other is CLOCK_MONOTONIC.
+    them from now on, in `real_time` no faster than the wall; any other is CLOCK_MONOTONIC.
     """
     buses: dict[str, LedBus] = {}
     for url in urls:
@@ -180,7 +180,7 @@ def open_clock(urls: Iterable[BusUrl]) -> Clock:
                 bus.give_back()
             return PacedClock()
         buses[str(url)] = led
-    return LeadingClock(buses) if buses else PacedClock()
+    return LeadingClock(buses, real_time=real_time) if buses else PacedClock()
 
 
 def _lead(url: BusUrl) -> LedBus | None:

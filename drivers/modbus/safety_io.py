@@ -29,7 +29,7 @@ class SafetyIoError(DriverError):
 
 
 class SafetyIo:
-    """One safety I/O; implements `cdpr_rt.executive.Watch`.
+    """One safety I/O; implements `cdpr_rt.cycle.Watch`.
 
     A task of `clock` polls and writes; whoever reads `alarm` or `stop_reason` judges by himself
     how old the last good poll is, so that a task that waits for an answer trips as well. While
@@ -61,7 +61,7 @@ class SafetyIo:
         self._state: IoState | None = None
         self._task: Task[None] | None = None
 
-    # -- what the executive asks every cycle
+    # -- what the loop asks every cycle
 
     def alarm(self) -> str:
         """Return why the torque must go at once, or an empty text."""

@@ -223,3 +223,22 @@ def test_work_aside_returns_what_it_does_and_raises_what_it_raises(kind: type[Cl
     )
     with pytest.raises(ZeroDivisionError):
         clock.aside(lambda: 1 // 0)
+
+
+def test_in_real_time_simulated_time_is_never_ahead_of_the_walls() -> None:
+    clock = LockstepClock(real_time=True)
+    clock.sleep(0.01)
+    begin_s, began_s = clock.now_s, time.monotonic()
+    for _ in range(10):
+        clock.sleep(0.02)
+        assert clock.now_s - begin_s <= time.monotonic() - began_s + 0.02
+
+
+def test_in_real_time_what_was_missed_is_not_made_up_for() -> None:
+    clock = LockstepClock(real_time=True)
+    clock.sleep(0.01)
+    time.sleep(0.3)  # as of a machine that was busy
+    clock.sleep(0.001)
+    began_s = time.monotonic()
+    clock.sleep(0.1)
+    assert time.monotonic() - began_s > 0.07

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import select
@@ -14,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+
+from tools.simulator import OwnSimulator
 
 # slow enough for a machine on which other tests run: its paced simulator must answer in time
 _ROBOT = """
@@ -37,6 +40,7 @@ node_id = 2
 """
 NAME, PERIOD_S = "slow-2", 0.01
 PATIENCE_S = 60.0
+_names = itertools.count()
 
 
 def write_robot(folder: Path, period_s: float = PERIOD_S, limits: str = "") -> Path:
@@ -66,7 +70,7 @@ def alive(pid: int) -> bool:
 class RealDaemon:
     """`cdpr run` of a slow robot with two axes, or of `robot`; `ready` is the line that it is up.
 
-    Where an answer came late while the bus was checked, it is checked again until it is ready.
+    Its drives live by the wall's clock where they are `paced`, else their time waits for the loop.
     """
 
     def __init__(
@@ -79,6 +83,7 @@ class RealDaemon:
         limits: str = "",
         robot: Path | None = None,
         cwd: Path | None = None,
+        paced: bool = False,
     ) -> None:
         self.socket = folder / "control.sock"
         self.at = ("--socket", str(self.socket))
@@ -86,6 +91,10 @@ class RealDaemon:
         self.http = httpx.Client(transport=transport, base_url="http://localhost", timeout=20.0)
         self._errors = (folder / "errors").open("w+")
         self.robot = robot or write_robot(folder, period_s, limits)
+        self._simulator: OwnSimulator | None = None
+        if paced:
+            bus = f"simbus:paced-{os.getpid()}-{next(_names)}"
+            self._simulator = OwnSimulator(str(self.robot), bus, paced=True)
         asked = ("run", str(self.robot), "--bus", bus, *self.at)
         command = [sys.executable, "-P", "-m", "tools.cli", *asked]
         self.process = subprocess.Popen(
@@ -96,9 +105,10 @@ class RealDaemon:
             env={**os.environ, **(env or {})},
             cwd=cwd,
         )
+        self.bus = f"simbus:own-{self.process.pid}" if bus == "simbus:" else bus
         try:
             self.ready: dict[str, Any] = json.loads(self._first_line())["ready"]
-            until(self._is_ready)
+            self.wait_for("ready")
         except BaseException as error:
             error.add_note(f"{self.status()} {self.errors()}")
             self.end()
@@ -110,13 +120,6 @@ class RealDaemon:
         line = self.process.stdout.readline() if told else ""
         assert line, self.errors()
         return line
-
-    def _is_ready(self) -> bool:
-        state = self.status().get("state")
-        asked = {"unconfigured": "/configure", "inactive": "/check", "fault": "/acknowledge"}
-        if state in asked:
-            self.http.post(asked[state], json={})
-        return state == "ready"
 
     def errors(self) -> str:
         """Return what it has said on standard error so far."""
@@ -169,6 +172,8 @@ class RealDaemon:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.communicate()
+        if self._simulator is not None:
+            self._simulator.stop()
         self._errors.close()
         return self.process.returncode
 

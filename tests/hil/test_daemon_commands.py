@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 from daemon_lab import (
     KEY,
-    again_where_the_machine_was_too_busy,
     angles,
     running,
     setpoints,
@@ -86,7 +85,6 @@ def terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     return Terminal(capsys, monkeypatch)
 
 
-@again_where_the_machine_was_too_busy
 def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> None:
     result = terminal.told("move", "left=20", "right=-15", "--speed", "200", *quick.at)
     assert result["arrived"] is True
@@ -97,7 +95,6 @@ def test_a_move_ends_where_it_should(quick: RealDaemon, terminal: Terminal) -> N
     assert setpoints(quick) == pytest.approx([20.0, -10.0], abs=0.1)
 
 
-@again_where_the_machine_was_too_busy
 def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: Terminal) -> None:
     start = setpoints(quick)
     result = terminal.told("jog", "left=40", "--seconds", "1", *quick.at)
@@ -108,7 +105,6 @@ def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: T
     assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0
 
 
-@again_where_the_machine_was_too_busy
 def test_a_controller_runs_to_its_end_and_hold_follows(
     quick: RealDaemon, terminal: Terminal
 ) -> None:

@@ -100,9 +100,8 @@ def test_a_loop_that_stands_still_is_killed_and_that_is_not_called_confirmed(
 def test_a_listener_stops_nothing_and_says_of_the_drives_what_it_hears(
     daemon: RealDaemon, tmp_path: Path
 ) -> None:
-    bus = f"simbus:own-{daemon.process.pid}"
     options = ("--no-record", "--read-only")
-    listener = RealDaemon(tmp_path, *options, bus=bus, period_s=PERIOD_S, limits=PATIENT)
+    listener = RealDaemon(tmp_path, *options, bus=daemon.bus, period_s=PERIOD_S, limits=PATIENT)
     try:
         with in_motion(daemon) as ear:
             status, told = estop(*listener.at)

@@ -19,7 +19,6 @@ import pytest
 import schemathesis
 from daemon_lab import (
     RIGHT,
-    again_where_the_machine_was_too_busy,
     angles,
     events,
     happened,
@@ -160,7 +159,6 @@ WISHES = st.dictionaries(
 )
 
 
-@again_where_the_machine_was_too_busy
 def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
     loop = quick.children()["loop"]
     programs = quick.http.get("/description").json()["programs"]
@@ -182,7 +180,6 @@ def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
     assert alive(loop)
 
 
-@again_where_the_machine_was_too_busy
 def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(quick: RealDaemon) -> None:
     command = [sys.executable, "-m", "tools.cli", "jog", "left=60", "--seconds", "60", *quick.at]
     client = subprocess.Popen(command)
@@ -198,7 +195,6 @@ def test_a_client_that_is_killed_while_it_jogs_leaves_an_axis_at_rest(quick: Rea
     assert "nobody holds the right to move" in quick.status()["reason"]
 
 
-@again_where_the_machine_was_too_busy
 def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
     quick: RealDaemon,
 ) -> None:
@@ -227,8 +223,7 @@ def test_a_service_that_comes_back_needs_the_keys_file_no_more(daemon: RealDaemo
     os.kill(service, signal.SIGKILL)
     try:
         until(lambda: daemon.children().get("service") not in (None, service))
-        daemon.wait_for("ready")
-        address = f"http://{daemon.status()['parts']['service']['http']}"
+        address = f"http://{until(daemon.status)['parts']['service']['http']}"
         wrong = {"Authorization": f"Bearer {text}x"}
         assert httpx.get(f"{address}/events", headers=RIGHT).status_code == 200
         assert httpx.get(f"{address}/events", headers=wrong).status_code == 401

@@ -36,7 +36,7 @@ class Ear:
     """Hears every frame of the daemon's bus, with the time at which it came."""
 
     def __init__(self, daemon: RealDaemon) -> None:
-        self.bus = BusUrl.parse(f"simbus:own-{daemon.process.pid}-can0")
+        self.bus = BusUrl.parse(f"{daemon.bus}-can0")
         self.frames: list[tuple[float, int, bytes]] = []
         self._port = open_port(self.bus)
         self._port.settimeout(0.1)
@@ -70,7 +70,8 @@ class Ear:
 
 
 def slow_daemon(folder: Path) -> RealDaemon:
-    return RealDaemon(folder, "--no-record", period_s=PERIOD_S, limits=PATIENT)
+    """Return one whose drives do not wait for it."""
+    return RealDaemon(folder, "--no-record", period_s=PERIOD_S, limits=PATIENT, paced=True)
 
 
 @pytest.fixture(scope="module")

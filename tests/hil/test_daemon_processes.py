@@ -68,15 +68,19 @@ def test_it_is_up_without_power_and_systemd_hears_so(daemon: RealDaemon, manager
         assert b"NOTIFY_SOCKET" not in Path(f"/proc/{pid}/environ").read_bytes()
 
 
-def test_the_loops_core_is_left_to_it(daemon: RealDaemon) -> None:
-    children = daemon.children()
-    taken = os.sched_getaffinity(children["loop"])
-    if len(taken) > 1:  # it could not have one, and says so
-        assert any("none to itself" in n or "ordinary" in n for n in daemon.status()["notices"])
-        return
-    for pid in (daemon.process.pid, children["service"], children["simulator"]):
-        for task in Path(f"/proc/{pid}/task").iterdir():
-            assert not taken & os.sched_getaffinity(int(task.name))
+def test_the_core_of_a_loop_that_has_to_be_punctual_is_left_to_it(tmp_path: Path) -> None:
+    daemon = RealDaemon(tmp_path, "--no-record", paced=True)
+    try:
+        children = daemon.children()
+        taken = os.sched_getaffinity(children["loop"])
+        if len(taken) > 1:  # it could not have one, and says so
+            assert any("none to itself" in n or "ordinary" in n for n in daemon.status()["notices"])
+            return
+        for pid in (daemon.process.pid, children["service"]):
+            for task in Path(f"/proc/{pid}/task").iterdir():
+                assert not taken & os.sched_getaffinity(int(task.name))
+    finally:
+        daemon.end()
 
 
 def test_a_second_daemon_for_the_same_robot_is_refused(daemon: RealDaemon) -> None:

@@ -19,13 +19,6 @@ from mcap.reader import make_reader
 from websockets.sync.client import connect
 
 PERIOD_s = 0.01
-TOLERANT = """
-late_s = 5.0
-missed_cycles = 500
-missed_in_window = 1000
-stale_cycles = 2000
-"""
-"""So that it runs to its end on a machine that is busy with other tests."""
 
 
 def told(*arguments: str | Path) -> dict[str, Any]:
@@ -89,7 +82,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Path]]:
     folder = tmp_path_factory.mktemp("run")
     recordings = folder / "recordings"
     with few_files(512):
-        daemon = RealDaemon(folder, "--record", str(recordings), "--live", "0", limits=TOLERANT)
+        daemon = RealDaemon(folder, "--record", str(recordings), "--live", "0")
     try:
         told("enable", *daemon.at)
         assert set(watch_live(daemon)) == {"left", "right"}
@@ -114,7 +107,9 @@ def test_no_cycle_is_missing_from_the_first_to_the_last(recorded: list[Path]) ->
     assert cycles.size > 200
     assert (np.diff(cycles) == 1).all()
     assert np.allclose(np.diff([row["time_s"] for row in rows]), PERIOD_s, atol=1e-6)
-    stamps = np.array([row["stamp_ns"] for row in rows])
+    timings = [row for path in recorded for _, row in messages(path, "/timing")]
+    assert [row["cycle"] for row in timings] == cycles.tolist()
+    stamps = np.array([row["stamp_ns"] for row in timings])
     assert (np.diff(stamps) > 0).all()
 
 

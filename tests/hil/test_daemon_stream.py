@@ -55,9 +55,8 @@ def ask(daemon: RealDaemon, path: str, token: str, **body: Any) -> dict[str, Any
 
 def follow(daemon: RealDaemon) -> str:
     """Take the right to move, enable the drives, and have them follow; return the token."""
-    for name in ("disable", "acknowledge"):
-        daemon.http.post(f"/{name}", json={})
-    until(daemon._is_ready)
+    daemon.http.post("/disable", json={})
+    daemon.wait_for("ready")
     until(lambda: not daemon.http.get("/control").json()["held"])
     token = daemon.http.post("/control", json={"client": "hand", "ttl_s": 5.0}).json()["token"]
     ask(daemon, "/enable", token, program="follow")
@@ -154,16 +153,15 @@ def test_a_hostile_network_makes_no_step(daemon: RealDaemon) -> None:
 
 
 def test_a_second_daemon_is_refused_and_a_listener_is_not(daemon: RealDaemon, folder: Path) -> None:
-    bus = f"simbus:own-{daemon.process.pid}"
-    until(daemon._is_ready)
+    daemon.wait_for("ready")
     other = folder / "other.sock"
-    told = cdpr("run", daemon.robot, "--bus", bus, "--socket", other, "--no-record")
+    told = cdpr("run", daemon.robot, "--bus", daemon.bus, "--socket", other, "--no-record")
     assert told.returncode == 1
     assert f"process {daemon.children()['loop']} " in told.stderr
     assert "or give --read-only to listen" in told.stderr
     beside = folder / "beside"
     beside.mkdir()
-    listener = RealDaemon(beside, "--read-only", "--no-record", bus=bus)
+    listener = RealDaemon(beside, "--read-only", "--no-record", bus=daemon.bus)
     try:
         heard = listener.status()["cycle"]["cycle"]
         follow(daemon)

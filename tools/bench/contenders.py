@@ -45,7 +45,7 @@ class Exchange(Protocol):
 
 
 class OwnExchange:
-    """`AxisGroup`, as the cyclic executive calls it."""
+    """`AxisGroup`, as the control loop calls it."""
 
     name = "ours"
 

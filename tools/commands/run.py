@@ -145,7 +145,7 @@ def run(
         simulator = None
         if asks_for_own_simulator(bus or ()):
             out.note(f"starting simulated drives: {len(profile.axes)} ...")
-            simulator = OwnSimulator(profile.reference, settings.buses[0], plant, paced=True)
+            simulator = OwnSimulator(profile.reference, settings.buses[0], plant)
             stack.callback(simulator.stop)
         _launch(profile, settings, out, manager, simulator)
 

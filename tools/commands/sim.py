@@ -18,6 +18,7 @@ from sim_bus.canopen.lss import UNCONFIGURED
 from sim_bus.canopen.store import StoreError
 from sim_bus.clock import ClockMode
 from sim_bus.drive import SimDrive
+from sim_bus.frame_log import FrameLog
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
@@ -72,6 +73,12 @@ def up(
         Path | None,
         typer.Option(help="Write the true motion, or pose, to this file (one drive, or a robot)."),
     ] = None,
+    frame_log: Annotated[
+        Path | None,
+        typer.Option(
+            "--frame-log", help="Write every frame, at bus time, to this file, as candump does."
+        ),
+    ] = None,
     unconfigured: Annotated[
         bool, typer.Option("--unconfigured", help="New drives: without node ids, waiting for LSS.")
     ] = False,
@@ -111,6 +118,7 @@ def up(
             *(profile, bus, plant, mode, stores, board, exit_with_stdin),
             truth_log=truth_log,
             detached=detached,
+            frame_log=_frame_log(frame_log),
         )
         return
     if detached:
@@ -137,6 +145,7 @@ def up(
             mode=mode,
             bitrate=profile.bitrate_bit_s,
             truth_log=str(truth_log) if truth_log else None,
+            frame_log=_frame_log(frame_log),
             until_stdin_ends=exit_with_stdin,
             slcan=slcan,
             socketcand_port=socketcand,
@@ -165,6 +174,16 @@ def _drives(
         stack.callback(drive.close)
         drives.append(drive)
     return drives
+
+
+def _frame_log(path: Path | None) -> FrameLog | None:
+    """Return the log that the buses close when they end."""
+    if path is None:
+        return None
+    try:
+        return FrameLog(path)
+    except OSError as error:
+        raise BadInputError(f"--frame-log {path}: {error.strerror}") from error
 
 
 def _store_file(folder: Path | None, serial: int) -> Path | None:

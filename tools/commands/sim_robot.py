@@ -13,6 +13,7 @@ from sim_bus.canopen.store import StoreError
 from sim_bus.clock import ClockMode
 from sim_bus.drive import SimDrive, transmission_of
 from sim_bus.fleet import FleetBus, serve_fleet
+from sim_bus.frame_log import FrameLog
 from sim_bus.motor_state import Transmission
 from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
@@ -33,14 +34,15 @@ def up(
     until_stdin_ends: bool,
     truth_log: Path | None = None,
     detached: bool = False,
+    frame_log: FrameLog | None = None,
 ) -> None:
     """Run the simulated drives of `robot` until Ctrl-C; serial numbers count the axes from 1.
 
     `plant` is a plant file: of the whole robot where it has a platform, whose true pose goes into
     `truth_log`; otherwise that of each motor, which differ in their noise only. `detached` leaves
     the cables off the drums: the same motors turn freely. `board` is a file to make, through which
-    other simulated devices share the axes' physics. Raises BadInputError for a robot that does not
-    fit its buses, and BusSetupError.
+    other simulated devices share the axes' physics. All frames go to `frame_log`. Raises
+    BadInputError for a robot that does not fit its buses, and BusSetupError.
     """
     require_fit(robot)
     urls = robot_urls(robot, buses)
@@ -79,7 +81,12 @@ def up(
             )
             for bus in robot.buses
         ]
-        serve_fleet(robot.reference, fleet, mode=mode, until_stdin_ends=until_stdin_ends)
+        serve_fleet(
+            *(robot.reference, fleet),
+            mode=mode,
+            until_stdin_ends=until_stdin_ends,
+            frame_log=frame_log,
+        )
 
 
 def _physics(

@@ -51,7 +51,9 @@ def main() -> int:
         if settings.read_only:
             machine = ListeningMachine(robot, settings.buses)
         else:
-            machine = RobotMachine(robot, settings.buses, settings.safety_io, settings.tension_port)
+            machine = RobotMachine(
+                robot, settings.buses, settings.safety_io, settings.tension_port, real_time=True
+            )
         parts = loop_parts(robot, block)
     except (ProfileError, CommandError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)

@@ -58,6 +58,7 @@ class RobotMachine:
 
     There is power only while the `safety_io` allows it: the robot's own where none is named, unless
     all buses are simulated. Tensions are measured where their sensors are at a `tension_port`.
+    Simulated buses in lockstep go on as fast as they can, in `real_time` no faster than the wall.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)
@@ -69,11 +70,13 @@ class RobotMachine:
         buses: Sequence[str],
         safety_io: str | None = None,
         tension_port: str | None = None,
+        *,
+        real_time: bool = False,
     ) -> None:
         self._robot = robot
         self._profiles = load_profiles(robot)
         self._urls = robot_urls(robot, buses)
-        self.clock = open_clock(self._urls.values())
+        self.clock = open_clock(self._urls.values(), real_time=real_time)
         real = not all(url.is_simulated for url in self._urls.values())
         self._tensions = RobotTensions(robot, tension_port)
         self._reference = safety_io or (robot.safety_io if real else None)

@@ -82,7 +82,7 @@ class Hoist:
 
 
 class _Lowering:
-    """From where the set-point is back to the start; the executive enters it at half its time."""
+    """From where the set-point is back to the start; it is entered at half its time."""
 
     def __init__(self, here_rad: FloatArray, start_rad: FloatArray, speed_rad_s: float) -> None:
         travel = start_rad - here_rad

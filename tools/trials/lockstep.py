@@ -82,7 +82,7 @@ class LockstepRobot:
         self._plant, self._truth_path, self._record = plant, truth_log, record
         self._more_programs = dict(programs or {})
         self._stack = ExitStack()
-        self._turns = 0
+        self._turns = self._status_seen = 0
         self.block: SharedBlock
         self.machine: RobotMachine
         self.loop: ControlLoop
@@ -135,7 +135,7 @@ class LockstepRobot:
         if self._record is not None:
             self.recorder = Recorder(block, self._record, robot.profile)
             stack.callback(self._end_recording)
-            self.recorder.start()
+            self.recorder.begin()
         self._boot()
         if self._truth_path is not None:
             self._truth = stack.enter_context(PoseLogTail(self._truth_path))
@@ -152,7 +152,7 @@ class LockstepRobot:
     def _end_recording(self) -> None:
         recorder = self.recorder
         if recorder is not None:
-            recorder.stop()
+            recorder.finish()
 
     # -- time
 
@@ -174,14 +174,18 @@ class LockstepRobot:
 
     def turn(self, turns: int = 1) -> None:
         """Run so many cycles."""
-        loop, right, stream = self.loop, self.right, self.stream
+        loop, right, stream, recorder = self.loop, self.right, self.stream, self.recorder
+        status = self.block.counters["status"]
         for _ in range(turns):
             right.look()
             stream.look()
             loop.turn()
             self._turns += 1
-            if self._turns % _LOOK_CYCLES == 0:
-                self._wait_for_recorder()
+            if recorder is not None and (
+                self._turns % _LOOK_CYCLES == 0 or status[0] != self._status_seen
+            ):
+                self._status_seen = int(status[0])
+                recorder.look()
 
     def run(self, seconds: float) -> Row:
         """Run cycles for `seconds` of bus time; return their rows."""
@@ -215,15 +219,6 @@ class LockstepRobot:
             elif time.monotonic() - last > _PATIENCE_S:
                 raise WorkFailedError(f"{what}: no cycle ran for {_PATIENCE_S:g} s: {self.told()}")
             self.turn()
-
-    def _wait_for_recorder(self) -> None:
-        """Let the recorder catch up before rows are lost to it."""
-        recorder, counters = self.recorder, self.block.counters
-        while recorder is not None and recorder.told()["recording"]:
-            behind = int(counters["rows"][0]) - int(counters["recorded"][0])
-            if behind < self.block.capacity // 2:
-                return
-            time.sleep(0.01)
 
     # -- commands
 

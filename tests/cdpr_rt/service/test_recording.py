@@ -1,6 +1,7 @@
 """Recording: nothing is missing, whatever ends it, and the stock `mcap` package reads it."""
 
 import io
+import json
 import os
 import shutil
 import threading
@@ -21,6 +22,7 @@ from recording_rig import (
     stock_messages,
 )
 
+from cdpr_rt.runtime.cycle_row import FIELDS, WALL_TIMES
 from cdpr_rt.runtime.shared_block import RowWriter
 from cdpr_rt.runtime.states import Reaction
 from cdpr_rt.runtime.stream_buttons import confirmation, stream_buttons
@@ -76,7 +78,82 @@ def test_read_back_as_columns(recorded: Path) -> None:
         assert (
             abs(columns[name] - rows[name]).max() < 1e-9 or (columns[name] != columns[name]).all()
         )
-    assert set(read_columns([recorded], ["cycle", "pose"])) == {"cycle", "pose"}
+    assert list(columns) == list(FIELDS)
+    for fields in (["cycle"], ["cycle", "pose"], ["pose", "stamp_ns"], ["compute_s"]):
+        assert set(read_columns([recorded], fields)) == set(fields)
+
+
+def _without_some_messages(path: Path, out: Path, dropped: set[tuple[str, int]]) -> Path:
+    """Write the file anew in small chunks, without messages of some topics and cycles."""
+    with path.open("rb") as file, out.open("wb") as target:
+        reader = make_reader(file)
+        writer = Writer(target, chunk_size=3000)
+        writer.start(profile="cdpr-rt")
+        for record in reader.iter_metadata():
+            writer.add_metadata(record.name, record.metadata)
+        ids: dict[str, int] = {}
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
+            assert schema is not None
+            if channel.topic not in ids:
+                schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+                ids[channel.topic] = writer.register_channel(channel.topic, "json", schema_id)
+            cycle = json.loads(message.data).get("cycle", -1)
+            if (channel.topic, cycle) not in dropped:
+                writer.add_message(ids[channel.topic], message.log_time, message.data, 0)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return out
+
+
+def test_wall_times_stand_apart_and_are_joined_again(tmp_path: Path) -> None:
+    path = _recorded(tmp_path, 500)
+    assert not set(WALL_TIMES) & stock_messages(path, "/cycle")[0][1].keys()
+    assert set(WALL_TIMES) < stock_messages(path, "/timing")[0][1].keys()
+    chunks = tmp_path / "chunks.mcap"  # many of them end between a row and its timing
+    _without_some_messages(path, chunks, set())
+    with chunks.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None and len(summary.chunk_indexes) > 100
+    assert (read_columns([chunks])["stamp_ns"] == made_rows(0, 500)["stamp_ns"]).all()
+    # the last row is missing of which the file has the timing
+    _without_some_messages(path, chunks, {("/cycle", 499)})
+    assert (read_columns([chunks])["stamp_ns"] == made_rows(0, 499)["stamp_ns"]).all()
+
+
+def test_a_row_never_gets_the_timing_of_another(tmp_path: Path) -> None:
+    path = _recorded(tmp_path, 500)
+    damaged = _without_some_messages(path, tmp_path / "damaged.mcap", {("/timing", 300)})
+    reader = RecordingReader(damaged)
+    rows = [int(stamp) for part in reader.cycles() for stamp in part["stamp_ns"]]
+    assert reader.ended == CUT and 200 < len(rows) <= 300
+    assert rows == made_rows(0, len(rows))["stamp_ns"].tolist()
+
+
+def test_two_runs_at_other_times_give_the_same_messages(tmp_path: Path) -> None:
+    told = []
+    for run in range(2):
+        block = block_with_clock()
+        block.counters["start_realtime_ns"] += run * 5_000_000_000
+        rows = made_rows(0, 300)
+        rows["state"][100:] = 4
+        rows["stamp_ns"] += run * 1_234_567
+        rows["compute_s"] += run * 1e-5
+        status = {"state": "fault", "since_ns": run, "count": {"worst_late_s": run}}
+        recorder = Recorder(block, tmp_path / str(run), "bench", reserve_bytes=0)
+        recorder.begin()
+        put(RowWriter(block), rows)
+        block.write_status({**status, "reason": "x", "buses": {"can0": {"url": f"simbus:{run}"}}})
+        recorder.remark("somebody came", client="panel")
+        recorder.look()
+        for late in range(3):  # only what is no longer of the run has changed: no message
+            block.write_status({**block.status(), "count": {"late": late + run}})
+            recorder.look()
+        recorder.finish()
+        path = Path(recorder.told()["file"])
+        topics = ("/cycle", "/status", "/description", "/events", "/timing")
+        told.append({one: [value for _, value in stock_messages(path, one)] for one in topics})
+    first, second = told
+    assert first.pop("/timing") != second.pop("/timing")
+    assert first == second and len(first["/status"]) == 1 and len(first["/events"]) == 4
 
 
 def test_killed_it_is_whole_and_the_next_goes_on_without_a_gap(tmp_path: Path) -> None:

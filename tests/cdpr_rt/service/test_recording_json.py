@@ -13,11 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recording_rig import made_rows
 
-from cdpr_rt.runtime.cycle_row import AXES, POSES, SCALARS, cycle_dtype
+from cdpr_rt.runtime.cycle_row import AXES, FIELDS, SCALARS, WALL_TIMES, cycle_dtype
 from cdpr_rt.service.recording_json import RowTexts
-from cdpr_rt.service.recording_schema import cycle_schema
+from cdpr_rt.service.recording_schema import (
+    CYCLE_FIELDS,
+    TIMING_FIELDS,
+    cycle_schema,
+    timing_schema,
+)
 
-_TEXTS = {n: RowTexts(n) for n in (1, 16)}
+_TEXTS = {n: RowTexts(n, FIELDS) for n in (1, 16)}
 
 
 def _written(values: list[float]) -> list[float | None]:
@@ -45,7 +50,7 @@ def test_the_kernel_is_ready_before_rows_come() -> None:
 import numpy as np
 from cdpr_rt.runtime.cycle_row import cycle_dtype
 from cdpr_rt.service.recording_json import RowTexts, _write
-texts = RowTexts(2)
+texts = RowTexts(2, ("cycle", "pose"))
 ready = len(_write.signatures)
 texts(np.zeros(300, cycle_dtype(2)))
 print(ready, len(_write.signatures))
@@ -105,11 +110,16 @@ def test_texts_are_what_the_schema_says(n: int) -> None:
     rows = made_rows(10, 4, n)
     rows["pose"][0] = [1, 2, 3, 1, 0, 0, 0]
     check = jsonschema_rs.Draft7Validator(cycle_schema(n))
-    for text in _TEXTS[n](rows):
+    texts = RowTexts(n, CYCLE_FIELDS)(rows)
+    for text in texts:
         check.validate(json.loads(text))
-    value = json.loads(_TEXTS[n](rows)[0])
-    assert list(value) == [*SCALARS, *AXES, *POSES]
-    for name in (*SCALARS, *AXES, *POSES):
+    timing = jsonschema_rs.Draft7Validator(timing_schema())
+    for text in RowTexts(n, TIMING_FIELDS)(rows):
+        timing.validate(json.loads(text))
+        assert json.loads(text).keys() == {"cycle", *WALL_TIMES}
+    value = json.loads(texts[0])
+    assert list(value) == [name for name in FIELDS if name not in WALL_TIMES]
+    for name in value:
         wanted = rows[name][0].tolist()
         read = value[name]
         if rows.dtype[name].base.kind == "f":

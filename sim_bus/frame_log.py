@@ -1,0 +1,113 @@
+"""Log of all frames on the buses of a simulator, as `candump -L` writes it, at bus time."""
+
+from __future__ import annotations
+
+import heapq
+import math
+import sys
+from pathlib import Path
+
+from sim_bus.frame import EFF_FLAG, EFF_MASK, FRAME, RTR_FLAG, SFF_MASK
+
+_WRITTEN_AT = 4096
+_MOST_WAITING = 1 << 18
+
+
+class FrameLog:
+    """Writes what its ears have heard: by bus time, at one instant bus by bus as they were opened.
+
+    So the order does not depend on which of several buses the simulator looked at first. A file
+    that cannot be written on ends, and says so; the buses go on.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Create the file; raises OSError."""
+        self._file = path.open("wb", buffering=0)
+        self._ears: list[FrameEar] = []
+        self._waiting = 0
+
+    def ear(self, channel: str) -> FrameEar:
+        """Return what hears one more bus, called `channel` in the log."""
+        ear = FrameEar(self, channel)
+        self._ears.append(ear)
+        return ear
+
+    def count(self) -> None:
+        """Note that one more frame waits to be written."""
+        self._waiting += 1
+        if self._waiting % _WRITTEN_AT == 0:
+            # a bus that stands behind the others for ever does not fill the memory
+            over = self._waiting >= _MOST_WAITING
+            self._write(math.inf if over else min(ear.now_s for ear in self._ears))
+
+    def close(self) -> None:
+        """Write what waits and close the file; safe to repeat."""
+        self._write(math.inf)
+        self._file.close()
+
+    def _write(self, before_s: float) -> None:
+        """Write the frames of the time before `before_s`, when no bus can add to them any more."""
+        parts = [ear.take(before_s) for ear in self._ears]
+        self._waiting -= sum(map(len, parts))
+        lines = heapq.merge(*parts, key=lambda entry: entry[0])
+        data = memoryview(b"".join(_line(*entry) for entry in lines))
+        try:
+            while data and not self._file.closed:
+                data = data[self._file.write(data) :]
+        except OSError as error:
+            print(f"frame log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
+            self._file.close()
+
+
+class FrameEar:
+    """A node without an id that hears every frame of its bus and says nothing."""
+
+    node_id = 0
+    sync_period_s = 0.0
+    accepts = None
+
+    def __init__(self, log: FrameLog, channel: str) -> None:
+        self.outbox: list[bytes] = []
+        self.now_s = 0.0
+        """Bus time that the bus has come to."""
+        self._log = log
+        self._channel = channel.encode()
+        self._heard: list[tuple[float, bytes, bytes]] = []
+
+    def receive(self, frame: bytes, now: float) -> None:
+        """Keep a frame for the log."""
+        self.now_s = now
+        self._heard.append((now, self._channel, frame))
+        self._log.count()
+
+    def advance(self, now: float) -> None:
+        """Note how far the bus is."""
+        self.now_s = now
+
+    def next_event(self) -> float:
+        """Return that nothing is due, ever."""
+        return math.inf
+
+    def close(self) -> None:
+        """Complete the log, as no more is heard of its buses."""
+        self._log.close()
+
+    def take(self, before_s: float) -> list[tuple[float, bytes, bytes]]:
+        """Return the time, channel and frame of what was heard before then, and forget it."""
+        heard = self._heard
+        count = len(heard)
+        while count and heard[count - 1][0] >= before_s:
+            count -= 1
+        self._heard = heard[count:]
+        return heard[:count]
+
+
+def _line(time_s: float, channel: bytes, frame: bytes) -> bytes:
+    can_id, length, data = FRAME.unpack(frame)
+    wide = can_id & EFF_FLAG
+    identifier = b"%08X" % (can_id & EFF_MASK) if wide else b"%03X" % (can_id & SFF_MASK)
+    if can_id & RTR_FLAG:
+        content = b"R%d" % length if length else b"R"
+    else:
+        content = data[:length].hex().upper().encode()
+    return b"(%017.6f) %s %s#%s\n" % (time_s, channel, identifier, content)

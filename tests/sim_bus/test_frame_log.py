@@ -1,0 +1,125 @@
+"""The log of all frames, read back by the tools that know candump's format."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.decode.candump import Logged, read_log
+from sim_bus.frame import EFF_FLAG, RTR_FLAG, pack_frame
+from sim_bus.frame_log import FrameEar, FrameLog
+
+StartBus = Callable[..., Any]
+SYNC = pack_frame(0x080)
+
+
+def logged(path: Path) -> list[Logged]:
+    with path.open() as file:
+        return list(read_log(path.name, file))
+
+
+def told(path: Path) -> list[tuple[float, str, int, bytes]]:
+    return [
+        (one.frame.time_s, one.channel, one.frame.can_id, one.frame.data) for one in logged(path)
+    ]
+
+
+def test_every_frame_is_there_at_bus_time_in_the_order_of_the_bus(
+    tmp_path: Path, start_bus: StartBus, stub_node: type
+) -> None:
+    path = tmp_path / "frames.log"
+    answers = (pack_frame(0x182, b"\xab\x01"), pack_frame(0x181, b""))
+    node = stub_node(1, sync_period_s=0.01, answers=answers, timers=(0.0, 0.025))
+    log = FrameLog(path)
+    bus = start_bus(node, log.ear("can3"))
+    member = bus.join()
+    member.lead()
+    for k in range(3):
+        member.send(0x200 + k, bytes([k]))
+        member.sync()
+    member.send(0x1ABCDE00 | EFF_FLAG, b"12345678")
+    member.send(0x321 | RTR_FLAG, b"")
+    member.send(0x700, bytes(8))
+    status = member.status()
+    assert status["nodes"] == [1]
+    bus.hub.stop()
+    bus.thread.join(5.0)
+    log.close()
+    cycle = [(0x080, b""), (0x181, b""), (0x182, b"\xab\x01")]
+    wanted = [(0.0, 0x701, b"\x05")]
+    for k in range(3):
+        wanted.append((0.01 * k, 0x200 + k, bytes([k])))
+        # the timer that runs out before the SYNC sends before it
+        wanted += [(0.03, 0x701, b"\x05")] * (k == 2)
+        wanted += [(round(0.01 * (k + 1), 6), *one) for one in cycle]
+    wanted += [(0.03, 0x1ABCDE00, b"12345678"), (0.03, 0x321, b""), (0.03, 0x700, bytes(8))]
+    assert told(path) == [(at, "can3", *rest) for at, *rest in wanted]
+    assert len(wanted) == status["frames"]
+    extended, remote = (one.frame for one in logged(path)[-3:-1])
+    assert extended.extended and remote.remote
+
+
+def play(path: Path, *order: int) -> bytes:
+    """Have two buses heard, at each instant in this order; return the file."""
+    log = FrameLog(path)
+    ears = [log.ear("left"), log.ear("right")]
+    for k in range(5000):
+        for number in order:
+            ears[number].advance(0.001 * k)
+            ears[number].receive(pack_frame(0x100 + k % 7, bytes([number])), 0.001 * k)
+    for ear in ears:
+        ear.close()
+    return path.read_bytes()
+
+
+def test_which_bus_was_looked_at_first_makes_no_difference(tmp_path: Path) -> None:
+    one = play(tmp_path / "one.log", 0, 1)
+    assert play(tmp_path / "other.log", 1, 0) == one
+    channels = [frame.channel for frame in logged(tmp_path / "other.log")]
+    assert channels == ["left", "right"] * 5000
+
+
+def test_a_bus_that_stands_for_ever_fills_no_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim_bus.frame_log._MOST_WAITING", 8192)
+    log = FrameLog(tmp_path / "frames.log")
+    speaks, stands = log.ear("left"), log.ear("right")
+    for k in range(20_000):
+        speaks.receive(SYNC, 0.001 * k)
+    assert isinstance(stands, FrameEar) and len(speaks.take(float("inf"))) < 8192
+    log.close()
+
+
+def test_a_full_disk_ends_the_log_and_not_the_bus(capsys: pytest.CaptureFixture[str]) -> None:
+    log = FrameLog(Path("/dev/full"))
+    ear = log.ear("can0")
+    for k in range(10_000):
+        ear.receive(SYNC, 0.001 * k)
+    ear.close()
+    assert capsys.readouterr().err == "frame log /dev/full: No space left on device; it ends here\n"
+
+
+def test_the_command_logs_where_the_environment_says(tmp_path: Path) -> None:
+    path = tmp_path / "frames.log"
+    script = """
+from tools.simulator import OwnSimulator
+for name in ("first", "second"):
+    OwnSimulator("winch-mpp0923d", f"simbus:frame-log-{name}").stop()
+"""
+    environment = {"CDPR_SIM_FRAME_LOG": str(path), "PATH": "/usr/bin:/bin"}
+    subprocess.run([sys.executable, "-c", script], env=environment, check=True, cwd=tmp_path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["frames-2.log", "frames.log"]
+    done = subprocess.run(
+        [sys.executable, "-m", "tools.cli", "sim", "up", "winch-mpp0923d", "--bus", "simbus:fl-x",
+         "--frame-log", str(tmp_path / "nowhere" / "frames.log")],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2 and "nowhere/frames.log: No such file" in done.stderr
+    assert "Traceback" not in done.stderr and json.dumps(done.stdout) == '""'
