@@ -15,8 +15,10 @@ def recorded(folder: Path, *, pause_s: float) -> dict[str, list[bytes]]:
     """Tighten the cables a little, with pauses by the wall; return the messages by topic."""
     with LockstepRobot("planar-3", record=folder) as robot:
         robot.enable()
-        robot.program("tighten")
-        for _ in range(4):
+        for name in ("hold", "tighten") * 3:
+            robot.program(name)
+            time.sleep(pause_s)
+        for _ in range(3):
             robot.run(0.3)
             time.sleep(pause_s)
             assert robot.recorder is not None
@@ -32,7 +34,7 @@ def recorded(folder: Path, *, pause_s: float) -> dict[str, list[bytes]]:
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, list[bytes]]]:
     folder = tmp_path_factory.mktemp("same")
-    return [recorded(folder / str(pause_s), pause_s=pause_s) for pause_s in (0.0, 0.7)]
+    return [recorded(folder / str(pause_s), pause_s=pause_s) for pause_s in (0.0, 0.6)]
 
 
 @pytest.mark.parametrize("topic", COMPARED)
