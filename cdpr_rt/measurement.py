@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,10 @@ import numpy as np
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.exchange import BoolArray, FloatArray
-from cdpr_rt.executive import Executive
 from cdpr_rt.identification import SweepData
+from cdpr_rt.raw_rows import column_names
 from cdpr_rt.rawlog import RawLog, RawLogWriter
-from cdpr_rt.recorder import column_names
+from cdpr_rt.runtime.operating import Operator
 from cdpr_rt.trajectory import Leg
 
 
@@ -58,17 +59,18 @@ def both_ways(speed_rad_s: float, lead_in_rad: float, turns: float) -> tuple[Pas
 
 
 def run_pass(
-    executive: Executive,
+    operator: Operator,
     controller: Controller,
     what: Pass,
     path: Path,
     meta: dict[str, Any],
+    on_progress: Callable[[float], None] | None = None,
 ) -> Path:
     """Run `controller` along one pass from where the axes stand, recording into `path`.
 
-    Raises what `Executive.run` raises; the file is closed and kept in every case.
+    Raises what `Operator.follow` raises; the file is closed and kept in every case.
     """
-    device = executive.device
+    device = operator.device
     begin, end = what.measured()
     meta = {
         **meta,
@@ -81,7 +83,8 @@ def run_pass(
     }
     log = RawLogWriter(path, column_names(device.n), meta)
     try:
-        executive.run(controller, what.leg(device.feedback.position_rad), log)
+        leg = what.leg(device.feedback.position_rad)
+        operator.follow(controller, leg, log, on_progress)
     finally:
         log.close()
     return path

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from cdpr_rt.exchange import FloatArray, Setpoint
@@ -37,6 +39,18 @@ def _fill(
         position[i] = start[i] + velocity[i] * travelled
         speed[i] = velocity[i] * shape
         acceleration[i] = velocity[i] * slope
+
+
+class Motion(Protocol):
+    """A set-point over time, such as a `Leg`."""
+
+    duration_s: float
+
+    def fill(self, time_s: float, setpoint: Setpoint) -> None:
+        """Write the set-point at `time_s` after the start."""
+
+    def brake(self, time_s: float) -> Motion:
+        """Return the motion that, entered at half its time, stops from the state at `time_s`."""
 
 
 class Leg:

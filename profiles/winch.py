@@ -67,3 +67,8 @@ class Winch:
     def cable_m_per_motor_rad(self) -> float:
         """Cable paid out per radian of the motor, with its sign."""
         return self.cable_sign * self.drum_radius_m / self.gear_ratio
+
+    @property
+    def latency_s(self) -> float:
+        """Nominal time from a true angle to the middle of the cycle its torque acts in."""
+        return self.drive.feedback_delay_s + self.drive.torque_delay_s + 1.5 * self.sync_period_s

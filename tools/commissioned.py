@@ -10,18 +10,28 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError
+from cdpr_rt.cogging_profile import CoggingProfile, CoggingProfileError, DriveIdentity
 from cdpr_rt.compensation import AxisCompensation
 from cdpr_rt.runtime.robot_arrays import limits_of
 from drivers.boot import BootReport
 from profiles import Robot, RobotAxis
 from profiles.motor_bounds import MotorBounds
-from tools.commissioning import Paths
+from tools.commission_files import Paths
 from tools.errors import BadInputError
-from tools.session import identity_of
 
 CoggingProfiles = tuple[CoggingProfile | None, ...]
 """One for each axis of a robot, None where its motor has not been commissioned."""
+
+
+def identity_of(report: BootReport) -> DriveIdentity:
+    """Return what a cogging profile is bound to, besides the motor, of a drive that has booted."""
+    return DriveIdentity(
+        vendor_id=report.vendor_id,
+        product_code=report.product_code,
+        revision=report.revision,
+        serial=report.serial,
+        encoder_counts_per_turn=report.counts_per_turn,
+    )
 
 
 def folder_of(axis: RobotAxis) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,9 @@ from cdpr_rt.controllers.pid import Pid
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.measurement import Pass, both_ways, run_pass
 from cdpr_rt.tuning import PidDesign
+from tools.commission_files import Paths
 from tools.output import Output
-from tools.session import WinchSession
+from tools.session import Session
 
 METHODS = ("none", "thesis", "better")
 
@@ -36,51 +37,10 @@ _FAST_LEGS = (
 _TORQUE_SHARE = 0.25
 
 
-@dataclass(frozen=True)
-class Paths:
-    """Where a commissioning leaves its files."""
-
-    out: Path
-
-    def raw(self, name: str) -> Path:
-        """Return the file of one recorded pass."""
-        return self.out / "raw" / f"{name}.raw"
-
-    def passes(self, name: str) -> list[Path]:
-        """Return the recorded passes whose names begin with `name`, in the order they were run."""
-        found = (self.out / "raw").glob(f"{name}-[0-9]*.raw")
-        return sorted(found, key=lambda path: int(path.stem.rsplit("-", 1)[1]))
-
-    @property
-    def profile(self) -> Path:
-        """Return the file of the cogging profile."""
-        return self.out / "cogging-profile.json"
-
-    @property
-    def run(self) -> Path:
-        """Return the file of what the report must know besides the recordings."""
-        return self.out / "run.json"
-
-    @property
-    def results(self) -> Path:
-        """Return the file of the results."""
-        return self.out / "report.json"
-
-    @property
-    def page(self) -> Path:
-        """Return the report for people."""
-        return self.out / "report.html"
-
-    @property
-    def truth(self) -> Path:
-        """Return the simulator's own log, which only the report reads."""
-        return self.out / "simulator-truth.log"
-
-
 class Measurement:
     """Runs passes of one winch and records them."""
 
-    def __init__(self, session: WinchSession, out: Output, paths: Paths) -> None:
+    def __init__(self, session: Session, out: Output, paths: Paths) -> None:
         self._session = session
         self._out = out
         self._paths = paths
@@ -124,15 +84,18 @@ class Measurement:
         session = self._session
         meta = {**meta, "what": name, "identity": session.identity}
         meta["sync_offset"] = session.sync_offset()
-        meta["latency_s"] = session.latency_s
+        meta["latency_s"] = session.winch.latency_s
         total = sum(one.duration_s() for one in passes)
         recorded = []
         with self._out.progress(name, total) as advance:
             done = 0.0
             for number, one in enumerate(passes):
-                session.executive.on_progress = lambda t, done=done: advance(done + t)
                 path = self._paths.raw(f"{name}-{number}")
-                recorded.append(run_pass(session.executive, controller, one, path, meta))
+                so_far = partial(_further, advance, done)
+                recorded.append(run_pass(session, controller, one, path, meta, so_far))
                 done += one.duration_s()
-        session.executive.on_progress = None
         return recorded
+
+
+def _further(advance: Callable[[float], None], done_s: float, time_s: float) -> None:
+    advance(done_s + time_s)

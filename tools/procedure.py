@@ -34,14 +34,11 @@ from cdpr_rt.rawlog import read_raw_log
 from cdpr_rt.tuning import PidDesign, TuningError, design_pid, stiffest_pid, sweep_gain
 from profiles import Winch
 from profiles.motor_bounds import MotorBounds
-from tools.commissioning import (
-    VALIDATION_SPEED_RAD_S,
-    Measurement,
-    Paths,
-)
+from tools.commission_files import Paths
+from tools.commissioning import VALIDATION_SPEED_RAD_S, Measurement
 from tools.finding_index import Index
 from tools.output import Output
-from tools.session import WinchSession
+from tools.session import Session
 
 DEFAULT_BANDWIDTH_HZ = 12.0
 
@@ -139,12 +136,18 @@ def store_profile(winch: Winch, identity: DriveIdentity, found: Identified, path
     ).save(paths.profile)
 
 
+def _begin_second_pass(found: Identified, paths: Paths) -> SecondPass:
+    return SecondPass(found.better, legs(paths.passes("fast")))
+
+
+def _refine(second: SecondPass, recorded: list[Path]) -> None:
+    second.add(legs(recorded))
+
+
 class Commissioning:
     """Runs the steps on an open session; each leaves its files in `paths`."""
 
-    def __init__(
-        self, session: WinchSession, out: Output, paths: Paths, plan: Plan = THOROUGH
-    ) -> None:
+    def __init__(self, session: Session, out: Output, paths: Paths, plan: Plan = THOROUGH) -> None:
         self._session = session
         self._plan = plan
         self._out = out
@@ -159,13 +162,12 @@ class Commissioning:
         self.prepare(index)
         self.measure()
         # it takes its time, and a safety I/O is asked meanwhile
-        identified = partial(identify_first, winch, session.latency_s, self._paths)
-        found = session.network.clock.aside(identified)
+        found = session.aside(partial(identify_first, winch, winch.latency_s, self._paths))
         found = self.measure_again(found, bandwidth_Hz)
         identity = session.drive_identity
         store_profile(winch, identity, found, self._paths)
         wanted, designs = self.validate(CoggingProfile.load(self._paths.profile), bandwidth_Hz)
-        status = session.bus_status()
+        status = next(iter(session.bus_status().values()), {})
         device, boot = session.device, session.boot
         return {
             "winch": winch.reference,
@@ -184,32 +186,29 @@ class Commissioning:
             "pid": [dataclasses.asdict(design) for design in designs],
             "bandwidth_Hz": bandwidth_Hz,
             "bandwidths_Hz": wanted,
-            "latency_s": session.latency_s,
+            "latency_s": winch.latency_s,
             "bus": {
-                "url": str(session.url),
+                "url": str(session.network.url),
                 "period_s": device.period_s,
                 "lockstep": device.lockstep,
                 "cycles": device.feedback.cycle,
                 "missed": device.missed,
-                "late": session.executive.lateness.late,
+                "late": session.lateness.late,
                 "wall_s": time.monotonic() - started,
                 **{key: status[key] for key in ("load", "peak_cycle_load", "overruns") if status},
             },
         }
 
     def prepare(self, index: Index = "homing") -> None:
-        """Find the index and put the drive into its torque mode; it has no power afterwards.
+        """Find the index; the drive has no power afterwards.
 
         By homing, or by the touch probe during a turn under the PID. Raises TripError when no
         index was seen.
         """
         session = self._session
-        mode = session.winch.drive.mode_torque
         if index == "homing":
             session.find_index()
-            session.set_mode(mode)
             return
-        session.set_mode(mode)
         session.expect_index()
         session.enable()
         turn = Pass(VALIDATION_SPEED_RAD_S, 0.0, _PROBE_TURNS * math.tau)
@@ -222,13 +221,15 @@ class Commissioning:
         """Return the stiffest of some loops that its latency allows, for legs at speed."""
         session = self._session
         inertia = session.winch.motor.rotor_inertia_kg_m2
-        return stiffest_pid(inertia, session.latency_s, _STIFF_HZ, session.device.period_s)
+        return stiffest_pid(inertia, session.winch.latency_s, _STIFF_HZ, session.device.period_s)
 
     def _first_design(self) -> PidDesign:
         """Return a loop for the motor as its data sheet has it."""
         session = self._session
         inertia = session.winch.motor.rotor_inertia_kg_m2
-        return design_pid(inertia, session.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s)
+        return design_pid(
+            inertia, session.winch.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s
+        )
 
     def measure(self) -> None:
         """Record the sweeps and the fast legs."""
@@ -236,7 +237,7 @@ class Commissioning:
         inertia = session.winch.motor.rotor_inertia_kg_m2
         self._out.note(f"sweeping at {math.degrees(plan.sweep_speed_rad_s):g} deg/s")
         session.enable()
-        self._sweep(sweep_gain(inertia, session.latency_s))
+        self._sweep(sweep_gain(inertia, session.winch.latency_s))
         self._measure.fast_legs(self._stiffest_design())
         session.disable()
 
@@ -252,7 +253,8 @@ class Commissioning:
                 self._measure.sweep(gain_Nm_rad, plan.sweep_speed_rad_s, plan.turns)
             except TripError as error:
                 last = attempt == _SWEEP_ATTEMPTS - 1
-                if self._session.device.alarm() or last or not self._session.url.is_simulated:
+                real = not self._session.network.url.is_simulated
+                if self._session.device.alarm() or last or real:
                     raise  # beside a real motor a person decides whether it turns again
                 gain_Nm_rad /= 2.0
                 self._out.note(f"{error}; sweeping again with {gain_Nm_rad:.2g} Nm/rad")
@@ -262,14 +264,14 @@ class Commissioning:
 
     def _settle(self) -> None:
         """Let the rotor come to rest without power after a motion was given up."""
-        self._session.disable()
+        self._session.reset()
         self._session.idle(_SETTLE_S)
         self._session.enable()
 
     def measure_again(self, found: Identified, bandwidth_Hz: float) -> Identified:
         """Record ramps under compensation and refine, until they do not get smoother."""
         session = self._session
-        second = SecondPass(found.better, legs(self._paths.passes("fast")))
+        second = session.aside(partial(_begin_second_pass, found, self._paths))
         passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 1)
         for number in range(self._plan.rounds):
             if second.done:
@@ -280,13 +282,13 @@ class Commissioning:
             known = stored_better(second.current).compensation(self._bounds)
             recorded = self._measure.track(round_name(number), design, known, passes)
             session.disable()
-            session.network.clock.aside(partial(second.add, legs(recorded)))
+            session.aside(partial(_refine, second, recorded))
         return dataclasses.replace(found, better=second.best)
 
     def _design(self, better: BetterResult, bandwidth_Hz: float) -> PidDesign:
         session = self._session
         inertia = better.inertia_kg_m2.value
-        return design_pid(inertia, session.latency_s, bandwidth_Hz, session.device.period_s)
+        return design_pid(inertia, session.winch.latency_s, bandwidth_Hz, session.device.period_s)
 
     def validate(
         self, profile: CoggingProfile, bandwidth_Hz: float
@@ -308,7 +310,7 @@ class Commissioning:
         for wanted in (bandwidth_Hz, *others):
             try:
                 design = design_pid(
-                    profile.inertia_kg_m2, session.latency_s, wanted, session.device.period_s
+                    profile.inertia_kg_m2, session.winch.latency_s, wanted, session.device.period_s
                 )
             except TuningError as error:
                 if wanted == bandwidth_Hz:

@@ -58,15 +58,15 @@ def open_rail(
     """
     with ExitStack() as stack:
         if rail.cia402 is None:
-            session = stack.enter_context(open_safety(safety_io, out, [], clock))
-            axis = ModbusRailAxis(rail, clock, None if session is None else session.io)
+            safety = stack.enter_context(open_safety(safety_io, out, clock))
+            axis = ModbusRailAxis(rail, clock, safety)
             stack.callback(axis.close)
             axis.open()
             yield axis
             return
         require_options(rail, bus, safety_io)
         url = _bus_of(rail, bus)
-        safety = stack.enter_context(open_safety(safety_io, out, [], clock))
+        safety = stack.enter_context(open_safety(safety_io, out, clock))
         assert safety is not None  # one was named
         drive = load_rail_drive(reference, rail.cia402)
         network = stack.enter_context(_network(rail.cia402, drive, url, clock))
@@ -76,7 +76,7 @@ def open_rail(
         report = boot(network, rail.cia402.node_id, drive, settings)
         stack.callback(network.release, rail.cia402.node_id)
         network.start_heartbeat()  # should we die, the drive stops
-        yield Cia402RailAxis(rail, drive, network, report, safety.io)
+        yield Cia402RailAxis(rail, drive, network, report, safety)
 
 
 def require_options(rail: RailProfile, bus: str | None, safety_io: str | None) -> None:

@@ -11,7 +11,8 @@ from cdpr_rt.tuning import PidDesign, design_pid
 from profiles.bounded_input import read_json
 from profiles.errors import ProfileError
 from profiles.reader import read_json_model
-from tools.commissioning import METHODS, Paths
+from tools.commission_files import Paths
+from tools.commissioning import METHODS
 from tools.errors import BadInputError
 from tools.evaluation import compare, lowest
 from tools.procedure import Identified, validation_name

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 
 from cdpr_rt.clock import Clock
 from drivers.axis_buses import AxisBuses, BusAxes
@@ -15,9 +16,11 @@ from drivers.cia402 import fault_text
 from drivers.data_sheet import load_dictionary
 from drivers.errors import BootError, BusError, DriverError, SdoError
 from drivers.network import CanNetwork
-from profiles import Robot, RobotAxis
+from profiles import Robot, RobotAxis, Winch
 from tools.errors import BadInputError, WorkFailedError
-from tools.session import lacking_guards
+
+# what makes a drive stop by itself once nobody leads it, and bounds its torque until then
+_GUARDS = ("1016h", "6007h", "605Ah", "6072h")
 
 
 def open_networks(
@@ -92,16 +95,21 @@ def _told(error: DriverError) -> str:
     return f"{where}: " + "; ".join([str(error), *others])
 
 
-def _settings(robot: Robot, axis: RobotAxis, torque_Nm: float) -> BootSettings:
-    motor = axis.winch.motor
+def boot_settings(winch: Winch, torque_Nm: float) -> BootSettings:
+    """Return what the master wants of a winch's drive besides its profile, 6072h `torque_Nm`."""
     return BootSettings(
-        robot.master_node_id,
-        robot.sync_period_s,
+        winch.master_node_id,
+        winch.sync_period_s,
         torque_Nm,
-        rated_torque_Nm=motor.rated_torque_Nm,
-        counts_per_turn=axis.winch.encoder_counts_per_turn,
-        mandatory=axis.mandatory,
+        rated_torque_Nm=winch.motor.rated_torque_Nm,
+        counts_per_turn=winch.encoder_counts_per_turn,
     )
+
+
+def _settings(robot: Robot, axis: RobotAxis, torque_Nm: float) -> BootSettings:
+    settings = boot_settings(axis.winch, torque_Nm)
+    # the robot's rate may have been changed since its file was read
+    return replace(settings, sync_period_s=robot.sync_period_s, mandatory=axis.mandatory)
 
 
 def device_of(
@@ -125,6 +133,14 @@ def device_of(
     return AxisBuses(buses, robot.sync_period_s)
 
 
+def _lacking_guards(node: str, report: BootReport) -> str:
+    """Return what to look at where a drive lacks what makes it stop by itself, else nothing."""
+    lacking = [name for name in report.absent if name.startswith(_GUARDS)]
+    if not lacking:
+        return ""
+    return f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
+
+
 def boot_notes(
     robot: Robot, booted: Mapping[int, BootReport], absent: Mapping[int, str]
 ) -> list[str]:
@@ -132,15 +148,15 @@ def boot_notes(
     notes = []
     for i, report in booted.items():
         axis = robot.axes[i]
-        notes.append(lacking_guards(f"bus {axis.bus} node {axis.node_id}", report))
+        notes.append(_lacking_guards(f"bus {axis.bus} node {axis.node_id}", report))
     notes += [f"axis {i} (optional) is left out: {reason}" for i, reason in absent.items()]
     return [note for note in notes if note]
 
 
 def faults_text(
-    axes: Sequence[RobotAxis], device: AxisBuses, networks: Mapping[str, CanNetwork]
+    axes: Sequence[RobotAxis], device: AxisBuses, networks: Mapping[str, CanNetwork], known: str
 ) -> str:
-    """Return what each drive in fault says of it, asked by SDO."""
+    """Return what each drive in fault says of it, asked by SDO, where that is not `known`."""
     texts = []
     for axis, faulted in zip(axes, device.faulted(), strict=True):
         if not faulted:
@@ -150,5 +166,6 @@ def faults_text(
             why = fault_text(code) if code else "no code given (603Fh = 0)"
         except (SdoError, BusError):
             why = "the drive does not say why"
-        texts.append(f"bus {axis.bus} node {axis.node_id}: {why}")
+        if why not in known:
+            texts.append(f"bus {axis.bus} node {axis.node_id}: {why}")
     return "; ".join(texts)

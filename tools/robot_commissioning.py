@@ -12,8 +12,8 @@ from cdpr_rt.realtime import one_core
 from drivers.bus import BusUrl
 from profiles import Robot, RobotAxis, Winch
 from tools.bus_fit import require_fit
+from tools.commission_files import Paths
 from tools.commissioned import folder_of
-from tools.commissioning import Paths
 from tools.errors import BadInputError
 from tools.output import Output
 from tools.robot_buses import asks_for_own_simulator, robot_urls

@@ -1,102 +1,169 @@
-"""One winch on a bus, opened for a command and left without power, however the command ends."""
+"""Drives opened for a command, run by the daemon's loop, and left without power however it ends."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from cdpr_rt.cogging_profile import DriveIdentity
-from cdpr_rt.errors import NotInTimeError, TripError
-from cdpr_rt.executive import Executive
+from cdpr_rt.errors import NotInTimeError
+from cdpr_rt.limits import Limit, Limits
 from cdpr_rt.realtime import one_core, paced_realtime
 from cdpr_rt.rehearsal import rehearse
-from cdpr_rt.supervisor import Limits, Supervisor
+from cdpr_rt.runtime.estimate import Estimator
+from cdpr_rt.runtime.loop import HOLD, IDLE, ControlLoop
+from cdpr_rt.runtime.loop_parts import LoopParts
+from cdpr_rt.runtime.machine import MachineError
+from cdpr_rt.runtime.operating import Operator
+from cdpr_rt.runtime.programs.limp import LimpProgram
+from cdpr_rt.runtime.programs.track import TrackProgram
+from cdpr_rt.runtime.robot_arrays import SPEED_SHARE, limits_of
+from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.runtime.states import Reaction
+from cdpr_rt.supervisor import Supervisor
 from drivers import touch_probe
-from drivers.axis_group import AxisGroup
-from drivers.axis_layout import AxisConfig
-from drivers.boot import BootReport, BootSettings, boot
+from drivers.axis_buses import AxisBuses
+from drivers.boot import BootReport
 from drivers.bus import BusUrl, query_status
 from drivers.bus.budget import HEARTBEATS_IN_TOLERANCE
 from drivers.bus.leading import open_clock
-from drivers.bus.master_lock import MasterLock
-from drivers.cia402 import Mode, State, fault_text
+from drivers.cia402 import Mode
 from drivers.data_sheet import load_dictionary
-from drivers.errors import BusError, DriveFaultError, SdoError
+from drivers.errors import BusError, DriveFaultError
 from drivers.homing import Homing
 from drivers.network import CanNetwork
-from profiles import Winch
+from profiles import Robot, Winch
+from profiles.robot import robot_of_winch
 from tools.bus_fit import require_fit
+from tools.commissioned import identity_of
 from tools.consent import require_consent
+from tools.daemon.machine import RobotMachine
+from tools.daemon.settings import RunSettings
 from tools.errors import BadInputError
 from tools.output import Output
-from tools.safety import SessionSafety, open_safety
-from tools.signals import stop_on_signals
+from tools.robot_buses import asks_for_own_simulator
+from tools.safety import CLOSED
+from tools.signals import StopRequest, stop_on_signals
 from tools.simulator import OwnSimulator
 from tools.tension.session_watch import Watching, no_watches
 
-_SPEED_SHARE = 0.2
-# a bare rotor may swing by turns without doing harm; its speed is what is limited
-_FOLLOWING_ERROR_RAD = 4.0 * math.tau
-_INDEX_TIMEOUT_S = 30.0
-# what makes a drive stop by itself once nobody leads it, and bounds its torque until then
-_GUARDS = ("1016h", "6007h", "605Ah", "6072h")
+_RING_S: Final = 8.0
+_INDEX_TIMEOUT_S: Final = 30.0
+# whatever ends a motion takes the torque at once, as nothing is held up by it; a watch may brake it
+_REACTIONS: Final[Mapping[Limit, Reaction]] = {
+    limit: Reaction.TORQUE_OFF
+    for limit in Limit
+    if limit not in (Limit.TORQUE, Limit.TORQUE_RATE, Limit.SAFETY_STOP)
+}
 
 
-class WinchSession:
-    """A booted winch and the executive that runs its axis."""
+@dataclass(frozen=True)
+class Tolerance:
+    """What a motion may do before it is ended; a bare rotor may swing by turns without harm."""
+
+    following_error_rad: float = 4.0 * math.tau
+    speed_rad_s: float | None = None
+    """A share of each motor's rated speed where left out."""
+
+
+class Session(Operator):
+    """Booted drives, of one winch or of a robot, and the loop that runs them for a command."""
 
     def __init__(
         self,
-        winch: Winch,
-        url: BusUrl,
-        network: CanNetwork,
-        device: AxisGroup,
-        executive: Executive,
-        report: BootReport,
-        safety: SessionSafety | None = None,
+        robot: Robot,
+        machine: RobotMachine,
+        loop: ControlLoop,
+        track: TrackProgram,
+        stop_requested: Callable[[], bool],
     ) -> None:
-        self.winch = winch
-        self.url = url
-        self.network = network
-        self.device = device
-        self.executive = executive
-        self.boot = report
-        self.safety = safety
-        self._paused_watch: list[tuple[int, int]] = []
+        super().__init__(loop, track, loop.turn, stop_requested)
+        self.robot = robot
+        self.machine = machine
+        self.boot_s = 0.0
+        """Bus time from the first frame to the last drive being operational."""
+        self.simulator_pid: int | None = None
+        """Process of the simulator that the command has started."""
 
     @property
-    def latency_s(self) -> float:
-        """From the instant an angle was true to the middle of the cycle its torque acts in."""
-        return latency_s(self.winch)
+    def device(self) -> AxisBuses:
+        """The booted axes."""
+        device = self.machine.device
+        assert device is not None  # until the session is closed
+        return device
+
+    def set_mode(self, modes: int | Sequence[int]) -> None:
+        """Ask for a mode of operation, one for all or one each, and wait until all confirm it.
+
+        Raises ModeRefusedError when one does not.
+        """
+        device = self.device
+        self.between_cycles(lambda: device.ask_mode(modes))
+        timeout_s = max(axis.winch.drive.mode_display_timeout_s for axis in self.robot.axes)
+        try:
+            self.wait(device.mode_confirmed, timeout_s, "the modes' confirmation")
+        except NotInTimeError as error:
+            if device.mode_confirmed():
+                raise
+            raise device.unconfirmed_mode() from error
+
+    def find_index(self, method: int = 34) -> None:
+        """Find the first axis' encoder index by homing, which turns the motor by up to a turn.
+
+        It is in its torque mode again afterwards, without power.
+        """
+        homing = Homing(*self.device.part_of(0), method, _INDEX_TIMEOUT_S)
+        self.beside(homing.configure)
+        self.set_mode(Mode.HOMING)
+        try:
+            # the procedure keeps its own time; this one is there for a drive gone deaf
+            self.let_drive(homing.update, 2.0 * _INDEX_TIMEOUT_S, "the encoder index (homing)")
+        except BaseException:
+            homing.abort()
+            raise
+        self.set_mode(self.device.torque_modes)
 
     def expect_index(self) -> None:
-        """Have the drive latch its index in the ordinary motion that follows (touch probe)."""
-        touch_probe.arm(self.device, 0)
+        """Have the first drive latch its index in the ordinary motion that follows."""
+        group, place = self.device.part_of(0)
+        self.beside(lambda: touch_probe.arm(group, place))
 
-    def restrict(self, speed_rad_s: float, following_error_rad: float) -> None:
-        """Tolerate less speed and following error than a bare rotor under test may have."""
-        usual = self.executive.supervisor.limits
-        limits = Limits(usual.torque_Nm, speed_rad_s, following_error_rad)
-        self.executive.supervisor = Supervisor(limits, self.device.n, self.device.period_s)
+    def bus_status(self) -> dict[str, dict[str, Any]]:
+        """Return what each simulated bus tells of itself, by the robot's name of it."""
+        return {
+            name: query_status(network.url.channel)
+            for name, network in self.machine.networks.items()
+            if network.url.is_simulated
+        }
 
-    def reset_fault(self) -> None:
-        """Acknowledge the drive's fault; it is left without power. Raises TripError if it stays."""
-        device = self.device
-        device.sync()
-        device.receive()
-        device.transmit()
-        device.acknowledge_fault()
-        self._lead_to(State.SWITCH_ON_DISABLED)
-        device.stop_cycling()
+    def sync_offset(self) -> int:
+        """Return how many SYNCs a simulated bus had seen before our first cycle."""
+        status = next(iter(self.bus_status().values()), {})
+        return int(status.get("sync_count", 0)) - self.device.feedback.cycle
 
-    def idle(self, seconds: float) -> None:
-        """Run cycles without torque for a while."""
-        cycles = iter(range(round(seconds / self.device.period_s)))
-        self.executive.step(lambda: next(cycles, None) is None, seconds + 1.0, "the end")
+    # -- of one winch
+
+    @property
+    def winch(self) -> Winch:
+        """The first axis' winch."""
+        return self.robot.axes[0].winch
+
+    @property
+    def network(self) -> CanNetwork:
+        """The first axis' bus."""
+        return self.machine.networks[self.robot.axes[0].bus]
+
+    @property
+    def boot(self) -> BootReport:
+        """What the first axis' drive told when it booted."""
+        return self.machine.reports[0]
 
     @property
     def drive_identity(self) -> DriveIdentity:
@@ -108,91 +175,6 @@ class WinchSession:
         """What raw data keep of where they come from."""
         whose = {"winch": self.winch.reference, "motor": self.winch.motor.model}
         return whose | self.drive_identity.model_dump()
-
-    def set_mode(self, mode: int) -> None:
-        """Ask for a mode of operation and wait until the drive confirms it.
-
-        Raises ModeRefusedError when it does not.
-        """
-        self.device.ask_mode(mode)
-        timeout = self.winch.drive.mode_display_timeout_s
-        try:
-            self.executive.step(self.device.mode_confirmed, timeout, "the mode's confirmation")
-        except NotInTimeError as error:
-            if self.device.mode_confirmed():
-                raise
-            raise self.device.unconfirmed_mode() from error
-
-    def enable(self) -> None:
-        """Switch the power stage on; the torque is zero until a controller runs."""
-        self.network.resume_watch(self.winch.node_id, self._paused_watch)
-        self._paused_watch = []
-        self._lead_to(State.OPERATION_ENABLED)
-        if self.safety is not None:
-            self.safety.release_brakes(self.executive)
-
-    def disable(self) -> None:
-        """Switch the power stage off, so that computation may take its time."""
-        if self.safety is not None:
-            self.safety.apply_brakes(self.executive)
-        self._lead_to(State.SWITCH_ON_DISABLED)
-        self.device.stop_cycling()
-        # a drive that was disabled before watches nothing now, and is to watch again all the same
-        self._paused_watch += self.network.pause_watch(self.winch.node_id) or []
-
-    def _lead_to(self, state: State) -> None:
-        self.device.request(state)
-        timeout = 4.0 * self.winch.drive.state_timeout_s
-        what = f"node {self.winch.node_id}: the state {state.label!r}"
-        self.executive.step(lambda: self.device.reached(state), timeout, what)
-
-    def find_index(self, method: int = 34) -> None:
-        """Find the encoder index by homing, which turns the motor by up to a turn."""
-        homing = Homing(self.device, 0, method, _INDEX_TIMEOUT_S)
-        homing.configure()
-        self.set_mode(Mode.HOMING)
-        self.enable()
-        try:
-            # the procedure keeps its own time; the executive's is there for a drive gone deaf
-            what = "the encoder index (homing)"
-            self.executive.step(homing.update, 2.0 * _INDEX_TIMEOUT_S, what)
-        except BaseException:
-            homing.abort()
-            raise
-        self.disable()
-
-    def sync_offset(self) -> int:
-        """Return how many SYNCs a simulated bus had seen before our first cycle."""
-        return int(self.bus_status().get("sync_count", 0)) - self.device.feedback.cycle
-
-    def bus_status(self) -> dict[str, Any]:
-        """Return what a simulated bus tells of itself, an empty table on others."""
-        return query_status(self.url.channel) if self.url.is_simulated else {}
-
-
-def identity_of(report: BootReport) -> DriveIdentity:
-    """Return what a cogging profile is bound to, besides the motor, of a drive that has booted."""
-    return DriveIdentity(
-        vendor_id=report.vendor_id,
-        product_code=report.product_code,
-        revision=report.revision,
-        serial=report.serial,
-        encoder_counts_per_turn=report.counts_per_turn,
-    )
-
-
-def latency_s(winch: Winch) -> float:
-    """Return the nominal time from a true angle to the middle of the cycle its torque acts in."""
-    drive = winch.drive
-    return drive.feedback_delay_s + drive.torque_delay_s + 1.5 * winch.sync_period_s
-
-
-def _fault_of(network: CanNetwork, node_id: int) -> str:
-    try:
-        code = network.read_int(node_id, 0x603F)
-    except SdoError:
-        return "the drive does not say why"
-    return fault_text(code) if code else "no code given (603Fh = 0)"
 
 
 def open_bus(text: str) -> BusUrl:
@@ -210,11 +192,7 @@ def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
 
 @contextmanager
 def open_network(
-    winch: Winch,
-    url: BusUrl,
-    out: Output,
-    plant: Path | None = None,
-    truth_log: Path | None = None,
+    winch: Winch, url: BusUrl, out: Output, plant: Path | None = None
 ) -> Iterator[CanNetwork]:
     """Join the bus for acyclic work, with a simulator of its own where `simbus:` has no name.
 
@@ -222,29 +200,17 @@ def open_network(
     """
     require_fit(winch)
     with ExitStack() as stack:
-        if url.starts_own_simulator:
-            url = _own_simulator(stack, winch, out, plant, truth_log)
-        elif plant is not None:
-            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-        drive = winch.drive
-        clock = open_clock([url])
+        bus, _ = _find_bus(stack, winch, url, out, plant)
+        clock = open_clock([bus])
         stack.callback(clock.close)
+        heartbeat_s = _heartbeat_s(winch)
         try:
-            network = CanNetwork(
-                url, clock, [winch.node_id], winch.master_node_id, _heartbeat_s(winch)
-            )
+            network = CanNetwork(bus, clock, [winch.node_id], winch.master_node_id, heartbeat_s)
         except BusError as error:
             raise BadInputError(str(error)) from error
         stack.callback(network.close)
-        network.add_node(winch.node_id, load_dictionary(drive.eds, winch.node_id))
+        network.add_node(winch.node_id, load_dictionary(winch.drive.eds, winch.node_id))
         yield network
-
-
-def _only_master(url: BusUrl) -> MasterLock:
-    try:
-        return MasterLock(url)
-    except BusError as error:
-        raise BadInputError(str(error)) from error
 
 
 @contextmanager
@@ -256,70 +222,137 @@ def open_winch(
     truth_log: Path | None = None,
     safety_io: str | None = None,
     watching: Watching = no_watches,
-) -> Iterator[WinchSession]:
-    """Boot the winch's drive on `url` and get ready to run its axis.
+    tolerance: Tolerance | None = None,
+    reset: bool = False,
+) -> Iterator[Session]:
+    """Boot the winch's drive on `url` and get ready to run its axis, in its torque mode.
 
     With `safety_io`, the profile of a safety I/O, there is power only while that allows it;
-    what `watching` opens by the robot's clock is asked every cycle besides. Whatever ends the
-    block, the drive's power stage is off afterwards. Raises what `open_network`, `watching` and
-    `open_safety` raise and the drivers' errors for a drive that does not boot.
+    what `watching` opens by the robot's clock is asked every cycle besides. A drive in fault is
+    refused, or acknowledged with `reset`. Whatever ends the block, the drive's power stage is off
+    afterwards. Raises BadInputError for a bus that cannot be opened, what `watching` and the safety
+    I/O raise, and the drivers' errors for a drive that does not boot.
     """
+    require_fit(winch)
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
-        rehearse(1, winch.sync_period_s)  # compiling keeps a poll waiting
-        network = stack.enter_context(open_network(winch, url, out, plant, truth_log))
-        clock = network.clock
-        stack.enter_context(_only_master(network.url))
-        watches = stack.enter_context(watching(clock))
-        safety = stack.enter_context(open_safety(safety_io, out, [winch.node_id], clock))
-        limit = winch.motor.rated_torque_Nm
-        report = boot(network, winch.node_id, winch.drive, boot_settings(winch))
-        stack.callback(network.release, winch.node_id)
-        device = stack.enter_context(_axis(winch, network, report, limit))
-        if safety is not None:
-            stack.callback(safety.drop_brakes)
-        stack.callback(stop_requested.closing)  # before what is closed above
-        stop_requested.energised = True
-        lacking = lacking_guards(f"node {winch.node_id}", report)
-        if lacking:
-            out.note(lacking)
-        network.start_heartbeat()
-        if not device.lockstep:
-            for notice in stack.enter_context(paced_realtime()):
-                out.note(notice)
-        limits = Limits(limit, _SPEED_SHARE * winch.motor.rated_speed_rad_s, _FOLLOWING_ERROR_RAD)
-        supervisor = Supervisor(limits, device.n, device.period_s)
-        if safety is not None:
-            watches = (safety.io, *watches)
-        executive = Executive(device, supervisor, stop_requested, watches)
-        try:
-            yield WinchSession(winch, network.url, network, device, executive, report, safety)
-        except TripError as error:
-            reason, faulted = str(error), device.faulted().any()
-            if faulted and (code := _fault_of(network, winch.node_id)) not in reason:
-                reason = f"{reason}: {code}"
-            if safety is not None:
-                reason = safety.cause(reason)
-            raise (DriveFaultError if faulted else TripError)(reason) from error
+        bus, pid = _find_bus(stack, winch, url, out, plant, truth_log)
+        robot = robot_of_winch(winch)
+        axis = replace(robot.axes[0], winch=winch)  # whose drive waits as long as its profile says
+        robot = replace(robot, axes=(axis,), master_heartbeat_s=_heartbeat_s(winch))
+        opened = _open(
+            stack, robot, [str(bus)], stop_requested, out, safety_io, watching, tolerance, reset
+        )
+        opened.simulator_pid = pid
+        yield opened
 
 
-def lacking_guards(node: str, report: BootReport) -> str:
-    """Return what to look at where a drive lacks what makes it stop by itself, else nothing."""
-    lacking = [name for name in report.absent if name.startswith(_GUARDS)]
-    if not lacking:
-        return ""
-    return f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
+@contextmanager
+def open_robot(
+    robot: Robot,
+    buses: Sequence[str],
+    out: Output,
+    *,
+    plant: Path | None = None,
+    safety_io: str | None = None,
+    reset: bool = False,
+) -> Iterator[Session]:
+    """Boot all drives of `robot`, and get ready to run its axes as `open_winch` does.
+
+    `buses` are what was given with --bus; `simbus:` alone starts a simulator of all buses, with
+    `plant`. Where no `safety_io` is named the robot's own counts, unless all buses are simulated.
+    """
+    require_fit(robot)
+    with ExitStack() as stack:
+        stop_requested = stack.enter_context(stop_on_signals())
+        pid = None
+        if asks_for_own_simulator(buses):
+            out.note(f"starting simulated drives: {len(robot.axes)} ...")
+            buses, pid = _own_simulator(stack, robot.reference, plant)
+        elif plant is not None:
+            raise _plant_not_ours()
+        opened = _open(stack, robot, buses, stop_requested, out, safety_io, reset=reset)
+        opened.simulator_pid = pid
+        yield opened
 
 
-def boot_settings(winch: Winch) -> BootSettings:
-    """Return what the master wants of a winch's drive besides its profile."""
-    return BootSettings(
-        winch.master_node_id,
-        winch.sync_period_s,
-        winch.motor.rated_torque_Nm,
-        rated_torque_Nm=winch.motor.rated_torque_Nm,
-        counts_per_turn=winch.encoder_counts_per_turn,
+def _open(
+    stack: ExitStack,
+    robot: Robot,
+    buses: Sequence[str],
+    stop_requested: StopRequest,
+    out: Output,
+    safety_io: str | None = None,
+    watching: Watching = no_watches,
+    tolerance: Tolerance | None = None,
+    reset: bool = False,
+) -> Session:
+    """Return the robot, booted and checked; `stack` leaves it without power."""
+    settings = RunSettings(
+        robot=robot.reference,
+        name=robot.profile,
+        buses=tuple(buses),
+        safety_io=safety_io,
+        socket=Path("unused"),
     )
+    machine = RobotMachine(robot, settings)
+    stack.callback(machine.clock.close)
+    n, period_s = len(robot.axes), robot.sync_period_s
+    rehearse(n, period_s)  # compiling keeps a poll waiting
+    watches = stack.enter_context(watching(machine.clock))
+    block = SharedBlock.create(n, _RING_S, 1.0 / period_s)
+    stack.callback(os.close, block.fd)
+    track, limp = TrackProgram(n, period_s), LimpProgram(n)
+    parts = LoopParts(
+        programs={IDLE: limp, HOLD: limp, track.name: track},
+        supervisor=Supervisor(_limits(robot, tolerance or Tolerance()), n, period_s),
+        estimator=Estimator(n, period_s),
+        punctual=lambda: stack.enter_context(paced_realtime()),
+    )
+    loop = ControlLoop(block, machine, parts)
+    session = Session(robot, machine, loop, track, stop_requested)
+    begun_s = machine.clock.now_s
+    stack.enter_context(_powered_off_at_last(machine))
+    session.boot_s = machine.clock.now_s - begun_s
+    stack.callback(stop_requested.closing)  # before what is closed above
+    stop_requested.energised = True
+    machine.watches = (*machine.watches, *watches)
+    session.check(reset)
+    for notice in (*machine.notices, *loop.notices):
+        out.note(notice)
+    if machine.safety:
+        out.note(f"{machine.safety}: {CLOSED}")
+    return session
+
+
+@contextmanager
+def _powered_off_at_last(machine: RobotMachine) -> Iterator[None]:
+    """Boot the drives; take their power at the end, and tell where that is not certain."""
+    try:
+        machine.open()
+    except MachineError as error:
+        if error.__cause__ is None:
+            raise
+        raise error.__cause__  # noqa: B904  # what it is decides how the command ends
+    try:
+        yield
+    except BaseException as error:
+        try:
+            doubt = machine.close()
+        except MachineError as another:
+            doubt = str(another)
+        if doubt:
+            error.add_note(doubt)
+        raise
+    if doubt := machine.close():
+        raise DriveFaultError(doubt)
+
+
+def _limits(robot: Robot, tolerance: Tolerance) -> Limits:
+    rated = np.array([axis.winch.motor.rated_speed_rad_s for axis in robot.axes])
+    speed = SPEED_SHARE * rated if tolerance.speed_rad_s is None else tolerance.speed_rad_s
+    torque_Nm = limits_of(robot).torque_Nm
+    return Limits(torque_Nm, speed, tolerance.following_error_rad, reactions=_REACTIONS)
 
 
 def _heartbeat_s(winch: Winch) -> float:
@@ -327,17 +360,33 @@ def _heartbeat_s(winch: Winch) -> float:
     return winch.drive.heartbeat_consumer_s / HEARTBEATS_IN_TOLERANCE
 
 
-def _axis(winch: Winch, network: CanNetwork, report: BootReport, limit_Nm: float) -> AxisGroup:
-    axis = AxisConfig.from_boot(winch.drive, report, limit_Nm)
-    return AxisGroup(network, [axis], winch.sync_period_s)
+def _find_bus(
+    stack: ExitStack,
+    winch: Winch,
+    url: BusUrl,
+    out: Output,
+    plant: Path | None,
+    truth_log: Path | None = None,
+) -> tuple[BusUrl, int | None]:
+    """Return the winch's bus, and the process of its simulator where one was to be started."""
+    if url.starts_own_simulator:
+        out.note("starting the simulated drive ...")
+        (bus,), pid = _own_simulator(stack, winch.reference, plant, truth_log)
+        return open_bus(bus), pid
+    if plant is not None:
+        raise _plant_not_ours()
+    return url, None
+
+
+def _plant_not_ours() -> BadInputError:
+    return BadInputError("--plant: only for a simulator that the command starts (simbus:)")
 
 
 def _own_simulator(
-    stack: ExitStack, winch: Winch, out: Output, plant: Path | None, truth_log: Path | None
-) -> BusUrl:
-    url = open_bus(f"simbus:own-{os.getpid()}")
-    out.note("starting the simulated drive ...")
-    simulator = OwnSimulator(winch.reference, str(url), plant, truth_log)
+    stack: ExitStack, reference: str, plant: Path | None, truth_log: Path | None = None
+) -> tuple[list[str], int]:
+    bus = f"simbus:own-{os.getpid()}"
+    simulator = OwnSimulator(reference, bus, plant, truth_log)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
-    return url
+    return [bus], simulator.process.pid

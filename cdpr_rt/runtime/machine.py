@@ -81,6 +81,9 @@ class Machine(Protocol):
     def prepared(self) -> bool:
         """Whether the drives confirm what `prepare` asked of them."""
 
+    def unprepared(self) -> str:
+        """Return which drive does not confirm what `prepare` asked of it."""
+
     def power_on(self) -> None:
         """Ask all drives for their power; raises MachineError where one must not have it."""
 

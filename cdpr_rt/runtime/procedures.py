@@ -27,7 +27,6 @@ _SETTLE_CYCLES: Final = 5
 _LOOKS: Final = 4
 _MODE_S: Final = 2.0
 _POWER_ON_S: Final = 4.0
-_REST_S: Final = 5.0
 _SETTLE_S: Final = 1.0
 _STILL_RAD_S: Final = 0.3
 _BRAKES_S: Final = 2.0
@@ -82,9 +81,10 @@ def check(loop: ControlLoop, reset: bool = False) -> Iterator[None]:
         yield from _look_at_cycles(loop)
     except ControlError as error:
         life.blame(str(error))
+        yield from _explain(loop)
         loop.stop_cycles()
         yield from _leave_cycles(loop)
-        raise
+        raise RefusedError(life.reason) from error
     life.enter(LoopState.READY)
     if machine.read_only:
         loop.switch("hold")
@@ -108,10 +108,11 @@ def _look_at_cycles(loop: ControlLoop) -> Iterator[None]:
     machine, cycle = loop.machine, loop.cycle
     assert cycle is not None  # cycles run
     device = cycle.device
-    waits = _until(loop, machine.prepared, _MODE_S, "the drives' confirmation of their modes")
-    for _ in waits:
+    for _ in _up_to(loop, _MODE_S, machine.prepared):
         _refuse_trouble(loop)
         yield
+    if not machine.prepared():
+        raise RefusedError(machine.unprepared())
     cycles = max(_CHECK_CYCLES, round(CHECK_S / device.period_s))
     limits = loop.parts.supervisor.limits
     allowed = cycles * device.n * limits.missed_in_window / limits.window_cycles
@@ -154,7 +155,20 @@ def _refuse_trouble(loop: ControlLoop) -> None:
     trouble = loop.lost_bus or loop.cycle.device_alarm() or loop.cycle.watch_alarm()
     trouble = trouble or loop.cycle.stop_reason()
     if trouble:
-        raise RefusedError(f"check: {trouble}")
+        raise RefusedError(trouble)
+
+
+def between_cycles(loop: ControlLoop, work: Callable[[], Any]) -> Iterator[None]:
+    """Run `work`, which may wait, while no cycles run; refused where the drives have power."""
+    if loop.life.state is not LoopState.READY:
+        raise RefusedError(f"cycles do not stop in state {loop.life.state.label}")
+    loop.stop_cycles()
+    yield from _slowly(loop, loop.machine.pause)
+    job = loop.job(work)
+    while not job.done:
+        yield
+    loop.start_cycles()
+    job.result()
 
 
 def enable(
@@ -224,7 +238,7 @@ def _brake(loop: ControlLoop) -> Iterator[None]:
     """
     machine, velocity = loop.machine, loop.parts.estimator.estimate.velocity_rad_s
     if loop.program.name != "lower":
-        yield from _up_to(loop, _REST_S, lambda: loop.program.at_rest)
+        yield from _up_to(loop, loop.program.rest_s, lambda: loop.program.at_rest)
         loop.switch("lower" if loop.lowers else "hold")
     if loop.lowers:
         yield from _up_to(loop, loop.parts.lowering_s, lambda: loop.program.at_rest)

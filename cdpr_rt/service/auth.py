@@ -131,6 +131,11 @@ class Gate:
 
         await self._app(scope, receive, send_on)
 
+    @property
+    def stops_for_all(self) -> bool:
+        """Whether everybody who can connect may stop the robot, without a key."""
+        return self._door.key is None
+
     def knows(self, head: bytes) -> bool:
         """Whether a request's head, up to its blank line, shows the key or who may move's token.
 

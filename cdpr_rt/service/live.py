@@ -6,7 +6,7 @@ import asyncio
 import json
 import time
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import FastAPI, Query, WebSocket
@@ -27,6 +27,7 @@ _STATUS_S = 1.0
 _MESSAGES_PER_S = 100.0
 BUSY, REFUSED, SILENT, UNFIT = 1013, 4409, 4408, 1008
 """Codes that a connection is closed with, beside the usual ones."""
+_MOST_REASON_BYTES = 123  # RFC 6455, 5.5
 
 
 class Order(models.Who):
@@ -62,7 +63,7 @@ class LiveSockets:
             unknown = [name for name in wanted if name not in FIELDS]
             await socket.accept()
             if unknown:
-                await socket.close(UNFIT, f"fields: {unknown[0][:40]!r} is none of a cycle's")
+                await socket.close(UNFIT, _reason(f"fields: {unknown[0]} is none of a cycle's"))
             elif self._service.counts["live_clients"] >= _MOST_LIVE:
                 await socket.close(BUSY, f"{_MOST_LIVE} others look on already")
             else:
@@ -78,7 +79,7 @@ class LiveSockets:
             try:
                 token = self._service.lease.take(client, ttl_s)
             except LeaseError as error:
-                await socket.close(REFUSED, str(error)[:120])
+                await socket.close(REFUSED, _reason(str(error)))
                 return
             try:
                 await self._obey(socket, client, token, ttl_s)
@@ -175,7 +176,8 @@ class LiveSockets:
             service.lease.renew(token)
             return service.link.state(), ""
         if order.do == "hold":
-            service.lease.renew(token)
+            with suppress(LeaseError):  # who has lost the right meanwhile may stop all the same
+                service.lease.renew(token)
             reply = await service.tell("hold", client)
         elif order.do == "program":
             program = _PROGRAM.validate_python({"program": order.program, "wanted": order.wanted})
@@ -219,6 +221,11 @@ class _News:
         if seen != self._seen or now - self._told_s > _STATUS_S:
             self._seen, self._told_s = seen, now
             yield {"kind": "status", "status": service.status()}
+
+
+def _reason(text: str) -> str:
+    """Return why a connection is closed as a close frame has room for it."""
+    return text.encode("ascii", "backslashreplace")[:_MOST_REASON_BYTES].decode()
 
 
 async def _send(socket: WebSocket, text: str) -> None:

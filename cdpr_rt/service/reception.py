@@ -51,8 +51,9 @@ class Reception:
     """Accepts what comes to `listener`; has `factory` make the protocol of who says something.
 
     A request for a stop is attended to at once, all others in their turn: those whose head `knows`
-    finds the key or the token in apart from strangers, and `factory` is told. Who says nothing is
-    ended after 10 s, and earlier where more than 256 wait: of the peer that has most, the oldest.
+    finds the key or the token in apart from strangers, and `factory` is told. A stranger's stop
+    waits as all else does, unless `stops_for_all`: it will be refused. Who says nothing is ended
+    after 10 s, and earlier where more than 256 wait: of the peer that has most, the oldest.
     `tell` is told, now and then, that the system gives no descriptor more.
     """
 
@@ -61,11 +62,13 @@ class Reception:
         listener: socket.socket,
         factory: Callable[[bool], asyncio.Protocol],
         knows: Callable[[bytes], bool],
+        stops_for_all: bool,
         turns: Turns,
         tell: Callable[[str], None],
     ) -> None:
         self._listener = listener
         self._factory, self._knows = factory, knows
+        self._stops_for_all = stops_for_all
         self._turns = turns
         self._tell = tell
         self._loop = asyncio.get_running_loop()
@@ -145,15 +148,19 @@ class Reception:
             head = b""
         newcomer.is_heard = b"\r\n\r\n" in head or len(head) == _HEAD_BYTES
         newcomer.is_known = newcomer.is_heard and self._knows(head)
-        if head.startswith(STOPS):
+        if head.startswith(STOPS) and (self._stops_for_all or newcomer.is_known):
             self._turns.give_way()
             self._enter(newcomer)
         elif not head:
             self._part_from(newcomer).close()
-        elif not may_stop(head) and (newcomer.is_known or not newcomer.asks):
+        elif self._may_wait(head) and (newcomer.is_known or not newcomer.asks):
             # the rest of a head that comes later may show the key: then among those who have it
             newcomer.asks = True
             self._turns.ask(partial(self._have_turn, newcomer), newcomer.is_known)
+
+    def _may_wait(self, head: bytes) -> bool:
+        """Whether it is said already that this is no stop that is attended to at once."""
+        return not may_stop(head) or (head.startswith(STOPS) and not self._stops_for_all)
 
     def _have_turn(self, newcomer: _Newcomer) -> bool:
         if self._silent.get(newcomer.sock.fileno()) is not newcomer:

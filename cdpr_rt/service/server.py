@@ -264,7 +264,7 @@ class Server(uvicorn.Server):
             )
         )
         self._listener = listener
-        self._knows = app.knows
+        self._app = app
         self._turns, self._tell = turns, tell
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -280,7 +280,7 @@ class Server(uvicorn.Server):
             )
             return protocol
 
-        shared = self._knows, self._turns, self._tell
+        shared = self._app.knows, self._app.stops_for_all, self._turns, self._tell
         receptions: Any = [Reception(one, factory, *shared) for one in sockets]
         self.servers = receptions
         self.started = True
@@ -300,12 +300,15 @@ def listen_unix(path: Path) -> socket.socket:
 
     What a daemon that was killed has left there is replaced, a daemon that answers is not.
     """
-    if path.exists() or path.is_symlink():
-        if not stat.S_ISSOCK(path.lstat().st_mode):
-            raise ListenError(f"socket {path}: is something else than a socket")
-        if _answers(path):
-            raise ListenError(f"socket {path}: another daemon listens there")
-        path.unlink()
+    try:
+        if path.exists() or path.is_symlink():
+            if not stat.S_ISSOCK(path.lstat().st_mode):
+                raise ListenError(f"socket {path}: is something else than a socket")
+            if _answers(path):
+                raise ListenError(f"socket {path}: another daemon listens there")
+            path.unlink()
+    except OSError as error:  # somebody else's, in a folder where all may write
+        raise ListenError(f"socket {path}: {error.strerror or error}") from None
     listener = socket.socket(socket.AF_UNIX)
     mask = os.umask(0o177)
     try:

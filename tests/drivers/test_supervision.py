@@ -19,11 +19,7 @@ from bus_log import BusLog, logged
 from scripted_node import scripted
 
 from cdpr_rt.clock import Clock, PacedClock
-from cdpr_rt.controllers.base import Idle
 from cdpr_rt.errors import TripError
-from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
-from cdpr_rt.executive import Executive, Motion
-from cdpr_rt.supervisor import Limits, Supervisor
 from drivers.bus import BusUrl
 from drivers.bus.health import BusState
 from drivers.cia402 import STATE_TABLE, State
@@ -68,38 +64,20 @@ def _eventually(clock: Clock, condition: Callable[[], object]) -> None:
     assert clock.wait(condition, clock.now_s + 5.0)
 
 
-class _Push(Idle):
-    """Asks for a constant torque, and does something once on its way."""
-
-    def __init__(self, n: int, at_cycle: int, trouble: Callable[[], None]) -> None:
-        super().__init__(n)
-        self._left = at_cycle
-        self._trouble = trouble
-
-    def update(self, _feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        torque_Nm[:] = 0.03
-        self._left -= 1
-        if self._left == 0:
-            self._trouble()
-
-
-class _Still:
-    duration_s = 5.0
-
-    def fill(self, _time_s: float, setpoint: Setpoint) -> None:
-        setpoint.position_rad[:] = 0.0
-
-    def brake(self, _time_s: float) -> Motion:
-        return self
-
-
 def _drive_into(rig: Rig, trouble: Callable[[], None]) -> str:
-    """Run the executive into trouble and switch off, as every command does; return why."""
-    limits = Limits(torque_Nm=3.0, speed_rad_s=1e3, following_error_rad=1e3)
-    supervisor = Supervisor(limits, rig.group.n, PERIOD_S)
-    executive = Executive(rig.group, supervisor, lambda: False)
-    with pytest.raises(TripError) as caught, rig.group:
-        executive.run(_Push(rig.group.n, 150, trouble), _Still())
+    """Drive until there is an alarm and switch off, as every loop does; return why."""
+    group = rig.group
+    with pytest.raises(TripError) as caught, group:
+        for cycle in range(5000):
+            group.sync()
+            group.receive()
+            text = group.alarm()
+            group.command.torque_Nm[:] = 0.0 if text else 0.03
+            if cycle == 150:
+                trouble()
+            group.transmit()
+            if text:
+                raise TripError(text)
     return str(caught.value)
 
 

@@ -20,16 +20,18 @@ from twin_rig import DRIVES, PLANT, Motion, bus_name, write_winch
 
 from cdpr_rt.measurement import both_ways, recording
 from cdpr_rt.rawlog import read_raw_log
+from cdpr_rt.runtime.lifecycle import RefusedError
 from cdpr_rt.tuning import design_pid
 from drivers import touch_probe
 from drivers.cia402 import POWER_OFF, Mode, State, state_of, supported_modes
 from drivers.errors import DriveFaultError, ModeRefusedError, SdoError
 from profiles import DriveProfile, load_winch
 from tools.commands.drive import info
-from tools.commissioning import Measurement, Paths
+from tools.commission_files import Paths
+from tools.commissioning import Measurement
 from tools.output import Output
 from tools.procedure import Commissioning
-from tools.session import WinchSession, open_bus, open_winch
+from tools.session import Session, open_bus, open_winch
 from tools.simulator import OwnSimulator
 
 # the plant's truth, which the master does not know
@@ -46,7 +48,7 @@ class Twin:
     """One drive type, simulated and booted, and what its tests need."""
 
     name: str
-    session: WinchSession
+    session: Session
     motion: Motion
 
     @property
@@ -82,9 +84,8 @@ def shared_twin(
 def twin(shared_twin: Twin) -> Iterator[Twin]:
     yield shared_twin
     session = shared_twin.session
-    session.reset_fault()
+    session.reset()
     session.idle(0.3)
-    session.disable()
 
 
 def test_boots_as_its_profile_says(twin: Twin) -> None:
@@ -117,7 +118,7 @@ def test_every_mode_of_its_profile_is_confirmed(twin: Twin) -> None:
 def test_info_tells_what_the_drive_cannot(twin: Twin, capsys: pytest.CaptureFixture[str]) -> None:
     """The ratings and modes for which a drive has no objects come from the files."""
     winch = twin.session.winch
-    info(winch.reference, str(twin.session.url), None, as_json=True)
+    info(winch.reference, str(twin.session.network.url), None, as_json=True)
     told = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert (told["rated_torque_Nm"], told["encoder_counts_per_turn"]) == (3.0, 8192)
     assert [int(name.split()[0]) for name in told["supported_modes"]] == sorted(
@@ -143,8 +144,9 @@ def test_is_enabled_and_disabled(twin: Twin) -> None:
     assert twin.session.device.states() == [State.OPERATION_ENABLED]
     assert twin.shown(0x6061) == twin.drive.mode_torque
     assert state_of(twin.shown(0x6041)) == State.OPERATION_ENABLED
-    with pytest.raises(ModeRefusedError, match="while the drive is enabled"):
+    with pytest.raises(RefusedError, match="cycles do not stop in state active"):
         twin.session.set_mode(Mode.HOMING)
+    assert twin.session.device.states() == [State.OPERATION_ENABLED]
     twin.session.disable()
     assert state_of(twin.shown(0x6041)) in POWER_OFF
 
@@ -177,6 +179,7 @@ def test_torques_are_told_and_sent_in_its_own_steps(twin: Twin) -> None:
         sent.append(float(device.command.sent_torque_Nm[0]))
         told.append(float(device.feedback.torque_Nm[0]))
     unit = UNITS_NM.get(twin.name, abs(device.axes[0].Nm_per_unit))
+    twin.motion.give_back()
     steps = np.array(sent) / unit
     assert steps == pytest.approx(np.round(steps), abs=1e-9)
     assert np.ptp(np.round(steps)) == 1
@@ -219,7 +222,7 @@ def test_touch_probe_finds_the_index_in_motion(twin: Twin) -> None:
     session, device = twin.session, twin.session.device
     if not any(entry.index == 0x60B9 for pdo in twin.drive.tpdos for entry in pdo.entries):
         with pytest.raises(DriveFaultError, match=r"60B8h is not in its EDS.*by homing"):
-            touch_probe.arm(device, 0)
+            touch_probe.arm(*device.part_of(0))
         return
     twin.power()
     session.expect_index()
@@ -238,7 +241,7 @@ def test_quick_stop_brings_the_rotor_to_rest(twin: Twin) -> None:
     twin.motion.push(0.6, 14)
     device.request(State.QUICK_STOP)
     begin = device.feedback.cycle
-    twin.session.executive.step(
+    twin.session.wait(
         lambda: device.reached(State.SWITCH_ON_DISABLED), 1.0, "the end of a quick stop"
     )
     end = device.feedback.cycle
@@ -257,7 +260,7 @@ def test_a_fault_takes_the_torque_and_stays_until_it_is_acknowledged(twin: Twin)
     assert now["motor_Nm"][0] == pytest.approx(0.0, abs=1e-6)
     with pytest.raises(DriveFaultError, match="acknowledge its fault"):
         device.request(State.OPERATION_ENABLED)
-    twin.session.reset_fault()
+    twin.session.reset()
     assert twin.shown(0x603F) == 0
     twin.power()
     assert twin.motion.push(0.6, 14)["motor_Nm"][8:14] == pytest.approx(0.624, rel=0.01)
@@ -280,7 +283,7 @@ def test_a_sweep_finds_the_cogging(twin: Twin, tmp_path: Path) -> None:
     (tmp_path / "raw").mkdir()
     Commissioning(session, Output(True), paths).prepare()
     inertia = session.winch.motor.rotor_inertia_kg_m2
-    design = design_pid(inertia, session.latency_s, 25.0, PERIOD_S)
+    design = design_pid(inertia, session.winch.latency_s, 25.0, PERIOD_S)
     session.enable()
     passes = both_ways(math.radians(60.0), 0.5 * math.pi, 1)
     recorded = Measurement(session, Output(True), paths).track("sweep", design, None, passes)

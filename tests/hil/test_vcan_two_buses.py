@@ -16,7 +16,7 @@ from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.trajectory import Leg
 from profiles import load_robot
 from tools.output import Output
-from tools.robot_session import open_robot
+from tools.session import open_robot
 
 pytestmark = pytest.mark.vcan
 
@@ -78,12 +78,11 @@ def test_four_drives_on_each_of_two_interfaces(
         device = session.device
         assert device.lockstep
         assert session.boot_s < 10.0
-        session.set_torque_mode()
         session.enable()
         start = device.feedback.position_rad.copy()
         speed = np.linspace(-3.0, 3.0, 8)
         controller = Proportional(np.full(8, 3.0), np.full(8, 1.5))
-        session.executive.run(controller, Leg(start, speed, 0.2, 0.05))
+        session.follow(controller, Leg(start, speed, 0.2, 0.05))
         np.testing.assert_allclose(device.feedback.position_rad - start, 0.25 * speed, atol=0.15)
         assert np.all(device.feedback.valid)
         assert device.missed == 0

@@ -18,7 +18,7 @@ from profiles import Winch, load_winch
 from sim_bus.drive import SimDrive
 from sim_bus.plant import Plant
 from sim_bus.server import serve
-from tools.session import WinchSession
+from tools.session import Session
 from tools.truth import NO_SYNC
 
 SHIPPED = Path(profiles.__file__).parent
@@ -54,9 +54,9 @@ def bus_name() -> str:
 
 
 class Motion:
-    """Runs cycles on a session's device and tells what truly happened in them."""
+    """Runs cycles on a session's device, its loop left aside; tells what truly happened in them."""
 
-    def __init__(self, session: WinchSession, truth_log: Path) -> None:
+    def __init__(self, session: Session, truth_log: Path) -> None:
         self.session = session
         self._log = truth_log
 
@@ -74,6 +74,11 @@ class Motion:
             device.transmit()
         return self.truth(first, device.feedback.cycle)
 
+    def give_back(self) -> None:
+        """Have the loop take the drives as they are now, whatever has moved them meanwhile."""
+        self.session.loop.parts.estimator.reset()
+        self.session.loop.parts.supervisor.reset()
+
     def truth(self, first: int, last: int) -> NDArray[np.void]:
         """Return the truth at the SYNCs of the cycles `first` up to `last`."""
         device = self.session.device
@@ -84,6 +89,7 @@ class Motion:
             device.receive()
             device.transmit()
         device.command.torque_Nm[:] = powered
+        self.give_back()
         start = first + self.session.sync_offset() - 1
         logged: NDArray[Any] = np.fromfile(self._log, _TRUTH, offset=_HEADER_BYTES)
         records = logged[logged["sync"] != NO_SYNC][start : start + last - first + 1]

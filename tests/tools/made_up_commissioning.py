@@ -15,10 +15,10 @@ from cdpr_rt.compensation import FrictionFeedforward
 from cdpr_rt.identification import BetterResult, Estimate, Harmonic, identify_thesis
 from cdpr_rt.identification.friction import FrictionShape
 from cdpr_rt.measurement import Pass
+from cdpr_rt.raw_rows import column_names
 from cdpr_rt.rawlog import RawLogWriter
-from cdpr_rt.recorder import column_names
 from cdpr_rt.tuning import design_pid
-from tools.commissioning import Paths
+from tools.commission_files import Paths
 from tools.procedure import Identified, legs, validation_name
 
 PERIOD_s = 2e-3

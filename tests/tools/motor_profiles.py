@@ -17,7 +17,6 @@ from cdpr_rt.cogging_profile import (
 from profiles import Robot, Winch
 from sim_bus.plant import Plant
 from tools.commissioned import folder_of
-from tools.session import latency_s
 
 SAMPLES = 512
 
@@ -49,7 +48,7 @@ def profile_of(winch: Winch, plant: Plant, serial: int) -> CoggingProfile:
             stribeck_speed_rad_s=f.stribeck_rad_s,
             viscous_Nms_rad=f.viscous_Nms_rad / gain,
         ),
-        look_ahead_s=latency_s(winch),
+        look_ahead_s=winch.latency_s,
         observer_s=0.003,
     )
     drive = winch.drive

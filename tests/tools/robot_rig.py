@@ -18,7 +18,7 @@ import profiles
 from cdpr_rt.controllers.proportional import Proportional
 from cdpr_rt.trajectory import Leg
 from tools.output import Output
-from tools.robot_session import RobotSession
+from tools.session import Session
 
 OUT = Output(as_json=True)
 ROOT = Path(__file__).parents[2]
@@ -100,7 +100,7 @@ def unique() -> str:
 
 
 def hold(
-    session: RobotSession,
+    session: Session,
     seconds: float,
     speed_rad_s: Sequence[float] | None = None,
     gain_Nm_rad: float = 3.0,
@@ -110,4 +110,4 @@ def hold(
     speed = np.zeros(n) if speed_rad_s is None else np.array(speed_rad_s, float)
     start = session.device.feedback.position_rad.copy()
     controller = Proportional(np.full(n, gain_Nm_rad), np.full(n, 1.5))
-    session.executive.run(controller, Leg(start, speed, seconds - 0.2, 0.1))
+    session.follow(controller, Leg(start, speed, seconds - 0.2, 0.1))

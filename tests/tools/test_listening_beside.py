@@ -18,7 +18,7 @@ from drivers.bus.simbus_socket import connect, exchange
 from drivers.listening import HeardBus, ListeningDevice, heard_axis
 from profiles import Robot, load_robot
 from tools.robot_buses import robot_urls
-from tools.robot_session import open_robot
+from tools.session import open_robot
 
 FRAME = struct.Struct("=IB3x8s")
 AXES = (("left", 1), ("right", 1), ("left", 2), ("right", 2))
@@ -92,7 +92,6 @@ def test_a_listener_hears_all_and_adds_nothing(tmp_path: Path) -> None:
         thread.start()
         try:
             with open_robot(robot, [url], OUT) as session:
-                session.set_torque_mode()
                 session.enable()
                 hold(session, 0.5, [1.0, -1.0, 2.0, -2.0])
                 session.disable()

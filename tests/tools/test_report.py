@@ -21,7 +21,7 @@ from made_up_commissioning import AMPLITUDES_Nm, Commissioned, make_up
 
 from cdpr_rt.errors import RawLogError
 from profiles import Winch, load_winch
-from tools.commissioning import Paths
+from tools.commission_files import Paths
 from tools.errors import BadInputError, WorkFailedError
 from tools.report.page import build
 from tools.report.save import save

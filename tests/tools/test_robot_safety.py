@@ -13,7 +13,7 @@ from cdpr_rt.errors import TripError
 from drivers.errors import DriveFaultError
 from profiles import load_robot
 from sim_bus.physics_board import PhysicsBoard
-from tools.robot_session import open_robot
+from tools.session import open_robot
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
 from safety_rig import Twin, board_file, patient_profile, wait_until
@@ -34,7 +34,6 @@ def test_the_emergency_stop_takes_the_torque_on_every_bus(
                     pytest.raises((TripError, DriveFaultError)) as caught,
                     open_robot(load_robot(path), [url], OUT, safety_io=twin.reference) as session,
                 ):
-                    session.set_torque_mode()
                     session.enable()
                     assert all(axis.state().power_on for axis in axes)
                     assert axes[0].brake_released

@@ -14,13 +14,13 @@ import pytest
 from robot_rig import OUT, Simulator, hold, robot_file, simulated, unique
 
 import profiles
-from cdpr_rt.errors import TripError
-from drivers.cia402 import POWER_OFF, State, state_of
-from drivers.errors import BusError, DriveFaultError
+from cdpr_rt.errors import ControlError, TripError
+from drivers.cia402 import POWER_OFF, Mode, State, state_of
+from drivers.errors import BusError, ModeRefusedError
 from profiles import Robot, load_robot
 from tools.bench.soak import Counts, compare
 from tools.errors import BadInputError, WorkFailedError
-from tools.robot_session import RobotSession, open_robot
+from tools.session import Session, open_robot
 
 SPATIAL = load_robot("spatial-8")
 
@@ -33,20 +33,23 @@ def bus() -> Iterator[str]:
 
 
 @pytest.fixture
-def session(bus: str) -> Iterator[RobotSession]:
+def session(bus: str) -> Iterator[Session]:
     with open_robot(SPATIAL, [bus], OUT) as opened:
         yield opened
 
 
-def drive_states(session: RobotSession) -> list[State]:
+def asked(session: Session, index: int) -> list[int]:
     """Ask every drive itself, by SDO."""
-    return [
-        state_of(session.networks[axis.bus].read_int(axis.node_id, 0x6041)) for axis in session.axes
-    ]
+    networks = session.machine.networks
+    return [networks[axis.bus].read_int(axis.node_id, index) for axis in session.robot.axes]
 
 
-def counts(session: RobotSession) -> list[int]:
-    return [session.networks[axis.bus].read_int(axis.node_id, 0x6064) for axis in session.axes]
+def drive_states(session: Session) -> list[State]:
+    return [state_of(word) for word in asked(session, 0x6041)]
+
+
+def counts(session: Session) -> list[int]:
+    return asked(session, 0x6064)
 
 
 def test_eight_drives_are_up_within_two_seconds_of_bus_time(bus: str):
@@ -57,13 +60,12 @@ def test_eight_drives_are_up_within_two_seconds_of_bus_time(bus: str):
             assert status["name"] == f"{name}-{of_bus}"
             # what all frames so far, SDO included, take on a real wire at 1 Mbit/s
             assert status["load"] * status["bus_time_s"] < 1.0
-        assert [report.node_id for report in opened.reports] == list(range(1, 9))
+        assert [report.node_id for report in opened.machine.reports] == list(range(1, 9))
         opened.idle(0.01)
         assert all(state != State.OPERATION_ENABLED for state in opened.device.states())
 
 
-def test_all_axes_run_as_one_device(session: RobotSession):
-    session.set_torque_mode()
+def test_all_axes_run_as_one_device(session: Session):
     session.enable()
     device = session.device
     assert device.lockstep
@@ -82,7 +84,7 @@ def test_all_axes_run_as_one_device(session: RobotSession):
     assert len({status["sync_count"] % 10**9 for status in session.bus_status().values()}) == 1
 
 
-def test_the_arrays_of_each_bus_are_slices_of_the_whole(session: RobotSession):
+def test_the_arrays_of_each_bus_are_slices_of_the_whole(session: Session):
     device = session.device
     for group, first in zip(device.groups, (0, 4), strict=True):
         for whole, part in (
@@ -101,7 +103,6 @@ def test_axes_may_alternate_between_buses(tmp_path: Path):
     robot = load_robot(path)
     with simulated(path) as url, open_robot(robot, [url], OUT) as opened:
         assert [axis.node_id for axis in opened.device.axes] == [3, 1, 2, 1]
-        opened.set_torque_mode()
         opened.enable()
         before, begin = opened.device.feedback.position_rad.copy(), counts(opened)
         speeds = np.array([3.0, -2.0, 1.0, -4.0])
@@ -116,30 +117,29 @@ def test_axes_may_alternate_between_buses(tmp_path: Path):
 
 def test_a_fault_on_one_bus_stops_the_axes_of_both(bus: str):
     with (
-        pytest.raises(DriveFaultError, match="bus can1: node 6") as caught,
+        pytest.raises(TripError, match=r"bus can1: node 6: .* 7305h incremental encoder"),
         open_robot(SPATIAL, [bus], OUT) as opened,
     ):
-        opened.set_torque_mode()
         opened.enable()
-        opened.networks["can1"].write(6, 0x2F00, 1, 0x7305)
+        opened.machine.networks["can1"].write(6, 0x2F00, 1, 0x7305)
         hold(opened, 10.0)
-    assert "bus can1 node 6: " in str(caught.value)
-    with open_robot(SPATIAL, [bus], OUT) as opened:
+    with (
+        pytest.raises(ControlError, match=r"^bus can1: node 6: "),
+        open_robot(SPATIAL, [bus], OUT) as opened,
+    ):
+        pytest.fail("opened with a drive in fault")
+    with open_robot(SPATIAL, [bus], OUT, reset=True) as opened:
         assert all(state in POWER_OFF for state in drive_states(opened))
-        assert drive_states(opened)[5] == State.FAULT
-        opened.reset_fault()
-        opened.set_torque_mode()
         opened.enable()
         assert opened.device.reached(State.OPERATION_ENABLED)
         opened.disable()
 
 
-def test_what_one_bus_refuses_enables_no_drive_of_the_other(session: RobotSession):
+def test_what_one_bus_refuses_enables_no_drive_of_the_other(session: Session):
     device = session.device
-    session.idle(0.01)
-    device.groups[0].ask_mode(10)
-    session.idle(0.05)
-    with pytest.raises(Exception, match="node 5: no mode of operation was asked for"):
+    device.groups[1].ask_mode(Mode.HOMING)
+    session.idle(0.001)
+    with pytest.raises(ModeRefusedError, match="node 5: asked for mode 6"):
         device.request(State.OPERATION_ENABLED)
     session.idle(0.05)
     assert all(state == State.SWITCH_ON_DISABLED for state in device.states())
@@ -151,10 +151,9 @@ def test_a_lost_bus_leaves_the_drives_of_the_other_without_power(tmp_path: Path)
     buses = [f"left={left.ready['bus']}", f"right={right.ready['bus']}"]
     try:
         with (
-            pytest.raises(BusError, match="has gone away") as caught,
+            pytest.raises(TripError, match="has gone away") as caught,
             open_robot(robot, buses, OUT) as opened,
         ):
-            opened.set_torque_mode()
             opened.enable()
             hold(opened, 0.3)
             left.kill()
@@ -166,7 +165,7 @@ def test_a_lost_bus_leaves_the_drives_of_the_other_without_power(tmp_path: Path)
         with open_robot(one, buses[1:], OUT) as opened:
             # it was switched off, not left to its own watch on the master
             assert drive_states(opened) == [State.SWITCH_ON_DISABLED]
-            assert opened.networks["right"].read_int(1, 0x1003) == 0
+            assert opened.machine.networks["right"].read_int(1, 0x1003) == 0
     finally:
         left.close()
         right.close()
@@ -180,7 +179,6 @@ def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path
     buses = [f"left={left.ready['bus']}", f"right={right.ready['bus']}"]
     try:
         with pytest.raises(TripError), open_robot(robot, buses, OUT) as opened:
-            opened.set_torque_mode()
             opened.enable()
             hold(opened, 0.5, gain_Nm_rad=0.05)
             left.process.send_signal(signal.SIGSTOP)
@@ -190,24 +188,11 @@ def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path
         with open_robot(one, buses[1:], OUT) as opened:
             assert drive_states(opened) == [State.SWITCH_ON_DISABLED]
             # by the master: a drive that misses its heartbeat reports it and is in fault
-            assert opened.networks["right"].read_int(1, 0x1003) == 0
+            assert opened.machine.networks["right"].read_int(1, 0x1003) == 0
     finally:
         left.process.send_signal(signal.SIGCONT)
         left.close()
         right.close()
-
-
-def test_an_optional_drive_may_be_missing(tmp_path: Path):
-    with simulated(robot_file(tmp_path, [("a", 1), ("b", 1)])) as url:
-        path = robot_file(tmp_path, [("a", 1), ("a", 7), ("b", 1)], optional=1)
-        with open_robot(load_robot(path), [url], OUT) as opened:
-            assert list(opened.absent) == [1]
-            assert "node 7 did not boot (step B)" in opened.absent[1]
-            assert [axis.bus for axis in opened.axes] == ["a", "b"]
-            opened.set_torque_mode()
-            opened.enable()
-            hold(opened, 0.3)
-            assert opened.device.missed == 0
 
 
 def test_a_mandatory_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Path):
@@ -235,7 +220,6 @@ def test_drives_of_different_makes_run_side_by_side(tmp_path: Path):
     path = robot_file(tmp_path, [("a", 1), ("a", 2), ("b", 1)], drives=drives)
     robot = load_robot(path)
     with simulated(path) as url, open_robot(robot, [url], OUT) as opened:
-        opened.set_torque_mode()
         opened.enable()
         hold(opened, 0.3)
         before = Counts.all(opened)
@@ -260,7 +244,6 @@ def test_paced_buses_run_as_one_device(tmp_path: Path):
     path = robot_file(tmp_path, axes, period_s=0.01)
     with simulated(path, "--paced") as url, open_robot(load_robot(path), [url], OUT) as opened:
         assert not opened.device.lockstep
-        opened.set_torque_mode()
         opened.enable()
         begin = time.monotonic()
         hold(opened, 1.0, gain_Nm_rad=0.05)

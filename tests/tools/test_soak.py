@@ -16,7 +16,7 @@ from robot_rig import OUT, ROOT, Simulator, robot_file, unique
 from profiles import load_robot
 from tools.bench import soak as soak_bench
 from tools.bench.soak import Process, Soak, growth
-from tools.robot_session import RobotSession, open_robot
+from tools.session import Session, open_robot
 
 SHORT = ("--hours", "0.02", "--rate", "250")
 
@@ -45,7 +45,7 @@ def test_minutes_of_bus_time_leak_nothing_and_lose_nothing():
 
 
 @pytest.fixture
-def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RobotSession]:
+def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
     """Two drives on two buses, enabled; legs of half a second."""
     monkeypatch.setattr(soak_bench, "_LEG_S", 1.5)
     path = robot_file(tmp_path, [("a", 1), ("b", 1)])
@@ -54,7 +54,6 @@ def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RobotSe
     try:
         with open_robot(load_robot(path), [name], OUT) as opened:
             opened.simulator_pid = simulator.process.pid
-            opened.set_torque_mode()
             opened.enable()
             yield opened
             opened.disable()
@@ -62,21 +61,21 @@ def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RobotSe
         simulator.close()
 
 
-def test_a_limit_on_the_clock_ends_it_with_the_leg(session: RobotSession):
+def test_a_limit_on_the_clock_ends_it_with_the_leg(session: Session):
     soak = Soak(session)
     soak.run(3600.0, lambda _: None, most_wall_s=0.1)
     assert soak.wall_s > 0.1
     assert 1.0 < soak.bus_s < 100.0
 
 
-def soaked(session: RobotSession, seconds: float, each_leg: Any = lambda _: None) -> dict[str, Any]:
+def soaked(session: Session, seconds: float, each_leg: Any = lambda _: None) -> dict[str, Any]:
     Soak(session).run(9.0, lambda _: None)
     soak = Soak(session)
     soak.run(seconds, each_leg)
     return soak.figures()
 
 
-def test_memory_and_files_that_are_kept_are_found(session: RobotSession):
+def test_memory_and_files_that_are_kept_are_found(session: Session):
     memory: list[bytearray] = []
     files: list[int] = []
 
@@ -108,7 +107,7 @@ class _Leaky:
         return 16 if command and self._sent % 10 == 0 else int(self._port.send(frame))
 
 
-def test_commands_that_never_reach_the_bus_are_found(session: RobotSession):
+def test_commands_that_never_reach_the_bus_are_found(session: Session):
     group = session.device.groups[1]
     group._port, port = _Leaky(group._port), group._port
     figures = soaked(session, 3.0)

@@ -21,8 +21,8 @@ from hypothesis import strategies as st
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.measurement import recording
+from cdpr_rt.raw_rows import column_names
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
-from cdpr_rt.recorder import column_names
 from cdpr_rt.runtime.last_lengths import LastLengths
 from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
 from cdpr_rt.tuning import design_pid
@@ -50,8 +50,8 @@ from tests.cdpr_here import cdpr_here
 from tests.profiles.test_robot_limits import calibration
 from tests.tools.motor_profiles import leave_profiles, profile_of
 from tools.bus_fit import require_fit
+from tools.commission_files import Paths
 from tools.commissioned import load_profile
-from tools.commissioning import Paths
 from tools.errors import BadInputError, CommandError
 from tools.kept import kept
 from tools.report import tables, words

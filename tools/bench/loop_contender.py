@@ -20,7 +20,6 @@ from profiles import Robot
 from tools.errors import WorkFailedError
 from tools.robot_boot import boot_robot, open_networks
 from tools.robot_buses import robot_urls
-from tools.session import latency_s
 from tools.simulator import OwnSimulator
 
 PROGRAM = "tools.bench.loop_obvious"
@@ -74,7 +73,7 @@ def _axes(robot: Robot, channels: dict[str, str]) -> dict[str, Any]:
     """Return what the loop has to know of its axes, which are all alike."""
     winch, period_s = robot.axes[0].winch, robot.sync_period_s
     motor = winch.motor
-    design = stiffest_pid(motor.rotor_inertia_kg_m2, latency_s(winch), _BANDWIDTHS_HZ, period_s)
+    design = stiffest_pid(motor.rotor_inertia_kg_m2, winch.latency_s, _BANDWIDTHS_HZ, period_s)
     limits = limits_of(robot)
     buses: dict[str, dict[int, str]] = {}
     for axis in robot.axes:

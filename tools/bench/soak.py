@@ -20,7 +20,7 @@ from drivers.errors import DriverError
 from profiles import Robot
 from tools.errors import WorkFailedError
 from tools.output import Output
-from tools.robot_session import RobotSession, open_robot
+from tools.session import Session, open_robot
 
 MEMORY_LIMIT_KiB = 2048
 """What each process may gain after it has warmed up: the allocator's own coming and going."""
@@ -61,7 +61,7 @@ class Counts:
     bus: Mapping[str, Any]
 
     @classmethod
-    def of(cls, session: RobotSession, name: str, status: Mapping[str, Any]) -> Counts:
+    def of(cls, session: Session, name: str, status: Mapping[str, Any]) -> Counts:
         """Take the counts of the robot's bus `name`."""
         device = session.device
         group = device.groups[[bus.name for bus in device.buses].index(name)]
@@ -70,7 +70,7 @@ class Counts:
         )
 
     @classmethod
-    def all(cls, session: RobotSession) -> dict[str, Counts]:
+    def all(cls, session: Session) -> dict[str, Counts]:
         """Take the counts of every bus, by the robot's name of it."""
         status = session.bus_status()
         return {name: cls.of(session, name, told) for name, told in status.items()}
@@ -99,7 +99,7 @@ class BusVerdict:
         return abs(self.syncs_lost) + self.answers_missed + self.dropped + self.malformed + gap
 
 
-def compare(name: str, session: RobotSession, before: Counts, after: Counts) -> BusVerdict:
+def compare(name: str, session: Session, before: Counts, after: Counts) -> BusVerdict:
     """Hold what the master has done on a bus against what the bus has counted."""
     device = session.device
     here = next(bus for bus in device.buses if bus.name == name)
@@ -137,7 +137,7 @@ def growth(samples: Sequence[Process]) -> Process:
 class Soak:
     """Runs an enabled robot to and fro for hours, and looks at both processes as it goes."""
 
-    def __init__(self, session: RobotSession) -> None:
+    def __init__(self, session: Session) -> None:
         self.session = session
         pids = {"master": os.getpid()}
         if session.simulator_pid is not None:
@@ -145,7 +145,7 @@ class Soak:
         self._pids = pids
         self.samples: dict[str, list[Process]] = {name: [] for name in pids}
         device = session.device
-        motors = [axis.winch.motor for axis in session.axes]
+        motors = [axis.winch.motor for axis in session.robot.axes]
         frequency = _PHASE / (1.5 * device.period_s)
         gain = frequency**2 * np.array([motor.rotor_inertia_kg_m2 for motor in motors])
         limit = _TORQUE_SHARE * np.array([motor.rated_torque_Nm for motor in motors])
@@ -179,7 +179,7 @@ class Soak:
     def _leg(self, seconds: float) -> None:
         start = self.session.device.feedback.position_rad.copy()
         cruise_s = max(0.0, seconds - 2.0 * _RAMP_S)
-        self.session.executive.run(self._controller, Leg(start, self._speed, cruise_s, _RAMP_S))
+        self.session.follow(self._controller, Leg(start, self._speed, cruise_s, _RAMP_S))
         self._speed = -self._speed
 
     def _sample(self) -> None:
@@ -232,8 +232,7 @@ def measure(
     if rate_Hz is not None:
         robot = replace(robot, sync_period_s=1.0 / rate_Hz)
     seconds = hours * _HOUR_S
-    with open_robot(robot, ["simbus:"], out, torque_share=_TORQUE_SHARE) as session:
-        session.set_torque_mode()
+    with open_robot(robot, ["simbus:"], out) as session:
         session.enable()
         Soak(session).run(_WARM_UP_CYCLES * robot.sync_period_s, lambda _: None)
         soak = Soak(session)
@@ -244,7 +243,7 @@ def measure(
     head = {
         "robot": robot.reference,
         "rate_Hz": 1.0 / robot.sync_period_s,
-        "drives": session.device.n,
+        "drives": len(robot.axes),
         "boot_s": round(session.boot_s, 3),
     }
     return head | figures

@@ -23,8 +23,9 @@ from tools.commands.options import (
     WinchArgument,
     YesOption,
 )
+from tools.commission_files import Paths
 from tools.commissioned import load_profile
-from tools.commissioning import METHODS, Paths
+from tools.commissioning import METHODS
 from tools.errors import BadInputError
 from tools.evaluation import compare
 from tools.output import Output
@@ -38,7 +39,7 @@ from tools.procedure import (
 )
 from tools.report import build
 from tools.results import assemble, identification, read_run
-from tools.session import confirm_motion, latency_s, open_bus, open_winch
+from tools.session import confirm_motion, open_bus, open_winch
 from tools.truth import Truth
 
 app = typer.Typer(help="Cogging: sweep, fit, validate, report.", no_args_is_help=True)
@@ -95,7 +96,7 @@ def fit(
     paths = Paths(folder)
     recorded_winch, identity, latency = _recorded_identity(paths)
     profile = load_winch(winch or recorded_winch)
-    found = identify(profile, latency or latency_s(profile), paths)
+    found = identify(profile, latency or profile.latency_s, paths)
     store_profile(profile, identity, found, paths)
     result = identification(found)
     summary.show_identified(out, result)

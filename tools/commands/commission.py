@@ -23,7 +23,7 @@ from tools.commands.options import (
     SafetyIoOption,
     YesOption,
 )
-from tools.commissioning import Paths
+from tools.commission_files import Paths
 from tools.errors import BadInputError, WorkFailedError
 from tools.finding_index import Index
 from tools.output import Output, to_json

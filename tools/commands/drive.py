@@ -28,7 +28,14 @@ from tools.commands.options import (
 )
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
-from tools.session import WinchSession, confirm_motion, open_bus, open_network, open_winch
+from tools.session import (
+    Session,
+    Tolerance,
+    confirm_motion,
+    open_bus,
+    open_network,
+    open_winch,
+)
 from tools.tension.session_watch import tension_watch
 
 app = typer.Typer(help="One drive on the bus.", no_args_is_help=True)
@@ -130,7 +137,6 @@ def enable(
     watching = tension_watch(sensors, port)
     opened = open_winch(profile, url, out, plant, safety_io=safety_io, watching=watching)
     with opened as session:
-        session.set_mode(profile.drive.mode_torque)
         session.enable()
         out.say(f"{session.device.states()[0].label}, no torque")
         session.idle(seconds)
@@ -151,8 +157,8 @@ def reset(
     """Acknowledge the drive's fault; nothing is enabled by it."""
     out = Output(as_json)
     profile = load_winch(winch)
-    with open_winch(profile, open_bus(bus), out, plant, safety_io=safety_io) as session:
-        session.reset_fault()
+    opened = open_winch(profile, open_bus(bus), out, plant, safety_io=safety_io, reset=True)
+    with opened as session:
         state = session.device.states()[0].label
     out.say(state)
     out.result({"ok": True, "state": state})
@@ -215,25 +221,26 @@ def jog(
         )
     confirm_motion(url, yes, f"the motor turns at {speed_deg_s:g} deg/s for {seconds:g} s")
     watching = tension_watch(sensors, port)
-    opened = open_winch(profile, url, out, plant, safety_io=safety_io, watching=watching)
+    speed = math.radians(speed_deg_s)
+    tolerance = Tolerance(_JOG_ERROR_RAD, max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S))
+    opened = open_winch(
+        profile, url, out, plant, safety_io=safety_io, watching=watching, tolerance=tolerance
+    )
     with opened as session:
-        session.set_mode(profile.drive.mode_torque)
-        speed = math.radians(speed_deg_s)
-        session.restrict(max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S), _JOG_ERROR_RAD)
         session.enable()
         start = session.device.feedback.position_rad.copy()
         leg = Leg(start, np.array([speed]), seconds, _JOG_RAMP_S)
-        session.executive.run(_jog_controller(session), leg)
+        session.follow(_jog_controller(session), leg)
         moved = math.degrees(session.device.feedback.position_rad[0] - start[0])
         session.disable()
     out.say(f"turned by {moved:.2f} deg")
     out.result({"ok": True, "moved_deg": moved})
 
 
-def _jog_controller(session: WinchSession) -> Pid:
+def _jog_controller(session: Session) -> Pid:
     motor, period = session.winch.motor, session.device.period_s
     # a soft loop lets a rotor with friction stick and slip: by turns at these speeds
-    design = stiffest_pid(motor.rotor_inertia_kg_m2, session.latency_s, _JOG_HZ, period)
+    design = stiffest_pid(motor.rotor_inertia_kg_m2, session.winch.latency_s, _JOG_HZ, period)
     return Pid([design.gains], np.array([_TORQUE_SHARE * motor.rated_torque_Nm]), period)
 
 

@@ -13,7 +13,8 @@ from profiles import load_winch
 from tools.commands.options import BusOption, JsonOption, PlantOption, WinchArgument
 from tools.errors import WorkFailedError
 from tools.output import Output
-from tools.session import boot_settings, open_bus, open_network
+from tools.robot_boot import boot_settings
+from tools.session import open_bus, open_network
 
 
 def add(drive: typer.Typer) -> None:
@@ -36,7 +37,7 @@ def configure(
     profile = load_winch(winch)
     node = profile.node_id
     with open_network(profile, open_bus(bus), out, plant) as network:
-        settings = boot_settings(profile)
+        settings = boot_settings(profile, profile.motor.rated_torque_Nm)
         report = boot(network, node, profile.drive, settings, store_configuration=store)
         network.release(node)
     for change in report.changed:

@@ -35,12 +35,13 @@ from tools.signals import stop_on_signals
 from tools.simulator import OwnSimulator
 from tools.tension import calibration
 from tools.tension import watch as watching
-from tools.tension.anchor import AnchorPlan, measure_anchored, plan_anchor
+from tools.tension.anchor import TOLERANCE, AnchorPlan, measure_anchored, plan_anchor
 from tools.tension.hoist import HoistPlan
 from tools.tension.masses import (
     Hang,
     by_prompt,
     check_masses,
+    hoist_tolerance,
     measure_masses,
     on_board,
     plan_hoist,
@@ -253,9 +254,9 @@ class _Run:
         with ExitStack() as stack:
             url, hang = _hands(stack, winch, self.url, out, self.plant, board)
             stack.enter_context(_keeping(self.folder))
-            session = stack.enter_context(open_winch(winch, url, out, safety_io=self.safety_io))
-            session.set_mode(winch.drive.mode_torque)
-            session.disable()  # nothing cycles while somebody hangs a mass
+            tolerance = hoist_tolerance(plan)
+            opened = open_winch(winch, url, out, safety_io=self.safety_io, tolerance=tolerance)
+            session = stack.enter_context(opened)
             raw = calibration.raw_folder(self.folder)
             measure_masses(session, out, raw, plan, masses_kg, hang, gravity)
 
@@ -264,12 +265,12 @@ class _Run:
         winch, out = self.winch, self.out
         with ExitStack() as stack:
             stack.enter_context(_keeping(self.folder))
-            opened = open_winch(winch, self.url, out, self.plant, safety_io=self.safety_io)
+            opened = open_winch(
+                winch, self.url, out, self.plant, safety_io=self.safety_io, tolerance=TOLERANCE
+            )
             session = stack.enter_context(opened)
-            clock = session.network.clock
-            sampler = stack.enter_context(TensionSampler(cell, port, clock))
-            sampler.await_readings(_FIRST_READING_S)
-            session.set_mode(winch.drive.mode_torque)
+            sampler = stack.enter_context(TensionSampler(cell, port, session.device.clock))
+            session.beside(lambda: sampler.await_readings(_FIRST_READING_S))
             path = calibration.pull_file(self.folder)
             measure_anchored(session, out, path, plan, sampler)
 

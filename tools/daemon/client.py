@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import os
 import socket
 import time
 from collections.abc import Iterator
@@ -59,7 +60,7 @@ class Daemon:
     def __init__(self, http: httpx.Client, where: str) -> None:
         self._http = http
         self.where = where
-        self.name = f"{getpass.getuser()}@{socket.gethostname()}"[:64]
+        self.name = f"{_user()}@{socket.gethostname()}"[:64]
 
     def get(self, path: str) -> dict[str, Any]:
         """Return what is at `path`."""
@@ -133,6 +134,13 @@ class Daemon:
         if response.status_code in _BAD_INPUT:
             raise BadInputError(message)
         raise WorkFailedError(message + _way_on(message, str(answer.get("state"))))
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # a user without a name, as in a container
+        return f"#{os.getuid()}"
 
 
 def _way_on(message: str, state: str) -> str:

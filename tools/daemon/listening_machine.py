@@ -108,6 +108,10 @@ class ListeningMachine:
             )
         return self._led
 
+    def unprepared(self) -> str:
+        """Return that no other master was heard."""
+        return f"no other master runs {self._robot.name}"
+
     def power_on(self) -> None:
         """Refuse, by MachineError."""
         raise MachineError(_NOTICE)

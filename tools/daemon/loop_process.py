@@ -10,11 +10,9 @@ from dataclasses import asdict
 from types import FrameType
 from typing import Any
 
-import numpy as np
-
 from cdpr_rt.errors import ControlError
-from cdpr_rt.exchange import AxisFeedback, Setpoint
 from cdpr_rt.realtime import settle_memory, stay_punctual
+from cdpr_rt.rehearsal import rehearse_judgement
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.loop import ControlLoop
 from cdpr_rt.runtime.loop_parts import LoopParts
@@ -29,7 +27,6 @@ from cdpr_rt.runtime.robot_arrays import described, limits_of, supervised, winch
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.state_file import state_path
 from cdpr_rt.supervisor import Supervisor
-from cdpr_rt.tension import TensionFeedback
 from profiles import Robot, load_robot
 from profiles.errors import ProfileError
 from tools.bus_fit import require_fit
@@ -40,7 +37,6 @@ from tools.daemon.loop_file import POWER_OFF_SIGNAL
 from tools.daemon.machine import RobotMachine
 from tools.daemon.settings import RunSettings
 from tools.errors import BAD_INPUT, DONE, FAILED, CommandError
-from tools.session import latency_s
 
 
 def main() -> int:
@@ -50,8 +46,11 @@ def main() -> int:
     try:
         robot = with_commissioned(load_robot(settings.robot), settings.commissioned)
         require_fit(robot)
-        kind = ListeningMachine if settings.read_only else RobotMachine
-        machine = kind(robot, settings)
+        machine = (
+            ListeningMachine(robot, settings)
+            if settings.read_only
+            else RobotMachine(robot, settings, real_time=True)
+        )
         parts = loop_parts(robot, block)
     except (ProfileError, CommandError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)
@@ -80,7 +79,7 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
     """Return what the loop of `robot` runs, compiled and ready."""
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
     limits = limits_of(robot)
-    latencies = [latency_s(axis.winch) for axis in axes]
+    latencies = [axis.winch.latency_s for axis in axes]
     known = compensation_of(robot, load_profiles(robot))
     model = model_of(axes, period_s, latencies, limits, known)
     estimator = Estimator(n, period_s, winches_of(axes))
@@ -97,18 +96,8 @@ def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
         punctual=stay_punctual,
     )
     rehearse_programs(programs, n, platform)
-    _rehearse_judgement(parts, n)
+    rehearse_judgement(estimator, parts.supervisor, n)
     return parts
-
-
-def _rehearse_judgement(parts: LoopParts, n: int) -> None:
-    """Have the estimate's and the supervisor's kernels compiled as well."""
-    feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
-    feedback.valid[:] = True
-    parts.estimator.update(feedback, TensionFeedback(n), inner_Nm=np.zeros(n))
-    parts.supervisor.check(feedback, parts.estimator.estimate, setpoint, torque)
-    parts.estimator.reset()
-    parts.supervisor.reset()
 
 
 def description(robot: Robot, parts: LoopParts) -> dict[str, Any]:

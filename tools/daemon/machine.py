@@ -18,6 +18,7 @@ from cdpr_rt.tension import TensionFeedback
 from drivers import touch_probe
 from drivers.axis_buses import AxisBuses
 from drivers.axis_shutdown import switch_off_by_sdo
+from drivers.boot import BootReport
 from drivers.bus.leading import open_clock
 from drivers.cia402 import POWER_OFF, State, state_of
 from drivers.errors import BusError, DriverError
@@ -56,13 +57,13 @@ def _told(
 class RobotMachine:
     """All axes of `robot` on the buses that `settings` name; implements `Machine`.
 
-    Simulated ones in lockstep go on no faster than in `real_time`, as people move the robot.
+    Simulated ones in lockstep go on as fast as they can, in `real_time` no faster than the wall.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)
     read_only = False
 
-    def __init__(self, robot: Robot, settings: RunSettings, *, real_time: bool = True) -> None:
+    def __init__(self, robot: Robot, settings: RunSettings, *, real_time: bool = False) -> None:
         self._robot = robot
         self._profiles = load_profiles(robot)
         self._urls = robot_urls(robot, settings.buses)
@@ -73,7 +74,10 @@ class RobotMachine:
         self._device: AxisBuses | None = None
         self.watches: Sequence[Watch] = ()
         self.notices: Sequence[str] = ()
-        self._networks: dict[str, CanNetwork] = {}
+        self.networks: dict[str, CanNetwork] = {}
+        """The buses, by the robot's names of them, once the drives have booted."""
+        self.reports: Sequence[BootReport] = ()
+        """What each drive told when it booted, in the order of the axes."""
         self._safety: SessionSafety | None = None
         self._stack = ExitStack()
 
@@ -105,9 +109,9 @@ class RobotMachine:
             for network in networks.values():
                 network.start_heartbeat()
             self._stack = stack.pop_all()
-        self._networks = networks
+        self.networks, self.reports = networks, list(booted.values())
         notices = [*boot_notes(self._robot, booted, absent), self._tensions.missing(self._robot)]
-        notices += unsought
+        notices += [*unsought, self._idle_brakes()]
         self.notices = [notice for notice in notices if notice]
         self.watches = () if self._safety is None else (self._safety.io,)
         self._device = device
@@ -136,6 +140,12 @@ class RobotMachine:
             return None
         io = stack.enter_context(connect(self._reference, self.clock))
         return SessionSafety(io, [axis.node_id for axis in self._robot.axes])
+
+    def _idle_brakes(self) -> str:
+        safety = self._safety
+        if safety is None or safety.braked or not any(a.brake for a in safety.io.profile.axes):
+            return ""
+        return "none of the safety I/O's brakes belongs to these nodes (key node_id): none moves"
 
     @_told
     def prepare(self) -> None:
@@ -169,7 +179,7 @@ class RobotMachine:
             if state in POWER_OFF:
                 continue
             try:
-                off = switch_off_by_sdo(self._networks[axis.bus], axis.node_id)
+                off = switch_off_by_sdo(self.networks[axis.bus], axis.node_id)
             except BusError as error:
                 doubts.append(f"{axis.name}: not known to be without power: {error}")
                 continue
@@ -182,8 +192,8 @@ class RobotMachine:
         """Return `reason` with what drives and safety I/O say of it."""
         device = self.device
         if device is not None and device.faulted().any():
-            faults = faults_text(self._robot.axes, device, self._networks)
-            reason = reason if faults in reason else f"{reason}: {faults}"
+            faults = faults_text(self._robot.axes, device, self.networks, reason)
+            reason = f"{reason}: {faults}" if faults else reason
         return reason if self._safety is None else self._safety.cause(reason)
 
     @_told
@@ -223,7 +233,7 @@ class RobotMachine:
         return {
             name: {
                 "url": str(url),
-                "state": str(self._networks[name].health.text) if name in self._networks else "",
+                "state": str(self.networks[name].health.text) if name in self.networks else "",
             }
             for name, url in self._urls.items()
         }
@@ -237,6 +247,10 @@ class RobotMachine:
     def prepared(self) -> bool:
         """Whether the drives confirm the mode in which they take torques."""
         return self._booted.mode_confirmed()
+
+    def unprepared(self) -> str:
+        """Return which drive does not confirm its mode, and what it says in place of it."""
+        return str(self._booted.unconfirmed_mode())
 
     @_told
     def power_on(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from profiles import Winch
-from tools.commissioning import Paths
+from tools.commission_files import Paths
 from tools.procedure import Identified
 
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from cdpr_rt.rawlog import read_raw_log
 from profiles import Winch
-from tools.commissioning import METHODS, Paths
+from tools.commission_files import Paths
+from tools.commissioning import METHODS
 from tools.errors import BadInputError
 from tools.output import to_json
 from tools.procedure import Identified, identify, validation_name

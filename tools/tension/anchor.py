@@ -9,15 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_rt.controllers.pid import Pid, PidGains
 from cdpr_rt.errors import RawLogError, TripError
+from cdpr_rt.exchange import FloatArray, Setpoint
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
-from cdpr_rt.runtime.states import Reaction
 from cdpr_rt.tension_gain import CalibrationRefusedError, TorquePoint
+from cdpr_rt.trajectory import Hold, Motion
 from drivers.modbus.tension import TensionSampler
 from profiles import Winch
 from tools.errors import BadInputError
 from tools.output import Output
-from tools.session import WinchSession
+from tools.session import Session, Tolerance
 
 COLUMNS = ["time_s", "winding_in", "torque_sent_Nm", "position_rad", "tension_N", "read_s"]
 _TORQUE_SHARE = 0.9
@@ -28,8 +30,9 @@ _TOO_MUCH = 1.25
 _DAMPING_PHASE = 0.5
 _NATURAL_HZ = 12.0
 _SPEED_FILTER_S = 0.002
-_FASTEST_RAD_S = 60.0
-_LONGEST_S = 3600.0
+_LONGEST_S, _END_S = 3600.0, 1e-3
+TOLERANCE = Tolerance(math.inf, 60.0)
+"""Of a rotor on an elastic cable, whose set-point may be far ahead of it."""
 _TURNED_RAD, _TURNED_SHARE = 0.15, 0.1
 
 
@@ -58,102 +61,109 @@ def plan_anchor(
     return AnchorPlan(lowest_N, highest_N, speed_m_s / gain, most_travel_m / gain)
 
 
-class _Puller:
-    """Moves the rotor at constant speed against the cable, one cycle at a time."""
+class _Pull:
+    """The motion: one way at constant speed until it is turned back; it may be ended anywhere."""
 
-    def __init__(self, session: WinchSession, plan: AnchorPlan) -> None:
-        device, winch = session.device, session.winch
-        self._device = device
-        self._executive = session.executive
-        self._setpoint = session.executive.setpoint
-        self._period_s = device.period_s
-        inertia = winch.motor.rotor_inertia_kg_m2
-        self._damping_Nms_rad = inertia * _DAMPING_PHASE / session.latency_s
-        self._stiffness_Nm_rad = inertia * (math.tau * _NATURAL_HZ) ** 2
-        needed = plan.highest_N * abs(winch.cable_m_per_motor_rad)
-        self._limit_Nm = min(_LIMIT_RATIO * needed + _LIMIT_MORE_Nm, winch.motor.rated_torque_Nm)
-        self._speed_rad_s = 0.0
-        self._last_rad = self._wanted_rad = float(device.feedback.position_rad[0])
-        self._start_rad = self._last_rad
-        self.wanted_rad_s = 0.0
+    duration_s = _LONGEST_S
+
+    def __init__(self, start_rad: FloatArray, speed_rad_s: float) -> None:
+        self._from_rad, self._since_s = np.array(start_rad, float), 0.0
+        self._speed_rad_s = speed_rad_s
+        self._now_s = 0.0
 
     @property
     def travel_rad(self) -> float:
-        """How far the set-point has gone."""
-        return abs(self._wanted_rad - self._start_rad)
+        """How far the set-point has gone this way."""
+        return abs(self._speed_rad_s) * (self._now_s - self._since_s)
 
-    def cycle(self) -> float:
-        """Write this cycle's torque and return it."""
-        feedback, command = self._device.feedback, self._device.command
-        position, period = float(feedback.position_rad[0]), self._period_s
-        share = period / (period + _SPEED_FILTER_S)
-        self._speed_rad_s += share * ((position - self._last_rad) / period - self._speed_rad_s)
-        self._last_rad = position
-        self._wanted_rad += self.wanted_rad_s * period
-        torque = self._stiffness_Nm_rad * (self._wanted_rad - position)
-        torque += self._damping_Nms_rad * (self.wanted_rad_s - self._speed_rad_s)
-        command.torque_Nm[0] = min(self._limit_Nm, max(-self._limit_Nm, torque))
-        supervisor = self._executive.supervisor
-        estimator = self._executive.estimator
-        estimator.update(feedback)
-        supervisor.check(feedback, estimator.estimate, self._setpoint, command.torque_Nm)
-        if supervisor.reaction > Reaction.CLAMP:
-            raise TripError(f"{supervisor.reason()}; is the cable made fast?")
-        return float(command.torque_Nm[0])
+    def turn_back(self) -> None:
+        """Go the other way from here on."""
+        self._from_rad = self._from_rad + self._speed_rad_s * (self._now_s - self._since_s)
+        self._since_s, self._speed_rad_s = self._now_s, -self._speed_rad_s
+
+    def fill(self, time_s: float, setpoint: Setpoint) -> None:
+        """Write the set-point at `time_s`."""
+        self._now_s = time_s
+        travelled_rad = self._speed_rad_s * (time_s - self._since_s)
+        setpoint.position_rad[:] = self._from_rad + travelled_rad
+        setpoint.velocity_rad_s[:] = self._speed_rad_s
+        setpoint.acceleration_rad_s2[:] = 0.0
+
+    def brake(self, time_s: float) -> Motion:
+        """Return the motion that ends at once: the torque goes, and the cable with it."""
+        now = Setpoint(self._from_rad.size)
+        self.fill(time_s, now)
+        return Hold(now.position_rad, _END_S)
 
 
 class _Recording:
-    """Pulls until a tension is reached, writing a row for each reading of the load cell."""
+    """Writes a row for each reading of the load cell, and says where to turn and to end."""
 
-    def __init__(self, session: WinchSession, plan: AnchorPlan, sampler: TensionSampler) -> None:
-        self._session = session
-        self._plan = plan
+    def __init__(
+        self,
+        session: Session,
+        plan: AnchorPlan,
+        pull: _Pull,
+        sampler: TensionSampler,
+        log: RawLogWriter,
+    ) -> None:
+        self._device = session.device
+        self._per_rad_m = abs(session.winch.cable_m_per_motor_rad)
+        self._plan, self._pull, self._log = plan, pull, log
         self._exchange = sampler.exchange
-        self._wind_in = -session.winch.cable_sign
-        self._puller = _Puller(session, plan)
         self._sums = np.zeros(3)
         self._row = np.zeros((1, len(COLUMNS)))
         self._read_s = -math.inf
+        self._winding_in = True
 
-    def pull(self, winding_in: bool, log: RawLogWriter) -> None:
-        """Wind in to the highest tension, or pay out to the lowest."""
-        side = self._wind_in if winding_in else -self._wind_in
-        self._puller.wanted_rad_s = side * self._plan.speed_rad_s
-        what = "the highest tension" if winding_in else "the lowest tension"
-        self._session.executive.step(lambda: self._cycle(winding_in, log), _LONGEST_S, what)
-
-    def _cycle(self, winding_in: bool, log: RawLogWriter) -> bool:
-        torque = self._puller.cycle()
-        feedback, told = self._session.device.feedback, self._exchange.feedback
-        self._sums += (1.0, torque, feedback.position_rad[0])
+    def cycle(self) -> bool:
+        """Take in a cycle; return whether the lowest tension has been paid out to."""
+        feedback, told = self._device.feedback, self._exchange.feedback
+        self._sums += (1.0, self._device.command.torque_Nm[0], feedback.position_rad[0])
         self._exchange.update()
         if not told.valid[0]:
             raise TripError(self._exchange.reason())
         if told.time_s[0] == self._read_s:
             return False
         self._read_s = float(told.time_s[0])
-        tension = float(told.tension_N[0])
-        if tension > _TOO_MUCH * self._plan.highest_N:
-            raise TripError(f"{self._exchange.cables[0]}: {tension:.1f} N")
+        return self._take(float(told.tension_N[0]), feedback.time_s)
+
+    def _take(self, tension_N: float, time_s: float) -> bool:
+        plan, pull = self._plan, self._pull
+        if tension_N > _TOO_MUCH * plan.highest_N:
+            raise TripError(f"{self._exchange.cables[0]}: {tension_N:.1f} N")
         _, mean_Nm, mean_rad = self._sums / self._sums[0]
         self._sums[:] = 0.0
-        if tension >= self._plan.lowest_N:
-            self._row[0] = (feedback.time_s, winding_in, mean_Nm, mean_rad, tension, self._read_s)
-            log.write(self._row)
-        if winding_in and self._puller.travel_rad > self._plan.most_travel_rad:
+        if tension_N >= plan.lowest_N:
+            self._row[0] = (time_s, self._winding_in, mean_Nm, mean_rad, tension_N, self._read_s)
+            self._log.write(self._row)
+        if not self._winding_in:
+            return tension_N <= plan.lowest_N
+        if pull.travel_rad > plan.most_travel_rad:
             raise TripError(
-                f"wound in by {1e3 * self._travel_m():.0f} mm and the tension is {tension:.1f} N; "
-                "is the cable made fast? (--travel-mm)"
+                f"wound in by {1e3 * pull.travel_rad * self._per_rad_m:.0f} mm and the tension is "
+                f"{tension_N:.1f} N; is the cable made fast? (--travel-mm)"
             )
-        plan = self._plan
-        return tension >= plan.highest_N if winding_in else tension <= plan.lowest_N
+        if tension_N >= plan.highest_N:
+            self._winding_in = False
+            pull.turn_back()
+        return False
 
-    def _travel_m(self) -> float:
-        return self._puller.travel_rad * abs(self._session.winch.cable_m_per_motor_rad)
+
+def _controller(session: Session, plan: AnchorPlan) -> Pid:
+    """Return a soft position loop, damped as far as latency allows on the rotor alone."""
+    winch = session.winch
+    inertia = winch.motor.rotor_inertia_kg_m2
+    proportional = inertia * (math.tau * _NATURAL_HZ) ** 2
+    derivative = inertia * _DAMPING_PHASE / winch.latency_s
+    needed_Nm = plan.highest_N * abs(winch.cable_m_per_motor_rad)
+    limit_Nm = min(_LIMIT_RATIO * needed_Nm + _LIMIT_MORE_Nm, winch.motor.rated_torque_Nm)
+    gains = PidGains(proportional, 0.0, derivative, _SPEED_FILTER_S)
+    return Pid([gains], np.array([limit_Nm]), session.device.period_s)
 
 
 def measure_anchored(
-    session: WinchSession,
+    session: Session,
     out: Output,
     path: Path,
     plan: AnchorPlan,
@@ -173,20 +183,15 @@ def measure_anchored(
         "cable": sampler.exchange.cables[0],
         "speed_rad_s": plan.speed_rad_s,
     }
-    session.restrict(_FASTEST_RAD_S, math.inf)
     session.enable()
+    pull = _Pull(device.feedback.position_rad, -winch.cable_sign * plan.speed_rad_s)
     log = RawLogWriter(path, COLUMNS, meta)
     try:
-        recording = _Recording(session, plan, sampler)
+        recording = _Recording(session, plan, pull, sampler, log)
         out.note(f"winding in to {plan.highest_N:g} N and paying out to {plan.lowest_N:g} N")
-        recording.pull(True, log)
-        recording.pull(False, log)
+        session.follow(_controller(session, plan), pull, until=recording.cycle)
     finally:
-        try:
-            device.command.torque_Nm[:] = 0.0
-            device.transmit()
-        finally:  # a bus that is gone takes no zero torque, yet the rows are to be kept
-            log.close()
+        log.close()
     session.disable()
     return path
 

@@ -11,10 +11,9 @@ import numpy as np
 from cdpr_rt.controllers.pid import Pid, PidGains
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.exchange import FloatArray, Setpoint
-from cdpr_rt.executive import Motion
 from cdpr_rt.rawlog import RawLog
 from cdpr_rt.tension_gain import CalibrationRefusedError, TorquePoint
-from cdpr_rt.trajectory import Hold, Leg
+from cdpr_rt.trajectory import Hold, Leg, Motion
 
 _DWELL_S = 1.0
 _RAMP_S = 0.5

@@ -15,8 +15,8 @@ import typer
 
 from cdpr_rt.clock import Clock
 from cdpr_rt.errors import TripError
+from cdpr_rt.raw_rows import column_names
 from cdpr_rt.rawlog import RawLogWriter, read_raw_log
-from cdpr_rt.recorder import column_names
 from cdpr_rt.tension_gain import (
     LEAST_LEVELS,
     LEAST_SPAN,
@@ -28,7 +28,7 @@ from profiles.motor_bounds import FARTHEST_FROM_NOMINAL
 from sim_bus.physics_board import PhysicsBoard
 from tools.errors import BadInputError
 from tools.output import Output
-from tools.session import WinchSession
+from tools.session import Session, Tolerance
 from tools.tension.hoist import Hoist, HoistPlan, hoist_controller, hoist_points
 
 _TORQUE_SHARE = 0.9
@@ -89,10 +89,14 @@ def by_prompt(mass_kg: float, clock: Clock) -> None:
         while clock.aside(partial(_typed, question)):
             typer.echo("Enter alone, please.", err=True)
     except (EOFError, KeyboardInterrupt):
-        raise BadInputError(f"nobody has hung {mass_kg:g} kg; the drive is without power") from None
+        raise _nobody(mass_kg) from None
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _nobody(mass_kg: float) -> BadInputError:
+    return BadInputError(f"nobody has hung {mass_kg:g} kg; the drive is without power")
 
 
 def _typed(question: str) -> str:
@@ -121,7 +125,7 @@ def on_board(board: Path) -> Hang:
 
 
 def measure_masses(
-    session: WinchSession,
+    session: Session,
     out: Output,
     folder: Path,
     plan: HoistPlan,
@@ -135,16 +139,14 @@ def measure_masses(
     """
     recorded = []
     for mass_kg in masses_kg:
-        hang(mass_kg, session.network.clock)
+        _have_hung(session, mass_kg, hang)
         path = folder / _file_name(mass_kg)
         with out.progress(f"raising and lowering {mass_kg:g} kg", plan.duration_s) as advance:
-            session.executive.on_progress = advance
-            _hoist(session, path, plan, mass_kg, gravity)
+            _hoist(session, path, plan, mass_kg, gravity, advance)
         # refused before the next mass is hung
         points = hoist_points(read_raw_log(path))
         _refuse_another_mass(points, mass_kg, gravity * abs(session.winch.cable_m_per_motor_rad))
         recorded.append(path)
-    session.executive.on_progress = None
     return recorded
 
 
@@ -159,8 +161,27 @@ def _refuse_another_mass(points: Sequence[TorquePoint], mass_kg: float, gain_m2_
         )
 
 
+def _have_hung(session: Session, mass_kg: float, hang: Hang) -> None:
+    """Have a mass hung; cycles go on meanwhile, so that what guards the winch is asked."""
+    try:
+        session.beside(lambda: hang(mass_kg, session.device.clock))
+    except KeyboardInterrupt:  # which comes where the cycles run
+        raise _nobody(mass_kg) from None
+
+
+def hoist_tolerance(plan: HoistPlan) -> Tolerance:
+    """Return by how much a mass may swing on its cable."""
+    speed = max(_SPEED_RATIO * plan.speed_rad_s, _LEAST_SPEED_RAD_S)
+    return Tolerance(plan.lead_in_rad + math.tau, speed)
+
+
 def _hoist(
-    session: WinchSession, path: Path, plan: HoistPlan, mass_kg: float, gravity: float
+    session: Session,
+    path: Path,
+    plan: HoistPlan,
+    mass_kg: float,
+    gravity: float,
+    on_progress: Callable[[float], None],
 ) -> None:
     winch, device = session.winch, session.device
     per_rad = winch.cable_m_per_motor_rad
@@ -169,7 +190,7 @@ def _hoist(
     controller = hoist_controller(
         winch.motor.rotor_inertia_kg_m2,
         mass_kg * per_rad**2,
-        session.latency_s,
+        winch.latency_s,
         device.period_s,
         limit,
     )
@@ -185,14 +206,11 @@ def _hoist(
         "lead_in_rad": plan.lead_in_rad,
         "turns": plan.turns,
     }
-    session.restrict(
-        max(_SPEED_RATIO * plan.speed_rad_s, _LEAST_SPEED_RAD_S), plan.lead_in_rad + math.tau
-    )
     session.enable()
     motion = Hoist(plan, device.feedback.position_rad, -winch.cable_sign)
     log = RawLogWriter(path, column_names(device.n), meta)
     try:
-        session.executive.run(controller, motion, log)
+        session.follow(controller, motion, log, on_progress)
     except TripError as error:
         if session.device.alarm() or abs(controller.effort_Nm[0]) < limit:
             raise

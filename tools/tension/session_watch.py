@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from cdpr_rt.clock import Clock
-from cdpr_rt.executive import Watch
+from cdpr_rt.cycle import Watch
 from cdpr_rt.tension import TensionWatch
 from drivers.modbus.tension import TensionSampler
 from profiles.tension_sensor import load_tension_sensors

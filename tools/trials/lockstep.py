@@ -125,7 +125,7 @@ class LockstepRobot:
         settings = RunSettings(
             robot=self._reference, name=robot.profile, buses=(bus,), socket=Path("unused")
         )
-        self.machine = RobotMachine(robot, settings, real_time=False)
+        self.machine = RobotMachine(robot, settings)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
         parts = loop_parts(robot, block)
@@ -273,7 +273,7 @@ class LockstepRobot:
     def misbehave(self, axis: int, sub: int, value: int) -> None:
         """Have a simulated drive do something on purpose (2F00h), told between two cycles."""
         where = self.robot.axes[axis]
-        networks = self.machine._networks
+        networks = self.machine.networks
         networks[where.bus].write(where.node_id, 0x2F00, sub, value)
 
     def shut_down(self) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from cdpr_rt.controllers.base import Controller
 from cdpr_rt.errors import ControlError
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
+
+REST_S: Final = 5.0
+"""The longest that a set-point within its bounds takes to come to rest."""
 
 
 class ProgramError(ControlError):
@@ -49,6 +52,10 @@ class Program(Protocol):
         """Whether the set-point stands still and nothing is left to do."""
 
     @property
+    def rest_s(self) -> float:
+        """Return the longest that it takes until it is at rest after a stop."""
+
+    @property
     def pose(self) -> FloatArray | None:
         """Return the platform's pose as this program knows it, (7,), None where it knows none."""
 
@@ -70,6 +77,11 @@ class Program(Protocol):
 
 class WithoutPlatform:
     """What a program tells that knows of no platform and follows no hand."""
+
+    @property
+    def rest_s(self) -> float:
+        """Return the longest that it takes until it is at rest after a stop."""
+        return REST_S
 
     @property
     def pose(self) -> FloatArray | None:

@@ -10,7 +10,7 @@ import numpy as np
 from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.robots.planar_kernel import G_m_s2
 from cdpr_rt.runtime.programs.axis_program import AxisProgram, Loop
-from cdpr_rt.runtime.programs.base import Program, ProgramError
+from cdpr_rt.runtime.programs.base import REST_S, Program, ProgramError
 from cdpr_rt.runtime.programs.idle import IdleProgram
 from cdpr_rt.runtime.programs.jog import JogProgram
 from cdpr_rt.runtime.programs.model import RobotModel
@@ -25,6 +25,7 @@ class PlatformHold:
 
     name = "hold"
     needs_lease = False
+    rest_s = REST_S
 
     def __init__(self, parts: PlatformParts, model: RobotModel, loop: Loop) -> None:
         self._parts = parts

@@ -16,7 +16,7 @@ from cdpr_rt.robots.planar_control import PlanarControl
 from cdpr_rt.robots.planar_kinematics import PlanarGeometry
 from cdpr_rt.runtime.estimate import Estimator
 from cdpr_rt.runtime.last_lengths import LastLengths
-from cdpr_rt.runtime.programs.base import ProgramError
+from cdpr_rt.runtime.programs.base import REST_S, ProgramError
 from cdpr_rt.runtime.programs.handover import Handover
 from cdpr_rt.runtime.programs.wanted import Wanted
 from profiles.platform import Platform
@@ -111,6 +111,7 @@ class PlatformProgram:
 
     name = "platform"
     needs_lease = False
+    rest_s = REST_S
 
     def __init__(self, parts: PlatformParts, _torque_Nm: FloatArray) -> None:
         self._parts = parts

@@ -15,7 +15,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -278,6 +278,46 @@ def test_wrong_keys_from_the_same_address_do_not_shut_out_the_right_one(rig: Rig
                 assert httpx.delete(f"{rig.guarded_url}/control", headers=mine).status_code == 200
         finally:
             guessing.kill()
+
+
+class NoTurns(connections.Turns):
+    """Where nobody has a turn; it keeps what asks for one."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked: list[Any] = []
+
+    def ask(self, work: Any, known: bool = False) -> None:
+        self.asked.append(work)
+
+
+@pytest.mark.parametrize(("stops_for_all", "at_once"), [(False, [True]), (True, [False, True])])
+def test_a_stop_that_will_be_refused_goes_before_nobody(
+    stops_for_all: bool, at_once: list[bool]
+) -> None:
+    entered: list[bool] = []
+    turns = NoTurns()
+
+    def enter(is_known: bool) -> asyncio.Protocol:
+        entered.append(is_known)
+        return asyncio.Protocol()
+
+    async def receive() -> None:
+        listener = server.listen_tcp("127.0.0.1", 0)
+        one = reception.Reception(
+            listener, enter, lambda head: KEY in head, stops_for_all, turns, lambda _: None
+        )
+        for head in (b"\r\n\r\n", b"Authorization: Bearer " + KEY + b"\r\n\r\n"):
+            sock = stack.enter_context(socket.create_connection(listener.getsockname()))
+            sock.sendall(b"POST /hold HTTP/1.1\r\n" + head)
+            await asyncio.sleep(0.1)
+        one.close()
+        listener.close()
+
+    with ExitStack() as stack:
+        asyncio.run(receive())
+    assert entered == at_once
+    assert len(turns.asked) == 2 - len(at_once)
 
 
 def test_a_head_that_comes_in_parts_shows_the_key_too(rig: Rig) -> None:

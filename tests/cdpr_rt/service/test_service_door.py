@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import socket
@@ -225,6 +226,19 @@ def test_a_file_in_the_sockets_place_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(ListenError, match="something else"):
         listen_unix(file)
     assert file.read_text() == "mine"
+
+
+def test_what_cannot_be_replaced_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_path: Path) -> None:  # as of a stranger's socket in /tmp
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    left = tmp_path / "left.sock"
+    listen_unix(left).close()
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(ListenError, match=r"left\.sock: Operation not permitted"):
+        listen_unix(left)
+    with pytest.raises(ListenError, match="name too long"):
+        listen_unix(tmp_path / (300 * "x"))
 
 
 def test_an_address_in_use_is_named(rig: Rig) -> None:

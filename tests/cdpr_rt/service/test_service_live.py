@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from itertools import pairwise
 from typing import Any
+from urllib.parse import quote
 
 import pytest
 from service_rig import AXES, KEY, Rig, running, wait_for
@@ -91,7 +92,18 @@ def test_no_rate_beyond_what_a_person_can_see(rig: Rig, query: str) -> None:
 
 def test_a_field_that_no_cycle_has_is_named(rig: Rig) -> None:
     with open_unix(rig, "/live?fields=cycle,colour") as connection:
-        assert closed_for(connection) == (1008, "fields: 'colour' is none of a cycle's")
+        assert closed_for(connection) == (1008, "fields: colour is none of a cycle's")
+
+
+@pytest.mark.parametrize("letter", ["\x01", "\u00e9", "\U0001fff0"])
+def test_a_field_of_strange_letters_is_refused_without_a_traceback(
+    rig: Rig, letter: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with open_unix(rig, f"/live?fields={quote(80 * letter)}") as connection:
+        code, reason = closed_for(connection)
+    assert code == 1008
+    assert reason.startswith("fields: ") and reason.isascii()
+    assert caplog.text == ""
 
 
 def test_a_client_that_does_not_read_is_dropped_and_others_are_not(rig: Rig) -> None:
@@ -175,6 +187,16 @@ def test_a_connection_cut_off_loses_it_at_once(rig: Rig) -> None:
         assert rig.lease_left_s > 5.0
         connection.socket.shutdown(socket.SHUT_RDWR)
         wait_for(lambda: rig.lease_left_s < 0.0, 2.0)
+
+
+def test_who_has_lost_the_right_may_stop_all_the_same(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=5") as connection:
+        token = json.loads(connection.recv(5.0))["token"]
+        rig.service.lease.release(token)
+        rig.service.lease.take("jan", 5.0)
+        assert ask(connection, do="renew")["ok"] is False
+        assert ask(connection, do="hold")["ok"] is True
+    assert [command["do"] for command in rig.loop.commands] == ["hold"]
 
 
 def test_a_client_that_is_there_but_silent_loses_it(rig: Rig) -> None:

@@ -43,7 +43,7 @@ class LoopRig:
         settings = RunSettings(
             robot=str(path), name="rig", buses=tuple(url.split()), socket=Path("unused"), **more
         )
-        self.machine = RobotMachine(self.robot, settings, real_time=False)
+        self.machine = RobotMachine(self.robot, settings)
         parts = loop_parts(self.robot, self.block)
         parts = replace(parts, programs={**parts.programs, **(programs or {})})
         self.loop = ControlLoop(self.block, self.machine, parts, lambda: self.now_ns)
@@ -106,7 +106,7 @@ class LoopRig:
     def misbehave(self, axis: int, sub: int, value: int) -> None:
         """Have a drive do something on purpose (2F00h), told between two cycles."""
         where = self.robot.axes[axis]
-        self.machine._networks[where.bus].write(where.node_id, 0x2F00, sub, value)
+        self.machine.networks[where.bus].write(where.node_id, 0x2F00, sub, value)
 
     @property
     def state(self) -> LoopState:

@@ -133,7 +133,7 @@ def test_a_drive_that_restarted_has_its_index_to_find_again(pair: tuple[Path, st
             assert rows["compensation_Nm"][-1].all()
             rig.obeyed("disable")
             for node in (1, 2):
-                rig.machine._networks["can0"].reset(node)
+                rig.machine.networks["can0"].reset(node)
             rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
             rig.obeyed("acknowledge")
 

@@ -64,7 +64,7 @@ def test_a_drive_that_restarted_needs_a_new_boot(lab: tuple[Path, str]) -> None:
         rig.block.post_command({"do": "check"})
         rig.turn(30)
         assert rig.state is LoopState.INACTIVE
-        rig.machine._networks["can0"].reset(2)
+        rig.machine.networks["can0"].reset(2)
         rig.turn_until(lambda: not rig.loop.busy)
         for _ in range(2):
             answer = rig.order("check")

@@ -42,7 +42,7 @@ class Wild:
     needs_lease = False
     at_rest = True
     pose = pose_setpoint = None
-    stream_age_s = math.nan
+    stream_age_s, rest_s = math.nan, 5.0
     stream_buttons = 0
 
     def __init__(self) -> None:
@@ -124,7 +124,7 @@ def states(row: Row) -> list[State]:
 
 
 def test_drives_are_told_the_robots_torque_and_heartbeat(ready: WildRig) -> None:
-    network = ready.machine._networks["can0"]
+    network = ready.machine.networks["can0"]
     for node in (1, 2):
         assert network.read_int(node, 0x6072) == 500  # 1.5 Nm of 3 Nm
         assert network.read_int(node, 0x1016, 1) == 127 << 16 | 175
