@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import heapq
 import math
 import sys
@@ -21,8 +23,15 @@ class FrameLog:
     """
 
     def __init__(self, path: Path) -> None:
-        """Create the file; raises OSError."""
-        self._file = path.open("wb", buffering=0)
+        """Create the file; raises OSError, also where another simulator writes it."""
+        self._file = path.open("ab", buffering=0)
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if path.is_file():
+                self._file.truncate(0)
+        except BlockingIOError:
+            self._file.close()
+            raise OSError(errno.EBUSY, "another simulator writes it") from None
         self._ears: list[FrameEar] = []
         self._waiting = 0
 

@@ -16,7 +16,8 @@ from tools.errors import BadInputError, WorkFailedError
 
 # the first start on a machine compiles the physics
 _START_TIMEOUT_S = 180.0
-_STOP_TIMEOUT_S = 5.0
+# one that is only held up completes its logs
+_STOP_TIMEOUT_S = 60.0
 
 
 _numbers = count(1)

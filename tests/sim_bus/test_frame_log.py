@@ -97,6 +97,19 @@ def test_a_bus_that_stands_for_ever_fills_no_memory(
     log.close()
 
 
+def test_two_simulators_do_not_write_one_file(tmp_path: Path) -> None:
+    path = tmp_path / "frames.log"
+    path.write_text("of before")
+    log = FrameLog(path)
+    with pytest.raises(OSError, match="another simulator writes it"):
+        FrameLog(path)
+    log.ear("can0").receive(SYNC, 0.5)
+    log.close()
+    assert path.read_text() == "(0000000000.500000) can0 080#\n"
+    FrameLog(path).close()
+    assert path.read_text() == ""
+
+
 def test_a_full_disk_ends_the_log_and_not_the_bus(capsys: pytest.CaptureFixture[str]) -> None:
     log = FrameLog(Path("/dev/full"))
     ear = log.ear("can0")

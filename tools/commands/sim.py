@@ -23,7 +23,14 @@ from sim_bus.physics_board import PhysicsBoard
 from sim_bus.plant import Plant
 from sim_bus.server import serve
 from tools.bus_fit import require_fit
-from tools.commands import sim_fault, sim_rail, sim_robot, sim_safety_io, sim_tension
+from tools.commands import (
+    sim_fault,
+    sim_rail,
+    sim_robot,
+    sim_safety_io,
+    sim_tension,
+    sim_verify,
+)
 from tools.errors import BadInputError
 
 app = typer.Typer(help="Simulated winches on a CAN bus.", no_args_is_help=True)
@@ -36,6 +43,7 @@ def register(parent: typer.Typer) -> None:
     sim_rail.add(app)
     sim_fault.add(app)
     sim_tension.add(app)
+    sim_verify.add(app)
 
 
 @app.callback()
@@ -76,7 +84,9 @@ def up(
     frame_log: Annotated[
         Path | None,
         typer.Option(
-            "--frame-log", help="Write every frame, at bus time, to this file, as candump does."
+            "--frame-log",
+            envvar="CDPR_SIM_FRAME_LOG",
+            help="Write every frame, at bus time, to this file, as candump does.",
         ),
     ] = None,
     unconfigured: Annotated[

@@ -1,0 +1,50 @@
+"""What a robot that is turned cycle by cycle records does not depend on when it is turned."""
+
+import time
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from tools.trials.lockstep import LockstepRobot
+
+COMPARED = ("/cycle", "/description", "/events", "/status")
+
+
+def recorded(folder: Path, *, pause_s: float) -> dict[str, list[bytes]]:
+    """Tighten the cables a little, with pauses by the wall; return the messages by topic."""
+    with LockstepRobot("planar-3", record=folder) as robot:
+        robot.enable()
+        for name in ("hold", "tighten") * 3:
+            robot.program(name)
+            time.sleep(pause_s)
+        for _ in range(3):
+            robot.run(0.3)
+            time.sleep(pause_s)
+            assert robot.recorder is not None
+            robot.recorder.remark("a mark", cycle=robot.cycle)
+    (path,) = robot.recordings()
+    messages: dict[str, list[bytes]] = {}
+    with path.open("rb") as file:
+        for _, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            messages.setdefault(channel.topic, []).append(message.data)
+    return messages
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, list[bytes]]]:
+    folder = tmp_path_factory.mktemp("same")
+    return [recorded(folder / str(pause_s), pause_s=pause_s) for pause_s in (0.0, 0.6)]
+
+
+@pytest.mark.parametrize("topic", COMPARED)
+def test_messages_are_the_same_whatever_the_wall_did(runs, topic):
+    quick, slow = runs
+    assert quick[topic] == slow[topic] and quick[topic]
+
+
+def test_the_walls_time_stands_apart(runs):
+    quick, slow = runs
+    assert quick.keys() == slow.keys() == {*COMPARED, "/timing"}
+    assert len(quick["/timing"]) == len(slow["/timing"]) == len(quick["/cycle"])
+    assert quick["/timing"] != slow["/timing"]

@@ -1,0 +1,1 @@
+"""Runs a command several times and compares what it writes."""

@@ -1,0 +1,135 @@
+"""One run of a command in a folder of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tools.errors import BadInputError, WorkFailedError
+from tools.repeat.disturbance import Stops, busy_processes
+
+FRAMES = "frames.log"
+"""The log of all frames among the files of a run."""
+_LOG_KEY = "CDPR_SIM_FRAME_LOG"
+_LOOK_S, _LIST_S = 0.02, 0.3
+_END_S = 20.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run has left."""
+
+    number: int
+    """From 1."""
+    folder: Path
+    """The working folder that it had; its files are compared."""
+    output: Path
+    """What it wrote to standard output and standard error."""
+    exit_status: int
+    seconds: float
+    processes: frozenset[int]
+    """Their ids, which may stand in names."""
+    stops: int
+    held_s: float
+    """For how long one of them was stopped."""
+
+
+def perform(
+    command: Sequence[str],
+    folder: Path,
+    number: int,
+    stops: Stops | None,
+    busy: int,
+    stop_requested: Callable[[], bool],
+) -> Run:
+    """Run `command` in a new folder in `folder`, with its simulators' frames logged.
+
+    `command` are the words after `cdpr`, or a program named by its path. `stops` hold it up,
+    beside so many `busy` processes. Raises BadInputError for what cannot be run, WorkFailedError
+    where it is to end early; no process of the run is left in any case.
+    """
+    place = folder / f"run-{number}"
+    work, output = place / "files", place / "output.txt"
+    work.mkdir(parents=True)
+    began_s, looked_s = time.monotonic(), 0.0
+    seen: set[int] = set()
+    processes: list[int] = []
+    with ExitStack() as stack:
+        out = stack.enter_context(output.open("wb"))
+        stack.enter_context(busy_processes(busy))
+        process = stack.enter_context(_running(command, work, out.fileno()))
+        if stops is not None:
+            stack.callback(stops.release)  # or nobody could end
+        while process.poll() is None:
+            if stop_requested():
+                raise WorkFailedError(f"stopped on request, in run {number}")
+            if time.monotonic() - looked_s > _LIST_S:
+                looked_s, processes = time.monotonic(), processes_of(work)
+                seen.update(processes)
+            if stops is not None:
+                stops.turn(processes)
+            time.sleep(_LOOK_S)
+    seconds = time.monotonic() - began_s
+    number_of, held_s = (0, 0.0) if stops is None else (stops.number, stops.held_s)
+    status = process.returncode
+    return Run(number, work, output, status, seconds, frozenset(seen), number_of, held_s)
+
+
+@contextmanager
+def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subprocess.Popen[bytes]]:
+    """Run the command meanwhile; end it, and whatever it has left, in order if possible."""
+    words = [sys.executable, "-P", "-m", "tools.cli", *command]
+    if "/" in command[0]:
+        words = [str(Path(command[0]).absolute()), *command[1:]]
+    path = f"{Path(sys.executable).parent}:{os.environ.get('PATH', os.defpath)}"
+    environment = {**os.environ, "PATH": path, _LOG_KEY: str(work / FRAMES)}
+    environment["XDG_STATE_HOME"] = str(work / "state")  # what one run learns, no other knows
+    try:
+        process = subprocess.Popen(
+            words,
+            cwd=work,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,  # a Ctrl-C at the terminal is ours to pass on
+        )
+    except OSError as error:
+        raise BadInputError(f"{words[0]}: cannot be run: {error.strerror}") from error
+    try:
+        yield process
+    finally:
+        _end(process, work)
+
+
+def _end(process: subprocess.Popen[bytes], work: Path) -> None:
+    """Ask the command to end, wait for whatever it has started, kill what does not."""
+    if process.poll() is None:
+        process.terminate()
+    end_s = time.monotonic() + _END_S
+    while (left := processes_of(work)) and time.monotonic() < end_s:
+        process.poll()
+        time.sleep(_LOOK_S)
+    for pid in left:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    process.wait()
+
+
+def processes_of(work: Path) -> list[int]:
+    """Return the ids of all processes of the run whose files are in `work`."""
+    mark = f"{_LOG_KEY}={work / FRAMES}\0".encode()
+    found = []
+    for path in Path("/proc").iterdir():
+        if path.name.isdecimal():
+            with suppress(OSError):  # ended, or not ours
+                if mark in (path / "environ").read_bytes():
+                    found.append(int(path.name))
+    return sorted(found)
