@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import ipaddress
+import asyncio
 import json
-import logging
 import math
 import re
-import secrets
+import socket
 import threading
 import time
 from collections.abc import Collection, Sequence
 from typing import Any, Final
 
-from foxglove import Channel, Context, start_server
-from foxglove.channels import FrameTransformChannel, LogChannel, PoseInFrameChannel
+from foxglove import Schema
 from foxglove.messages import (
     FrameTransform,
     Log,
@@ -25,22 +23,18 @@ from foxglove.messages import (
     Timestamp,
     Vector3,
 )
-from foxglove.websocket import WebSocketServer
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.runtime.states import LoopState, Reaction
-from cdpr_rt.service.live_door import LiveDoor
+from cdpr_rt.service.foxglove_server import FoxgloveServer, Topic
 from cdpr_rt.service.recording import WallClock
 from cdpr_rt.service.recording_events import Events
-from cdpr_rt.service.server import listen_tcp
+from cdpr_rt.service.server import ListenError, listen_tcp
 
 RATE_Hz: Final = 50.0
 _HOST: Final = "127.0.0.1"
-_LOOPBACK: Final = ipaddress.ip_network("127.0.0.0/8")
-_BACKLOG: Final = 128
-"""Messages kept for a client that reads slowly; the oldest are dropped for it."""
 _AXIS_FIELDS: Final = {
     "setpoint_deg": ("setpoint_rad", True),
     "position_deg": ("position_rad", True),
@@ -70,17 +64,14 @@ class LiveView:
         self, block: SharedBlock, robot: str, port: int, origins: Collection[str] = ()
     ) -> None:
         self._block = block
-        self._origins = origins
-        self._robot = robot
         self._port = port
         self._wall = WallClock(block)
         self._reader = RowReader(block)
         self._events = Events()
         self._versions = {"description": 0, "status": 0}
-        self._context = Context()
         self._topics: _Topics | None = None
-        self._server: WebSocketServer | None = None
-        self._door: LiveDoor | None = None
+        self._server = FoxgloveServer(f"cdpr-rt {robot}", origins)
+        self._listener: socket.socket | None = None
         self._url: str | None = None
         self._messages = 0
         self._error = ""
@@ -89,48 +80,41 @@ class LiveView:
 
     def start(self) -> None:
         """Listen on loopback; raises LiveViewError where the port is not free."""
-        # it has a line for each client that talks nonsense: they could fill a disk with them
-        logging.getLogger("foxglove.websocket").setLevel(logging.CRITICAL)
-        inner = str(_LOOPBACK[secrets.randbelow(_LOOPBACK.num_addresses - 512) + 256])
         try:
-            listener = listen_tcp(_HOST, self._port)
-            self._server = start_server(
-                name=f"cdpr-rt {self._robot}",
-                host=inner,
-                port=0,
-                context=self._context,
-                message_backlog_size=_BACKLOG,
-            )
-        except Exception as error:
+            self._listener = listen_tcp(_HOST, self._port)
+        except ListenError as error:
             self._error = f"port {self._port}: {error}"
             raise LiveViewError(f"live view: {self._error}") from error
-        self._url = f"ws://{_HOST}:{listener.getsockname()[1]}"
-        self._door = LiveDoor(listener, (inner, self._server.port), self._origins)
-        self._door.start()
+        self._url = f"ws://{_HOST}:{self._listener.getsockname()[1]}"
         self._thread.start()
 
     def stop(self) -> None:
-        """Say goodbye to all clients."""
+        """Cut all clients off."""
         self._end.set()
         if self._thread.is_alive():
             self._thread.join()
-        if self._door is not None:
-            self._door.stop()
-        if self._server is not None:
-            self._server.stop()
 
     def told(self) -> dict[str, Any]:
-        """Return the URL to connect to, the number of moments shown, and what is wrong."""
-        door = {} if self._door is None else self._door.told()
-        return {"url": self._url, "moments": self._messages, "error": self._error, **door}
+        """Return the URL to connect to, the number of moments shown, and what is wrong.
+
+        Also how many look on, how many were refused, and why the last of them.
+        """
+        told = {"url": self._url, "moments": self._messages, "error": self._error}
+        return {**told, **self._server.told()}
 
     def _run(self) -> None:
         try:
-            while not self._end.wait(1.0 / RATE_Hz):
-                self._show()
+            asyncio.run(self._serve())
         except BaseException as error:
             self._error = f"the live view ended: {type(error).__name__}: {error}"
             raise
+
+    async def _serve(self) -> None:
+        assert self._listener is not None  # by `start`
+        async with self._server.serving(self._listener):
+            while not self._end.is_set():
+                self._show()
+                await asyncio.sleep(1.0 / RATE_Hz)
 
     def _show(self) -> None:
         description = self._changed("description")
@@ -154,8 +138,8 @@ class LiveView:
         names = [str(axis.get("name", "")) for axis in description.get("axes", [])]
         if self._topics is None or names != self._topics.given:
             if self._topics is not None:
-                self._topics.close()
-            self._topics = _Topics(self._context, names, self._block.n)
+                self._server.withdraw()
+            self._topics = _Topics(self._server, names, self._block.n)
 
     def _changed(self, name: str) -> dict[str, Any] | None:
         version = int(self._block.counters[name][0])
@@ -170,54 +154,52 @@ class LiveView:
 
 
 class _Topics:
-    """The channels of one robot; axes by their names, which message paths can spell."""
+    """The topics of one robot; axes by their names, which message paths can spell."""
 
-    def __init__(self, context: Context, given: Sequence[str], n: int) -> None:
+    def __init__(self, server: FoxgloveServer, given: Sequence[str], n: int) -> None:
         self.given = list(given)
+        self._server = server
         names = [*given, *(f"axis_{k + 1}" for k in range(len(given), n))][:n]
         self._names = _spelled(names)
-        axis = _schema("Axis", dict.fromkeys((*_AXIS_FIELDS, "error_deg"), "number"))
+        axis = _object("Axis", dict.fromkeys((*_AXIS_FIELDS, "error_deg"), "number"))
         axes = {"type": "object", "title": "cdpr_rt.Axes"}
         axes["properties"] = dict.fromkeys(self._names, axis)  # type: ignore[assignment]
-        self._axes = Channel("/axes", schema=axes, context=context)
-        tensions = _schema("Tensions", dict.fromkeys(self._names, "number"))
-        self._tensions = Channel("/tensions", schema=tensions, context=context)
+        self._axes = self._json("/axes", axes)
+        tensions = _object("Tensions", dict.fromkeys(self._names, "number"))
+        self._tensions = self._json("/tensions", tensions)
         timing = {name.replace("_s", "_ms"): "number" for name in _TIMES}
         counts = dict.fromkeys(("missed", "late_cycles", "answered"), "integer")
-        self._timing = Channel(
-            "/cycle_time", schema=_schema("CycleTime", {**timing, **counts}), context=context
-        )
+        self._timing = self._json("/cycle_time", _object("CycleTime", {**timing, **counts}))
         words = dict.fromkeys(("state", "reaction"), "string")
-        self._state = Channel("/state", schema=_schema("State", words), context=context)
-        self._pose = PoseInFrameChannel("/pose", context=context)
-        self._wanted = PoseInFrameChannel("/pose_setpoint", context=context)
-        self._frame = FrameTransformChannel("/tf", context=context)
-        self._log = LogChannel("/log", context=context)
+        self._state = self._json("/state", _object("State", words))
+        pose = PoseInFrame.get_schema()
+        self._pose = server.advertise("/pose", "protobuf", pose)
+        self._wanted = server.advertise("/pose_setpoint", "protobuf", pose)
+        self._frame = server.advertise("/tf", "protobuf", FrameTransform.get_schema())
+        self._log = server.advertise("/log", "protobuf", Log.get_schema())
 
-    def close(self) -> None:
-        """Take all channels back."""
-        for channel in (self._axes, self._tensions, self._timing, self._state):
-            channel.close()
-        for typed in (self._pose, self._wanted, self._frame, self._log):
-            typed.close()
+    def _json(self, name: str, schema: dict[str, Any]) -> Topic:
+        data = json.dumps(schema).encode()
+        told = Schema(name=schema["title"], encoding="jsonschema", data=data)
+        return self._server.advertise(name, "json", told)
 
     def show_event(self, text: str, time_ns: int) -> None:
         """Put a line into the log."""
         line = Log(timestamp=_stamp(time_ns), level=LogLevel.Info, message=text, name="cdpr-rt")
-        self._log.log(line, log_time=time_ns)
+        self._server.send(self._log, line.encode(), time_ns)
 
     def show(self, rows: Row, time_ns: int) -> None:
         """Show the last of `rows`, and the longest times of all of them."""
         row = rows[-1]
-        for channel, value in (
+        for topic, value in (
             (self._axes, self._axes_of),
             (self._tensions, self._tensions_of),
             (self._state, _state_of),
         ):
-            if channel.base.has_sinks():
-                channel.base.log(json.dumps(value(row)).encode(), time_ns)
-        if self._timing.base.has_sinks():
-            self._timing.base.log(json.dumps(_timing_of(rows)).encode(), time_ns)
+            if self._server.is_wanted(topic):
+                self._server.send(topic, json.dumps(value(row)).encode(), time_ns)
+        if self._server.is_wanted(self._timing):
+            self._server.send(self._timing, json.dumps(_timing_of(rows)).encode(), time_ns)
         self._show_pose(row["pose"].tolist(), self._pose, time_ns)
         self._show_pose(row["pose_setpoint"].tolist(), self._wanted, time_ns)
 
@@ -236,7 +218,7 @@ class _Topics:
         named = zip(self._names, row["tension_N"].tolist(), strict=True)
         return {name: value for name, value in named if math.isfinite(value)}
 
-    def _show_pose(self, pose: list[float], channel: PoseInFrameChannel, time_ns: int) -> None:
+    def _show_pose(self, pose: list[float], topic: Topic, time_ns: int) -> None:
         if not all(math.isfinite(value) for value in pose):
             return
         x, y, z, qw, qx, qy, qz = pose
@@ -245,8 +227,8 @@ class _Topics:
         shown = PoseInFrame(
             timestamp=stamp, frame_id="base", pose=Pose(position=place, orientation=turned)
         )
-        channel.log(shown, log_time=time_ns)
-        if channel is self._pose:
+        self._server.send(topic, shown.encode(), time_ns)
+        if topic is self._pose:
             transform = FrameTransform(
                 timestamp=stamp,
                 parent_frame_id="base",
@@ -254,7 +236,7 @@ class _Topics:
                 translation=place,
                 rotation=turned,
             )
-            self._frame.log(transform, log_time=time_ns)
+            self._server.send(self._frame, transform.encode(), time_ns)
 
 
 def _spelled(names: Sequence[str]) -> list[str]:
@@ -268,7 +250,7 @@ def _spelled(names: Sequence[str]) -> list[str]:
     return spelled
 
 
-def _schema(title: str, fields: dict[str, str]) -> dict[str, Any]:
+def _object(title: str, fields: dict[str, str]) -> dict[str, Any]:
     properties = {name: {"type": kind} for name, kind in fields.items()}
     return {"type": "object", "title": f"cdpr_rt.{title}", "properties": properties}
 

@@ -8,7 +8,8 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import jsonschema_rs
@@ -19,8 +20,9 @@ from websockets.asyncio.client import connect
 
 from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.shared_block import RowWriter, SharedBlock
+from cdpr_rt.service import foxglove_server
+from cdpr_rt.service.foxglove_server import MOST_VIEWERS
 from cdpr_rt.service.foxglove_view import LiveView, LiveViewError
-from cdpr_rt.service.live_door import MOST_VIEWERS
 
 _PROTOCOL = "foxglove.sdk.v1"
 _LONGEST_S = 60.0
@@ -78,9 +80,14 @@ async def _watch(
                 messages.setdefault(topic, []).append((log_time, text[13:]))
             elif (told := json.loads(text))["op"] == "advertise":
                 new = {channel["id"]: channel for channel in told["channels"]}
+                names = {channel["topic"] for channel in channels.values()}
+                assert not names & {channel["topic"] for channel in new.values()}
                 channels |= new
                 wanted = [{"id": number, "channelId": number} for number in new]
                 await socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+            elif told["op"] == "unadvertise":
+                for number in told["channelIds"]:
+                    del channels[number]
     return {channel["topic"]: channel for channel in channels.values()}, messages
 
 
@@ -232,15 +239,137 @@ def test_programs_look_on_and_so_do_pages_that_were_named(origin: tuple[str, ...
         view.stop()
 
 
-def test_the_server_behind_the_door_is_not_where_a_page_would_look() -> None:
+def _listening() -> set[str]:
+    """Return the inodes of this process' sockets that listen on TCP."""
+    mine = set()
+    for entry in Path("/proc/self/fd").iterdir():
+        with suppress(FileNotFoundError):
+            mine.add(str(entry.readlink()).removeprefix("socket:[").removesuffix("]"))
+    told = "".join(Path(f"/proc/net/{file}").read_text() for file in ("tcp", "tcp6"))
+    lines = [line.split() for line in told.splitlines()]
+    return {line[9] for line in lines if line[3] == "0A" and line[9] in mine}
+
+
+def test_there_is_one_port_and_none_behind_it() -> None:
+    before = _listening()
     with _running(block_with_clock()) as view:
-        assert view._door is not None
-        host, port = view._door._inner
-        assert host.startswith("127.")
-        assert host != "127.0.0.1"
-        for guess in ("127.0.0.1", "localhost"):
-            with pytest.raises(ConnectionRefusedError):
-                socket.create_connection((guess, port), 5.0)
+        asyncio.run(_watch(view.told()["url"], lambda _: True))
+        assert len(_listening() - before) == 1
+
+
+def test_who_connects_over_and_over_costs_few_descriptors() -> None:
+    with _running(block_with_clock()) as view:
+        address = ("127.0.0.1", int(view.told()["url"].rsplit(":", 1)[1]))
+        before, most = len(list(Path("/proc/self/fd").iterdir())), 0
+        open_here = []
+        for _ in range(400):
+            open_here.append(socket.create_connection(address, 5.0))
+            used = len(list(Path("/proc/self/fd").iterdir())) - len(open_here)
+            most = max(most, used - before)
+        assert most <= 6 * MOST_VIEWERS
+    for one in open_here:
+        one.close()
+
+
+@contextmanager
+def _joined(view: LiveView) -> Iterator[socket.socket]:
+    """A viewer that has subscribed to everything, and does nothing by itself."""
+    with socket.socket() as viewer:
+        viewer.settimeout(5.0)
+        viewer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        viewer.connect(("127.0.0.1", int(view.told()["url"].rsplit(":", 1)[1])))
+        viewer.sendall(f"{UPGRADE}Host: localhost\r\n\r\n".encode())
+        assert b" 101 " in viewer.recv(4096)
+        wanted = [{"id": number, "channelId": number} for number in range(1, 9)]
+        text = json.dumps({"op": "subscribe", "subscriptions": wanted}).encode()
+        viewer.sendall(_frame(0x81, text))
+        yield viewer
+
+
+def _frame(head: int, data: bytes) -> bytes:
+    """Return a client's frame; the mask is 0."""
+    return struct.pack(">BBH4x", head, 0xFE, len(data)) + data
+
+
+def _cut_off(view: LiveView) -> bool:
+    end = time.monotonic() + _LONGEST_S
+    while view.told()["viewers"] and time.monotonic() < end:
+        time.sleep(0.01)
+    return not view.told()["viewers"]
+
+
+def test_a_viewer_that_never_reads_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(foxglove_server, "_PATIENCE_S", 0.2)
+    monkeypatch.setattr(foxglove_server, "_MOST_UNSENT_BYTES", 4096)
+    block = block_with_clock()
+    with _running(block) as view, _repeating(block, made_rows(100, 1)), _joined(view):
+        assert _cut_off(view)
+        assert view.told()["error"] == ""
+
+
+@pytest.mark.parametrize("head", [0x81, 0x82, 0x89, 0x01], ids=["text", "data", "ping", "part"])
+def test_a_viewer_that_talks_without_end_is_cut_off(head: int) -> None:
+    with _running(block_with_clock()) as view, _joined(view) as viewer:
+        with suppress(ConnectionError):
+            viewer.sendall(_frame(head, b"x" * 125) * 1000)
+        assert _cut_off(view)
+        assert view.told()["error"] == ""
+
+
+def test_what_is_no_wish_changes_nothing() -> None:
+    block = block_with_clock()
+    nonsense: list[str | bytes] = [
+        "",
+        "[" * 30_000,
+        "[]",
+        '{"op": "subscribe"}',
+        '{"op": "subscribe", "subscriptions": [1, {"id": -1, "channelId": 1}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": 4294967296, "channelId": 1}]}',
+        '{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 1000}, {"id": [], "x": 1}]}',
+        '{"op": "unsubscribe", "subscriptionIds": [[], {}, 99]}',
+        b"\x01\x02",
+    ]
+
+    async def beside_nonsense(url: str) -> None:
+        async with connect(url, subprotocols=[_PROTOCOL]) as client:  # type: ignore[list-item]
+            for one in nonsense:
+                await client.send(one)
+            await client.send('{"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 1}]}')
+            while not isinstance(data := await asyncio.wait_for(client.recv(), _LONGEST_S), bytes):
+                pass
+            assert data[:5] == struct.pack("<BI", 1, 7)
+            await client.send('{"op": "unsubscribe", "subscriptionIds": [7]}')
+            with pytest.raises(TimeoutError):
+                while True:
+                    await asyncio.wait_for(client.recv(), 0.5)
+
+    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+        asyncio.run(beside_nonsense(view.told()["url"]))
+        assert view.told()["error"] == ""
+
+
+def test_axes_that_are_called_otherwise_are_other_topics() -> None:
+    block = block_with_clock()
+
+    def renamed(messages: Messages) -> bool:
+        axes = [set(json.loads(data)) for _, data in messages.get("/axes", ())]
+        if len(axes) == 1:
+            block.write_description({"axes": [{"name": "front"}, {"name": "rear"}]})
+        return {"front", "rear"} in axes
+
+    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+        channels, messages = asyncio.run(_watch(view.told()["url"], renamed))
+    assert "front" in json.loads(channels["/axes"]["schema"])["properties"]
+    assert {"left", "right"} == set(json.loads(messages["/axes"][0][1]))
+
+
+def test_strange_letters_of_a_refused_page_can_be_told() -> None:
+    with _running(block_with_clock()) as view:
+        address = ("127.0.0.1", int(view.told()["url"].rsplit(":", 1)[1]))
+        with socket.create_connection(address, 5.0) as client:
+            client.sendall(f"{UPGRADE}Host: localhost\r\nOrigin: ".encode() + b"\xff\r\n\r\n")
+            assert b" 403 " in client.recv(4096)
+        assert view.told()["refused_last"].encode().startswith(b"Origin: ")
 
 
 def test_who_says_nothing_makes_room_and_too_many_are_told(
