@@ -1,16 +1,12 @@
-"""Listening: sockets, and connections that nobody can hold open for nothing."""
+"""Connections that nobody can hold open for nothing."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
-import os
 import socket
-import stat
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 import h11
@@ -19,9 +15,9 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
-from cdpr_rt.errors import ControlError
 from cdpr_rt.service.auth import MOST_BODY_BYTES, Gate
 from cdpr_rt.service.connections import Guests, Turns, peer_of
+from cdpr_rt.service.listening import listen_tcp as listen_tcp  # noqa: PLC0414  # the live view's
 from cdpr_rt.service.reception import LONGEST_STOP, STOPS, Reception, may_stop
 
 _REQUEST_S, _ANSWER_S, _LOOK_S = 10.0, 90.0, 2.0
@@ -34,10 +30,6 @@ _PIECE_BYTES: Final = 2048
 _STOP_AGAIN_S: Final = 0.2
 """A connection that asks for a stop this soon after another waits for its turn as all do."""
 _NO_UTF8: Final = 1007  # RFC 6455, 7.4.1
-
-
-class ListenError(ControlError):
-    """An address cannot be listened at; the message says which and why."""
 
 
 class _Http(H11Protocol):
@@ -295,62 +287,9 @@ class Server(uvicorn.Server):
         yield
 
 
-def listen_unix(path: Path) -> socket.socket:
-    """Return a socket at `path` that this user alone may connect to; raises ListenError.
-
-    What a daemon that was killed has left there is replaced, a daemon that answers is not.
-    """
-    try:
-        if path.exists() or path.is_symlink():
-            if not stat.S_ISSOCK(path.lstat().st_mode):
-                raise ListenError(f"socket {path}: is something else than a socket")
-            if _answers(path):
-                raise ListenError(f"socket {path}: another daemon listens there")
-            path.unlink()
-    except OSError as error:  # somebody else's, in a folder where all may write
-        raise ListenError(f"socket {path}: {error.strerror or error}") from None
-    listener = socket.socket(socket.AF_UNIX)
-    mask = os.umask(0o177)
-    try:
-        listener.bind(str(path))
-        listener.listen()  # whoever sees the socket can connect
-    except OSError as error:
-        listener.close()
-        raise ListenError(f"socket {path}: {error.strerror or error}") from None
-    finally:
-        os.umask(mask)
-    return listener
-
-
-def listen_tcp(host: str, port: int) -> socket.socket:
-    """Return a socket at one address of `host`; raises ListenError."""
-    try:
-        family, kind, proto, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        listener = socket.socket(family, kind, proto)
-    except OSError as error:
-        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind(address)
-        listener.listen()  # before that, another could bind the same
-    except OSError as error:
-        listener.close()
-        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
-    return listener
-
-
 def _is_text(fragments: list[bytes]) -> bool:
     try:
         b"".join(fragments).decode()
     except UnicodeDecodeError:
         return False
     return True
-
-
-def _answers(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX) as probe:
-        probe.settimeout(1.0)
-        failed = probe.connect_ex(str(path))
-    return failed not in (errno.ECONNREFUSED, errno.ENOENT)

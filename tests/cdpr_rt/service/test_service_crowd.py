@@ -26,7 +26,7 @@ from service_rig import KEY, Rig, raw, reachable, running, wait_for
 
 from cdpr_rt.service import auth, connections, reception, server
 from cdpr_rt.service.auth import Door, Gate
-from cdpr_rt.service.server import listen_unix
+from cdpr_rt.service.listening import listen_tcp, listen_unix
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 
@@ -303,7 +303,7 @@ def test_a_stop_that_will_be_refused_goes_before_nobody(
         return asyncio.Protocol()
 
     async def receive() -> None:
-        listener = server.listen_tcp("127.0.0.1", 0)
+        listener = listen_tcp("127.0.0.1", 0)
         one = reception.Reception(
             listener, enter, lambda head: KEY in head, stops_for_all, turns, lambda _: None
         )
