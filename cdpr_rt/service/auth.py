@@ -132,6 +132,11 @@ class Gate:
         await self._app(scope, receive, send_on)
 
     @property
+    def is_local(self) -> bool:
+        """Whether this is the Unix socket's, which only its user reaches."""
+        return self._door.local
+
+    @property
     def stops_for_all(self) -> bool:
         """Whether everybody who can connect may stop the robot, without a key."""
         return self._door.key is None

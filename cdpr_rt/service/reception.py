@@ -50,25 +50,25 @@ class _Newcomer:
 class Reception:
     """Accepts what comes to `listener`; has `factory` make the protocol of who says something.
 
-    A request for a stop is attended to at once, all others in their turn: those whose head `knows`
-    finds the key or the token in apart from strangers, and `factory` is told. A stranger's stop
-    waits as all else does, unless `stops_for_all`: it will be refused. Who says nothing is ended
-    after 10 s, and earlier where more than 256 wait: of the peer that has most, the oldest.
-    `tell` is told, now and then, that the system gives no descriptor more.
+    A request for a stop is attended to at once where `goes_first` says so of who is known or not,
+    all others in their turn: those whose head `knows` finds the key or the token in apart from
+    strangers. `factory` is told whether one is known, and whether it goes first. Who says nothing
+    is ended after 10 s, and earlier where more than 256 wait: of the peer that has most, the
+    oldest. `tell` is told, now and then, that the system gives no descriptor more.
     """
 
     def __init__(
         self,
         listener: socket.socket,
-        factory: Callable[[bool], asyncio.Protocol],
+        factory: Callable[[bool, bool], asyncio.Protocol],
         knows: Callable[[bytes], bool],
-        stops_for_all: bool,
+        goes_first: Callable[[bool], bool],
         turns: Turns,
         tell: Callable[[str], None],
     ) -> None:
         self._listener = listener
         self._factory, self._knows = factory, knows
-        self._stops_for_all = stops_for_all
+        self._goes_first = goes_first
         self._turns = turns
         self._tell = tell
         self._loop = asyncio.get_running_loop()
@@ -148,19 +148,15 @@ class Reception:
             head = b""
         newcomer.is_heard = b"\r\n\r\n" in head or len(head) == _HEAD_BYTES
         newcomer.is_known = newcomer.is_heard and self._knows(head)
-        if head.startswith(STOPS) and (self._stops_for_all or newcomer.is_known):
-            self._turns.give_way()
-            self._enter(newcomer)
+        stops = head.startswith(STOPS)
+        if stops and self._goes_first(newcomer.is_known):
+            self._enter(newcomer, goes_first=True)
         elif not head:
             self._part_from(newcomer).close()
-        elif self._may_wait(head) and (newcomer.is_known or not newcomer.asks):
+        elif (stops or not may_stop(head)) and (newcomer.is_known or not newcomer.asks):
             # the rest of a head that comes later may show the key: then among those who have it
             newcomer.asks = True
             self._turns.ask(partial(self._have_turn, newcomer), newcomer.is_known)
-
-    def _may_wait(self, head: bytes) -> bool:
-        """Whether it is said already that this is no stop that is attended to at once."""
-        return not may_stop(head) or (head.startswith(STOPS) and not self._stops_for_all)
 
     def _have_turn(self, newcomer: _Newcomer) -> bool:
         if self._silent.get(newcomer.sock.fileno()) is not newcomer:
@@ -168,15 +164,16 @@ class Reception:
         self._enter(newcomer)
         return True
 
-    def _enter(self, newcomer: _Newcomer) -> None:
+    def _enter(self, newcomer: _Newcomer, goes_first: bool = False) -> None:
         sock = self._part_from(newcomer)
-        task = self._loop.create_task(self._connect(sock, newcomer.is_known))
+        made = partial(self._factory, newcomer.is_known, goes_first)
+        task = self._loop.create_task(self._connect(sock, made))
         self._entering.add(task)
         task.add_done_callback(self._entering.discard)
 
-    async def _connect(self, sock: socket.socket, is_known: bool) -> None:
+    async def _connect(self, sock: socket.socket, made: Callable[[], asyncio.Protocol]) -> None:
         with suppress(OSError):  # it has gone meanwhile
-            await self._loop.connect_accepted_socket(partial(self._factory, is_known), sock)
+            await self._loop.connect_accepted_socket(made, sock)
 
     def _part_from(self, newcomer: _Newcomer) -> socket.socket:
         fd = newcomer.sock.fileno()

@@ -1,16 +1,13 @@
-"""Listening: sockets, and connections that nobody can hold open for nothing."""
+"""Connections that nobody can hold open for nothing."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import errno
-import os
 import socket
-import stat
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 import h11
@@ -19,10 +16,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import Frame
 
-from cdpr_rt.errors import ControlError
 from cdpr_rt.service.auth import MOST_BODY_BYTES, Gate
 from cdpr_rt.service.connections import Guests, Turns, peer_of
+from cdpr_rt.service.listening import listen_tcp as listen_tcp  # noqa: PLC0414  # the live view's
 from cdpr_rt.service.reception import LONGEST_STOP, STOPS, Reception, may_stop
+from cdpr_rt.service.token_buckets import TokenBuckets
 
 _REQUEST_S, _ANSWER_S, _LOOK_S = 10.0, 90.0, 2.0
 _LEAVE_S: Final = 5.0
@@ -33,20 +31,27 @@ _MOST_UNSEEN_BYTES: Final = 1 << 20
 _PIECE_BYTES: Final = 2048
 _STOP_AGAIN_S: Final = 0.2
 """A connection that asks for a stop this soon after another waits for its turn as all do."""
+_STRANGERS_PER_S, _STRANGERS = 20.0, 4.0
+"""Stops of strangers on TCP that go first."""
 _NO_UTF8: Final = 1007  # RFC 6455, 7.4.1
-
-
-class ListenError(ControlError):
-    """An address cannot be listened at; the message says which and why."""
 
 
 class _Http(H11Protocol):
     """Ends a connection that neither asks anything nor takes its answer, and one too many.
 
-    What it asks waits for its turn; a stop does not, unless the last one came just before.
+    What it asks waits for its turn; a stop does not where `goes_first` says so of who is known or
+    not, unless the last one came just before. Of the first that is said by `is_first`.
     """
 
-    def __init__(self, guests: Guests, turns: Turns, is_known: bool, **given: Any) -> None:
+    def __init__(
+        self,
+        guests: Guests,
+        turns: Turns,
+        goes_first: Callable[[bool], bool],
+        is_known: bool,
+        is_first: bool,
+        **given: Any,
+    ) -> None:
         super().__init__(**given)
         self.app_state = {**self.app_state, "guest": self}
         self.peer = ""
@@ -54,6 +59,7 @@ class _Http(H11Protocol):
         self.is_refused = self.stops_only = False
         self.since_s = 0.0
         self._guests, self._turns = guests, turns
+        self._goes_first, self._is_first = goes_first, is_first
         self._waits = self._stops = False
         self._stopped_s = -_STOP_AGAIN_S
 
@@ -100,11 +106,7 @@ class _Http(H11Protocol):
             if self.stops_only and not may_stop(head):
                 self.transport.abort()
                 return
-            now_s = self.loop.time()
-            self._stops = head.startswith(STOPS) and now_s - self._stopped_s >= _STOP_AGAIN_S
-            if self._stops:
-                self._stopped_s = now_s
-                self._turns.give_way()
+            self._stops = head.startswith(STOPS) and self._may_go_first()
             if not head:
                 super().handle_events()  # no more has come yet
                 return
@@ -114,6 +116,16 @@ class _Http(H11Protocol):
             self._waits = True
             self.flow.pause_reading()
             self._turns.ask(self._have_turn, self.is_known)
+
+    def _may_go_first(self) -> bool:
+        is_first, self._is_first = self._is_first, False
+        now_s = self.loop.time()
+        if now_s - self._stopped_s < _STOP_AGAIN_S:
+            return False
+        if not (is_first or self._goes_first(self.is_known)):
+            return False
+        self._stopped_s = now_s
+        return True
 
     def _have_turn(self) -> bool:
         self._waits = False
@@ -243,12 +255,12 @@ class Server(uvicorn.Server):
         turns: Turns,
         tell: Callable[[str], None],
     ) -> None:
-        shared = (Guests(), turns)
+        guests = Guests()
         super().__init__(
             uvicorn.Config(
                 app,
-                http=partial(_Http, *shared),  # type: ignore[arg-type]  # called as a class is
-                ws=partial(_WebSocket, *shared),  # type: ignore[arg-type]
+                http=partial(_Http, guests, turns, self._goes_first),  # type: ignore[arg-type]  # called as a class is
+                ws=partial(_WebSocket, guests, turns),  # type: ignore[arg-type]
                 lifespan="off",
                 log_config=None,
                 access_log=False,
@@ -266,6 +278,7 @@ class Server(uvicorn.Server):
         self._listener = listener
         self._app = app
         self._turns, self._tell = turns, tell
+        self._strangers_first = TokenBuckets(_STRANGERS_PER_S, _STRANGERS)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen; called by `serve`."""
@@ -274,16 +287,28 @@ class Server(uvicorn.Server):
         made: Any = self.config.http_protocol_class
         given = {"config": self.config, "server_state": self.server_state}
 
-        def factory(is_known: bool) -> asyncio.Protocol:
+        def factory(is_known: bool, is_first: bool) -> asyncio.Protocol:
             protocol: asyncio.Protocol = made(
-                is_known=is_known, **given, app_state=self.lifespan.state
+                is_known=is_known, is_first=is_first, **given, app_state=self.lifespan.state
             )
             return protocol
 
-        shared = self._app.knows, self._app.stops_for_all, self._turns, self._tell
+        shared = self._app.knows, self._goes_first, self._turns, self._tell
         receptions: Any = [Reception(one, factory, *shared) for one in sockets]
         self.servers = receptions
         self.started = True
+
+    def _goes_first(self, is_known: bool) -> bool:
+        """Whether a stop of one who is known or not is attended to before all that has turns.
+
+        On the Unix socket, and of the known, it is, and all that has turns steps back. Of strangers
+        on TCP so many a second, all together, as they may have any number of addresses; more than
+        that have turns, and so has one that will be refused.
+        """
+        if is_known or self._app.is_local:
+            self._turns.give_way()
+            return True
+        return self._app.stops_for_all and self._strangers_first.take("", time.monotonic())
 
     async def run_until_told(self) -> None:
         """Serve until `should_exit` is set."""
@@ -295,62 +320,9 @@ class Server(uvicorn.Server):
         yield
 
 
-def listen_unix(path: Path) -> socket.socket:
-    """Return a socket at `path` that this user alone may connect to; raises ListenError.
-
-    What a daemon that was killed has left there is replaced, a daemon that answers is not.
-    """
-    try:
-        if path.exists() or path.is_symlink():
-            if not stat.S_ISSOCK(path.lstat().st_mode):
-                raise ListenError(f"socket {path}: is something else than a socket")
-            if _answers(path):
-                raise ListenError(f"socket {path}: another daemon listens there")
-            path.unlink()
-    except OSError as error:  # somebody else's, in a folder where all may write
-        raise ListenError(f"socket {path}: {error.strerror or error}") from None
-    listener = socket.socket(socket.AF_UNIX)
-    mask = os.umask(0o177)
-    try:
-        listener.bind(str(path))
-        listener.listen()  # whoever sees the socket can connect
-    except OSError as error:
-        listener.close()
-        raise ListenError(f"socket {path}: {error.strerror or error}") from None
-    finally:
-        os.umask(mask)
-    return listener
-
-
-def listen_tcp(host: str, port: int) -> socket.socket:
-    """Return a socket at one address of `host`; raises ListenError."""
-    try:
-        family, kind, proto, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        listener = socket.socket(family, kind, proto)
-    except OSError as error:
-        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind(address)
-        listener.listen()  # before that, another could bind the same
-    except OSError as error:
-        listener.close()
-        raise ListenError(f"{host}:{port}: {error.strerror or error}") from None
-    return listener
-
-
 def _is_text(fragments: list[bytes]) -> bool:
     try:
         b"".join(fragments).decode()
     except UnicodeDecodeError:
         return False
     return True
-
-
-def _answers(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX) as probe:
-        probe.settimeout(1.0)
-        failed = probe.connect_ex(str(path))
-    return failed not in (errno.ECONNREFUSED, errno.ENOENT)

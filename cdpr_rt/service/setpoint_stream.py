@@ -28,7 +28,7 @@ class StreamError(ControlError):
 
 
 class SetpointStream:
-    """Listens at `host` and `port` (0: any free one) from `start` until `stop`.
+    """Takes packets from `sock`, as `listen_udp` returns one, from `start` until `stop`.
 
     Set-points go into `block` while their sender has the right to move, which `lease` gives.
     Without a `key` only sessions are served that `desk.give` has given. Raises ControlError for a
@@ -41,49 +41,35 @@ class SetpointStream:
         self,
         block: SharedBlock,
         lease: Lease,
-        host: str = "127.0.0.1",
-        port: int = 0,
+        sock: socket.socket,
         key: bytes | None = None,
     ) -> None:
         self.desk = StreamDesk(block, lease, key)
-        self._wanted = host, port, key is not None
-        self._sock: socket.socket | None = None
+        self._sock = sock
+        host, port = sock.getsockname()[:2]
+        self.address: tuple[str, int] = host, port
+        """The host and the port it listens at."""
         self._holders: _HoldersSocket | None = None
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="set-point stream", daemon=True)
-        self.port = 0
-        """The port it listens at, once it has started."""
 
     def start(self) -> None:
-        """Begin to take packets.
-
-        Raises StreamError for an address that cannot be listened at, and for one other than
-        loopback without a key.
-        """
-        self._sock = _listen(*self._wanted)
-        self.port = int(self._sock.getsockname()[1])
+        """Begin to take packets."""
         self._thread.start()
 
     def stop(self) -> None:
         """Stop; whoever holds the stream loses it."""
         self._stop.set()
-        if self._sock is None:
-            return
         self._thread.join()
         self.desk.close()
         self._follow_holder(self._sock)
         self._sock.close()
 
-    @property
-    def address(self) -> tuple[str, int]:
-        """Return the host and the port it listens at."""
-        return self._wanted[0], self.port
-
     def told(self) -> dict[str, Any]:
         """Return who holds it, the delay there and back, and the packets counted."""
         holder, delay_s = self.desk.holder, self.desk.round_trip_s
         return {
-            "address": f"{self._wanted[0]}:{self.port}",
+            "address": "{}:{}".format(*self.address),
             "holder": None if holder is None else f"{holder[0]}:{holder[1]}",
             "round_trip_s": None if math.isnan(delay_s) else delay_s,
             "packets": dict(self.desk.counts),
@@ -92,7 +78,6 @@ class SetpointStream:
     def _run(self) -> None:
         buffer = memoryview(bytearray(LONGEST_BYTES + 1))
         first = self._sock
-        assert first is not None
         while not self._stop.is_set():
             socks = [first] if self._holders is None else [self._holders.sock, first]
             readable = _readable(socks)
@@ -167,7 +152,12 @@ def _addresses(host: str, port: int) -> list[tuple[Any, ...]]:
         raise StreamError(f"set-point stream: {host!r} is no address ({reason})") from None
 
 
-def _listen(host: str, port: int, has_key: bool) -> socket.socket:
+def listen_udp(host: str, port: int, has_key: bool = False) -> socket.socket:
+    """Return a socket for a stream at `host` and `port` (0: any free one).
+
+    Raises StreamError for an address that cannot be listened at, and for one other than loopback
+    without a key.
+    """
     if not has_key and not is_loopback(host):
         raise StreamError(
             f"set-point stream: {host} is not loopback, and no key is shared; give a key "

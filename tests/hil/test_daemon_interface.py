@@ -53,7 +53,6 @@ def quick_daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemo
 
 @pytest.fixture
 def url(daemon: RealDaemon) -> str:
-    # a service that was started anew has found itself another port
     return f"http://{daemon.status()['parts']['service']['http']}"
 
 
@@ -214,8 +213,10 @@ def test_a_service_that_stalls_lets_go_and_one_that_dies_is_joined_again(
     assert status["control"]["held"] is False
 
 
-def test_a_service_that_comes_back_needs_the_keys_file_no_more(daemon: RealDaemon) -> None:
-    """The launcher has read the key once; last, as the service's address is another afterwards."""
+def test_a_service_that_comes_back_needs_the_keys_file_no_more(
+    daemon: RealDaemon, url: str
+) -> None:
+    """The launcher has read the key once, and the address is the same."""
     key_file = daemon.socket.parent / "key"
     text = key_file.read_text()
     key_file.unlink()
@@ -224,6 +225,7 @@ def test_a_service_that_comes_back_needs_the_keys_file_no_more(daemon: RealDaemo
     try:
         until(lambda: daemon.children().get("service") not in (None, service))
         address = f"http://{until(daemon.status)['parts']['service']['http']}"
+        assert address == url
         wrong = {"Authorization": f"Bearer {text}x"}
         assert httpx.get(f"{address}/events", headers=RIGHT).status_code == 200
         assert httpx.get(f"{address}/events", headers=wrong).status_code == 401

@@ -19,7 +19,7 @@ from pathlib import Path
 import httpx
 import pytest
 from daemon_lab import KEY, with_key
-from daemon_rig import RealDaemon, until
+from daemon_rig import RealDaemon, cdpr, until
 from test_daemon_stream import port_of
 
 from cdpr_rt.service.stream_packet import StreamSetpoint
@@ -141,3 +141,55 @@ def test_set_points_without_key_or_session_are_counted_and_not_answered(
     assert as_nobody(send) == "TimeoutError"
     assert daemon.status()["parts"]["stream"]["packets"]["unsigned"] == 30
     assert not daemon.status()["control"]["held"]
+
+
+def http_port_of(daemon: RealDaemon) -> int:
+    return int(until(daemon.status)["parts"]["service"]["http"].rpartition(":")[2])
+
+
+def bind(kind: socket.SocketKind, port: int) -> None:
+    with socket.socket(socket.AF_INET, kind) as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if IS_ROOT:  # the kernel lets a user share a port with none but itself
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        sock.bind(("127.0.0.1", port))
+        if kind is socket.SOCK_STREAM:
+            sock.listen()
+
+
+def test_a_port_is_not_to_be_had_while_the_service_is_away(daemon: RealDaemon) -> None:
+    ports = {socket.SOCK_STREAM: http_port_of(daemon), socket.SOCK_DGRAM: port_of(daemon)}
+    service = daemon.children()["service"]
+
+    def take() -> object:
+        refused, got, end_s = 0, [], time.monotonic() + 0.5
+        while time.monotonic() < end_s:
+            for kind, port in ports.items():
+                try:
+                    bind(kind, port)
+                    got.append(kind.name)
+                except OSError:
+                    refused += 1
+        return refused > 10, sorted(set(got))
+
+    os.kill(service, signal.SIGKILL)
+    until(lambda: "service" not in daemon.children())
+    assert as_nobody(take) == "(True, [])"
+    # who asks meanwhile is answered by the service that comes
+    with httpx.Client(base_url=f"http://127.0.0.1:{ports[socket.SOCK_STREAM]}") as client:
+        assert client.get("/status", timeout=60.0).status_code == 200
+    assert (http_port_of(daemon), port_of(daemon)) == tuple(ports.values())
+    assert daemon.children()["service"] != service
+
+
+@pytest.mark.parametrize("option", ["--http", "--stream"])
+def test_no_daemon_starts_where_its_port_is_anothers(
+    daemon: RealDaemon, tmp_path: Path, option: str
+) -> None:
+    port = http_port_of(daemon) if option == "--http" else port_of(daemon)
+    at = ("--socket", str(tmp_path / "other.sock"), option, str(port))
+    second = cdpr("run", daemon.robot, "--bus", "simbus:", "--no-record", *at)
+    assert second.returncode == 1
+    assert second.stderr.startswith(f"cdpr: {option}")
+    assert second.stderr.endswith(f"{port}: Address already in use\n")
+    assert second.stderr.count("\n") == 1

@@ -140,6 +140,7 @@ def run(
     _require_free(settings.socket)
     _require_no_master(profile, settings)
     _ask(profile, settings, yes)
+    settings = settings.with_key_kept().with_ports_bound()
     manager = ServiceManager()  # before any child is started: none of them speaks for the daemon
     with ExitStack() as stack:
         simulator = None
@@ -212,7 +213,7 @@ def _launch(
     block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
     block.counters["start_monotonic_ns"] = time.monotonic_ns()
     block.counters["start_realtime_ns"] = time.time_ns()
-    settings = settings.with_key_kept().model_copy(update={"block_fd": block.fd})
+    settings = settings.model_copy(update={"block_fd": block.fd})
 
     def ready(status: dict[str, Any]) -> None:
         told = {"robot": robot.name, "state": status["state"], "reason": status.get("reason", "")}

@@ -17,7 +17,7 @@ _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_T
 
 
 class Child:
-    """One of the daemon's processes; it inherits the shared memory and nothing else."""
+    """One of the daemon's processes; it inherits the shared memory and `keep`."""
 
     def __init__(self, module: str, settings: RunSettings, keep: Sequence[int] = ()) -> None:
         # -P: no module of the working directory in place of ours; PYTHONPATH is its user's to set

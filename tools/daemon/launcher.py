@@ -101,8 +101,7 @@ class Launcher:
                     self._service.stop(_SERVICE_STOP_S)
 
     def _start_service(self) -> Child:
-        key_fd = self._settings.key_fd
-        return Child(SERVICE, self._settings, () if key_fd < 0 else (key_fd,))
+        return Child(SERVICE, self._settings, self._settings.service_fds)
 
     def _wait(self) -> None:
         poll = select.poll()

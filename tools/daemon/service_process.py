@@ -8,6 +8,7 @@ import logging
 import os
 import resource
 import signal
+import socket
 import sys
 import time
 from functools import partial
@@ -22,9 +23,10 @@ from cdpr_rt.service.auth import Door, Gate
 from cdpr_rt.service.bounded_log import BoundedLog
 from cdpr_rt.service.connections import Turns
 from cdpr_rt.service.foxglove_view import LiveView
+from cdpr_rt.service.listening import listen_unix
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.recording import Recorder
-from cdpr_rt.service.server import ListenError, Server, listen_tcp, listen_unix
+from cdpr_rt.service.server import Server
 from cdpr_rt.service.service import Service
 from cdpr_rt.service.setpoint_stream import SetpointStream
 from tools.daemon.child import end_with, is_running, orphaned
@@ -78,8 +80,8 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     if settings.live is not None:
         parts.append(LiveView(block, settings.name, settings.live, settings.live_origins))
     if settings.stream is not None:
-        host, port = settings.stream.host, settings.stream.port
-        parts.append(SetpointStream(block, lease, host, port, settings.key()))
+        sock = socket.socket(fileno=settings.stream_fd)
+        parts.append(SetpointStream(block, lease, sock, settings.key()))
     return parts
 
 
@@ -136,25 +138,15 @@ async def _told_to_end(ended: asyncio.Event, settings: RunSettings, block: Share
 
 
 def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Server]:
-    """Return the servers; the Unix socket must be had, an address on TCP need not.
-
-    A robot in motion is not let go because somebody else has taken its port.
-    """
+    """Return the servers: at the Unix socket, and at what the launcher has bound on TCP."""
     watched = (service.count_refusal, service.lease.is_held_by)
     turns = Turns()
     tell = partial(service.events.add, "http")
     unix = listen_unix(settings.socket)
     servers = [Server(Gate(app, Door(local=True), *watched), unix, turns, tell)]
-    address = settings.http
-    if address is None:
-        return servers
-    door = Door.named(settings.key(), address.host, loopback=address.is_loopback)
-    try:
-        listener = listen_tcp(address.host, address.port)
-    except ListenError as error:
-        service.events.add("http", f"--http {error}")
-        _LOG.error("--http %s", error)
-    else:
+    if (address := settings.http) is not None:
+        door = Door.named(settings.key(), address.host, loopback=address.is_loopback)
+        listener = socket.socket(fileno=settings.http_fd)
         service.http = listener.getsockname()[:2]
         servers.append(Server(Gate(app, door, *watched), listener, turns, tell))
     return servers

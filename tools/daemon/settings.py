@@ -12,9 +12,11 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from cdpr_rt.service.listening import ListenError, listen_tcp
+from cdpr_rt.service.setpoint_stream import StreamError, listen_udp
 from profiles.bounded_input import open_regular
 from profiles.errors import ProfileError
-from tools.errors import BadInputError
+from tools.errors import BadInputError, WorkFailedError
 
 _SECRET_CHARS, _MOST_KEY_BYTES = 16, 4096
 _ALL_SEALS = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL
@@ -102,6 +104,9 @@ class RunSettings(BaseModel):
     """The shared memory's descriptor, inherited under the same number."""
     key_fd: int = -1
     """The key's descriptor, inherited by the service alone, in place of `key_file`."""
+    http_fd: int = -1
+    stream_fd: int = -1
+    """Sockets at `http` and `stream`, which the service inherits as well."""
 
     @model_validator(mode="after")
     def _reachable_with_key_only(self) -> Self:
@@ -133,6 +138,30 @@ class RunSettings(BaseModel):
         os.write(fd, key)
         fcntl.fcntl(fd, fcntl.F_ADD_SEALS, _ALL_SEALS)
         return self.model_copy(update={"key_file": None, "key_fd": fd})
+
+    def with_ports_bound(self) -> RunSettings:
+        """Return settings with sockets at `http` and `stream`: they are bound now, once.
+
+        Between two services nobody else gets a port to which clients send the key. Raises
+        WorkFailedError.
+        """
+        http_fd = stream_fd = -1
+        try:
+            if self.http is not None:
+                http_fd = listen_tcp(self.http.host, self.http.port).detach()
+            if self.stream is not None:
+                host, port = self.stream.host, self.stream.port
+                stream_fd = listen_udp(host, port, self.has_key).detach()
+        except ListenError as error:
+            raise WorkFailedError(f"--http {error}") from None
+        except StreamError as error:
+            raise WorkFailedError(f"--stream: {error}") from None
+        return self.model_copy(update={"http_fd": http_fd, "stream_fd": stream_fd})
+
+    @property
+    def service_fds(self) -> tuple[int, ...]:
+        """The descriptors that each service inherits, beside the shared memory's."""
+        return tuple(fd for fd in (self.key_fd, self.http_fd, self.stream_fd) if fd >= 0)
 
     def key(self) -> bytes | None:
         """Return the shared key that the launcher has kept, None where there is none."""

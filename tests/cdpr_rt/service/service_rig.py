@@ -22,7 +22,8 @@ from cdpr_rt.service.app import create_app
 from cdpr_rt.service.auth import Door, Gate
 from cdpr_rt.service.connections import Turns
 from cdpr_rt.service.lease import LeaseError
-from cdpr_rt.service.server import Server, listen_tcp, listen_unix
+from cdpr_rt.service.listening import listen_tcp, listen_unix
+from cdpr_rt.service.server import Server
 from cdpr_rt.service.service import Service
 
 KEY = b"an old key that opens this door"

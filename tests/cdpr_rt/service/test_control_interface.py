@@ -16,7 +16,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from service_rig import AXES, Rig, running, wait_for
 
-from cdpr_rt.service.setpoint_stream import SetpointStream
+from cdpr_rt.service.setpoint_stream import SetpointStream, listen_udp
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import Standing, StreamSession
 
@@ -103,13 +103,13 @@ def test_the_holder_alone_is_given_a_session_of_the_stream(rig: Rig) -> None:
         answer = client.post("/stream", headers=headers)
         assert answer.status_code == 404
         assert "takes no set-point stream" in answer.json()["error"]
-        stream = SetpointStream(rig.block, rig.service.lease)
+        stream = SetpointStream(rig.block, rig.service.lease, listen_udp("127.0.0.1", 0))
         rig.service.start_parts([stream])
         try:
             for wrong in ({}, {"X-Control-Token": "made up"}):
                 assert client.post("/stream", headers=wrong).status_code == 409
             told = client.post("/stream", headers=headers).json()
-            assert (told["host"], told["port"]) == ("127.0.0.1", stream.port)
+            assert (told["host"], told["port"]) == stream.address
             given = StreamSession(told["session"], bytes.fromhex(told["key"]))
             with StreamClient(told["host"], told["port"], given) as hand:
                 wait_for(lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != [])

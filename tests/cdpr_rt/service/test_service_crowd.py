@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,7 +26,7 @@ from service_rig import KEY, Rig, raw, reachable, running, wait_for
 
 from cdpr_rt.service import auth, connections, reception, server
 from cdpr_rt.service.auth import Door, Gate
-from cdpr_rt.service.server import listen_unix
+from cdpr_rt.service.listening import listen_tcp, listen_unix
 
 RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
 
@@ -291,21 +291,25 @@ class NoTurns(connections.Turns):
         self.asked.append(work)
 
 
-@pytest.mark.parametrize(("stops_for_all", "at_once"), [(False, [True]), (True, [False, True])])
-def test_a_stop_that_will_be_refused_goes_before_nobody(
-    stops_for_all: bool, at_once: list[bool]
-) -> None:
+@pytest.mark.parametrize(("for_all", "at_once"), [(False, [True]), (True, [False, True])])
+def test_a_stop_that_will_be_refused_goes_before_nobody(for_all: bool, at_once: list[bool]) -> None:
     entered: list[bool] = []
     turns = NoTurns()
 
-    def enter(is_known: bool) -> asyncio.Protocol:
+    def enter(is_known: bool, is_first: bool) -> asyncio.Protocol:
+        assert is_first
         entered.append(is_known)
         return asyncio.Protocol()
 
     async def receive() -> None:
-        listener = server.listen_tcp("127.0.0.1", 0)
+        listener = listen_tcp("127.0.0.1", 0)
         one = reception.Reception(
-            listener, enter, lambda head: KEY in head, stops_for_all, turns, lambda _: None
+            listener,
+            enter,
+            lambda head: KEY in head,
+            lambda is_known: is_known or for_all,
+            turns,
+            lambda _: None,
         )
         for head in (b"\r\n\r\n", b"Authorization: Bearer " + KEY + b"\r\n\r\n"):
             sock = stack.enter_context(socket.create_connection(listener.getsockname()))
@@ -318,6 +322,54 @@ def test_a_stop_that_will_be_refused_goes_before_nobody(
         asyncio.run(receive())
     assert entered == at_once
     assert len(turns.asked) == 2 - len(at_once)
+
+
+def test_of_strangers_stops_on_tcp_a_few_a_second_go_before_all_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """From however many addresses they come; those of the known and of the socket always do."""
+    now_s = 0.0
+    monkeypatch.setattr(server, "time", SimpleNamespace(monotonic=lambda: now_s))
+
+    def first(door: Door, is_known: bool) -> Callable[[int], list[bool]]:
+        gate = Gate(Any, door, lambda: None, lambda _token: False)  # type: ignore[arg-type]
+        with socket.socket() as sock:
+            one = server.Server(gate, sock, turns, lambda _: None)
+        return lambda count: [one._goes_first(is_known) for _ in range(count)]
+
+    class Stepped(connections.Turns):
+        back = 0
+
+        def give_way(self) -> None:
+            self.back += 1
+
+    turns = Stepped()
+    stranger = first(Door(), is_known=False)
+    assert stranger(6) == [True] * 4 + [False] * 2
+    now_s = 0.1
+    assert stranger(3) == [True, True, False]
+    assert turns.back == 0
+    assert first(Door(key=KEY), is_known=False)(1) == [False]
+    assert first(Door(local=True), is_known=False)(100) == [True] * 100
+    assert first(Door(), is_known=True)(100) == [True] * 100
+    assert turns.back == 200
+
+
+def test_a_stranger_whose_stop_is_one_of_many_waits_for_its_turn(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waited: list[bool] = []
+    ask = connections.Turns.ask
+
+    def note(self: connections.Turns, work: Any, known: bool = False) -> None:
+        waited.append(known)
+        ask(self, work, known)
+
+    monkeypatch.setattr(connections.Turns, "ask", note)
+    monkeypatch.setattr(server.TokenBuckets, "take", lambda *_: False)
+    assert httpx.post(f"{rig.url}/hold").status_code == 200
+    assert waited == [False, False]  # to come in, and to be heard
+    assert [command["do"] for command in rig.loop.commands] == ["hold"]
 
 
 def test_a_head_that_comes_in_parts_shows_the_key_too(rig: Rig) -> None:

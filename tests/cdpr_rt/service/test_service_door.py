@@ -17,9 +17,9 @@ from service_rig import KEY, Rig, running
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from cdpr_rt.service import auth, server
+from cdpr_rt.service import auth, listening
 from cdpr_rt.service.auth import Door, is_ours
-from cdpr_rt.service.server import ListenError, listen_tcp, listen_unix
+from cdpr_rt.service.listening import ListenError, listen_tcp, listen_unix
 
 WRONG_AGAIN_S = 4.0
 """So late that no busy machine makes it of an answer at once."""
@@ -217,7 +217,7 @@ def test_a_socket_in_use_is_refused_and_one_left_behind_is_replaced(
     listen_unix(left).close()
     assert left.exists()
     with listen_unix(left):
-        assert server._answers(left)
+        assert listening._answers(left)
 
 
 def test_a_file_in_the_sockets_place_is_left_alone(tmp_path: Path) -> None:

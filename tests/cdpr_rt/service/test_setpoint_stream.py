@@ -26,7 +26,7 @@ from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.right import PublishedRight
 from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.service.lease import Lease, LeaseError
-from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError, is_loopback
+from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError, is_loopback, listen_udp
 from cdpr_rt.service.stream_client import StreamClient
 from cdpr_rt.service.stream_packet import (
     Hello,
@@ -45,9 +45,10 @@ class Robot:
     def __init__(self, key: bytes | None = None, host: str = "127.0.0.1", port: int = 0) -> None:
         self.block = SharedBlock.create(1, 0.1, 1000.0)
         self.lease = Lease(PublishedRight(self.block))
-        self.stream = SetpointStream(self.block, self.lease, host, port, key)
+        sock = listen_udp(host, port, key is not None)
+        self.stream = SetpointStream(self.block, self.lease, sock, key)
         self.stream.start()
-        self.port = self.stream.port
+        _, self.port = self.stream.address
 
     def give(self) -> StreamSession:
         """Take the right to move, where nobody has it, and give its holder a session."""
@@ -198,28 +199,22 @@ def test_forged_hellos_do_not_keep_out_who_has_the_key() -> None:
 
 
 def test_elsewhere_than_on_loopback_a_key_is_needed() -> None:
-    block = SharedBlock.create(1, 0.1, 1000.0)
-    lease = Lease(PublishedRight(block))
     assert is_loopback("127.0.0.1") and is_loopback("::1") and is_loopback("localhost")
     for host in ("0.0.0.0", "::"):
         with pytest.raises(StreamError, match="no key is shared"):
-            SetpointStream(block, lease, host).start()
+            listen_udp(host, 0)
     with pytest.raises(StreamError, match="no address"):
-        SetpointStream(block, lease, "no such host.invalid").start()
-    with pytest.raises(ControlError, match="at least 16"):
-        SetpointStream(block, lease, "0.0.0.0", 0, b"short")
-    stream = SetpointStream(block, lease, "0.0.0.0", 0, KEY)
-    stream.start()
-    stream.stop()
+        listen_udp("no such host.invalid", 0)
+    listen_udp("0.0.0.0", 0, has_key=True).close()
+    with pytest.raises(ControlError, match="at least 16"), robot(b"short"):
+        pass
 
 
 def test_an_address_in_use_is_told() -> None:
     with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
         converse(client, lambda: client.answered >= 1)  # with the holder's socket in place
-        other = SetpointStream(there.block, there.lease, "127.0.0.1", there.port)
         with pytest.raises(StreamError, match="in use"):
-            other.start()
-        other.stop()
+            listen_udp("127.0.0.1", there.port)
 
 
 FLOOD = """

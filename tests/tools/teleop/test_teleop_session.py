@@ -14,7 +14,7 @@ from cdpr_rt.runtime.shared_block import SAMPLES, SharedBlock
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.runtime.stream_buttons import CLUTCH, confirmation
 from cdpr_rt.service.lease import Lease
-from cdpr_rt.service.setpoint_stream import SetpointStream
+from cdpr_rt.service.setpoint_stream import SetpointStream, listen_udp
 from cdpr_rt.service.stream_client import StreamClient
 from tools.teleop import session as session_module
 from tools.teleop.hand import End, Hand, HandDevice
@@ -32,7 +32,7 @@ class Robot:
         self.block = SharedBlock.create(3, 0.1, 1000.0)
         self.lease = Lease(PublishedRight(self.block))
         self.token = self.lease.take("the operator", 2.0)
-        self.stream = SetpointStream(self.block, self.lease)
+        self.stream = SetpointStream(self.block, self.lease, listen_udp("127.0.0.1", 0))
         self.stream.start()
         self.run(POSE)
 
@@ -64,7 +64,7 @@ def lead(
     """Lead to the end; have something happen after some seconds."""
     timer = threading.Timer(*after) if after else None
     given = robot.stream.desk.give(robot.token)
-    with StreamClient("127.0.0.1", robot.stream.port, given) as stream:
+    with StreamClient(*robot.stream.address, given) as stream:
         session = Session(stream, device, SCALE, POSE)
         if timer:
             timer.start()
