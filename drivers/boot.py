@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from drivers import sdo_abort
 from drivers.bus_census import flood_text
@@ -14,7 +14,7 @@ from drivers.errors import BootError, DriverError, SdoAbortError, SdoCancelledEr
 from drivers.network import CanNetwork
 from profiles import DriveProfile
 
-__all__ = ["BootReport", "BootSettings", "boot", "boot_all"]
+__all__ = ["BootReport", "BootReports", "BootSettings", "boot", "boot_all"]
 
 _DEVICE_TYPE, _IDENTITY = 0x1000, 0x1018
 _PROFILE_402 = 402
@@ -48,6 +48,15 @@ class BootReport:
     """Whether the drive was told to store its configuration (1010h)."""
 
 
+class BootReports(dict[int, BootReport]):
+    """Reports of the drives that are up, by node id."""
+
+    def __init__(self, reports: Mapping[int, BootReport], missing: Mapping[int, BootError]) -> None:
+        super().__init__(reports)
+        self.missing = dict(missing)
+        """Why each optional node that is not up did not boot, by node id."""
+
+
 def boot(
     network: CanNetwork,
     node_id: int,
@@ -57,7 +66,7 @@ def boot(
     store_configuration: bool = False,
 ) -> BootReport:
     """Boot one drive that `network` knows; see `boot_all`. Raises BootError, BusError."""
-    drives = {node_id: (profile, want)}
+    drives = {node_id: (profile, replace(want, mandatory=True))}
     return boot_all(network, drives, store_configuration=store_configuration)[node_id]
 
 
@@ -66,13 +75,15 @@ def boot_all(
     drives: Mapping[int, tuple[DriveProfile, BootSettings]],
     *,
     store_configuration: bool = False,
-) -> dict[int, BootReport]:
+) -> BootReports:
     """Boot several drives at the same time, by node id.
 
     All listen together for another master. Then each drive's communication is reset, its identity
     held against the profile, what differs of its configuration written, and its heartbeat
-    awaited. They are started together once none has failed. With `store_configuration` a drive
-    whose stored configuration is another one is told to keep it (1010h).
+    awaited. They are started together once no mandatory one has failed; a node that is not
+    mandatory and fails stays in pre-operational and stands in `missing`. With
+    `store_configuration` a drive whose stored configuration is another one is told to keep it
+    (1010h).
 
     Raises the BootError of the lowest node id that failed, with the others' as notes (and who
     floods the bus, should that be why), once all have come to an end, and BusError.
@@ -80,7 +91,7 @@ def boot_all(
     _listen(network, drives)
     network.clear_alarm()
     reports: dict[int, BootReport] = {}
-    fatal: list[BootError] = []
+    errors: dict[int, BootError] = {}
 
     def prepare(
         node_id: int, profile: DriveProfile, want: BootSettings
@@ -93,7 +104,8 @@ def boot_all(
         try:
             reports[node_id] = task.result()
         except BootError as error:
-            fatal.append(error)
+            errors[node_id] = error
+    fatal = [error for node, error in errors.items() if drives[node][1].mandatory]
     if fatal:
         babbled = any(error.letter in _MAY_BE_A_FLOOD for error in fatal)
         flood = flood_text(network.url, network.clock) if babbled else ""
@@ -103,7 +115,7 @@ def boot_all(
         raise fatal[0]
     for node_id in reports:
         network.start(node_id, drives[node_id][0].heartbeat_producer_s)
-    return reports
+    return BootReports(reports, errors)
 
 
 def _listen(network: CanNetwork, drives: Mapping[int, tuple[DriveProfile, BootSettings]]) -> None:

@@ -34,6 +34,8 @@ class BootSettings:
     """What 6076h must hold, and what holds without it; None leaves it unchecked."""
     counts_per_turn: int | None = None
     """Encoder resolution of a drive that has no 608Fh."""
+    mandatory: bool = True
+    """Whether the others may not start without it (CiA 302-2, 1F81h bit 3)."""
 
 
 @dataclass(frozen=True)

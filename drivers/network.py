@@ -228,20 +228,35 @@ class CanNetwork(BusMember, ObjectAccess):
         """
         self._errors.release(node_id)
         try:
-            if self._end_watch(node_id):
+            if self.pause_watch(node_id) is not None:
                 self.stop_process_data(node_id)
         except DriverError:
             return
 
-    def _end_watch(self, node_id: int) -> bool:
-        """Have a drive without power watch the master's heartbeat no more; whether it has none."""
+    def pause_watch(self, node_id: int) -> list[tuple[int, int]] | None:
+        """Have a drive without power not watch the master's heartbeat, for `resume_watch` later.
+
+        A master that computes is no reason for a drive at rest to report an error. Returns the
+        entries of 1016h that were taken out, None for a drive that may have power: it goes on
+        watching. Raises SdoError, BusError.
+        """
         if state_of(self.read_int(node_id, 0x6041, attempts=1)) not in POWER_OFF:
-            return False
-        if 0x1016 in self.dictionary(node_id):
-            for sub in range(1, self.read_int(node_id, 0x1016) + 1):
-                if self.read_int(node_id, 0x1016, sub) >> 16 & _NODE == self._master_node_id:
-                    self.write(node_id, 0x1016, sub, 0)
-        return True
+            return None
+        if 0x1016 not in self.dictionary(node_id):
+            return []
+        entries = range(1, self.read_int(node_id, 0x1016) + 1)
+        watch = [(sub, self.read_int(node_id, 0x1016, sub)) for sub in entries]
+        taken = [
+            (sub, value) for sub, value in watch if value >> 16 & _NODE == self._master_node_id
+        ]
+        for sub, _ in taken:
+            self.write(node_id, 0x1016, sub, 0)
+        return taken
+
+    def resume_watch(self, node_id: int, entries: list[tuple[int, int]]) -> None:
+        """Have the drive watch the master's heartbeat again; raises SdoError, BusError."""
+        for sub, value in entries:
+            self.write(node_id, 0x1016, sub, value)
 
     def _command(self, command: int, node_id: int) -> None:
         self.send(0, bytes([command, node_id]))

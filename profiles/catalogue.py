@@ -179,7 +179,7 @@ def _axes(path: Path, file: RobotFile) -> list[RobotAxis]:
         name = axis.name or default_name(i)
         known = _calibration(path, i, axis.calibration, winch)
         learnt = None if axis.commissioned is None else _path_from(path, axis.commissioned)
-        axes.append(RobotAxis(winch, axis.bus, axis.node_id, name, known, learnt))
+        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name, known, learnt))
     return axes
 
 

@@ -31,6 +31,7 @@ class AxisFile(Profile):
     winch: str
     bus: str
     node_id: int = Field(ge=1, le=127)
+    mandatory: bool = True
     name: str | None = Field(default=None, min_length=1, max_length=32)
     cable_sign: Annotated[int, one_of(-1, 1)] | None = None
     calibration: str | None = None
@@ -130,6 +131,7 @@ class RobotAxis:
     winch: Winch
     bus: str
     node_id: int
+    mandatory: bool
     name: str
     calibration: WinchCalibration | None = None
     commissioned: Path | None = None
@@ -182,6 +184,7 @@ def robot_of_winch(winch: Winch) -> Robot:
         watched_by_heartbeat(winch, heartbeat_s),
         bus.name,
         winch.node_id,
+        mandatory=True,
         name=default_name(0),
     )
     return Robot(

@@ -9,7 +9,7 @@ from dataclasses import replace
 from cdpr_rt.clock import Clock
 from drivers.axis_buses import AxisBuses, BusAxes
 from drivers.axis_layout import AxisConfig
-from drivers.boot import BootReport, BootSettings, boot_all
+from drivers.boot import BootReport, BootReports, BootSettings, boot_all
 from drivers.bus import BusUrl
 from drivers.bus.master_lock import MasterLock
 from drivers.cia402 import fault_text
@@ -49,14 +49,15 @@ def open_networks(
 
 def boot_robot(
     stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_Nm: Sequence[float]
-) -> list[BootReport]:
-    """Boot all buses at the same time; return what each axis' drive told.
+) -> tuple[dict[int, BootReport], dict[int, str]]:
+    """Boot all buses at the same time; return reports, and why optional axes did not, by axis.
 
     Each drive's torque is limited (6072h) to `torque_Nm`, one for each axis of the robot. `stack`
-    leaves the drives alone again. Raises WorkFailedError where one does not boot.
+    leaves the drives alone again. Raises WorkFailedError for a mandatory one that does not
+    boot.
     """
 
-    def boot_bus(name: str, network: CanNetwork) -> Callable[[], dict[int, BootReport]]:
+    def boot_bus(name: str, network: CanNetwork) -> Callable[[], BootReports]:
         wanted = {
             axis.node_id: (axis.winch.drive, _settings(robot, axis, most_Nm))
             for axis, most_Nm in ((robot.axes[i], torque_Nm[i]) for i in robot.axes_on(name))
@@ -66,20 +67,27 @@ def boot_robot(
     clock = next(iter(networks.values())).clock
     tasks = clock.together([boot_bus(*bus) for bus in networks.items()])
     failures: list[DriverError] = []
-    booted: dict[tuple[str, int], BootReport] = {}
-    for (name, network), task in zip(networks.items(), tasks, strict=True):
+    booted: dict[int, BootReport] = {}
+    absent: dict[int, str] = {}
+    for name, task in zip(networks, tasks, strict=True):
         try:
             reports = task.result()
         except (BootError, BusError) as error:
             failures.append(error)
             error.add_note(f"on bus {name}")
             continue
-        for node_id, report in reports.items():
-            booted[name, node_id] = report
-            stack.callback(network.release, node_id)
+        for i in robot.axes_on(name):
+            node_id = robot.axes[i].node_id
+            if node_id in reports:
+                booted[i] = reports[node_id]
+                stack.callback(networks[name].release, node_id)
+            else:
+                absent[i] = str(reports.missing[node_id])
     if failures:
         raise WorkFailedError("; ".join(_told(error) for error in failures)) from failures[0]
-    return [booted[axis.bus, axis.node_id] for axis in robot.axes]
+    if not booted:
+        raise WorkFailedError(f"{robot.name}: no drive booted; {'; '.join(absent.values())}")
+    return dict(sorted(booted.items())), absent
 
 
 def _told(error: DriverError) -> str:
@@ -101,24 +109,27 @@ def boot_settings(winch: Winch, torque_Nm: float) -> BootSettings:
 def _settings(robot: Robot, axis: RobotAxis, torque_Nm: float) -> BootSettings:
     settings = boot_settings(axis.winch, torque_Nm)
     # the robot's rate may have been changed since its file was read
-    return replace(settings, sync_period_s=robot.sync_period_s)
+    return replace(settings, sync_period_s=robot.sync_period_s, mandatory=axis.mandatory)
 
 
 def device_of(
     robot: Robot,
     networks: Mapping[str, CanNetwork],
-    reports: Sequence[BootReport],
+    booted: Mapping[int, BootReport],
     torque_Nm: Sequence[float],
 ) -> AxisBuses:
-    """Return the axes as one device; raises the drivers' errors."""
-    configs = [
-        AxisConfig.from_boot(axis.winch.drive, report, most_Nm)
-        for axis, report, most_Nm in zip(robot.axes, reports, torque_Nm, strict=True)
-    ]
+    """Return the axes that have booted as one device; raises the drivers' errors."""
+    place_of = {i: place for place, i in enumerate(booted)}
     buses = []
     for name, network in networks.items():
-        places = robot.axes_on(name)
-        buses.append(BusAxes(name, network, [configs[i] for i in places], places))
+        here = [i for i in robot.axes_on(name) if i in booted]
+        if not here:
+            continue
+        configs = [
+            AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i]) for i in here
+        ]
+        places = [place_of[i] for i in here]
+        buses.append(BusAxes(name, network, configs, places))
     return AxisBuses(buses, robot.sync_period_s)
 
 
@@ -130,12 +141,15 @@ def _lacking_guards(node: str, report: BootReport) -> str:
     return f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
 
 
-def boot_notes(robot: Robot, reports: Sequence[BootReport]) -> list[str]:
-    """Return what people should know of the drives that have booted."""
-    notes = [
-        _lacking_guards(f"bus {axis.bus} node {axis.node_id}", report)
-        for axis, report in zip(robot.axes, reports, strict=True)
-    ]
+def boot_notes(
+    robot: Robot, booted: Mapping[int, BootReport], absent: Mapping[int, str]
+) -> list[str]:
+    """Return what people should know of the drives that have booted, and of those that have not."""
+    notes = []
+    for i, report in booted.items():
+        axis = robot.axes[i]
+        notes.append(_lacking_guards(f"bus {axis.bus} node {axis.node_id}", report))
+    notes += [f"axis {i} (optional) is left out: {reason}" for i, reason in absent.items()]
     return [note for note in notes if note]
 
 

@@ -288,25 +288,18 @@ def _open(
     reset: bool = False,
 ) -> Session:
     """Return the robot, booted and checked; `stack` leaves it without power."""
-    machine = RobotMachine(robot, buses, safety_io)
+    machine = RobotMachine(robot, buses, safety_io, optional=True)
     stack.callback(machine.clock.close)
-    n, period_s = len(robot.axes), robot.sync_period_s
-    rehearse(n, period_s)  # compiling keeps a poll waiting
+    rehearse(len(robot.axes), robot.sync_period_s)  # compiling keeps a poll waiting
+    loop, track = _loop_of(stack, machine, tolerance or Tolerance())
     watches = stack.enter_context(watching(machine.clock))
-    block = SharedBlock.create(n, _RING_S, 1.0 / period_s)
-    stack.callback(os.close, block.fd)
-    track, limp = TrackProgram(n, period_s), LimpProgram(n)
-    parts = LoopParts(
-        programs={IDLE: limp, HOLD: limp, track.name: track},
-        supervisor=Supervisor(_limits(robot, tolerance or Tolerance()), n, period_s),
-        estimator=Estimator(n, period_s),
-        punctual=lambda: stack.enter_context(paced_realtime()),
-    )
-    loop = ControlLoop(block, machine, parts)
-    session = Session(robot, machine, loop, track, stop_requested)
     begun_s = machine.clock.now_s
     stack.enter_context(_powered_off_at_last(machine))
-    session.boot_s = machine.clock.now_s - begun_s
+    boot_s = machine.clock.now_s - begun_s
+    if len(machine.robot.axes) < len(robot.axes):
+        loop, track = _loop_of(stack, machine, tolerance or Tolerance())
+    session = Session(machine.robot, machine, loop, track, stop_requested)
+    session.boot_s = boot_s
     stack.callback(stop_requested.closing)  # before what is closed above
     stop_requested.energised = True
     session.device.tolerate_silence(_BRIDGED_CYCLES)
@@ -317,6 +310,23 @@ def _open(
     if machine.safety:
         out.note(f"{machine.safety}: {CLOSED}")
     return session
+
+
+def _loop_of(
+    stack: ExitStack, machine: RobotMachine, tolerance: Tolerance
+) -> tuple[ControlLoop, TrackProgram]:
+    """Return the loop of the machine's axes, and its program."""
+    robot, n, period_s = machine.robot, len(machine.robot.axes), machine.robot.sync_period_s
+    block = SharedBlock.create(n, _RING_S, 1.0 / period_s)
+    stack.callback(os.close, block.fd)
+    track, limp = TrackProgram(n, period_s), LimpProgram(n)
+    parts = LoopParts(
+        programs={IDLE: limp, HOLD: limp, track.name: track},
+        supervisor=Supervisor(_limits(robot, tolerance), n, period_s),
+        estimator=Estimator(n, period_s),
+        punctual=lambda: stack.enter_context(paced_realtime()),
+    )
+    return ControlLoop(block, machine, parts), track
 
 
 @contextmanager

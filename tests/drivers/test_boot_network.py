@@ -1,10 +1,11 @@
-"""Booting several nodes: what is started when, and two devices with one id."""
+"""Booting several nodes: optional ones, what is started when, and two devices with one id."""
 
 from __future__ import annotations
 
 import itertools
 import threading
 import time
+from dataclasses import replace
 
 import can
 import pytest
@@ -18,15 +19,43 @@ from drivers.bus_census import census, flood_text
 from drivers.errors import BootError
 from profiles import Pdo
 
+OPTIONAL = replace(SETTINGS, mandatory=False)
 WRONG = DRIVE.model_copy(update={"product_code": 0x1234})
 
 
-def test_nobody_is_started_when_a_node_fails(bus: str) -> None:
+def test_an_optional_node_that_is_missing_is_told_and_nothing_else(bus: str) -> None:
+    drives = {1: (DRIVE, SETTINGS), 2: (DRIVE, OPTIONAL), 9: (DRIVE, OPTIONAL)}
+    with open_network(bus, [1, 2, 9]) as network:
+        reports = boot_all(network, drives)
+        assert sorted(reports) == [1, 2]
+        assert reports[2].counts_per_turn == 8192
+        assert list(reports.missing) == [9]
+        assert reports.missing[9].letter == "B"
+        assert [network.wait_for_heartbeat(node, 2.0) for node in (1, 2)] == [5, 5]
+        assert network.alarm_text == ""
+
+
+def test_an_optional_node_that_is_another_device_is_not_started(bus: str) -> None:
+    with open_network(bus, [1, 2]) as network:
+        reports = boot_all(network, {1: (DRIVE, SETTINGS), 2: (WRONG, OPTIONAL)})
+        assert reports.missing[2].letter == "M"
+        network.write(2, 0x1017, 0, 100)
+        assert network.wait_for_heartbeat(2, 2.0) == 127
+        assert network.wait_for_heartbeat(1, 2.0) == 5
+
+
+def test_nobody_is_started_when_a_mandatory_node_fails(bus: str) -> None:
     with open_network(bus, [1, 2]) as network:
         with pytest.raises(BootError) as caught:
             boot_all(network, {1: (DRIVE, SETTINGS), 2: (WRONG, SETTINGS)})
         assert (caught.value.letter, caught.value.node_id) == ("M", 2)
         assert network.wait_for_heartbeat(1, 2.0) == 127
+
+
+def test_a_node_booted_alone_is_mandatory(bus: str) -> None:
+    with open_network(bus, [2]) as network, pytest.raises(BootError) as caught:
+        boot(network, 2, WRONG, OPTIONAL)
+    assert caught.value.letter == "M"
 
 
 def test_another_master_is_told_for_all_at_once(bus: str) -> None:
@@ -36,7 +65,7 @@ def test_another_master_is_told_for_all_at_once(bus: str) -> None:
     ):
         other.send(0x700 + MASTER, b"\x05")
         with pytest.raises(BootError) as caught:
-            boot_all(network, {1: (DRIVE, SETTINGS), 2: (DRIVE, SETTINGS)})
+            boot_all(network, {1: (DRIVE, OPTIONAL), 2: (DRIVE, OPTIONAL)})
     assert caught.value.letter == "L"
 
 

@@ -23,6 +23,7 @@ node_id = {node}
 winch = "winch-mpp0923d"
 bus = "left"
 node_id = 2
+mandatory = false
 """
 
 
@@ -37,6 +38,7 @@ def test_the_shipped_robot_has_four_winches_on_each_of_two_buses():
     robot = load_robot("spatial-8")
     assert [robot.axes_on(bus.name) for bus in robot.buses] == [(0, 1, 2, 3), (4, 5, 6, 7)]
     assert robot.sync_period_s == 0.001
+    assert all(axis.mandatory for axis in robot.axes)
     assert robot.reference == "spatial-8"
     assert "spatial-8" in profiles.list_profiles()["robots"]
     assert isinstance(profiles.load_all()["robots"]["spatial-8"], Robot)
@@ -50,6 +52,7 @@ def test_winches_are_told_what_the_robot_decides(tmp_path: Path):
     assert (right.winch.bitrate_bit_s, left.winch.bitrate_bit_s) == (500_000, 1_000_000)
     assert {axis.winch.sync_period_s for axis in robot.axes} == {0.004}
     assert {axis.winch.master_node_id for axis in robot.axes} == {100}
+    assert not left.mandatory
     assert robot.reference == str(tmp_path / "two.toml")
     assert load_robot(robot.reference) == robot
 

@@ -30,9 +30,10 @@ def robot_file(
     axes: Sequence[tuple[str, int]],
     *,
     period_s: float = 1e-3,
+    optional: int = -1,
     drives: Sequence[str] = (),
 ) -> Path:
-    """Write a robot with `axes` (bus, node id).
+    """Write a robot with `axes` (bus, node id); the one numbered `optional` is not mandatory.
 
     `drives` are the drive profiles of the axes, where these are not that of the shipped winch.
     """
@@ -49,6 +50,7 @@ def robot_file(
     for i, (bus, node) in enumerate(axes):
         winch = f"with-{drives[i]}" if drives else "winch-mpp0923d"
         lines += ["[[axes]]", f'winch = "{winch}"', f'bus = "{bus}"', f"node_id = {node}"]
+        lines += ["mandatory = false"] * (i == optional)
     path = folder / f"robot-{next(_names)}.toml"
     path.write_text("\n".join(lines))
     return path

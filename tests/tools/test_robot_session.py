@@ -195,6 +195,19 @@ def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path
         right.close()
 
 
+def test_an_optional_drive_may_be_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    with simulated(robot_file(tmp_path, [("a", 1), ("b", 1)])) as url:
+        path = robot_file(tmp_path, [("a", 1), ("a", 7), ("b", 1)], optional=1)
+        with open_robot(load_robot(path), [url], OUT) as opened:
+            told = capsys.readouterr().err
+            assert "axis 1 (optional) is left out" in told
+            assert "node 7 did not boot (step B)" in told
+            assert [axis.bus for axis in opened.robot.axes] == ["a", "b"]
+            opened.enable()
+            hold(opened, 0.3)
+            assert opened.device.missed == 0
+
+
 def test_a_drive_that_does_not_boot_is_named_with_its_bus(tmp_path: Path):
     drives, winches = (Path(profiles.__file__).parent / kind for kind in ("drives", "winches"))
     drive = (drives / "generic-cia402.toml").read_text()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import wraps
 from typing import Any, Concatenate, Final, ParamSpec, TypeVar
 
@@ -59,6 +60,7 @@ class RobotMachine:
     There is power only while the `safety_io` allows it: the robot's own where none is named, unless
     all buses are simulated. Tensions are measured where their sensors are at a `tension_port`.
     Simulated buses in lockstep go on as fast as they can, in `real_time` no faster than the wall.
+    Axes that are not mandatory are left out where they do not boot, if they may be `optional`.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)
@@ -72,8 +74,11 @@ class RobotMachine:
         tension_port: str | None = None,
         *,
         real_time: bool = False,
+        optional: bool = False,
     ) -> None:
-        self._robot = robot
+        self.robot = robot
+        """Its axes are those which have booted, once they have."""
+        self._optional = optional
         self._profiles = load_profiles(robot)
         self._urls = robot_urls(robot, buses)
         self.clock = open_clock(self._urls.values(), real_time=real_time)
@@ -98,14 +103,18 @@ class RobotMachine:
         with ExitStack() as stack:
             self._safety = self._open_safety(stack)
             self._tensions.open(stack, self.clock)
-            networks = open_networks(stack, self._robot, self._urls, self.clock)
-            torque_Nm = np.asarray(limits_of(self._robot).torque_Nm).tolist()
-            reports = boot_robot(stack, self._robot, networks, torque_Nm)
-            refuse_strangers(self._robot, self._profiles, reports)
-            device = device_of(self._robot, networks, reports, torque_Nm)
+            networks = open_networks(stack, self.robot, self._urls, self.clock)
+            torque_Nm = np.asarray(limits_of(self.robot).torque_Nm).tolist()
+            booted, absent = boot_robot(stack, self.robot, networks, torque_Nm)
+            device = device_of(self.robot, networks, booted, torque_Nm)
+            notices = boot_notes(self.robot, booted, absent)
+            if absent:
+                self._leave_out(absent)
+            reports = list(booted.values())
+            refuse_strangers(self.robot, self._profiles, reports)
             stack.callback(device.close)
             # the supervisor judges silence before the device does
-            device.tolerate_silence(self._robot.limits.missed_cycles + 1)
+            device.tolerate_silence(self.robot.limits.missed_cycles + 1)
             unsought = self._seek_indices(device)
             # the collector keeps every thread waiting: it looks at what stays now, and never again
             gc.collect()
@@ -114,11 +123,21 @@ class RobotMachine:
                 network.start_heartbeat()
             self._stack = stack.pop_all()
         self.networks, self.reports = networks, reports
-        notices = [*boot_notes(self._robot, reports), self._tensions.missing(self._robot)]
-        notices += [*unsought, self._idle_brakes()]
+        notices += [self._tensions.missing(self.robot), *unsought, self._idle_brakes()]
         self.notices = [notice for notice in notices if notice]
         self.watches = () if self._safety is None else (self._safety.io,)
         self._device = device
+
+    def _leave_out(self, absent: Mapping[int, str]) -> None:
+        """Go on as a robot without the axes that have not booted; raises MachineError."""
+        if not self._optional:
+            raise MachineError(
+                "; ".join(f"axis {i}: {reason}" for i, reason in absent.items())
+                + " (the daemon runs all axes of a robot or none)"
+            )
+        present = [i for i in range(len(self.robot.axes)) if i not in absent]
+        self._profiles = tuple(self._profiles[i] for i in present)
+        self.robot = replace(self.robot, axes=tuple(self.robot.axes[i] for i in present))
 
     def _seek_indices(self, device: AxisBuses) -> list[str]:
         """Have each drive latch its encoder's index in whatever motion comes (touch probe).
@@ -128,11 +147,11 @@ class RobotMachine:
         one of them is not.
         """
         notes = []
-        for i, (axis, profile) in enumerate(zip(self._robot.axes, self._profiles, strict=True)):
+        for i, (axis, profile) in enumerate(zip(self.robot.axes, self._profiles, strict=True)):
             group, place = device.part_of(i)
             if profile is not None:
                 touch_probe.arm(group, place)
-            elif self._robot.platform and group.tells_probe(place):
+            elif self.robot.platform and group.tells_probe(place):
                 try:
                     touch_probe.arm(group, place)
                 except DriverError as error:
@@ -143,7 +162,7 @@ class RobotMachine:
         if self._reference is None:
             return None
         io = stack.enter_context(connect(self._reference, self.clock))
-        return SessionSafety(io, [axis.node_id for axis in self._robot.axes])
+        return SessionSafety(io, [axis.node_id for axis in self.robot.axes])
 
     def _idle_brakes(self) -> str:
         safety = self._safety
@@ -179,7 +198,7 @@ class RobotMachine:
         """See to it that no drive has power which does not answer; return what is uncertain."""
         device = self._booted
         doubts = []
-        for axis, state in zip(self._robot.axes, device.states(), strict=True):
+        for axis, state in zip(self.robot.axes, device.states(), strict=True):
             if state in POWER_OFF:
                 continue
             try:
@@ -196,7 +215,7 @@ class RobotMachine:
         """Return `reason` with what drives and safety I/O say of it."""
         device = self.device
         if device is not None and device.faulted().any():
-            faults = faults_text(self._robot.axes, device, self.networks, reason)
+            faults = faults_text(self.robot.axes, device, self.networks, reason)
             reason = f"{reason}: {faults}" if faults else reason
         return reason if self._safety is None else self._safety.cause(reason)
 
@@ -322,7 +341,7 @@ class RobotMachine:
     def has_brakes(self) -> bool:
         """Whether every axis has a brake that holds it without power."""
         braked = () if self._safety is None else self._safety.braked
-        return len(braked) == len(self._robot.axes)
+        return len(braked) == len(self.robot.axes)
 
     def states(self) -> list[str]:
         """Return what each drive says of itself, in the standard's words."""
@@ -330,5 +349,5 @@ class RobotMachine:
             return []
         return [
             f"{axis.name} is {state.label}"
-            for axis, state in zip(self._robot.axes, self.device.states(), strict=True)
+            for axis, state in zip(self.robot.axes, self.device.states(), strict=True)
         ]
