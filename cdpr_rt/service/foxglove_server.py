@@ -74,6 +74,7 @@ class FoxgloveServer:
         self._session = str(time.time_ns())
         self._strangers: dict[_Viewer, None] = {}
         self._viewers: set[_Viewer] = set()
+        self._is_ending = False
         self._refused = 0
         self._refused_last = ""
         # it has lines for each client that talks nonsense: they could fill a disk with them
@@ -102,6 +103,7 @@ class FoxgloveServer:
             try:
                 yield
             finally:
+                self._is_ending = True
                 for one in (*self._strangers, *self._viewers):
                     one.transport.abort()
 
@@ -140,6 +142,8 @@ class FoxgloveServer:
 
     def admit(self, viewer: _Viewer) -> None:
         """Take a new connection; who says nothing leaves first where many wait."""
+        if self._is_ending:  # it would be waited for
+            viewer.transport.abort()
         if len(self._strangers) >= MOST_VIEWERS:
             oldest = next(iter(self._strangers))
             del self._strangers[oldest]

@@ -64,7 +64,7 @@ def main() -> int:
 def _allow_many_files() -> None:
     """So that clients who open connections without end do not keep the recorder from its files."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    # each connection to the live view takes 160 kB: without a bound they would take all memory
+    # bounded all the same: each connection takes memory
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, _MOST_FILES), most))
 
 
