@@ -173,7 +173,7 @@ class Gate:
                 else "nobody can show a key here: everybody may look on, hold and disable; for the "
                 "rest use the Unix socket, or start the daemon with --key-file",
             )
-        if scope["path"] in URGENT_PATHS:
+        if _stops(scope):
             return
         token = headers.get(b"x-control-token", b"").decode("latin-1")
         if self._leads(token):
@@ -233,6 +233,12 @@ class Gate:
         await asyncio.sleep(_WRONG_AGAIN_S)
         if guest:
             guest.is_refused = False
+
+
+def _stops(scope: Scope) -> bool:
+    """Whether this asks for a stop; another method at the same path does not."""
+    is_post = scope["type"] == "http" and scope["method"] == "POST"
+    return is_post and scope["path"] in URGENT_PATHS
 
 
 async def _whole_body(receive: Receive) -> Receive:

@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -82,6 +82,35 @@ def test_a_flood_does_not_shut_out_the_one_that_may_move_from_the_same_address(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(auth, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    ask = _asking("the token".__eq__)
+
+    async def flood() -> list[int]:
+        while await ask() != 429:
+            pass
+        return [await ask(x_control_token=token) for token in ("another", "the token")]
+
+    assert asyncio.run(flood()) == [429, 200]
+
+
+@pytest.mark.parametrize("path", sorted(auth.URGENT_PATHS))
+def test_only_what_stops_is_free_from_the_measure_of_requests(
+    path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(auth, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    ask = _asking(lambda _token: False)
+
+    async def flood() -> list[int]:
+        for _ in range(1000):
+            if await ask("GET", path) == 429:
+                break
+        others = [await ask(method, path) for method in ("GET", "HEAD", "PUT", "OPTIONS")]
+        return [*others, await ask("POST", path)]
+
+    assert asyncio.run(flood()) == [429, 429, 429, 429, 200]
+
+
+def _asking(leads: Callable[[str], bool]) -> Callable[..., Coroutine[Any, Any, int]]:
+    """Return what asks a door of the Unix socket and returns the status of the answer."""
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": []})
@@ -90,25 +119,20 @@ def test_a_flood_does_not_shut_out_the_one_that_may_move_from_the_same_address(
     async def receive() -> dict[str, Any]:
         return {"type": "http.request"}
 
-    gate = Gate(app, Door(local=True), lambda: None, "the token".__eq__)
+    gate = Gate(app, Door(local=True), lambda: None, leads)
 
-    async def ask(**headers: str) -> int:
+    async def ask(method: str = "GET", path: str = "/control", **headers: str) -> int:
         sent: list[dict[str, Any]] = []
 
         async def send(message: Any) -> None:
             sent.append(message)
 
         given = [(name.replace("_", "-").encode(), text.encode()) for name, text in headers.items()]
-        scope = {"type": "http", "method": "GET", "path": "/control", "headers": given, "state": {}}
+        scope = {"type": "http", "method": method, "path": path, "headers": given, "state": {}}
         await gate({**scope, "client": ("10.0.0.1", 1)}, receive, send)
         return int(sent[0]["status"])
 
-    async def flood() -> list[int]:
-        while await ask() != 429:
-            pass
-        return [await ask(x_control_token=token) for token in ("another", "the token")]
-
-    assert asyncio.run(flood()) == [429, 200]
+    return ask
 
 
 def test_no_stop_is_one_too_many(rig: Rig) -> None:
