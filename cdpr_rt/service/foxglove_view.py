@@ -29,9 +29,9 @@ from cdpr_rt.runtime.cycle_row import Row
 from cdpr_rt.runtime.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.runtime.states import LoopState, Reaction
 from cdpr_rt.service.foxglove_server import FoxgloveServer, Topic
+from cdpr_rt.service.listening import ListenError, listen_tcp
 from cdpr_rt.service.recording import WallClock
 from cdpr_rt.service.recording_events import Events
-from cdpr_rt.service.server import ListenError, listen_tcp
 
 RATE_Hz: Final = 50.0
 _HOST: Final = "127.0.0.1"
