@@ -11,7 +11,6 @@ from profiles.catalogue import (
     load_motor_ratings,
     load_robot,
     load_winch,
-    time_load_all,
 )
 from profiles.drive import DriveProfile, Pdo, PdoEntry
 from profiles.errors import ProfileError
@@ -42,5 +41,4 @@ __all__ = [
     "load_motor_ratings",
     "load_robot",
     "load_winch",
-    "time_load_all",
 ]

@@ -1,6 +1,5 @@
 """Find profiles by name or path and load them, references included."""
 
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -283,16 +282,6 @@ def load_all() -> dict[str, dict[str, object]]:
         for path in _files(kind):
             everything[kind][path.stem] = load(path.stem)
     return everything
-
-
-def time_load_all(repeats: int = 5) -> float:
-    """Return the best of `repeats` wall times of `load_all` in s, nothing kept from one to next."""
-    best = float("inf")
-    for _ in range(repeats):
-        start = time.perf_counter()
-        load_all()
-        best = min(best, time.perf_counter() - start)
-    return best
 
 
 def _files(kind: Kind) -> list[Path]:

@@ -15,7 +15,7 @@ BOUND_MS = 100.0
 def measure(repeats: int) -> dict[str, Any]:
     """Return the best of `repeats` wall times of both, in ms, and their ratio."""
     files = sorted(Path(profiles.__file__).parent.glob("*/*.toml"))
-    load_ms = round(1e3 * profiles.time_load_all(repeats), 2)
+    load_ms = round(1e3 * min(_load_s() for _ in range(repeats)), 2)
     parse_ms = round(1e3 * min(_parse_s(files) for _ in range(repeats)), 2)
     return {
         "files": len(files),
@@ -25,6 +25,12 @@ def measure(repeats: int) -> dict[str, Any]:
         "bound_ms": BOUND_MS,
         "reached": load_ms < BOUND_MS,
     }
+
+
+def _load_s() -> float:
+    start = time.perf_counter()
+    profiles.load_all()
+    return time.perf_counter() - start
 
 
 def _parse_s(files: list[Path]) -> float:
