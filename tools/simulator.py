@@ -19,7 +19,6 @@ _START_TIMEOUT_S = 180.0
 # one that is only held up completes its logs
 _STOP_TIMEOUT_S = 60.0
 
-
 _numbers = count(1)
 
 

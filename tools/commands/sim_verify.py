@@ -15,7 +15,7 @@ import typer
 from tools.commands.options import JsonOption
 from tools.errors import BadInputError, WorkFailedError
 from tools.output import Output
-from tools.repeat.compare import compare
+from tools.repeat.compare import Verdict, compare
 from tools.repeat.disturbance import Stops
 from tools.repeat.run import Run, perform
 from tools.signals import stop_on_signals
@@ -67,14 +67,9 @@ def verify(
             beside = besides if done else 0
             done.append(perform(command, folder, number, stops, beside, stop_requested))
             out.note(_run_line(done[-1], beside))
-            _check(done)
+            _check(done[-1])
         verdicts = compare(done)
-    if not any(verdict.same is not None for verdict in verdicts):
-        raise WorkFailedError("the command wrote no file that is compared")
-    same = all(verdict.same is not False for verdict in verdicts)
-    for verdict in verdicts:
-        out.say(verdict.line())
-    out.say(f"{runs} runs: {'the same' if same else 'NOT the same'}")
+    same = _tell(out, done, verdicts)
     out.result(
         {
             "ok": same,
@@ -92,6 +87,17 @@ def verify(
         raise typer.Exit(WorkFailedError.exit_status)
 
 
+def _tell(out: Output, runs: Sequence[Run], verdicts: Sequence[Verdict]) -> bool:
+    """Write the verdicts; return whether all is the same. Raises WorkFailedError without any."""
+    if not any(verdict.same is not None for verdict in verdicts):
+        raise WorkFailedError("the command wrote no file that is compared")
+    for verdict in verdicts:
+        out.say(verdict.line())
+    same = all(verdict.same is not False for verdict in verdicts)
+    out.say(f"{len(runs)} runs: {'the same' if same else 'NOT the same'}")
+    return same
+
+
 def _passing() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="cdpr-verify-")
 
@@ -103,9 +109,8 @@ def _run_line(run: Run, busy: int) -> str:
     return f"run {run.number}: {run.seconds:.1f} s, {how}"
 
 
-def _check(runs: Sequence[Run]) -> None:
+def _check(run: Run) -> None:
     """Raise WorkFailedError where a run failed, with what it said."""
-    run = runs[-1]
     if run.exit_status:
         lines = run.output.read_text(errors="replace").strip().splitlines() or ["(no output)"]
         raise WorkFailedError(
