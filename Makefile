@@ -13,9 +13,9 @@ demo: $(STAMP)  ## commission one simulated winch on the embedded bus
 	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo --overwrite
 
 test: $(STAMP) check  ## every test; needs nothing but Python
-	$(BIN)/python -m pytest --cache-clear -n $(JOBS) --max-worker-restart 0 --dist loadscope --no-loadscope-reorder \
-	  || { echo "once more, alone, what failed beside other tests:"; \
-	       $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; }
+	$(BIN)/python -m pytest -n $(JOBS) --max-worker-restart 0 --dist loadscope --no-loadscope-reorder \
+	  -m "not alone"
+	$(BIN)/python -m pytest -m alone
 
 soak: $(STAMP)  ## ten minutes of hours of bus time with eight drives: no leak, no lost frame
 	$(BIN)/cdpr bench soak --hours 24 --wall-minutes $(SOAK_MINUTES)

@@ -15,6 +15,8 @@ from axis_rig import DRIVE, Rig, open_network
 from drivers.bus import member, open_line_port
 from drivers.cia402 import Mode, State, state_of
 
+pytestmark = pytest.mark.alone
+
 PERIOD_S = 10e-3
 """Slow enough for two processes of a busy machine."""
 

@@ -23,6 +23,8 @@ from profiles import load_drive
 from sim_bus.canopen import CanopenSlave, ObjectDictionary, ParameterStore, SlaveApplication
 from sim_bus.hub import Hub
 
+pytestmark = pytest.mark.alone
+
 EDS = load_drive("generic-cia402").eds
 VENDOR, PRODUCT, REVISION = 0x00CD9A01, 0x402, 0x10000
 TIMEOUT_S = 0.02

@@ -17,6 +17,8 @@ from bus_log import logged
 
 from drivers.errors import BusError
 
+pytestmark = pytest.mark.alone
+
 PERIOD_S = 20e-3
 """Slow enough for two processes of a busy machine."""
 DROP, DELAY = 2, 8

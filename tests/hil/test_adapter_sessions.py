@@ -18,6 +18,8 @@ import pytest
 
 from profiles import load_winch
 
+pytestmark = pytest.mark.alone
+
 WINCH = "winch-mpp0923d"
 EDS = load_winch(WINCH).drive.eds
 OFF, ENABLED, FAULT = 0x40, 0x27, 0x08

@@ -24,6 +24,8 @@ from drivers.data_sheet import load_dictionary
 from drivers.network import CanNetwork
 from profiles import load_drive
 
+pytestmark = pytest.mark.alone
+
 PERIOD_S, HEARTBEAT_S = 0.002, 0.1
 PATIENT = "missed_cycles = 50\nmissed_in_window = 500\nlate_s = 0.5"
 NODES = (1, 2)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from daemon_rig import RealDaemon, write_robot
 
-pytestmark = pytest.mark.vcan
+pytestmark = [pytest.mark.vcan, pytest.mark.alone]
 
 BUS = "can0=socketcan:vcan0"
 PERIOD_S = 0.02  # the guest's kernel is slow, and has one processor for all of it

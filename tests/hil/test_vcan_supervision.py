@@ -11,7 +11,7 @@ from drivers.bus import BusState, BusUrl, open_port
 from drivers.bus.packed import ERR_FLAG, FRAME
 from drivers.network import CanNetwork
 
-pytestmark = pytest.mark.vcan
+pytestmark = [pytest.mark.vcan, pytest.mark.alone]
 
 VCAN0 = BusUrl.parse("socketcan:vcan0")
 

@@ -171,6 +171,7 @@ def test_a_lost_bus_leaves_the_drives_of_the_other_without_power(tmp_path: Path)
         right.close()
 
 
+@pytest.mark.alone
 def test_a_silent_bus_does_not_hold_up_switching_off_on_the_other(tmp_path: Path):
     robot = load_robot(robot_file(tmp_path, [("left", 1), ("right", 1)], period_s=0.01))
     left, right = (
