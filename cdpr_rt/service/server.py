@@ -18,7 +18,6 @@ from websockets.frames import Frame
 
 from cdpr_rt.service.auth import MOST_BODY_BYTES, Gate
 from cdpr_rt.service.connections import Guests, Turns, peer_of
-from cdpr_rt.service.listening import listen_tcp as listen_tcp  # noqa: PLC0414  # the live view's
 from cdpr_rt.service.reception import LONGEST_STOP, STOPS, Reception, may_stop
 from cdpr_rt.service.token_buckets import TokenBuckets
 
