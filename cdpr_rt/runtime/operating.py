@@ -21,7 +21,7 @@ from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.trajectory import Motion
 
 _T = TypeVar("_T")
-_DRAIN_CYCLES = 1024
+_DRAIN_CYCLES = 2048
 
 
 class Operator:
@@ -135,6 +135,7 @@ class Operator:
         loop, track = self.loop, self._track
         track.take(controller, motion)
         rows, stopping, cycles = RowReader(loop.block), False, 0
+        drained_after = min(_DRAIN_CYCLES, loop.block.capacity // 2)
         loop.switch(track.name)
         try:
             while loop.program is track and not track.at_rest:
@@ -145,7 +146,7 @@ class Operator:
                 if not stopping and self._stop_requested():
                     stopping = True
                     track.stop()
-                if cycles % _DRAIN_CYCLES == 0:
+                if cycles % drained_after == 0:
                     self._drain(rows, log)
                     if on_progress is not None:
                         on_progress(track.progress()["time_s"])

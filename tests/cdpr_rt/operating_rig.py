@@ -143,7 +143,7 @@ class Rig:
         programs = {"idle": limp, "hold": limp, "track": track}
         self.supervisor = Supervisor(LIMITS, 2, PERIOD_S)
         parts = LoopParts(programs, self.supervisor, Estimator(2, PERIOD_S))
-        self.block = SharedBlock.create(2, 4.0, 1.0 / PERIOD_S)
+        self.block = SharedBlock.create(2, 0.2, 1.0 / PERIOD_S)
         self.loop = ControlLoop(self.block, self.machine, parts)  # type: ignore[arg-type]
         self.operator = Operator(self.loop, track, self.loop.turn, self._asked)
         self.operator.check()

@@ -59,14 +59,14 @@ def test_follows_a_leg_and_records_every_cycle(tmp_path: Path) -> None:
 def test_a_motion_longer_than_the_ring_loses_no_row(tmp_path: Path) -> None:
     writer, told = log(tmp_path / "a.raw"), []
     with powered() as rig:
-        assert rig.block.capacity == 4000
+        assert rig.block.capacity == 256
         motion = Leg(np.zeros(2), np.array([0.1, 0.1]), 9.0, 0.1)
         rig.operator.follow(controller(), motion, writer, told.append)
     writer.close()
     np.testing.assert_array_equal(
         np.diff(read_raw_log(tmp_path / "a.raw").column("cycle")), np.ones(9200)
     )
-    assert told == pytest.approx(1.024 * np.arange(1, 9))
+    assert told == pytest.approx(0.128 * np.arange(1, 72))
 
 
 def test_motions_follow_each_other_with_no_torque_in_between() -> None:
