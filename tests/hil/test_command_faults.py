@@ -46,6 +46,9 @@ class Lab:
         self._network = canopen.Network()
         self._network.NOTIFIER_CYCLE = 0.05
         self._network.connect(interface="simbus", channel=self.bus.partition(":")[2])
+        # of the cycles, which come faster than in real time, it would be seconds behind
+        asked = [{"can_id": i + 1, "can_mask": 0x7FF} for i in (0x080, 0x580, 0x700)]
+        self._network.bus.set_filters(asked)
         self.node = self._network.add_node(1, str(EDS))
         self.node.sdo.RESPONSE_TIMEOUT = 5.0
 
