@@ -253,6 +253,7 @@ def test_drives_of_different_makes_run_side_by_side(tmp_path: Path):
         opened.disable()
 
 
+@pytest.mark.alone
 def test_paced_buses_run_as_one_device(tmp_path: Path):
     axes = [(bus, node) for bus in ("a", "b") for node in (1, 2, 3, 4)]
     path = robot_file(tmp_path, axes, period_s=0.01)

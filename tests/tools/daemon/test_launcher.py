@@ -295,7 +295,9 @@ def test_a_loop_that_cannot_be_named_ends_the_daemon_before_it_is_ready(start: S
     path = daemon.folder / "control.loop"
     assert reason == f"{path}: cannot be written, for `cdpr estop`: Is a directory"
     assert daemon.ends() == 2
-    assert sorted(daemon.log()) == ["loop stopped", "service stopped"]
+    # the service is told to end too, maybe before it has begun
+    assert "loop stopped" in daemon.log()
+    assert set(daemon.log()) <= {"loop stopped", "service stopped"}
     assert not list(daemon.folder.glob(".control*"))
 
 
