@@ -86,7 +86,7 @@ class PoseStream:
         self.state = StreamState.STOPPED
         self.pose: FloatArray = self._played[:7]
         """What is played: x y z in m, quaternion w x y z. Its meaning is the program's."""
-        self._receive(0, 0)  # compiled here, not when the first sample comes
+        self.update()  # compiled here, not when the first sample comes
         self.reset()
 
     def reset(self) -> None:

@@ -93,6 +93,9 @@ class PoseProgram(PlatformProgram):
         self._aiming = False
         self._inside = False
         self._before = np.zeros((3, 2))
+        # compiled here, not when a hand begins to lead
+        self._led()
+        attend(self._target, self._control.position_m, self._awake, _ASLEEP_m, self._goal)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until a position is wanted."""
