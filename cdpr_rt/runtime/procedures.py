@@ -210,8 +210,8 @@ def enable(
 
 def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
     """See to the end of a motion that has been ended, until the drives have no power."""
-    life, machine = loop.life, loop.machine
-    if loop.driving:
+    life, machine, led = loop.life, loop.machine, loop.driving
+    if led:
         yield from _brake(loop)
     else:
         machine.set_brakes(False)
@@ -221,7 +221,8 @@ def come_to_rest(loop: ControlLoop, then: LoopState) -> Iterator[None]:
     yield from _up_to(loop, _POWER_OFF_AT_LAST_S, machine.unpowered)
     doubts: list[str] = []
     yield from _slowly(loop, lambda: doubts.append(machine.make_sure()))
-    yield from _keep_lengths(loop)
+    if led or machine.has_brakes:  # what fell when its power went is not where it was seen last
+        yield from _keep_lengths(loop)
     if any(doubts):
         life.blame("; ".join(filter(None, (life.reason, *doubts))), life.details)
         then = LoopState.FAULT

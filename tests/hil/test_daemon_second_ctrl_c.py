@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 from collections.abc import Iterator
@@ -54,7 +55,7 @@ def hanging(tmp_path: Path) -> Iterator[RealDaemon]:
 
 
 def test_a_platform_that_hangs_is_not_let_down_then(
-    hanging: RealDaemon, record_property: pytest.RecordProperty
+    hanging: RealDaemon, tmp_path: Path, record_property: pytest.RecordProperty
 ) -> None:
     ear = Ear(hanging)
     try:
@@ -64,6 +65,8 @@ def test_a_platform_that_hangs_is_not_let_down_then(
         ear.close()
     assert "\nthe power is taken at once" in hanging.errors()
     assert "; the platform was not let down" in hanging.errors()
+    kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar.json").read_text())
+    assert kept["stopped"] is False  # it has fallen since its lengths were seen last
     told_s, off_s, cycles = 0.0, 0.0, 0
     for node in NODES:
         before = ear.of(0x200 + node)
