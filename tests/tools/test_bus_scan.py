@@ -75,6 +75,8 @@ hastily = pytest.mark.usefixtures("hasty")
 
 
 def test_scan_tells_who_is_there(lab: Lab) -> None:
+    # the drives are switched on when somebody speaks: this waits until they have started up
+    assert cdpr_here("drive", "info", WINCH, "--bus", lab.bus).returncode == 0
     found = scan(lab)
     assert found.keys() == {0, 1, 2}
     assert found[0]["seconds"] < 15.0  # one after the other the 125 silent ids alone take 100 s
