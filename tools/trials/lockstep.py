@@ -27,8 +27,7 @@ from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
 from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.recording import Recorder
 from drivers.bus import query_status
-from profiles import Robot, load_robot
-from profiles.robot import watched_by_heartbeat
+from profiles import load_robot
 from tools.commissioned import with_commissioned, without_commissioned
 from tools.daemon.loop_process import description, loop_parts
 from tools.daemon.machine import RobotMachine
@@ -40,10 +39,7 @@ from tools.trials.right import RightInBusTime
 from tools.trials.stream import StreamInBusTime
 
 RING_S: Final = 30.0
-_PATIENCE_S: Final = 60.0
-"""Time by the clock in which no cycle runs at all, as while drives boot."""
 _LOOK_CYCLES: Final = 512
-_WATCH_S: Final = 0.4
 _names = count()
 
 
@@ -74,7 +70,7 @@ class LockstepRobot:
         commissioned: Path | None = None,
         compensated: bool = True,
     ) -> None:
-        self.robot = _patient(with_commissioned(load_robot(robot), commissioned))
+        self.robot = with_commissioned(load_robot(robot), commissioned)
         if not compensated:
             self.robot = without_commissioned(self.robot)
         self.period_s = self.robot.sync_period_s
@@ -209,15 +205,11 @@ class LockstepRobot:
             raise WorkFailedError(f"{what}: {self.loop.life.reason or 'the power was taken'}")
 
     def _turn_until(self, done: Callable[[], bool], within_s: float, what: str) -> None:
-        last_cycle, last = self.cycle, time.monotonic()
-        end_s = self.now_s + within_s
+        clock = self.machine.clock  # bus time goes on without cycles too, as in a boot
+        end_s = clock.now_s + within_s
         while not done():
-            if self.cycle != last_cycle:
-                last_cycle, last = self.cycle, time.monotonic()
-                if self.now_s > end_s:
-                    raise WorkFailedError(f"{what}: not within {within_s:g} s: {self.told()}")
-            elif time.monotonic() - last > _PATIENCE_S:
-                raise WorkFailedError(f"{what}: no cycle ran for {_PATIENCE_S:g} s: {self.told()}")
+            if clock.now_s > end_s:
+                raise WorkFailedError(f"{what}: not within {within_s:g} s: {self.told()}")
             self.turn()
 
     # -- commands
@@ -330,9 +322,3 @@ class LockstepRobot:
     def recordings(self) -> Sequence[Path]:
         """Return the files recorded so far, in their order."""
         return [] if self._record is None else sorted(self._record.glob("*.mcap"))
-
-
-def _patient(robot: Robot) -> Robot:
-    """Return `robot` with drives that bear a busy machine until cycles, and bus time, begin."""
-    axes = (replace(axis, winch=watched_by_heartbeat(axis.winch, _WATCH_S)) for axis in robot.axes)
-    return replace(robot, axes=tuple(axes))

@@ -1,15 +1,12 @@
 """Recording: nothing is missing, whatever ends it, and the stock `mcap` package reads it."""
 
-import io
 import json
 import os
-import shutil
-import threading
 import time
 from pathlib import Path
 
 import pytest
-from mcap.reader import NonSeekingReader, make_reader
+from mcap.reader import make_reader
 from mcap.writer import Writer
 from recording_rig import (
     DESCRIPTION,
@@ -20,13 +17,14 @@ from recording_rig import (
     run_for,
     stock_cycles,
     stock_messages,
+    wait_until,
 )
 
 from cdpr_rt.runtime.cycle_row import FIELDS, WALL_TIMES
 from cdpr_rt.runtime.shared_block import RowWriter
 from cdpr_rt.runtime.states import Reaction
 from cdpr_rt.runtime.stream_buttons import confirmation, stream_buttons
-from cdpr_rt.service.recording import Recorder, reserve_of
+from cdpr_rt.service.recording import Recorder
 from cdpr_rt.service.recording_events import Events
 from cdpr_rt.service.recording_file import RecordingError
 from cdpr_rt.service.recording_reader import CLOSED, CUT, KILLED, RecordingReader, read_columns
@@ -45,13 +43,6 @@ def _recorded(folder: Path, rows: int = 3000) -> Path:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _recorded(tmp_path_factory.mktemp("recording"))
-
-
-def _wait_until(done: object, seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not done():  # type: ignore[operator]
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def test_every_row_is_there_as_it_was(recorded: Path) -> None:
@@ -267,148 +258,6 @@ def test_lengths_that_are_damaged_are_no_end_of_memory(recorded: Path, tmp_path:
             continue
 
 
-def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None:
-    block = block_with_clock()
-    writer = RowWriter(block)
-    recorder = RecorderProcess(block, tmp_path, most_file_bytes=300_000)
-    written = 0
-    while not (told := recorder.told())["error"]:
-        put(writer, made_rows(written, 500))
-        written += 500
-        _wait_until(
-            lambda upto=written: block.counters["recorded"][0] == upto or recorder.told()["error"]
-        )
-        assert written < 20_000
-    assert "File too large" in told["error"] and "bench-" in told["error"]
-    assert not told["recording"]
-    run_for(writer, 0.3, written)
-    told = recorder.stop()
-    (path,) = tmp_path.iterdir()  # it never began again
-    assert path.stat().st_size <= 300_000
-    kept = stock_cycles(path)
-    assert kept == list(range(len(kept))) and len(kept) > 100
-    # what was not safe is not counted as such
-    assert int(block.counters["recorded"][0]) == len(kept)
-
-
-def test_at_no_moment_of_writing_is_the_end_missing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The power is cut between any two writes, and in the middle of each."""
-    writes: list[tuple[bytes, int]] = []
-    pwrite = os.pwrite
-
-    def noted(fd: int, data: bytes, at: int) -> int:
-        writes.append((bytes(data), at))
-        return pwrite(fd, data, at)
-
-    monkeypatch.setattr(os, "pwrite", noted)
-    block = block_with_clock()
-    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
-    recorder.start()
-    run_for(RowWriter(block), 2.0, 0)
-    recorder.stop()
-    disk, least = bytearray(), 0
-    for data, at in writes:
-        if not disk:
-            disk[:] = data
-            continue
-        torn = disk.copy()
-        half = data[: len(data) // 2]
-        torn[at : at + len(half)] = half
-        kept = NonSeekingReader(io.BytesIO(torn)).iter_messages(["/cycle"])
-        if len(data) > 100:  # the few bytes of the old end stand in one sector
-            assert sum(1 for _ in kept) >= least
-        disk[at : at + len(data)] = data
-        count = sum(1 for _ in make_reader(io.BytesIO(disk)).iter_messages(["/cycle"]))
-        assert count >= least
-        least = count
-    assert least == recorder.told()["rows"] > 0 and len(writes) > 4
-
-
-def test_rows_that_never_stop_coming_are_made_safe_all_the_same(tmp_path: Path) -> None:
-    block = block_with_clock(seconds=60.0)
-    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
-    newest = block.counters["rows"]
-    end = threading.Event()
-
-    def feed() -> None:
-        while not end.is_set():
-            if newest[0] - recorder._reader.next < 20_000:
-                newest[0] += 2_000
-            time.sleep(0)
-
-    thread = threading.Thread(target=feed)
-    recorder.start()
-    thread.start()
-    try:
-        _wait_until(lambda: int(block.counters["recorded"][0]) > 0)
-    finally:
-        end.set()
-        thread.join()
-        recorder.stop()
-
-
-def test_a_file_that_is_removed_ends_the_recording(tmp_path: Path) -> None:
-    folder = tmp_path / "recordings"
-    recorder = Recorder(block_with_clock(), folder, "bench")
-    recorder.start()
-    shutil.rmtree(folder)
-    _wait_until(lambda: recorder.told()["error"])
-    recorder.stop()
-    assert "001.mcap: recording ended: the file has been removed" in recorder.told()["error"]
-
-
-def test_daemons_of_one_second_and_folder_do_not_take_each_others_files(tmp_path: Path) -> None:
-    recorders = [Recorder(block_with_clock(), tmp_path, "bench") for _ in range(4)]
-    threads = [threading.Thread(target=recorder.start) for recorder in recorders]
-    for thread in threads:
-        thread.start()
-    for thread, recorder in zip(threads, recorders, strict=True):
-        thread.join()
-        recorder.stop()
-    assert [recorder.told()["error"] for recorder in recorders] == [""] * 4
-    assert len(list(tmp_path.iterdir())) == 4
-
-
-def test_the_thousandth_file_of_a_session_is_not_the_last(tmp_path: Path) -> None:
-    for number in (999, 1000):
-        (tmp_path / f"bench-20270115T080000Z-{number}.mcap").write_bytes(b"")
-    recorder = Recorder(block_with_clock(), tmp_path, "bench")
-    recorder.start()
-    recorder.stop()
-    assert recorder.told()["error"] == "" and recorder.told()["file"].endswith("-1001.mcap")
-
-
-def test_a_small_disk_keeps_a_small_reserve(tmp_path: Path) -> None:
-    assert reserve_of(20 << 20) == 1 << 20
-    assert reserve_of(1 << 40) == 64 << 20
-
-
-def test_no_room_at_all_is_said_at_the_start(tmp_path: Path) -> None:
-    folder = tmp_path / "file"
-    folder.write_text("")
-    ends: list[str] = []
-    recorder = Recorder(block_with_clock(), folder, "bench", ended=ends.append)
-    recorder.start()
-    recorder.stop()
-    assert ends == [recorder.told()["error"]]
-    assert not recorder.told()["recording"] and "cannot record" in recorder.told()["error"]
-
-
-def test_it_ends_before_the_disk_is_full(tmp_path: Path) -> None:
-    block = block_with_clock()
-    ends: list[str] = []
-    recorder = Recorder(block, tmp_path, "bench", reserve_bytes=1 << 60, ended=ends.append)
-    recorder.start()
-    put(RowWriter(block), made_rows(0, 10))
-    _wait_until(lambda: recorder.told()["error"])
-    recorder.stop()
-    assert "MB free" in recorder.told()["error"] and ends == [recorder.told()["error"]]
-    (path,) = tmp_path.iterdir()
-    assert stock_cycles(path) == list(range(10))
-
-
 def test_rotated_by_size_each_file_stands_alone(tmp_path: Path) -> None:
     block = block_with_clock()
     recorder = Recorder(block, tmp_path, "bench", most_bytes=40_000, reserve_bytes=0)
@@ -454,10 +303,10 @@ def test_events_say_what_changed_and_why(tmp_path: Path) -> None:
     recorder.start()
     writer = RowWriter(block)
     put(writer, rows[:65])
-    _wait_until(lambda: recorder.told()["rows"] == 65)
+    wait_until(lambda: recorder.told()["rows"] == 65)
     block.write_status({"state": "fault", "reason": "right: 31 N below 40 N"})
     put(writer, rows[65:])
-    _wait_until(lambda: recorder.told()["rows"] == 100)
+    wait_until(lambda: recorder.told()["rows"] == 100)
     recorder.remark("stopped by somebody", client="panel", at=float("nan"), by=Path("x"))
     recorder.stop()
     events = [value for _, value in stock_messages(Path(recorder.told()["file"]), "/events")]
@@ -499,7 +348,7 @@ def test_states_without_cycles_are_events_too(tmp_path: Path) -> None:
     time.sleep(0.4)
     writer = RowWriter(block)
     put(writer, made_rows(0, 50))
-    _wait_until(lambda: recorder.told()["rows"] == 50)
+    wait_until(lambda: recorder.told()["rows"] == 50)
     block.write_status({"state": "dead", "reason": "the loop has died: killed by signal 9"})
     time.sleep(0.4)
     recorder.stop()

@@ -1,0 +1,18 @@
+"""The service that tests of its doors share, one for each module."""
+
+from collections.abc import Iterator
+
+import pytest
+from service_rig import Rig, running
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with running(tmp_path_factory.mktemp("door")) as rig:
+        yield rig
+
+
+@pytest.fixture
+def rig(shared: Rig) -> Rig:
+    shared.reset()
+    return shared
