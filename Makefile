@@ -7,15 +7,18 @@ BIN := $(VENV)/bin
 JOBS ?= $(shell expr $$(nproc) + 1)
 SOAK_MINUTES ?= 10
 
-.PHONY: demo test soak check lint lock clean
+.PHONY: demo test tests soak check docs lock clean
 
 demo: $(STAMP)  ## commission one simulated winch on the embedded bus
 	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo --overwrite
 
-test: $(STAMP) check  ## every test; needs nothing but Python
+test: $(STAMP)  ## every check and test; needs nothing but Python
+	@$(MAKE) -j 2 check tests
+
+tests: $(STAMP)
 	$(BIN)/python -m pytest -n $(JOBS) --max-worker-restart 0 --dist loadscope --no-loadscope-reorder \
-	  -m "not alone and not vcan"
-	$(BIN)/python -m pytest -m "alone or vcan"
+	  -m "not alone"
+	$(BIN)/python -m pytest -m alone $$(grep -rl "mark\.alone" tests --include="test_*.py")
 
 soak: $(STAMP)  ## ten minutes of hours of bus time with eight drives: no leak, no lost frame
 	$(BIN)/cdpr bench soak --hours 24 --wall-minutes $(SOAK_MINUTES)
@@ -26,9 +29,12 @@ check: $(STAMP)  ## formatting, lint, types, import directions
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(STAMP)  ## the pages and the interfaces of the packages as a site, in build/site
+	$(BIN)/mkdocs build -q --strict -d build/site
+
 lock:  ## resolve the versions anew (maintainers)
 	$(PYTHON) -m venv build/lock && build/lock/bin/pip install -q uv
-	build/lock/bin/uv pip compile --universal --python-version 3.11 --extra dev --generate-hashes \
+	build/lock/bin/uv pip compile --universal --python-version 3.11 --extra dev --extra docs --generate-hashes \
 	  --no-emit-index-url --no-emit-find-links --no-header --upgrade -o requirements.lock pyproject.toml
 
 $(STAMP): requirements.lock pyproject.toml

@@ -5,6 +5,10 @@ class ControlError(Exception):
     """Something the runtime was asked for could not be done."""
 
 
+class InvalidRequestError(ControlError):
+    """A procedure cannot be begun or go on as it was asked for; no motor has power."""
+
+
 class TripError(ControlError):
     """The supervisor or the device ended the motion; the message says which limit and value."""
 
@@ -19,3 +23,7 @@ class InterruptedMotionError(ControlError):
 
 class RawLogError(ControlError):
     """A raw measurement file cannot be written or read."""
+
+
+class GeometryError(ControlError):
+    """A geometry no robot can have; the message names the cable and the value."""

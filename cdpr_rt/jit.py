@@ -1,16 +1,95 @@
 """Compile the numeric kernels of the cycle to machine code."""
 
+import hashlib
+import importlib
+import sys
 from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import cgutils, config, types
+from numba.extending import intrinsic
 
+_SETTINGS: Any = config
+_T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
-def jit(function: _F) -> _F:
+def _skip_blas() -> None:
+    """Have numba load what it knows of arrays without scipy.linalg, 0.2 s of each process's start.
+
+    It looks for scipy's BLAS to know whether kernels may call np.cov and np.corrcoef. Others of
+    its functions of linear algebra look for it when they are compiled.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas not in sys.modules:
+        sys.modules[blas] = cast(Any, None)  # makes its import fail
+        try:
+            importlib.import_module("numba.np.arraymath")
+        finally:
+            del sys.modules[blas]
+
+
+_skip_blas()
+
+
+@cache
+def _kernel_cache(folder: Path) -> str:
+    """Return a cache directory that belongs to this state of the kernels' sources in `folder`.
+
+    numba looks only at the file of the function it compiles, not at those of the functions that
+    one calls, and would go on using machine code of an older callee.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(folder.glob("*.py")):
+        text = source.read_bytes()
+        if b"from cdpr_rt.jit import" in text:
+            digest.update(text)
+    base = Path(_SETTINGS.CACHE_DIR or folder / "__pycache__")
+    return str(base / f"kernels-{digest.hexdigest()[:12]}")
+
+
+def jit(function: _F, *, nogil: bool = False) -> _F:
     """Return `function` compiled by numba, cached on disk, with its type kept for the checker.
 
-    It may call only kernels of its own file: the cache sees no change in another one.
+    It may call only kernels of its own folder: the cache sees no change in another one.
     """
-    return cast(_F, numba.njit(cache=True)(function))
+    cache_of_all = _SETTINGS.CACHE_DIR
+    _SETTINGS.CACHE_DIR = _kernel_cache(Path(function.__code__.co_filename).parent)
+    try:
+        return cast(_F, numba.njit(cache=True, nogil=nogil)(function))
+    finally:
+        _SETTINGS.CACHE_DIR = cache_of_all
+
+
+def jit_unlocked(function: _F) -> _F:
+    """Return `function` compiled as by `jit`; other threads run while it waits for the system."""
+    return jit(function, nogil=True)
+
+
+def bound(kernel: Callable[..., _T], *arrays: Any, then: tuple[Any, ...] = ()) -> Callable[..., _T]:
+    """Return the compiled `kernel` with its first arguments fixed.
+
+    Which machine code serves the arguments' types, an ordinary call finds out anew for each of
+    them, at a cost above that of most kernels; here it is found out once. `then` has an example of
+    each argument that is left, whose type is not looked at any more: an array has to have the same
+    type and be as contiguous. Compiles what is not compiled yet.
+    """
+    dispatcher: Any = kernel
+    type_of: Callable[[Any], Any] = numba.typeof
+    types = tuple(type_of(argument) for argument in (*arrays, *then))
+    return partial(dispatcher.compile(types), *arrays)
+
+
+@cast(Callable[[Callable[..., Any]], Callable[[int, int, int], None]], intrinsic)
+def copy_bytes(_typing: Any, to: Any, source: Any, size: Any) -> Any:
+    """Within a kernel: copy `size` bytes from the address `source` to the address `to`."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        there, here = (builder.inttoptr(address, cgutils.voidptr_t) for address in arguments[:2])
+        memcpy: Callable[..., None] = cgutils.raw_memcpy
+        memcpy(builder, there, here, arguments[2], 1)
+
+    return types.void(to, source, size), generate

@@ -9,10 +9,10 @@ import re
 from pathlib import Path
 from typing import Any
 
+from cdpr_profiles.errors import FileMissingError, ProfileError
+from cdpr_profiles.reading.bounded_input import read_json
 from cdpr_rt.errors import ControlError
 from cdpr_rt.private_files import FILE_MODE, make_private_folder
-from profiles.bounded_input import read_json
-from profiles.errors import FileMissingError, ProfileError
 
 _MOST_BYTES = 1 << 16
 

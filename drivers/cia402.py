@@ -1,4 +1,4 @@
-"""CiA 402 words: states, the controlword that leads to a wanted state, modes, fault texts."""
+"""CiA 402: states, the controlword towards a target state, modes, fault texts."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""What one unit of a drive's torque, velocity and acceleration objects is, in SI."""
+"""SI values of the units of a drive's torque, velocity and acceleration objects."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from profiles import DriveProfile
+from cdpr_profiles import DriveProfile
 
 _OF_RATED = {"per_mille_of_rated": 1e-3, "percent_of_rated": 1e-2}
 _ABSOLUTE_Nm = {"mNm": 1e-3, "cNm": 1e-2}
@@ -19,7 +19,7 @@ def torque_unit_Nm(drive: DriveProfile, rated_torque_Nm: float) -> float:
 
 
 def whole_units(limit: float, unit: float) -> int:
-    """Return how many units are within a limit; the share of a unit that is noise counts as one."""
+    """Return the whole number of units within a limit, with a tolerance for rounding of 1e-9."""
     return int(limit / unit + 1e-9)
 
 

@@ -1,12 +1,16 @@
-"""Errors of the master side; every message tells what happened, where, and what would help."""
+"""Errors of the master side; messages say what happened, where, and what helps."""
 
 from __future__ import annotations
 
-from drivers.sdo_abort import abort_text
+from cdpr_drivers.canopen.sdo_abort import abort_text
 
 
 class DriverError(Exception):
     """Base of all errors that the master side raises on purpose."""
+
+
+class ConfigurationError(DriverError):
+    """What was asked for, the robot's file and its buses do not go together; nothing has power."""
 
 
 class BusError(DriverError):
@@ -45,6 +49,10 @@ class BootError(DriverError):
         self.node_id = node_id
         self.advice = advice
         super().__init__(f"node {node_id} did not boot (step {letter}): {problem}; {advice}")
+
+
+class RobotBootError(DriverError):
+    """Mandatory drives of a robot did not boot; names each with its bus and reason."""
 
 
 class DriveFaultError(DriverError):

@@ -1,44 +1,14 @@
 """Motors, drives, winches, cables and robots as validated data."""
 
-from profiles.cable import Cable
-from profiles.catalogue import (
-    list_profiles,
-    load_all,
-    load_cable,
-    load_drive,
-    load_machine,
-    load_motor,
-    load_motor_ratings,
-    load_robot,
-    load_winch,
-)
-from profiles.drive import DriveProfile, Pdo, PdoEntry
-from profiles.errors import ProfileError
-from profiles.motor import Motor, MotorRatings
-from profiles.robot import Robot, RobotAxis, RobotBus
-from profiles.robot_limits import RobotLimits
-from profiles.winch import Winch
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Cable",
-    "DriveProfile",
-    "Motor",
-    "MotorRatings",
-    "Pdo",
-    "PdoEntry",
-    "ProfileError",
-    "Robot",
-    "RobotAxis",
-    "RobotBus",
-    "RobotLimits",
-    "Winch",
-    "list_profiles",
-    "load_all",
-    "load_cable",
-    "load_drive",
-    "load_machine",
-    "load_motor",
-    "load_motor_ratings",
-    "load_robot",
-    "load_winch",
-]
+if TYPE_CHECKING:
+    from cdpr_profiles.public import *  # noqa: F403  # its __all__ is the list
+
+
+def __getattr__(name: str) -> Any:
+    """Import the models when one is asked for: who needs only the errors is spared pydantic."""
+    if name.startswith("_"):  # as `__path__`, which the import itself asks for
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.public"), name)

@@ -1,12 +1,12 @@
-"""Cables: a single one with what was measured on it, and a maker's table of sizes."""
+"""Cables: a single one with measured values, and a maker's table of sizes."""
 
 from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from profiles.reader import Profile
-from profiles.table import records
-from profiles.units import N_PER_KGF
+from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reading.table import records
+from cdpr_profiles.reading.units import N_PER_KGF
 
 Positive = Annotated[float, Field(gt=0)]
 

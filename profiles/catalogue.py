@@ -1,50 +1,52 @@
 """Find profiles by name or path and load them, references included."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal, TypeVar, get_args
+from typing import TypeVar
 
-from profiles.bounded_input import is_file, path_of, read_toml, resolved
-from profiles.cable import Cable, CableSeries
-from profiles.drive import DriveProfile
-from profiles.errors import ProfileError
-from profiles.motor import Motor, MotorRatings, MotorSeries
-from profiles.motor_bounds import MOST_SPEED_RATIO
-from profiles.platform import Platform
-from profiles.rail import load_rail
-from profiles.reader import closest, read_toml_model
-from profiles.robot import (
+from cdpr_profiles.cable import Cable, CableSeries
+from cdpr_profiles.devices.rail import load_rail
+from cdpr_profiles.devices.safety_io import load_safety_io
+from cdpr_profiles.devices.tension_sensor import load_tension_sensors
+from cdpr_profiles.drive import DriveProfile
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.limits.motor_bounds import MOST_SPEED_RATIO
+from cdpr_profiles.motor import Motor, MotorRatings, MotorSeries
+from cdpr_profiles.platform import Platform
+from cdpr_profiles.reading.bounded_input import is_file, path_of, read_toml, resolved
+from cdpr_profiles.reading.places import (
+    KINDS,
+    SERIES,
+    SHIPPED,
+    Kind,
+    find,
+    profile_files,
+    require,
+    unknown_profile,
+)
+from cdpr_profiles.reading.reader import read_toml_model
+from cdpr_profiles.robot import (
     Robot,
     RobotAxis,
     RobotFile,
     default_name,
     robot_of_winch,
-    watched_by_heartbeat,
+    with_heartbeat_timeout,
 )
-from profiles.safety_io import load_safety_io
-from profiles.tension_sensor import load_tension_sensors
-from profiles.winch import Winch, WinchFile
-from profiles.winch_calibration import WinchCalibration, load_winch_calibration
-
-Kind = Literal[
-    "motors", "drives", "cables", "winches", "robots", "tension_sensors", "safety_io", "rails"
-]
-KINDS: tuple[Kind, ...] = get_args(Kind)
-SHIPPED = Path(__file__).parent
-
-_SERIES = ".series.toml"
+from cdpr_profiles.winch import Winch, WinchFile
+from cdpr_profiles.winch_calibration import WinchCalibration, load_winch_calibration
 
 _T = TypeVar("_T")
 
 
 def load_motor(name: str | Path, beside: Path | None = None) -> Motor:
-    """Return a motor by name ("MPP0923D") or path; `beside` is a folder looked into first.
+    """Return a motor by name ("MPP0923D") or path; `beside` is a folder that is searched first.
 
     Raises ProfileError, also for a motor whose source gives its ratings only.
     """
-    path = _find("motors", name, beside)
+    path = find("motors", name, beside)
     if path is not None:
         return read_toml_model(path, Motor)
     for series_path, series in _motor_series().items():
@@ -58,7 +60,7 @@ def load_motor(name: str | Path, beside: Path | None = None) -> Motor:
                 f"the source gives the ratings of {name} only, not its torque constant and winding;"
                 " write these into a motor file of your own",
             )
-    raise _unknown("motors", name, beside)
+    raise unknown_profile("motors", name, beside, _names("motors"))
 
 
 def load_motor_ratings(name: str) -> MotorRatings:
@@ -66,12 +68,12 @@ def load_motor_ratings(name: str) -> MotorRatings:
     for series in _motor_series().values():
         if name in series.names():
             return series.names()[name]
-    raise _unknown("motors", name, None)
+    raise unknown_profile("motors", name, more=_names("motors"))
 
 
 def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
     """Return a drive by name or path, its `eds` an existing absolute path; raises ProfileError."""
-    path = _require("drives", name, beside)
+    path = require("drives", name, beside)
     drive = read_toml_model(path, DriveProfile)
     eds = path.parent / drive.eds
     if not is_file(eds):
@@ -81,16 +83,15 @@ def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
 
 def load_cable(name: str | Path, beside: Path | None = None) -> Cable:
     """Return a cable by name or path; raises ProfileError."""
-    return read_toml_model(_require("cables", name, beside), Cable)
+    return read_toml_model(require("cables", name, beside), Cable)
 
 
 def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     """Return a winch by name or path with the motor, drive and cable it names.
 
-    These are looked for beside the winch's own file, then among the shipped ones. Raises
-    ProfileError.
+    These are looked for beside the winch's own file first. Raises ProfileError.
     """
-    path = _require("winches", name, beside)
+    path = require("winches", name, beside)
     file = read_toml_model(path, WinchFile)
     folder = path.parent
     if file.node_id == file.master_node_id:
@@ -100,9 +101,9 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     return Winch(
         profile=path.stem,
         path=resolved(path),
-        motor=_referred(path, "motor", load_motor, file.motor, folder),
-        drive=_referred(path, "drive", load_drive, file.drive, folder),
-        cable=_referred(path, "cable", load_cable, file.cable, folder),
+        motor=_load_reference(path, "motor", load_motor, file.motor, folder),
+        drive=_load_reference(path, "drive", load_drive, file.drive, folder),
+        cable=_load_reference(path, "cable", load_cable, file.cable, folder),
         **file.model_dump(exclude={"motor", "drive", "cable"}),
     )
 
@@ -110,18 +111,18 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
 def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
     """Return a robot by name or path with the winches it names; raises ProfileError.
 
-    The winches are looked for beside the robot's own file, then among the shipped ones. Where
-    `name` is that of a winch, the robot has this one axis.
+    The winches are looked for beside the robot's own file first. Where `name` is that of a winch,
+    the robot has this one axis.
     """
-    path = _find("robots", name, beside)
+    path = find("robots", name, beside)
     if path is None or "motor" in read_toml(path):
-        if _find("winches", name, beside) is None:
-            raise _unknown("robots", name, beside, _shipped_names("winches"))
+        if find("winches", name, beside) is None:
+            raise unknown_profile("robots", name, beside, _names("winches"))
         return robot_of_winch(load_winch(name, beside))
     file = read_toml_model(path, RobotFile)
-    _refuse(path, list(file.faults()))
+    _raise_faults(path, list(file.faults()))
     axes = _axes(path, file)
-    _refuse(path, list(_too_strong(file, axes)))
+    _raise_faults(path, list(_limit_faults(file, axes)))
     return Robot(
         profile=path.stem,
         path=resolved(path),
@@ -143,28 +144,32 @@ def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
 def _platform(file: RobotFile) -> Platform | None:
     if file.platform is None:
         return None
+    told = {key: value for key, value in file.platform if value is not None}
+    up = (*(0.0 for _ in file.platform.home_m[1:]), 1.0)
     return Platform(
-        **file.platform.model_dump(),
+        **told,
         exit_points_m=tuple(axis.exit_point_m or () for axis in file.axes),
         anchor_points_m=tuple(axis.anchor_point_m or () for axis in file.axes),
+        pulley_radius_m=tuple(axis.pulley_radius_m for axis in file.axes),
+        pulley_axes=tuple(axis.pulley_axis or up for axis in file.axes),
     )
 
 
-def _refuse(path: Path, faults: list[tuple[str, str]]) -> None:
+def _raise_faults(path: Path, faults: list[tuple[str, str]]) -> None:
     if faults:
         further = "".join(f"\n{path}: {key}: {problem}" for key, problem in faults[1:])
         raise ProfileError(path, faults[0][0], faults[0][1] + further)
 
 
 def _axes(path: Path, file: RobotFile) -> list[RobotAxis]:
-    """Return the axes with their winches, told what the robot decides."""
+    """Return the axes; their winches take bit rate, cycle and node ids from the robot."""
     bitrates = {bus.name: bus.bitrate_bit_s for bus in file.buses}
     winches: dict[str, Winch] = {}
     axes = []
     for i, axis in enumerate(file.axes):
         if axis.winch not in winches:
-            winches[axis.winch] = watched_by_heartbeat(
-                _referred(path, f"axes[{i}].winch", load_winch, axis.winch, path.parent),
+            winches[axis.winch] = with_heartbeat_timeout(
+                _load_reference(path, f"axes[{i}].winch", load_winch, axis.winch, path.parent),
                 file.master_heartbeat_s,
             )
         winch = replace(
@@ -193,16 +198,16 @@ def _calibration(robot: Path, axis: int, name: str | None, winch: Winch) -> Winc
     return found
 
 
-def _too_strong(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[str, str]]:
-    """Yield (key, problem) for limits that the motors or cables do not bear."""
-    for key, bears, of in (
+def _limit_faults(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[str, str]]:
+    """Yield (key, problem) for limits above the ratings of motors or cables."""
+    for key, ratings, of in (
         ("torque_Nm", [a.winch.motor.peak_torque_Nm for a in axes], "the motor's peak torque"),
         ("speed_rad_s", [_speed_rad_s(a) for a in axes], "twice the motor's rated speed"),
         ("tension_max_N", [a.winch.cable.breaking_force_N for a in axes], "the breaking force"),
     ):
-        wanted = getattr(file.limits, key) or ()
-        for i, value in enumerate(wanted):
-            most = bears[i] if len(wanted) > 1 else min(bears)
+        limits = getattr(file.limits, key) or ()
+        for i, value in enumerate(limits):
+            most = ratings[i] if len(limits) > 1 else min(ratings)
             if value > most:
                 yield f"limits.{key}[{i}]", f"value {value:g}; allowed: up to {of} ({most:.6g})"
 
@@ -212,7 +217,7 @@ def _speed_rad_s(axis: RobotAxis) -> float:
 
 
 def _device(robot: Path, key: str, load: Callable[[str], object], name: str | None) -> str | None:
-    """Return what `load` finds a device by that a robot's file names; raises ProfileError."""
+    """Return the reference to a device that a robot's file names; raises ProfileError."""
     if name is None:
         return None
     reference = _beside(robot, name)
@@ -234,116 +239,85 @@ def _beside(file: Path, name: str) -> str:
 
 
 def _path_from(file: Path, text: str) -> Path:
-    """Return the path that a profile's file gives from its own folder."""
+    """Return a path in a profile, which is relative to its own folder."""
     return resolved(path_of(file.parent, text))
 
 
 def load_machine(name: str | Path) -> Winch | Robot:
     """Return the robot or the winch of this name or path; raises ProfileError."""
-    robot = _find("robots", name, None)
+    robot = find("robots", name, None)
     if robot is None:
-        if _find("winches", name, None) is None:
-            raise _unknown("winches", name, None, _shipped_names("robots"))
+        if find("winches", name, None) is None:
+            raise unknown_profile("winches", name, None, _names("robots"))
         return load_winch(name)
-    if _find("winches", name, None) == robot and not {"axes", "buses"} & set(read_toml(robot)):
+    if find("winches", name, None) == robot and not {"axes", "buses"} & set(read_toml(robot)):
         return load_winch(name)
     return load_robot(name)
 
 
-def list_profiles() -> dict[str, tuple[str, ...]]:
-    """Return the names of the shipped profiles by kind; motors include every one of a series."""
-    return {kind: tuple(sorted(_shipped_names(kind))) for kind in KINDS}
+def list_profiles() -> dict[Kind, tuple[str, ...]]:
+    """Return the names of all profiles by kind; motors include every one of a series."""
+    return {kind: tuple(sorted(_names(kind))) for kind in KINDS}
+
+
+def load_profile(kind: Kind, name: str) -> object:
+    """Return a profile by its kind and name, of a motor without a size sheet its ratings.
+
+    Raises ProfileError.
+    """
+    if kind == "motors" and find(kind, name) is None:
+        ratings = load_motor_ratings(name)
+        return next(filter(None, (s.motor(name) for s in _motor_series().values())), ratings)
+    return _LOADERS[kind](name)
 
 
 def load_all() -> dict[str, dict[str, object]]:
-    """Read and validate every shipped profile; raises ProfileError.
+    """Read and validate every profile that `list_profiles` names; raises ProfileError.
 
-    A motor whose source has no size sheet appears with its ratings.
+    The sizes of a series of cables are among them.
     """
     _motor_series.cache_clear()
-    _cable_series.cache_clear()
-    everything: dict[str, dict[str, object]] = {kind: {} for kind in KINDS}
-    for series in _motor_series().values():
-        for name, ratings in series.names().items():
-            everything["motors"][name] = series.motor(name) or ratings
-    for cables in _cable_series().values():
-        everything["cables"] |= {size.code: size for size in cables.sizes}
-    loaders: tuple[tuple[Kind, Callable[[str], object]], ...] = (
-        ("motors", load_motor),
-        ("drives", load_drive),
-        ("cables", load_cable),
-        ("winches", load_winch),
-        ("robots", load_robot),
-        ("tension_sensors", load_tension_sensors),
-        ("safety_io", load_safety_io),
-        ("rails", load_rail),
-    )
-    for kind, load in loaders:
-        for path in _files(kind):
-            everything[kind][path.stem] = load(path.stem)
+    everything: dict[str, dict[str, object]] = {
+        kind: {name: load_profile(kind, name) for name in _names(kind)} for kind in KINDS
+    }
+    for path in sorted((SHIPPED / "cables").glob("*" + SERIES)):
+        everything["cables"] |= {s.code: s for s in read_toml_model(path, CableSeries).sizes}
     return everything
-
-
-def _files(kind: Kind) -> list[Path]:
-    folder = SHIPPED / kind
-    return sorted(p for p in folder.glob("*.toml") if not p.name.endswith(_SERIES))
 
 
 @lru_cache(maxsize=1)
 def _motor_series() -> dict[Path, MotorSeries]:
-    paths = sorted((SHIPPED / "motors").glob("*" + _SERIES))
+    paths = sorted((SHIPPED / "motors").glob("*" + SERIES))
     return {path: read_toml_model(path, MotorSeries) for path in paths}
 
 
-@lru_cache(maxsize=1)
-def _cable_series() -> dict[Path, CableSeries]:
-    paths = sorted((SHIPPED / "cables").glob("*" + _SERIES))
-    return {path: read_toml_model(path, CableSeries) for path in paths}
-
-
-def _shipped_names(kind: Kind) -> set[str]:
-    names = {path.stem for path in _files(kind)}
+def _names(kind: Kind) -> set[str]:
+    names = {path.stem for path in profile_files(kind)}
     if kind == "motors":
         for series in _motor_series().values():
             names |= set(series.names())
     return names
 
 
-def _find(kind: Kind, name: str | Path, beside: Path | None) -> Path | None:
-    """Return the file of a profile, or None where no file has this name."""
-    text = str(name)
-    folder = beside if beside is not None else Path()
-    if isinstance(name, Path) or "/" in text or text.endswith(".toml"):
-        return path_of(folder, text)
-    candidates = [SHIPPED / kind / f"{text}.toml"]
-    if beside is not None:
-        candidates.insert(0, beside / f"{text}.toml")
-    return next((path for path in candidates if is_file(path)), None)
-
-
-def _require(kind: Kind, name: str | Path, beside: Path | None) -> Path:
-    path = _find(kind, name, beside)
-    if path is None:
-        raise _unknown(kind, name, beside)
-    return path
-
-
-def _unknown(
-    kind: Kind, name: str | Path, beside: Path | None, more: Iterable[str] = ()
-) -> ProfileError:
-    known = _shipped_names(kind) | set(more)
-    if beside is not None:
-        known |= {path.stem for path in beside.glob("*.toml")}
-    meant = closest(str(name), known)
-    hint = f"did you mean {meant!r}?" if meant else f"allowed: {', '.join(sorted(known))}"
-    return ProfileError(kind, "", f"no profile named {str(name)!r}; {hint} (or a path to a file)")
-
-
-def _referred(file: Path, key: str, load: Callable[[str, Path], _T], name: str, folder: Path) -> _T:
-    """Load what a file's key names; an unknown name is told with that file and key."""
+def _load_reference(
+    file: Path, key: str, load: Callable[[str, Path], _T], name: str, folder: Path
+) -> _T:
+    """Load the profile that a file's key names; errors name that file and key."""
     try:
         return load(name, folder)
     except ProfileError as error:
         if error.file in KINDS:
             raise ProfileError(file, key, error.problem) from None
         raise
+
+
+_LOADERS: dict[Kind, Callable[[str], object]] = {
+    "motors": load_motor,
+    "drives": load_drive,
+    "cables": load_cable,
+    "winches": load_winch,
+    "robots": load_robot,
+    "tension_sensors": load_tension_sensors,
+    "safety_io": load_safety_io,
+    "rails": load_rail,
+}

@@ -1,11 +1,11 @@
-"""Servo drives: what the master must know of one, with its peculiarities as data."""
+"""Servo drives: PDOs, units, signs, time-outs and quirks of a drive type as data."""
 
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from profiles.reader import Profile, one_of
+from cdpr_profiles.reading.reader import Profile, one_of
 
 Sign = Annotated[int, one_of(-1, 1)]
 Unsigned8 = Annotated[int, Field(ge=0, le=0xFF)]
@@ -59,7 +59,7 @@ class Pdo(Profile):
 
 
 class Quirks(Profile):
-    """Where a drive departs from the standard's state machine.
+    """Departures of a drive from the state machine of CiA 402.
 
     The mode of an enabled drive is never changed, so that no key is needed for drives which
     refuse that.
@@ -68,7 +68,7 @@ class Quirks(Profile):
     halt_before_mode_change: bool = False
     """6060h is taken only while bit 8 of the controlword (halt) is set."""
     homing_done_by_bit_12_alone: bool = False
-    """Bit 10 of the statusword tells nothing in homing mode; bit 12 comes once at rest."""
+    """Bit 10 of the statusword is without meaning in homing mode; bit 12 comes once at rest."""
 
 
 class Verification(Profile):
@@ -85,10 +85,10 @@ class DriveProfile(Profile):
     without 6076h the motor's rated torque holds, without 608Fh the winch's encoder resolution and
     without 6502h `supported_modes`.
 
-    `torque_unit`, `velocity_unit` and `acceleration_unit` tell what one unit of the drive's
-    objects is. The signs turn the drive's directions into the motor's, each for itself:
-    `position_sign` is -1 where 6064h falls while the motor turns forward, `torque_sign` where a
-    positive 6071h drives it backward, `homing_sign` where method 34 seeks the index backward.
+    `torque_unit`, `velocity_unit` and `acceleration_unit` are the units of the drive's objects. The
+    signs turn the drive's directions into the motor's, each for itself: `position_sign` is -1 where
+    6064h falls while the motor turns forward, `torque_sign` where a positive 6071h drives it
+    backward, `homing_sign` where method 34 seeks the index backward.
 
     `torque_slope_Nm_s` is written to 6087h, which modes with a torque ramp (PT, 4) need: as steep
     as the drive takes it, since a ramp is a lag in the loop. `torque_delay_s` is the nominal lag of

@@ -7,9 +7,9 @@ _MOST_LINE_CHARS = 1000
 
 
 def brief(text: str, most: int = _MOST_CHARS) -> str:
-    """Return a text as a message may repeat it: printable, and not too long."""
-    told = text if text.isprintable() else repr(text)[1:-1]
-    return told if len(told) <= most else told[: most - 3] + "..."
+    """Return a text for use in a message: printable and cut to `most` characters."""
+    shown = text if text.isprintable() else repr(text)[1:-1]
+    return shown if len(shown) <= most else shown[: most - 3] + "..."
 
 
 class ProfileError(Exception):

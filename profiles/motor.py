@@ -4,13 +4,13 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from profiles.reader import Profile
-from profiles.table import records, undashed
-from profiles.units import RAD_S_PER_RPM
+from cdpr_profiles.reading.reader import Profile
+from cdpr_profiles.reading.table import dash_to_none, records
+from cdpr_profiles.reading.units import RAD_S_PER_RPM
 
 Positive = Annotated[float, Field(gt=0)]
 Plausible = Annotated[float, Field(ge=1e-9, le=1e6)]
-"""A figure that a motor can have, in its unit; what lies outside is a slip of the pen."""
+"""A plausible value of a motor in its unit; others are typing errors."""
 Dashed = Annotated[float, Field(gt=0)] | None
 
 _TORQUE_RATIO = 2.0
@@ -52,11 +52,6 @@ class Motor(Profile):
     def rated_speed_rad_s(self) -> float:
         """Rated speed in rad/s."""
         return self.rated_speed_rpm * RAD_S_PER_RPM
-
-    @property
-    def rated_power_W(self) -> float:
-        """Shaft power at rated torque and speed."""
-        return self.rated_torque_Nm * self.rated_speed_rad_s
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -147,7 +142,7 @@ class MotorDetail(Profile):
     @model_validator(mode="before")
     @classmethod
     def _dash_to_none(cls, table: Any) -> Any:
-        return {k: undashed(v) for k, v in table.items()} if isinstance(table, dict) else table
+        return {k: dash_to_none(v) for k, v in table.items()} if isinstance(table, dict) else table
 
 
 class CommonSpecifications(Profile):

@@ -1,17 +1,17 @@
-"""The platform of a cable robot and where its cables run: what makes winches a robot."""
+"""The platform of a cable robot: mass, exit and anchor points, workspace, limits."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Annotated
+from typing import Annotated, Any, Final, Literal, get_args
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from profiles.reader import Profile
+from cdpr_profiles.reading.reader import Profile
 
 FURTHEST_m = 1000.0
-"""Beyond this no robot reaches."""
+"""Largest coordinate that is allowed."""
 
 
 def _in_metres(value: float) -> float:
@@ -20,9 +20,40 @@ def _in_metres(value: float) -> float:
     return value
 
 
+def _direction(values: tuple[float, ...]) -> tuple[float, ...]:
+    size = math.hypot(*values)
+    if not size > 0.0:
+        raise ValueError(f"value {list(values)}; allowed: a direction, not all 0")
+    return tuple(value / size for value in values)
+
+
+def _one_or_several(value: Any) -> Any:
+    return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
 _Coordinate = Annotated[float, AfterValidator(_in_metres)]
 Point = Annotated[tuple[_Coordinate, ...], Field(min_length=2, max_length=3)]
-_FEWEST = {2: 3, 3: 6}
+Direction = Annotated[
+    tuple[float, ...], Field(min_length=2, max_length=3), AfterValidator(_direction)
+]
+"""A direction in the room; its length does not matter, and is 1 once read."""
+_Numbers = Annotated[tuple[float, ...], BeforeValidator(_one_or_several)]
+"""A single number is an array of one."""
+
+TensionMethod = Literal[
+    "minimum-norm", "minimum-deviation", "closed-form",
+    "polygon-1-norm", "polygon-2-norm", "polygon-centroid",
+]  # fmt: skip
+TENSION_METHODS: Final[tuple[str, ...]] = get_args(TensionMethod)
+"""Methods of tension distribution."""
+CableModelName = Literal["rigid", "elastic", "catenary"]
+DirectionName = Literal["x", "y", "z", "angle", "rx", "ry", "rz"]
+DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
+    2: ("x", "y", "angle"),
+    3: ("x", "y", "z", "rx", "ry", "rz"),
+}
+"""Directions of a platform by how many coordinates it has: positions, then angles."""
+_LEAST_ARM_m = 0.1
 
 
 class PlatformFile(Profile):
@@ -33,15 +64,30 @@ class PlatformFile(Profile):
 
     mass_kg: float = Field(gt=0, le=10_000)
     home_m: Point
-    """Where its origin is at rest, on its stand: when the robot is started, and at its end."""
+    """Position of its origin at rest on its stand, where sessions begin and end."""
     home_tolerance_m: float = Field(default=0.05, gt=0, le=1)
-    """How far from there it may really be."""
+    """Largest deviation from there."""
     workspace_min_m: Point
     workspace_max_m: Point
     """The box in which targets may lie."""
     speed_m_s: float = Field(gt=0, le=20)
     acceleration_m_s2: float = Field(gt=0, le=100)
     """Along each direction."""
+    inertia_kg_m2: _Numbers | None = None
+    """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass in the platform's frame; one in a plane."""
+    centre_of_mass_m: Point | None = None
+    """In the platform's frame; its origin if left out."""
+    home_rotation_rad: _Numbers | None = None
+    """Rotation vector from the room's axes to the platform's at home, an angle in a plane."""
+    workspace_angle_rad: float = Field(default=0.0, ge=0, lt=math.pi)
+    """Largest angle from the orientation at home in which targets may lie."""
+    angular_speed_rad_s: float | None = Field(default=None, gt=0, le=100)
+    angular_acceleration_rad_s2: float | None = Field(default=None, gt=0, le=10_000)
+    """About each axis."""
+    controlled: tuple[DirectionName, ...] | None = None
+    """Directions that the cables control; what they can if left out."""
+    tension_distribution: TensionMethod = "minimum-deviation"
+    cable_model: CableModelName = "elastic"
 
 
 @dataclass(frozen=True)
@@ -49,7 +95,9 @@ class Platform:
     """A platform on the cables of a robot's axes; points in the order of the axes.
 
     `exit_points_m` are in the room, `anchor_points_m` in the platform's frame, whose origin is what
-    `home_m` and targets speak of.
+    `home_m` and targets speak of. What is left out (empty, or 0 of an angular speed or
+    acceleration) is filled in: these two are then those with which the furthest anchor point, 0.1 m
+    away at least, moves with `speed_m_s` and `acceleration_m_s2`.
     """
 
     mass_kg: float
@@ -61,6 +109,45 @@ class Platform:
     acceleration_m_s2: float
     exit_points_m: tuple[tuple[float, ...], ...]
     anchor_points_m: tuple[tuple[float, ...], ...]
+    inertia_kg_m2: tuple[float, ...] | None = None
+    """Ixx Iyy Izz Ixy Ixz Iyz about the centre of mass, platform's frame; one number in a plane."""
+    centre_of_mass_m: tuple[float, ...] = ()
+    """In the platform's frame."""
+    home_rotation_rad: tuple[float, ...] = ()
+    """Rotation vector from the room's axes to the platform's; one number in a plane."""
+    workspace_angle_rad: float = 0.0
+    """Largest angle from the orientation at home in which targets may lie."""
+    angular_speed_rad_s: float = 0.0
+    angular_acceleration_rad_s2: float = 0.0
+    """About each axis."""
+    controlled: tuple[str, ...] = ()
+    """Names out of DIRECTIONS, in their order."""
+    tension_distribution: str = "minimum-deviation"
+    cable_model: str = "elastic"
+    pulley_radius_m: tuple[float, ...] = ()
+    """One for each axis; 0 for an eye."""
+    pulley_axes: tuple[tuple[float, ...], ...] = ()
+    """Unit vectors along which the cables come up to their pulleys, one for each axis."""
+
+    def __post_init__(self) -> None:
+        """Fill in what was left out."""
+        size, n = len(self.home_m), len(self.exit_points_m)
+        up = (0.0,) * (size - 1) + (1.0,)
+        arm_m = max(_LEAST_ARM_m, *(math.hypot(*anchor) for anchor in self.anchor_points_m))
+        wanted = self.controlled or controlled_by_default(self.anchor_points_m)
+        filled: dict[str, Any] = {
+            "centre_of_mass_m": self.centre_of_mass_m or (0.0,) * size,
+            "home_rotation_rad": self.home_rotation_rad or (0.0,) * (1 if size == 2 else 3),
+            "controlled": tuple(name for name in DIRECTIONS[size] if name in wanted),
+            "pulley_radius_m": self.pulley_radius_m or (0.0,) * n,
+            "pulley_axes": self.pulley_axes or (up,) * n,
+            "angular_speed_rad_s": self.angular_speed_rad_s or self.speed_m_s / arm_m,
+            "angular_acceleration_rad_s2": (
+                self.angular_acceleration_rad_s2 or self.acceleration_m_s2 / arm_m
+            ),
+        }
+        for key, value in filled.items():
+            object.__setattr__(self, key, value)
 
     @property
     def is_planar(self) -> bool:
@@ -69,7 +156,7 @@ class Platform:
 
     @property
     def longest_cable_m(self) -> float:
-        """The longest that a cable is with the platform at home or in its box, turned anyhow."""
+        """Longest cable with the platform at home or in its workspace, at any orientation."""
         corners = product(*zip(self.workspace_min_m, self.workspace_max_m, strict=True))
         ways = product(self.exit_points_m, (*corners, self.home_m))
         return max(math.dist(*way) for way in ways) + max(
@@ -77,44 +164,12 @@ class Platform:
         )
 
 
-def platform_faults(
-    file: PlatformFile | None,
-    exits: Sequence[tuple[float, ...] | None],
-    anchors: Sequence[tuple[float, ...] | None],
-) -> Iterator[tuple[str, str]]:
-    """Yield (key, problem) for points that are missing, too many, or of another dimension."""
-    if file is None:
-        for i, points in enumerate(zip(exits, anchors, strict=True)):
-            if points != (None, None):
-                yield f"axes[{i}]", "exit_point_m, anchor_point_m: allowed: along with [platform]"
-        return
-    size = len(file.home_m)
-    for name, points_m in (("exit_point_m", exits), ("anchor_point_m", anchors)):
-        for i, given in enumerate(points_m):
-            if given is None:
-                yield f"axes[{i}].{name}", "missing; allowed: one for each axis of a platform"
-            elif len(given) != size:
-                problem = f"{len(given)} coordinates; allowed: {size}, as platform.home_m has"
-                yield f"axes[{i}].{name}", problem
-    if len(exits) < _FEWEST[size]:
-        yield "axes", f"{len(exits)}; allowed: {_FEWEST[size]} and more for a platform"
-    yield from _box_faults(file)
+def controlled_by_default(anchor_points_m: Sequence[tuple[float, ...]]) -> tuple[str, ...]:
+    """Return the directions that the cables of a platform with these anchor points can control.
 
-
-def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
-    """Yield what is wrong with the box; the stand may be under it, not beside or above it."""
-    size = len(file.home_m)
-    for key in ("workspace_min_m", "workspace_max_m"):
-        point = getattr(file, key)
-        if len(point) != size:
-            yield f"platform.{key}", f"{len(point)} coordinates; allowed: {size}, as home_m has"
-            return
-    box = zip(file.workspace_min_m, file.home_m, file.workspace_max_m, strict=True)
-    for i, (low, home, high) in enumerate(box):
-        if not low < high:
-            yield f"platform.workspace_max_m[{i}]", f"value {high:g}; allowed: above {low:g}"
-        elif i == size - 1 and home > high:
-            problem = f"value {home:g}; allowed: up to {high:g} (the last coordinate is upward)"
-            yield f"platform.home_m[{i}]", problem
-        elif i < size - 1 and not low <= home <= high:
-            yield f"platform.home_m[{i}]", f"value {home:g}; allowed: {low:g} to {high:g}"
+    The positions; and the angles, but where all cables end in one point, and of up to three cables
+    in a plane, which leave the platform free to turn.
+    """
+    size = len(anchor_points_m[0])
+    free = len(set(anchor_points_m)) == 1 or (size == 2 and len(anchor_points_m) <= 3)
+    return DIRECTIONS[size][: size if free else None]

@@ -7,18 +7,20 @@ from typing import Annotated
 
 from pydantic import Field
 
-from profiles.platform import Platform, PlatformFile, Point, platform_faults
-from profiles.reader import Profile, one_of
-from profiles.robot_limits import RobotLimits
-from profiles.winch import BITRATES_bit_s, Winch
-from profiles.winch_calibration import WinchCalibration
+from cdpr_profiles.limits.robot_limits import RobotLimits
+from cdpr_profiles.platform import Direction, Platform, PlatformFile, Point
+from cdpr_profiles.platform_faults import platform_faults
+from cdpr_profiles.reading.places import reference
+from cdpr_profiles.reading.reader import Profile, one_of
+from cdpr_profiles.winch import BITRATES_bit_s, Winch
+from cdpr_profiles.winch_calibration import WinchCalibration
 
-HEARTBEATS_WAITED = 1.75
-"""Periods of the master's heartbeat after which its drives take it for lost: fewer than two."""
+HEARTBEAT_TIMEOUT_PERIODS = 1.75
+"""Heartbeat time-out of the drives in periods of the master's heartbeat: fewer than two."""
 
 
 class RobotBus(Profile):
-    """One CAN bus of a robot; `url` is where it is found unless a command is told otherwise."""
+    """One CAN bus of a robot; `url` is its default, which commands may override."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,14}$")
     url: str | None = Field(default=None, min_length=1)
@@ -26,7 +28,7 @@ class RobotBus(Profile):
 
 
 class AxisFile(Profile):
-    """One axis as the file has it; `winch` is the name or path of a winch profile."""
+    """One axis in the file; `winch` is the name or path of a winch profile."""
 
     winch: str
     bus: str
@@ -36,15 +38,19 @@ class AxisFile(Profile):
     cable_sign: Annotated[int, one_of(-1, 1)] | None = None
     calibration: str | None = None
     commissioned: str | None = Field(default=None, min_length=1)
-    """Folder in which `cdpr commission` left its motor's profile, or the profile's file."""
+    """Folder in which `cdpr commission` wrote its motor's profile, or the profile's file."""
     exit_point_m: Point | None = None
     """Where its cable leaves for the platform."""
     anchor_point_m: Point | None = None
     """Where its cable is made fast, in the platform's frame."""
+    pulley_radius_m: float = Field(default=0.0, ge=0, le=1)
+    """Of the pulley over which its cable leaves; 0 for an eye."""
+    pulley_axis: Direction | None = None
+    """Direction in which the cable comes up to that pulley, about which it swivels; up if not."""
 
 
 class RobotFile(Profile):
-    """A robot as its file has it."""
+    """The file of a robot."""
 
     name: str = Field(min_length=1)
     notes: tuple[str, ...] = ()
@@ -60,7 +66,7 @@ class RobotFile(Profile):
     platform: PlatformFile | None = None
 
     def faults(self) -> Iterator[tuple[str, str]]:
-        """Yield (key, problem) for what contradicts itself."""
+        """Yield (key, problem) for contradictions."""
         yield from self.limits.faults(len(self.axes))
         yield from self._repeated_names()
         yield from self._unbounded_tensions()
@@ -68,6 +74,7 @@ class RobotFile(Profile):
             self.platform,
             [axis.exit_point_m for axis in self.axes],
             [axis.anchor_point_m for axis in self.axes],
+            [axis.pulley_axis for axis in self.axes],
         )
         if self.master_heartbeat_s < 2 * self.sync_period_s:
             allowed = f"allowed: at least two cycles ({2 * self.sync_period_s:g})"
@@ -116,13 +123,13 @@ class RobotFile(Profile):
 
 
 def default_name(axis: int) -> str:
-    """Return what the axis of this number is called where its file does not say."""
+    """Return the default name of the axis of this number."""
     return f"axis {axis}"
 
 
 @dataclass(frozen=True)
 class RobotAxis:
-    """One axis: its winch, told the robot's bit rate, cycle, node ids and heartbeat.
+    """One axis: its winch, with bit rate, cycle, node ids and heartbeat of the robot.
 
     `name` is what messages call it; `calibration` its measured tension-to-torque gain,
     `commissioned` where its motor's cogging profile is: a file, or the folder that holds it.
@@ -143,7 +150,7 @@ class Robot:
 
     `safety_io`, `tension_sensors` and `rails` are what their own loaders take. The master's
     heartbeat goes out every `master_heartbeat_s`; the drives stop by themselves (1016h, 6007h)
-    when they miss it for `HEARTBEATS_WAITED` of that.
+    when they miss it for `HEARTBEAT_TIMEOUT_PERIODS` of that.
     """
 
     profile: str
@@ -160,16 +167,14 @@ class Robot:
     master_heartbeat_s: float = 0.1
     limits: RobotLimits = field(default_factory=RobotLimits)
     platform: Platform | None = None
-    """What the axes hold together; None for winches that have nothing in common."""
+    """The platform that the axes hold; None for independent winches."""
     is_winch: bool = False
     """Whether it is a single winch, run as a robot of one axis; its file is that of the winch."""
 
     @property
     def reference(self) -> str:
-        """What `load_robot` finds this robot by from anywhere: its name, or its file's path."""
-        kind = "winches" if self.is_winch else "robots"
-        shipped = self.path.parent == Path(__file__).parent / kind
-        return self.profile if shipped else str(self.path)
+        """Reference for `load_robot` from any folder: the robot's name, or its file's path."""
+        return reference("winches" if self.is_winch else "robots", self.path)
 
     def axes_on(self, bus: str) -> tuple[int, ...]:
         """Return which axes, counted from 0, are on the bus of this name."""
@@ -181,7 +186,7 @@ def robot_of_winch(winch: Winch) -> Robot:
     heartbeat_s = max(0.1, 2 * winch.sync_period_s)
     bus = RobotBus(name="can0", bitrate_bit_s=winch.bitrate_bit_s)
     axis = RobotAxis(
-        watched_by_heartbeat(winch, heartbeat_s),
+        with_heartbeat_timeout(winch, heartbeat_s),
         bus.name,
         winch.node_id,
         mandatory=True,
@@ -201,8 +206,8 @@ def robot_of_winch(winch: Winch) -> Robot:
     )
 
 
-def watched_by_heartbeat(winch: Winch, master_heartbeat_s: float) -> Winch:
-    """Return `winch` with a drive that takes its master for lost in fewer than two heartbeats."""
-    waits_s = HEARTBEATS_WAITED * master_heartbeat_s
-    drive = winch.drive.model_copy(update={"heartbeat_consumer_s": waits_s})
+def with_heartbeat_timeout(winch: Winch, master_heartbeat_s: float) -> Winch:
+    """Return `winch` with the drive's heartbeat time-out set by the master's heartbeat."""
+    timeout_s = HEARTBEAT_TIMEOUT_PERIODS * master_heartbeat_s
+    drive = winch.drive.model_copy(update={"heartbeat_consumer_s": timeout_s})
     return replace(winch, drive=drive)

@@ -6,17 +6,18 @@ from typing import Annotated
 
 from pydantic import Field
 
-from profiles.cable import Cable
-from profiles.drive import DriveProfile
-from profiles.motor import Motor
-from profiles.reader import Profile, one_of
+from cdpr_profiles.cable import Cable
+from cdpr_profiles.drive import DriveProfile
+from cdpr_profiles.motor import Motor
+from cdpr_profiles.reading.places import reference
+from cdpr_profiles.reading.reader import Profile, one_of
 
 # Those of CiA 301.
 BITRATES_bit_s = (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
 
 
 class WinchFile(Profile):
-    """A winch as its file has it; motor, drive and cable are names or paths of other profiles."""
+    """The file of a winch; motor, drive and cable are names or paths of other profiles."""
 
     name: str = Field(min_length=1)
     notes: tuple[str, ...] = ()
@@ -59,9 +60,8 @@ class Winch:
 
     @property
     def reference(self) -> str:
-        """What `load_winch` finds this winch by from anywhere: its name, or its file's path."""
-        shipped = self.path.parent == Path(__file__).parent / "winches"
-        return self.profile if shipped else str(self.path)
+        """Reference for `load_winch` from any folder: the winch's name, or its file's path."""
+        return reference("winches", self.path)
 
     @property
     def cable_m_per_motor_rad(self) -> float:
@@ -70,5 +70,5 @@ class Winch:
 
     @property
     def latency_s(self) -> float:
-        """Nominal time from a true angle to the middle of the cycle its torque acts in."""
+        """Nominal delay from a true angle to the middle of the cycle in which its torque acts."""
         return self.drive.feedback_delay_s + self.drive.torque_delay_s + 1.5 * self.sync_period_s

@@ -1,4 +1,4 @@
-"""The calibration of one winch: what torque its motor needs for a cable tension."""
+"""The calibration of one winch: motor torque over cable tension."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from profiles.errors import ProfileError
-from profiles.motor_bounds import Faults, MotorBounds, within
-from profiles.reader import Profile, read_toml_model
-from profiles.winch import Winch
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.limits.motor_bounds import Faults, MotorBounds, within
+from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.winch import Winch
 
 
 class WinchCalibration(Profile):
@@ -45,7 +45,7 @@ class WinchCalibration(Profile):
     raw_data: tuple[str, ...]
 
     def faults(self, winch: Winch) -> Faults:
-        """Yield (key, problem) for what cannot be true of `winch`."""
+        """Yield (key, problem) for values that are impossible for `winch`."""
         bounds, nominal_m = MotorBounds(winch.motor), abs(winch.cable_m_per_motor_rad)
         if self.motor != winch.motor.model:
             yield "motor", f"value {self.motor!r}; allowed: {winch.motor.model}"

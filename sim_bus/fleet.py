@@ -8,13 +8,12 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from sim_bus.clock import ClockMode
-from sim_bus.control import status
-from sim_bus.frame_log import FrameLog
-from sim_bus.hub import Hub
-from sim_bus.node_protocol import LocalNode
-from sim_bus.server import heard_by, open_hub, run_until_stopped
-from sim_bus.watcher import FINE_WAIT_S
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.bus.node_protocol import LocalNode
+from cdpr_sim_bus.bus.server import open_hub, run_until_stopped, with_frame_log
+from cdpr_sim_bus.bus.watcher import FINE_WAIT_S
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.frame_log import FrameLog
 
 
 @dataclass(frozen=True)
@@ -28,13 +27,13 @@ class FleetBus:
 
 
 class Fleet:
-    """The loops of several hubs, each of which keeps its own bus time."""
+    """Event loop of several hubs, each with its own bus time."""
 
     def __init__(self, hubs: Sequence[Hub]) -> None:
         self._hubs = {hub.fileno(): hub for hub in hubs}
         self._first = hubs[0]
-        for hub in hubs:
-            hub.fellows = hubs
+        for number, hub in enumerate(hubs):
+            hub.robot_hubs, hub.buses_before = hubs, hubs[:number]
         self._poller = select.epoll()
         for descriptor in self._hubs:
             self._poller.register(descriptor, select.EPOLLIN)
@@ -59,21 +58,23 @@ class Fleet:
             hub.check()
 
     def _turn(self) -> None:
-        """Let those hubs have their turn which have frames, or whose wait is over."""
+        """Run a turn of those hubs that have frames or whose wait is over."""
         waits = {hub: hub.wait_s() for hub in self._hubs.values()}
-        least = min((wait for wait in waits.values() if wait is not None), default=None)
-        if least and least < FINE_WAIT_S:
-            select.select([self._poller], [], [], least)
-        ready = dict(self._poller.poll(0.0 if least is not None and least < FINE_WAIT_S else least))
+        shortest = min((wait for wait in waits.values() if wait is not None), default=None)
+        if shortest and shortest < FINE_WAIT_S:
+            select.select([self._poller], [], [], shortest)
+        ready = dict(
+            self._poller.poll(0.0 if shortest is not None and shortest < FINE_WAIT_S else shortest)
+        )
         # always in the same order, as the drives of all buses may share their physics
         for descriptor, hub in self._hubs.items():
             if descriptor in ready:
                 hub.turn(0.0)
                 waits.pop(hub)
         # with frames on one bus no time has passed on the others
-        over = 0.0 if ready else least
+        expired = 0.0 if ready else shortest
         for hub, wait in waits.items():
-            if wait is not None and over is not None and wait <= over:
+            if wait is not None and expired is not None and wait <= expired:
                 hub.turn(0.0)
 
     def close(self) -> None:
@@ -100,7 +101,7 @@ def serve_fleet(
         hubs = {
             bus.name: open_hub(
                 stack,
-                heard_by(bus.nodes, frame_log, bus.name),
+                with_frame_log(bus.nodes, frame_log, bus.name),
                 bus.url,
                 mode=mode,
                 bitrate=bus.bitrate_bit_s,
@@ -109,6 +110,6 @@ def serve_fleet(
         }
         fleet = Fleet(list(hubs.values()))
         stack.callback(fleet.close)
-        told = {bus.name: {"bus": bus.url, **status(hubs[bus.name])} for bus in buses}
-        ready = {"robot": robot, "pid": os.getpid(), "buses": told}
+        report = {bus.name: {"bus": bus.url, **hubs[bus.name].status()} for bus in buses}
+        ready = {"robot": robot, "pid": os.getpid(), "buses": report}
         run_until_stopped(fleet, ready, mode, until_stdin_ends)

@@ -9,14 +9,14 @@ import math
 import sys
 from pathlib import Path
 
-from sim_bus.frame import EFF_FLAG, EFF_MASK, FRAME, RTR_FLAG, SFF_MASK
+from cdpr_sim_bus.frame import EFF_FLAG, EFF_MASK, FRAME, RTR_FLAG, SFF_MASK
 
 _WRITTEN_AT = 4096
 _MOST_WAITING = 1 << 18
 
 
 class FrameLog:
-    """Writes what its ears have heard: by bus time, at one instant bus by bus as they were opened.
+    """Writes the frames of its listeners by bus time, at one instant in the order of the buses.
 
     So the order does not depend on which of several buses the simulator looked at first. A file
     that cannot be written on ends, and says so; the buses go on.
@@ -32,22 +32,22 @@ class FrameLog:
         except BlockingIOError:
             self._file.close()
             raise OSError(errno.EBUSY, "another simulator writes it") from None
-        self._ears: list[FrameEar] = []
+        self._listeners: list[FrameListener] = []
         self._waiting = 0
 
-    def ear(self, channel: str) -> FrameEar:
-        """Return what hears one more bus, called `channel` in the log."""
-        ear = FrameEar(self, channel)
-        self._ears.append(ear)
-        return ear
+    def listener(self, channel: str) -> FrameListener:
+        """Return a listener for one more bus, called `channel` in the log."""
+        listener = FrameListener(self, channel)
+        self._listeners.append(listener)
+        return listener
 
     def count(self) -> None:
-        """Note that one more frame waits to be written."""
+        """Count one more frame that waits to be written."""
         self._waiting += 1
         if self._waiting % _WRITTEN_AT == 0:
             # a bus that stands behind the others for ever does not fill the memory
             over = self._waiting >= _MOST_WAITING
-            self._write(math.inf if over else min(ear.now_s for ear in self._ears))
+            self._write(math.inf if over else min(listener.now_s for listener in self._listeners))
 
     def close(self) -> None:
         """Write what waits and close the file; safe to repeat."""
@@ -56,7 +56,7 @@ class FrameLog:
 
     def _write(self, before_s: float) -> None:
         """Write the frames of the time before `before_s`, when no bus can add to them any more."""
-        parts = [ear.take(before_s) for ear in self._ears]
+        parts = [listener.take(before_s) for listener in self._listeners]
         self._waiting -= sum(map(len, parts))
         lines = heapq.merge(*parts, key=lambda entry: entry[0])
         data = memoryview(b"".join(_line(*entry) for entry in lines))
@@ -68,8 +68,8 @@ class FrameLog:
             self._file.close()
 
 
-class FrameEar:
-    """A node without an id that hears every frame of its bus and says nothing."""
+class FrameListener:
+    """A node without an id that receives every frame of its bus and sends nothing."""
 
     node_id = 0
     sync_period_s = 0.0
@@ -81,12 +81,12 @@ class FrameEar:
         """Bus time that the bus has come to."""
         self._log = log
         self._channel = channel.encode()
-        self._heard: list[tuple[float, bytes, bytes]] = []
+        self._frames: list[tuple[float, bytes, bytes]] = []
 
     def receive(self, frame: bytes, now: float) -> None:
         """Keep a frame for the log."""
         self.now_s = now
-        self._heard.append((now, self._channel, frame))
+        self._frames.append((now, self._channel, frame))
         self._log.count()
 
     def advance(self, now: float) -> None:
@@ -98,17 +98,17 @@ class FrameEar:
         return math.inf
 
     def close(self) -> None:
-        """Complete the log, as no more is heard of its buses."""
+        """Complete the log, as no frames follow."""
         self._log.close()
 
     def take(self, before_s: float) -> list[tuple[float, bytes, bytes]]:
-        """Return the time, channel and frame of what was heard before then, and forget it."""
-        heard = self._heard
-        count = len(heard)
-        while count and heard[count - 1][0] >= before_s:
+        """Remove and return time, channel and frame of what came before `before_s`."""
+        frames = self._frames
+        count = len(frames)
+        while count and frames[count - 1][0] >= before_s:
             count -= 1
-        self._heard = heard[count:]
-        return heard[:count]
+        self._frames = frames[count:]
+        return frames[:count]
 
 
 def _line(time_s: float, channel: bytes, frame: bytes) -> bytes:

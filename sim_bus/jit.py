@@ -1,7 +1,10 @@
 """Compile the numeric kernels of the simulation to machine code."""
 
 import hashlib
+import importlib
+import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -12,6 +15,24 @@ _SETTINGS: Any = config
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
+def _skip_blas() -> None:
+    """Have numba load what it knows of arrays without scipy.linalg, 0.2 s of each process's start.
+
+    It looks for scipy's BLAS to know whether kernels may call np.cov and np.corrcoef. Others of
+    its functions of linear algebra look for it when they are compiled.
+    """
+    blas = "scipy.linalg.cython_blas"
+    if blas not in sys.modules:
+        sys.modules[blas] = cast(Any, None)  # makes its import fail
+        try:
+            importlib.import_module("numba.np.arraymath")
+        finally:
+            del sys.modules[blas]
+
+
+_skip_blas()
+
+
 def _kernel_cache() -> str:
     """Return a cache directory that belongs to this state of the kernels' sources.
 
@@ -20,9 +41,9 @@ def _kernel_cache() -> str:
     """
     here = Path(__file__).parent
     digest = hashlib.sha256()
-    for source in sorted(here.glob("*.py")):
+    for source in sorted(here.rglob("*.py")):
         text = source.read_bytes()
-        if b"from sim_bus.jit import" in text:
+        if b"from cdpr_sim_bus.jit import" in text:
             digest.update(text)
     base = Path(_SETTINGS.CACHE_DIR or here / "__pycache__")
     return str(base / f"kernels-{digest.hexdigest()[:12]}")
@@ -39,3 +60,14 @@ def jit(function: _F) -> _F:
         return cast(_F, numba.njit(cache=True)(function))
     finally:
         _SETTINGS.CACHE_DIR = elsewhere
+
+
+def bound(kernel: Callable[..., Any], *arrays: Any, then: tuple[Any, ...]) -> Callable[..., Any]:
+    """Return the compiled `kernel` with its first arguments fixed, so that no call looks at types.
+
+    `then` has an example of each argument that is left.
+    """
+    dispatcher: Any = kernel
+    type_of: Callable[[Any], Any] = numba.typeof
+    types = tuple(type_of(argument) for argument in (*arrays, *then))
+    return partial(dispatcher.compile(types), *arrays)

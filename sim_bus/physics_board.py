@@ -1,7 +1,7 @@
-"""The physics board: a small shared file through which simulated devices feel each other.
+"""The physics board: a small shared file through which simulated devices interact.
 
 The simulated drives write what really happens to motor and cable; simulated sensors, safety
-devices and hands, each in a process of its own, read it and write what they do to the winch.
+devices and operators, each in a process of its own, read it and write power, brake and mass.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
-from sim_bus.errors import BusSetupError
+from cdpr_sim_bus.errors import BusSetupError
 
 _T = TypeVar("_T")
 _HEADER = struct.Struct("<8sIII")
@@ -25,7 +25,7 @@ _MAX_AXES = 256
 # each 8 bytes: the drive's own part first, behind its sequence number, then what others write
 _SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON, _COUNT = range(7)
 _POWER_FROM, _POWER_UNTIL, _BRAKE_FROM, _BRAKE_UNTIL, _MASS = range(7, 12)
-# the course of the tension behind it, a ring of instants and tensions, by the drive as well
+# history of the tension behind it, a ring buffer of times and tensions, by the drive as well
 _SAMPLES, _SPACING_S = 512, 0.9e-3
 _RING = 16
 _WORDS = _RING + 2 * _SAMPLES
@@ -52,7 +52,7 @@ class BoardState(NamedTuple):
 
 
 class BoardAxis:
-    """One axis of a board. The drive calls `publish`, everybody may read; the setters are others'.
+    """One axis of a board. The drive calls `publish`; other devices call the setters; all may read.
 
     Every field has one writer. Reads of the drive's part are consistent: they are repeated while a
     write is under way (a sequence lock; it relies on stores becoming visible in order, as on x86).
@@ -97,12 +97,12 @@ class BoardAxis:
         return self._numbers[_TIME]
 
     def state(self) -> BoardState:
-        """Return what the drive last wrote; after a writer that died in the middle, what stands."""
-        told = self._consistent(self._numbers[_TIME : _POWER_ON + 1].tolist)
-        time_s, tension, angle, speed, power = told
+        """Return what the drive wrote last, as it is where the writer died in the middle."""
+        numbers = self._consistent(self._numbers[_TIME : _POWER_ON + 1].tolist)
+        time_s, tension, angle, speed, power = numbers
         return BoardState(time_s, tension, angle, speed, power != 0.0)
 
-    def course(self, after: int) -> tuple[int, list[Window]]:
+    def tension_history(self, after: int) -> tuple[int, list[Window]]:
         """Return how many samples of the tension there have been, and those that came `after`.
 
         A sample is (bus time, tension in N), one a millisecond at the most; only the last
@@ -118,12 +118,12 @@ class BoardAxis:
         words = self._words
         for attempt in range(_TRIES):
             before = words[_SEQUENCE]
-            told = read()
+            value = read()
             if not before & 1 and words[_SEQUENCE] == before:
                 break
             if attempt > _SPINS:  # its process waits for a core, perhaps for ours
                 time.sleep(_PAUSE_S)
-        return told
+        return value
 
     # -- what others write
 
@@ -262,7 +262,7 @@ class PhysicsBoard:
 
 
 def common_time(boards: Sequence[PhysicsBoard]) -> Callable[[], float] | None:
-    """Return what tells the bus time of boards in lockstep, None where the clock counts.
+    """Return a function that gives the bus time of boards in lockstep, None for paced ones.
 
     Raises BusSetupError where some of them are in lockstep and others not.
     """

@@ -1,4 +1,4 @@
-"""How a simulator tells that it is up: JSON for programs, a few lines on a terminal."""
+"""The ready line of a simulator: JSON for programs, a few lines on a terminal."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-_TOLD = ("robot", "bus", "mode", "nodes", "slcan", "socketcand", "truth_log")
+_SHOWN_KEYS = ("robot", "bus", "mode", "nodes", "slcan", "socketcand", "truth_log")
 
 
-def tell_ready(ready: dict[str, Any]) -> None:
-    """Print {"ready": ...} as one line of JSON, or what a person wants to know on a terminal."""
+def print_ready(ready: dict[str, Any]) -> None:
+    """Print {"ready": ...} as one line of JSON, or a readable text on a terminal."""
     if not sys.stdout.isatty():
         print(json.dumps({"ready": ready}), flush=True)
         return
@@ -21,7 +21,7 @@ def tell_ready(ready: dict[str, Any]) -> None:
 
 
 def _lines(ready: dict[str, Any]) -> Iterator[str]:
-    for key in _TOLD:
+    for key in _SHOWN_KEYS:
         value = ready.get(key)
         if value is not None:
             shown = ", ".join(map(str, value)) if isinstance(value, list) else value

@@ -1,4 +1,4 @@
-"""A file of true records (`--truth-log`) that begins by describing them."""
+"""A file of records that begins by describing them: what was true, or measured from outside."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RecordFile:
             while data:
                 data = data[self._file.write(data) :]
         except OSError as error:
-            print(f"truth log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
+            print(f"log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
             self._file.close()
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ from unittest import mock
 
 import pytest
 
-from tools.cli import main
+from cdpr_tools.cli import main
 
 
 def cdpr_here(

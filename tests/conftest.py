@@ -7,15 +7,20 @@ import sys
 from collections.abc import Generator
 from typing import Any
 
+import fork_server
 import pytest
 import pytest_timeout
 from xdist.scheduler import LoadScopeScheduling
 
 # before anything loads numpy: threads that spin for work take the cores of the other processes
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+for _library in ("OPENBLAS", "OMP", "NUMBA"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+# profiles of whoever runs the tests are none of theirs
+os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
 # tests start hundreds of processes, none of which is to compile all sources anew
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+fork_server.install()
 
 
 class _ByFile(LoadScopeScheduling):
@@ -29,6 +34,14 @@ class _ByFile(LoadScopeScheduling):
         if "/test_vcan_" in file:
             return "vcan"
         return "daemon" if "/hil/test_daemon_" in file or "/test_bench_loop" in file else file
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Where tests run, compile no kernel that another process compiles."""
+    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
+        import kernel_locks  # noqa: PLC0415  not for the process that only shares tests out
+
+        kernel_locks.install()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:

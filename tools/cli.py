@@ -2,90 +2,148 @@
 
 from __future__ import annotations
 
-import importlib
+import json
 import sys
-from functools import cache
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
-from cdpr_rt.errors import ControlError
-from drivers.errors import DriverError
-from profiles.errors import ProfileError
-from sim_bus.errors import BusSetupError, SimulatorError
-from tools.errors import BAD_INPUT, DONE, FAILED, CommandError
-from tools.output import to_json
+from cdpr_drivers.errors import ConfigurationError, DriverError
+from cdpr_profiles.errors import ProfileError
+from cdpr_rt.errors import ControlError, InvalidRequestError
+from cdpr_sim_bus.errors import BusSetupError, SimulatorError
+from cdpr_tools.command_group import group_of
+from cdpr_tools.errors import BAD_INPUT, DONE, FAILED, CommandError
+
+MODULES = {
+    "commission": {
+        "commission": "Measure, identify, validate and report motors, each detached from its load.",
+    },
+    "doctor": {
+        "doctor": "Look at this machine and say what to mend before a robot runs on it.",
+    },
+    "daemon.estop": {
+        "estop": "Take the power from a robot's drives at once: no braking, no lowering; brakes "
+        "are applied.",
+    },
+    "daemon.run": {
+        "run": "Run a robot's control loop as a daemon; it stands ready, without power, until "
+        "enabled.",
+    },
+    "daemon.service_unit": {
+        "service-unit": "Print a systemd unit that runs the robot's daemon; takes the options of "
+        "`cdpr run` as well.",
+    },
+    "daemon.daemon_motion": {
+        "jog": "Turn axes at a speed for a while; they stop when this command does, however it "
+        "ends.",
+        "move": "Take axes or the platform to positions and wait until there; Ctrl-C holds and "
+        "fails.",
+        "controller": "Change over to a program and stay with it until it is done; hold follows "
+        "then.",
+    },
+    "daemon.daemon_platform": {
+        "tighten": "Take up the slack of a platform's cables and learn where it is; it is held "
+        "then.",
+        "lower": "Let the platform down onto its stand; the power stays on, the cables are loose.",
+        "pause": "Stop the platform and hold it there; `resume` goes on.",
+        "resume": "Go on to the position that the platform had not reached when it was paused.",
+    },
+    "daemon.daemon_state": {
+        "status": "Say how a daemon and its robot are; changes nothing.",
+        "check": "Boot the drives anew and check the bus without power; ready afterwards.",
+        "enable": "Give the drives power; they hold where they are.",
+        "disable": "Stop the motion under control, then take the power off.",
+        "hold": "Stop the motion and stay there, whoever moves; the power stays on.",
+        "ack": "Acknowledge a fault whose cause is gone; nothing gets power by it.",
+        "stop": "End the daemon: the motion stops under control, the power goes off.",
+    },
+    "bench.bench": {
+        "bench": "Measure this project's own cost on this machine.",
+    },
+    "bus.bus": {
+        "bus": "Look at a CAN bus.",
+    },
+    "cogging": {
+        "cogging": "Cogging: sweep, fit, validate, report.",
+    },
+    "drive.drive": {
+        "drive": "One drive on the bus.",
+    },
+    "io": {
+        "io": "The safety I/O beside the drives.",
+    },
+    "log": {
+        "log": "The daemon's recordings: what is in them, as tables and pictures.",
+    },
+    "profiles": {
+        "profiles": "Profiles of motors, drives, cables, winches and robots.",
+    },
+    "rail": {
+        "rail": "The rails on which winches stand.",
+    },
+    "robot": {
+        "robot": "Describe a cable robot, look at it, try it.",
+    },
+    "sim.sim": {
+        "sim": "Simulated winches on a CAN bus.",
+    },
+    "daemon.teleop": {
+        "teleop": "Lead a robot by hand: `cdpr teleop ROBOT` means `cdpr teleop robot ROBOT`.",
+    },
+    "tension": {
+        "tension": "Cable tensions: watch, tare, calibrate.",
+    },
+}
+_INTERRUPTED = 130
+_BAD_INPUTS = (ProfileError, BusSetupError, ConfigurationError, InvalidRequestError)
 
 app = typer.Typer(
+    cls=group_of(MODULES),
     name="cdpr",
     help="Commission, run and simulate the winches of cable-driven parallel robots.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
-_COMMANDS = (
-    "bench",
-    "bus",
-    "cogging",
-    "commission",
-    "doctor",
-    "drive",
-    "estop",
-    "io",
-    "log",
-    "profiles",
-    "rail",
-    "robot",
-    "run",
-    "service-unit",
-    "sim",
-    "teleop",
-    "tension",
-)
-_OF_A_DAEMON = {
-    "daemon_motion": ("controller", "jog", "move"),
-    "daemon_platform": ("lower", "pause", "resume", "tighten"),
-    "daemon_state": ("ack", "check", "disable", "enable", "hold", "status", "stop"),
-}
-_MODULES = {name: name.replace("-", "_") for name in _COMMANDS} | {
-    name: module for module, names in _OF_A_DAEMON.items() for name in names
-}
-_INTERRUPTED = 130
+
+def _tell_version(asked: bool) -> None:
+    if asked:
+        # loaded here: it takes longer than the help
+        from importlib.metadata import version  # noqa: PLC0415
+
+        print(f"cdpr {version('cdpr-rt')}")
+        raise typer.Exit
 
 
 @app.callback()
-def _group() -> None:
+def _group(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", callback=_tell_version, is_eager=True, help="Tell the version."),
+    ] = False,
+) -> None:
     """Commission, run and simulate the winches of cable-driven parallel robots."""
 
 
-def _register(arguments: list[str]) -> None:
-    """Load the commands; only the one that is asked for, since each brings libraries along."""
-    asked = _MODULES.get(arguments[0]) if arguments else None
-    for module in [asked] if asked else dict.fromkeys(_MODULES.values()):
-        _load(module)
-
-
-@cache
-def _load(module: str) -> None:
-    """Add the commands of a module, once however often `main` runs in this process."""
-    importlib.import_module(f"tools.commands.{module}").register(app)
-
-
-def _exit_status(error: BaseException) -> int:
+def exit_status(error: BaseException) -> int:
+    """Return with what the command ends that `error` has ended."""
     if isinstance(error, CommandError):
         return error.exit_status
-    return BAD_INPUT if isinstance(error, ProfileError | BusSetupError) else FAILED
+    return BAD_INPUT if isinstance(error, _BAD_INPUTS) else FAILED
 
 
 def main() -> None:
     """Run the command line; a known error is one line on standard error, never a traceback."""
     try:
-        _register(sys.argv[1:])
         app(standalone_mode=True)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:
         notes = getattr(error, "__notes__", ())
-        _end("; ".join([str(error), *notes]), _exit_status(error))
+        _end("; ".join([str(error), *notes]), exit_status(error))
+    except ModuleNotFoundError as error:
+        if not error.name or error.name.startswith("cdpr_"):
+            raise
+        _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[daemon]'", FAILED)
     except KeyboardInterrupt:  # while libraries are loaded
         _end("interrupted", FAILED)
     except SystemExit as end:
@@ -99,7 +157,7 @@ def main() -> None:
 def _end(message: str, status: int) -> NoReturn:
     print(f"cdpr: {message}", file=sys.stderr)
     if "--json" in sys.argv:
-        print(to_json({"ok": False, "error": message, "exit_status": status}))
+        print(json.dumps({"ok": False, "error": message, "exit_status": status}))
     sys.exit(status)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError
 
 
 def require_consent(question: str, yes: bool) -> None:

@@ -12,8 +12,6 @@ class CommandError(Exception):
 class WorkFailedError(CommandError):
     """The work was begun and failed: a drive fault, a limit, a lost bus."""
 
-    exit_status = FAILED
-
 
 class BadInputError(CommandError):
     """The command cannot begin: a wrong argument, file, profile or bus."""

@@ -44,9 +44,10 @@ class Output:
         self.notes = Console(stderr=True, highlight=False, emoji=False)
         self.text = self.notes if as_json else Console(highlight=False, emoji=False)
 
-    def say(self, text: str) -> None:
-        """Write a line for people."""
-        self.text.print(text, markup=False, soft_wrap=True)
+    def say(self, *lines: str) -> None:
+        """Write lines for people."""
+        for line in lines:
+            self.text.print(line, markup=False, soft_wrap=True)
 
     def note(self, text: str) -> None:
         """Write a line on what is going on, to standard error."""

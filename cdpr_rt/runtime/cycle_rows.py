@@ -1,146 +1,90 @@
-"""Writes the row of each cycle straight into the shared ring."""
+"""Writes the row of each cycle into the shared ring."""
 
 from __future__ import annotations
 
 import struct
-from typing import Any
+from operator import attrgetter
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cdpr_rt.cycle import Cycle
-from cdpr_rt.exchange import BoolArray, FloatArray, Setpoint, WordArray
-from cdpr_rt.jit import jit
-from cdpr_rt.runtime.estimate import AxisEstimate
-from cdpr_rt.runtime.programs.base import Program
-from cdpr_rt.runtime.shared_block import RowWriter, SharedBlock
+from cdpr_rt.core.cycle_row import AXIS_FIELDS, POSE_FIELDS, SCALAR_FIELDS, Field
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.shared_block import RowWriter, SharedBlock
+from cdpr_rt.jit import bound, copy_bytes, jit
 
-_SCALARS = struct.Struct("<QdqdddQQdQBBBBhH")
+_CODES: Final = {"<u8": "Q", "<i8": "q", "<f8": "d", "<u2": "H", "<i2": "h", "<u1": "B"}
+_SCALARS = struct.Struct("<" + "".join(_CODES[field.kind] for field in SCALAR_FIELDS))
+_scalars_of = attrgetter(*(field.source for field in SCALAR_FIELDS))
+_axes_of = attrgetter(*(field.source for field in AXIS_FIELDS))
+_poses_of = attrgetter(*(field.source for field in POSE_FIELDS))
 _UNKNOWN = np.full(7, np.nan)
 
 
 @jit
 def _fill(
-    rows: Any,
+    copies: NDArray[np.int64],
+    rows: int,
+    size: int,
+    pose_rows: FloatArray,
+    poses: tuple[FloatArray, ...],
     k: int,
-    pose: FloatArray,
-    pose_setpoint: FloatArray,
-    setpoint: FloatArray,
-    setpoint_velocity: FloatArray,
-    position: FloatArray,
-    velocity: FloatArray,
-    actual: FloatArray,
-    asked: FloatArray,
-    sent: FloatArray,
-    effort: FloatArray,
-    compensation: FloatArray,
-    tension: FloatArray,
-    length: FloatArray,
-    index: FloatArray,
-    statusword: WordArray,
-    valid: BoolArray,
-    alive: BoolArray,
-    rate_ok: BoolArray,
-    index_known: BoolArray,
-    measured: BoolArray,
 ) -> None:
-    row = rows[k]
-    for i in range(position.size):
-        row.setpoint_rad[i] = setpoint[i]
-        row.setpoint_velocity_rad_s[i] = setpoint_velocity[i]
-        row.position_rad[i] = position[i]
-        row.velocity_rad_s[i] = velocity[i]
-        row.torque_actual_Nm[i] = actual[i]
-        row.torque_asked_Nm[i] = asked[i]
-        row.torque_sent_Nm[i] = sent[i]
-        row.effort_Nm[i] = effort[i]
-        row.compensation_Nm[i] = compensation[i]
-        row.tension_N[i] = tension[i]
-        row.cable_length_m[i] = length[i]
-        row.index_rad[i] = index[i]
-        row.statusword[i] = statusword[i]
-        row.valid[i] = valid[i]
-        row.alive[i] = alive[i]
-        row.rate_ok[i] = rate_ok[i]
-        row.index_known[i] = index_known[i]
-        row.tension_measured[i] = measured[i]
-    for i in range(7):
-        row.pose[i] = pose[i]
-        row.pose_setpoint[i] = pose_setpoint[i]
-
-
-def _with_bytes(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Return the type of a row with its flags as bytes, since kernels know no arrays of flags."""
-    fields: list[Any] = []
-    for name in dtype.names or ():
-        kind, shape = dtype[name].base, dtype[name].shape
-        fields.append((name, np.uint8 if kind == np.bool_ else kind, shape))
-    return np.dtype(fields)
+    for j in range(copies.shape[0]):
+        copy_bytes(rows + k * size + copies[j, 0], copies[j, 1], copies[j, 2])
+    for j in range(len(poses)):
+        for i in range(7):
+            pose_rows[k, j, i] = poses[j][i]
 
 
 class CycleRows:
-    """One row a cycle, filled where it lies; nothing is allocated.
+    """Fills one row a cycle in place, without allocating memory that stays.
 
-    The scalars, which come first in a row, are packed at once.
+    The scalars, which come first in a row, are packed in one call. Arrays over the axes are copied
+    from their addresses: passing 18 arrays to compiled code costs more than copying them.
     """
 
     def __init__(self, block: SharedBlock) -> None:
         self._writer = RowWriter(block)
-        self._raw = memoryview(block.rows.view(np.uint8).data)
-        self._rows = block.rows.view(_with_bytes(block.rows.dtype))
-        self._size = block.rows.dtype.itemsize
+        rows, n = block.rows, block.n
+        self._rows = rows
+        self._raw = memoryview(rows.view(np.uint8).data)
+        self._size = rows.dtype.itemsize
         self._capacity = block.capacity
         self._written = int(block.counters["rows"][0])
-        n = block.n
-        self._axes: Any = (
-            *(np.zeros(n) for _ in range(12)),
-            np.zeros(n, np.uint16),
-            *(np.zeros(n, np.bool_) for _ in range(5)),
-        )
-        # compiled here, not in a cycle; the next row to be written takes this one's place
-        _fill(self._rows, self._written % self._capacity, _UNKNOWN, _UNKNOWN, *self._axes)
+        shape, at = (self._capacity, len(POSE_FIELDS), 7), self._offset(POSE_FIELDS[0])
+        self._poses = np.ndarray(shape, "<f8", self._raw, at, (self._size, 7 * 8, 8))
+        # compiled here, not in a cycle
+        self._bind(tuple(np.zeros(n, field.kind) for field in AXIS_FIELDS))
 
-    def follow(
-        self,
-        cycle: Cycle,
-        setpoint: Setpoint,
-        estimate: AxisEstimate,
-        program: Program,
-        asked_Nm: FloatArray,
-    ) -> None:
-        """Take the axes' values from these arrays from now on; `asked_Nm` before its limits."""
-        feedback, command = cycle.device.feedback, cycle.device.command
-        self._axes = (
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            feedback.position_rad,
-            estimate.velocity_rad_s,
-            feedback.torque_Nm,
-            asked_Nm,
-            command.sent_torque_Nm,
-            program.controller.effort_Nm,
-            program.controller.compensation_Nm,
-            estimate.tension_N,
-            estimate.cable_length_m,
-            feedback.index_rad,
-            feedback.statusword,
-            feedback.valid,
-            feedback.alive,
-            feedback.rate_ok,
-            feedback.index_known,
-            estimate.tension_measured,
-        )
+    def _offset(self, field: Field) -> int:
+        fields: Any = self._rows.dtype.fields
+        return int(fields[field.name][1])
 
-    def write(self, program: Program, *scalars: float) -> None:
-        """Write and publish one row; `scalars` are a row's first fields, in their order."""
+    def _bind(self, axes: tuple[NDArray[Any], ...]) -> None:
+        copies = np.zeros((len(axes), 3), np.int64)
+        for copy, field, values in zip(copies, AXIS_FIELDS, axes, strict=True):
+            kind, allowed = np.dtype((values.dtype, values.shape)), self._rows.dtype[field.name]
+            if kind != allowed or not values.flags.c_contiguous:
+                raise TypeError(f"{field.source}: {kind}; allowed: {allowed}, contiguous")
+            copy[:] = self._offset(field), values.ctypes.data, values.nbytes
+        self._axes = axes  # their addresses hold as long as they live
+        rows, then = self._rows.ctypes.data, ((_UNKNOWN,) * len(POSE_FIELDS), 0)
+        self._fill = bound(_fill, copies, rows, self._size, self._poses, then=then)
+
+    def follow(self, engine: Any) -> None:
+        """Bind the arrays over the axes that `engine` has now at the sources of their fields.
+
+        Raises TypeError where one has another type, length or layout than its field.
+        """
+        self._bind(_axes_of(engine))
+
+    def write(self, engine: Any) -> None:
+        """Write and publish one row of what `engine` has now."""
         k = self._written % self._capacity
-        _SCALARS.pack_into(self._raw, k * self._size, *scalars)
-        pose, wanted = program.pose, program.pose_setpoint
-        _fill(
-            self._rows,
-            k,
-            _UNKNOWN if pose is None else pose,
-            _UNKNOWN if wanted is None else wanted,
-            *self._axes,
-        )
+        _SCALARS.pack_into(self._raw, k * self._size, *_scalars_of(engine))
+        poses = tuple([_UNKNOWN if pose is None else pose for pose in _poses_of(engine)])
+        self._fill(poses, k)
         self._written += 1
         self._writer.commit()

@@ -1,15 +1,15 @@
-"""What the control loop needs of the drives and of what guards them; it knows no bus itself."""
+"""Interface of the control loop to drives, brakes and safety I/O; it knows no bus."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from cdpr_rt.clock import Clock
-from cdpr_rt.cycle import Watch
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.cycle import Watch
+from cdpr_rt.core.exchange import AxisDevice
+from cdpr_rt.core.tension import TensionFeedback
 from cdpr_rt.errors import ControlError
-from cdpr_rt.exchange import AxisDevice
-from cdpr_rt.tension import TensionFeedback
 
 
 class MachineError(ControlError):
@@ -17,23 +17,23 @@ class MachineError(ControlError):
 
 
 class Machine(Protocol):
-    """The axes of one robot with their buses, brakes and guards.
+    """The axes of one robot with their buses, brakes and safety I/O.
 
     The slow methods are called in a task of `clock`, while cycles run or not, and wait by it alone;
     they raise MachineError. All others are called in a cycle and wait for nothing.
     """
 
     failures: tuple[type[Exception], ...]
-    """What the device raises when a bus is gone."""
+    """The exceptions that the device raises when a bus is lost."""
     read_only: bool
     """Whether nothing is ever sent, because another master runs the axes."""
     watches: Sequence[Watch]
     notices: Sequence[str]
-    """What people should know of the drives that have booted."""
+    """Notices on the booted drives, for the status."""
 
     @property
     def clock(self) -> Clock:
-        """The robot's time, the same one from beginning to end."""
+        """The robot's time; one object for the life of the machine."""
 
     @property
     def device(self) -> AxisDevice | None:
@@ -41,7 +41,7 @@ class Machine(Protocol):
 
     @property
     def safety(self) -> str:
-        """What guards the power besides the bus, for people."""
+        """Text of the safety I/O's state, for the status."""
 
     @property
     def has_brakes(self) -> bool:
@@ -53,22 +53,22 @@ class Machine(Protocol):
         """Open the buses and boot the drives; they are left without power."""
 
     def prepare(self) -> None:
-        """Do what must be done before cycles run for a check: contactor, mode of operation."""
+        """Prepare a check: close the contactor, set the mode of operation."""
 
     def acknowledge(self) -> None:
-        """Forget what the guards have latched, whose cause is gone."""
+        """Acknowledge what the safety I/O has latched."""
 
     def pause(self) -> None:
-        """Leave the drives, which have no power, for a while without cycles."""
+        """Leave the drives, which have no power, without cycles until `prepare`."""
 
-    def make_sure(self) -> str:
-        """See to it that no drive has power which does not answer; return what is uncertain."""
+    def confirm_power_off(self) -> str:
+        """Remove the power of drives that do not answer; return what is unconfirmed."""
 
     def explain(self, reason: str) -> str:
-        """Return `reason` with what drives and guards say of it when they are asked."""
+        """Return `reason` with what drives and safety I/O report of it."""
 
     def close(self) -> str:
-        """Take the power from the drives and leave the buses; return what stayed uncertain."""
+        """Remove the drives' power and leave the buses; return what is unconfirmed."""
 
     # -- in a cycle
 
@@ -85,10 +85,10 @@ class Machine(Protocol):
         """Return which drive does not confirm what `prepare` asked of it."""
 
     def power_on(self) -> None:
-        """Ask all drives for their power; raises MachineError where one must not have it."""
+        """Enable all drives; raises MachineError where one must not be."""
 
     def power_off(self) -> None:
-        """Take torque and power from all drives with this cycle's command."""
+        """Remove torque and power of all drives with this cycle's command."""
 
     def quick_stop(self) -> None:
         """Have all drives brake by themselves, then switch off, from this cycle's command on."""
@@ -97,10 +97,10 @@ class Machine(Protocol):
         """Whether all drives have their power and obey."""
 
     def unpowered(self) -> bool:
-        """Whether no drive that can be heard has power, by what it said last."""
+        """Whether no drive that answers has power, by its last answer."""
 
     def reset_faults(self) -> None:
-        """Forget latched alarms and have faults reset in the cycles that follow."""
+        """Clear latched alarms and reset the drives' faults in the cycles that follow."""
 
     def intact(self) -> bool:
         """Whether every drive answers and needs no new boot."""
@@ -109,10 +109,10 @@ class Machine(Protocol):
         """Whether no drive is in fault."""
 
     def set_brakes(self, released: bool) -> None:
-        """Have the brakes released or applied; does not wait for them."""
+        """Release or apply the brakes, without waiting for them."""
 
     def brakes_are(self, released: bool) -> bool:
         """Whether the brakes have followed; true where there are none."""
 
     def states(self) -> list[str]:
-        """Return what each drive says of itself, in the standard's words."""
+        """Return each drive's state, in the words of CiA 402."""

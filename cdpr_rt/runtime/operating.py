@@ -1,34 +1,34 @@
-"""What a procedure does with a running loop: one thing after the other, each waited for."""
+"""A loop operated by a procedure in the same process, step by step."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from typing import TypeVar
 
-from cdpr_rt.controllers.base import Controller
-from cdpr_rt.cycle import Lateness
+from cdpr_rt.control.base import Controller
+from cdpr_rt.core.cycle import Lateness
+from cdpr_rt.core.exchange import AxisDevice
+from cdpr_rt.core.rawlog import RawLogWriter, raw_rows
+from cdpr_rt.core.shared_block import RowReader
+from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import InterruptedMotionError, NotInTimeError, TripError
-from cdpr_rt.exchange import AxisDevice
-from cdpr_rt.raw_rows import raw_rows
-from cdpr_rt.rawlog import RawLogWriter
-from cdpr_rt.runtime import procedures
-from cdpr_rt.runtime.loop import HOLD, IDLE, ControlLoop
-from cdpr_rt.runtime.programs.track import TrackProgram
-from cdpr_rt.runtime.shared_block import RowReader
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.trajectory import Motion
+from cdpr_rt.motion.trajectory import Motion
+from cdpr_rt.programs.axes.track import TrackProgram
+from cdpr_rt.runtime.control_loop.engine import HOLD, IDLE
+from cdpr_rt.runtime.control_loop.loop import ControlLoop
+from cdpr_rt.runtime.control_loop.transition_runner import Steps
 
 _T = TypeVar("_T")
 _DRAIN_CYCLES = 2048
 
 
 class Operator:
-    """Operates a loop that has a `TrackProgram`; all its methods return when what they do is done.
+    """Operates a loop that has a `TrackProgram`; its methods return when they are done.
 
-    `go_on` lets the loop run one turn. All raise TripError where the loop ends what goes on, after
-    it has taken the power, and InterruptedMotionError as soon as `stop_requested`.
+    `go_on` lets the loop run one turn. All raise TripError after the loop has ended the motion and
+    removed the power, and InterruptedMotionError as soon as `stop_requested`.
     """
 
     def __init__(
@@ -39,6 +39,8 @@ class Operator:
         stop_requested: Callable[[], bool],
     ) -> None:
         self.loop = loop
+        self._engine, self._runner, self._transitions = loop.engine, loop.runner, loop.transitions
+        self._life = loop.life
         self._track = track
         self._go_on = go_on
         self._stop_requested = stop_requested
@@ -46,44 +48,44 @@ class Operator:
     @property
     def device(self) -> AxisDevice:
         """The axes, which have booted."""
-        device = self.loop.machine.device
+        device = self._engine.machine.device
         assert device is not None  # procedures begin later
         return device
 
     @property
     def lateness(self) -> Lateness:
         """How the deadlines were kept."""
-        cycle = self.loop.cycle
+        cycle = self._engine.cycle
         return Lateness() if cycle is None else cycle.lateness
 
     def check(self, reset: bool = False) -> None:
-        """Have cycles run without power and be looked at; with `reset`, drives in fault as well."""
-        self._do(procedures.check(self.loop, reset))
+        """Run the check of the bus, without power; `reset` resets drives in fault."""
+        self._do(self._transitions.check(reset))
 
     def enable(self) -> None:
-        """Give the drives power and release the brakes; the torque is zero."""
+        """Enable the drives and release the brakes; the torque is zero."""
         self._refuse_when_stopped("the drives have power")
-        self._do(procedures.enable(self.loop, HOLD, None, 0))
+        self._do(self._transitions.enable(HOLD, {}, 0))
 
     def disable(self) -> None:
-        """Apply the brakes and take the power; cycles go on, so that work may take its time."""
-        self._do(procedures.disable(self.loop))
+        """Apply the brakes and remove the power; cycles go on."""
+        self._do(self._transitions.disable())
 
     def reset(self) -> None:
-        """Acknowledge whatever there is to acknowledge; the drives are left without power."""
-        if self.loop.life.state is LoopState.ACTIVE:
+        """Acknowledge faults; the drives are left without power."""
+        if self._life.state is LoopState.ACTIVE:
             with suppress(TripError):  # what is found on the way is acknowledged as well
                 self.disable()
-        self._do(procedures.acknowledge(self.loop))
+        self._do(self._transitions.acknowledge())
 
     def idle(self, seconds: float) -> None:
         """Let cycles run for a while."""
-        left = iter(range(self.loop.cycles_in(seconds)))
+        left = iter(range(self._engine.cycles_in(seconds)))
         self.wait(lambda: next(left, None) is None, math.inf, "the end")
 
     def wait(self, done: Callable[[], bool], within_s: float, what: str) -> None:
         """Let cycles run until `done`, which is asked once a cycle; raises NotInTimeError."""
-        left = math.inf if within_s == math.inf else self.loop.cycles_in(within_s)
+        left = math.inf if within_s == math.inf else self._engine.cycles_in(within_s)
         while not done():
             self._refuse_when_stopped(what)
             if left <= 0:
@@ -94,28 +96,30 @@ class Operator:
     def let_drive(self, done: Callable[[], bool], within_s: float, what: str) -> None:
         """Have the drives move by themselves, as in homing, until `done`; without power then."""
         self.enable()
-        self.loop.driving = False  # an angle may begin to count from elsewhere, and is not judged
+        self._engine.driving = (
+            False  # an angle may begin to count from elsewhere, and is not judged
+        )
         self.wait(done, within_s, what)
         self.disable()
 
     def between_cycles(self, work: Callable[[], object]) -> None:
-        """Do `work`, which may wait by the clock, while no cycles run and nothing has power."""
-        self._do(procedures.between_cycles(self.loop, work))
+        """Do `work`, which may wait by the clock, while no cycles run and no drive has power."""
+        self._do(self._transitions.between_cycles(work))
 
-    def beside(self, work: Callable[[], _T]) -> _T:
+    def run_task(self, work: Callable[[], _T]) -> _T:
         """Return what `work` does, which may wait by the clock, as a task beside the cycles."""
-        task = self.loop.job(work)
+        task = self._runner.start(work)
         try:
             while not task.done:
                 self._turn()
         finally:
-            self.loop.machine.clock.cancel(task)
+            self._engine.machine.clock.cancel(task)
         result: _T = task.result()
         return result
 
-    def aside(self, work: Callable[[], _T]) -> _T:
+    def run_blocking(self, work: Callable[[], _T]) -> _T:
         """Return what `work` does, which touches no bus and may take its time."""
-        return self.beside(lambda: self.loop.machine.clock.aside(work))
+        return self.run_task(lambda: self._engine.machine.clock.run_blocking(work))
 
     def follow(
         self,
@@ -127,18 +131,18 @@ class Operator:
     ) -> None:
         """Run `controller` along `motion` to its end, or `until` that is true after a cycle.
 
-        Its cycles go into `log`; `on_progress` is told now and then how long it has gone on.
-        However it ends, the last torque is none and what was recorded is in the file. What is asked
-        for or a watch wants ends by the braking motion under the same controller.
+        Its cycles go into `log`; `on_progress` gets the motion's time now and then. However it
+        ends, the last torque is zero and what was recorded is in the file. A requested stop, or a
+        watch's, ends it by the braking motion under the same controller.
         """
         self._refuse_when_stopped("the motion")
-        loop, track = self.loop, self._track
+        engine, track = self._engine, self._track
         track.take(controller, motion)
-        rows, stopping, cycles = RowReader(loop.block), False, 0
-        drained_after = min(_DRAIN_CYCLES, loop.block.capacity // 2)
-        loop.switch(track.name)
+        rows, stopping, cycles = RowReader(engine.block), False, 0
+        drained_after = min(_DRAIN_CYCLES, engine.block.capacity // 2)
+        engine.switch(track.name)
         try:
-            while loop.program is track and not track.at_rest:
+            while engine.program is track and not track.at_rest:
                 self._go_on()
                 cycles += 1
                 if until is not None and until():
@@ -151,8 +155,8 @@ class Operator:
                     if on_progress is not None:
                         on_progress(track.progress()["time_s"])
         finally:
-            if loop.program is track:
-                loop.switch(IDLE)
+            if engine.program is track:
+                engine.switch(IDLE)
             self._drain(rows, log)
         self._turn()
         if stopping:
@@ -160,35 +164,35 @@ class Operator:
 
     def _drain(self, rows: RowReader, log: RawLogWriter | None) -> None:
         new = rows.read()
-        new = new[new["program"] == self.loop.programs.index(self._track)]
+        new = new[new["program"] == self._engine.programs.index(self._track)]
         if log is not None and new.size:
             log.write(raw_rows(new))
 
-    def _do(self, procedure: Iterator[None]) -> None:
+    def _do(self, transition: Steps) -> None:
         failed: list[Exception] = []
 
-        def told() -> Iterator[None]:
+        def watched() -> Steps:
             try:
-                yield from procedure
-            except Exception as error:  # for whoever has asked
+                yield from transition
+            except Exception as error:  # raised again below
                 failed.append(error)
 
-        self.loop.begin(told())
+        self._runner.begin(watched())
         self._finish()
         if failed:
             raise failed[0]
 
     def _turn(self) -> None:
         self._go_on()
-        loop = self.loop
-        if (loop.reacting and loop.life.reason) or loop.life.state is LoopState.FAULT:
+        ended = self._engine.reacting and self._life.reason
+        if ended or self._life.state is LoopState.FAULT:
             self._finish()
 
     def _finish(self) -> None:
-        while self.loop.busy:
+        while self._runner.busy:
             self._go_on()
-        if self.loop.life.state is LoopState.FAULT:
-            raise TripError(self.loop.life.reason)
+        if self._life.state is LoopState.FAULT:
+            raise TripError(self._life.reason)
 
     def _refuse_when_stopped(self, what: str) -> None:
         if self._stop_requested():

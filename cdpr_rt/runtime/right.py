@@ -1,7 +1,8 @@
-"""The right to move in the shared memory: a number that grows with every taking, and its end.
+"""The right to move: a lease with a fencing token, in the shared memory.
 
-An order or a sample counts only with the number of the taking that holds just now. Numbers never
-come again, so that nothing that was asked for under one taking goes on under the next.
+Every grant has a number, higher than all before, and an expiry time. A command or a sample counts
+only with the number of the current grant, so that nothing commanded under one grant goes on under
+the next.
 """
 
 from __future__ import annotations
@@ -9,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.core.shared_block import SharedBlock
 
 LONGEST_S: Final = 10.0
-"""The longest that the right may be given for at a time."""
+"""The longest time for which it is granted or renewed."""
 _LONGEST_NS: Final = round(LONGEST_S * 1e9)
 
 
 class PublishedRight:
-    """The service's side: tells the loop which taking holds, and until when (CLOCK_MONOTONIC)."""
+    """The service's side: publishes the current grant and its expiry (CLOCK_MONOTONIC)."""
 
     def __init__(self, block: SharedBlock) -> None:
         self._number = block.counters["right_number"]
@@ -26,60 +27,64 @@ class PublishedRight:
 
     @property
     def number(self) -> int:
-        """The number of the newest taking, 0 before the first."""
+        """The number of the newest grant, 0 before the first."""
         return int(self._number[0])
 
     def begin(self, until_ns: int) -> int:
-        """Publish a new taking that holds until then; return its number."""
-        self._until_ns[0] = 0  # whoever reads between sees nobody, not the next under a past time
+        """Publish a new grant that holds until then; return its number."""
+        self._until_ns[0] = (
+            0  # a reader in between sees no grant, rather than the new one with the old expiry
+        )
         self._number[0] += 1
         self._until_ns[0] = until_ns
         return self.number
 
     def until(self, until_ns: int) -> None:
-        """Have the newest taking hold until then; 0 ends it."""
+        """Set the expiry of the newest grant; 0 ends it."""
         self._until_ns[0] = until_ns
 
 
 class RightToMove:
-    """The loop's side: which taking holds now, and on whose behalf the present program moves."""
+    """The loop's side: the current grant, and the grant under which the program runs."""
 
     def __init__(self, block: SharedBlock, clock_ns: Callable[[], int]) -> None:
-        self._number = block.counters["right_number"]
-        self._until_ns = block.counters["right_until_ns"]
-        self._mover = block.counters["mover"]
+        # read in every cycle: a memoryview is faster
+        self._number = block.counters["right_number"].data
+        self._until_ns = block.counters["right_until_ns"].data
+        self._mover = block.counters["mover"].data
         self._clock_ns = clock_ns
         self.mover = 0
 
     @property
     def current(self) -> int:
-        """The number of the taking that holds now, 0 where nobody has the right.
+        """The number of the current grant, 0 where there is none.
 
-        A time further ahead than `LONGEST_S` is none that the service gives: nobody's.
+        An expiry further ahead than `LONGEST_S` is not the service's and counts as none.
         """
-        number = int(self._number[0])
-        left_ns = int(self._until_ns[0]) - self._clock_ns()
-        changed = int(self._number[0]) != number
+        number: int = self._number[0]
+        left_ns = self._until_ns[0] - self._clock_ns()
+        changed = self._number[0] != number
         return 0 if changed or not 0 < left_ns <= _LONGEST_NS else number
 
     @property
     def mover(self) -> int:
-        """The number on whose behalf the present program moves, 0 for nobody's."""
-        return int(self._mover[0])
+        """The number of the grant under which the program runs, 0 for none."""
+        mover: int = self._mover[0]
+        return mover
 
     @mover.setter
     def mover(self, number: int) -> None:
         self._mover[0] = number
 
-    def missing(self, number: int) -> str:
-        """Return why an order with this number is not obeyed, "" where it is."""
+    def refusal(self, number: int) -> str:
+        """Return why a command with this number is refused, "" where it is not."""
         current = self.current
         if current == 0:
             return "nobody holds the right to move; take it first"
         return "" if number == current else "the right to move is somebody else's by now"
 
-    def lost(self) -> str:
-        """Return why the present motion is nobody's any more, "" while it is the holder's."""
+    def loss(self) -> str:
+        """Return why the program's grant is not the current one, "" while it is."""
         current = self.current
         if current == 0:
             return "nobody holds the right to move any more"

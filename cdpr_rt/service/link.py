@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from cdpr_rt.core.shared_block import MESSAGE_BYTES, SharedBlock, SharedBlockError
 from cdpr_rt.errors import ControlError
-from cdpr_rt.runtime.shared_block import MESSAGE_BYTES, SharedBlock, SharedBlockError
 from cdpr_rt.service.events import EventLog
 from cdpr_rt.service.rows import plain
 
@@ -22,7 +22,7 @@ _MOST_PENDING = 32
 _SILENT_S = 5.0
 URGENT: Final = frozenset({"hold", "disable", "shutdown"})
 """Stops: for everybody, never refused for want of room, before what waits for the loop already."""
-_ALIKE: Final = URGENT | {"acknowledge", "configure", "check"}
+_COALESCED: Final = URGENT | {"acknowledge", "configure", "check"}
 """Commands that say nothing but their name: asked for twice at once, they are sent once."""
 
 
@@ -54,15 +54,14 @@ class LoopLink:
     `description`, `state` and `wall_ns`.
     """
 
-    def __init__(self, block: SharedBlock, clock_ns: Callable[[], int] = time.monotonic_ns) -> None:
+    def __init__(self, block: SharedBlock) -> None:
         self.block = block
         self.events = EventLog(self.wall_ns)
-        self._clock_ns = clock_ns
         self._texts: dict[str, tuple[int, dict[str, Any]]] = {}
         self._pending: dict[int, asyncio.Future[Reply]] = {}
-        self._alike: dict[str, asyncio.Future[Reply]] = {}
+        self._coalesced: dict[str, asyncio.Future[Reply]] = {}
         self._wake = asyncio.Event()
-        self._loop = _Life()
+        self._loop = _ProcessWatch()
         self._told = ("", "")
         while block.take_reply() is not None:  # to a service that is no more
             pass
@@ -101,7 +100,7 @@ class LoopLink:
     def silent_s(self) -> float:
         """Return how long ago the loop turned last, 0 before its first turn."""
         alive_ns = int(self.block.counters["loop_alive_ns"][0])
-        return max(0.0, (self._clock_ns() - alive_ns) * 1e-9) if alive_ns else 0.0
+        return max(0.0, (time.monotonic_ns() - alive_ns) * 1e-9) if alive_ns else 0.0
 
     def wall_ns(self) -> int:
         """Return the time of day, ns since 1970, unmoved by a clock that is set meanwhile."""
@@ -109,7 +108,7 @@ class LoopLink:
         start_ns = int(counters["start_realtime_ns"][0])
         if start_ns == 0:
             return time.time_ns()
-        return start_ns + self._clock_ns() - int(counters["start_monotonic_ns"][0])
+        return start_ns + time.monotonic_ns() - int(counters["start_monotonic_ns"][0])
 
     def _text(self, name: str, read: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         version = int(self.block.counters[name][0])
@@ -136,7 +135,7 @@ class LoopLink:
             # in this order: one that is not answered yet is done after all that may still start
             self.block.void_commands()
             self._take_replies()
-        future = self._alike.get(do)
+        future = self._coalesced.get(do)
         if future is None or future.done():
             future = self._send(do, fields)
         try:
@@ -167,16 +166,16 @@ class LoopLink:
             raise LoopBusyError(str(error)) from None
         future: asyncio.Future[Reply] = asyncio.get_running_loop().create_future()
         self._pending[number] = future
-        if do in _ALIKE:
-            self._alike[do] = future
+        if do in _COALESCED:
+            self._coalesced[do] = future
         future.add_done_callback(lambda done: self._forget(number, do, done))
         self._wake.set()
         return future
 
     def _forget(self, number: int, do: str, done: asyncio.Future[Reply]) -> None:
         self._pending.pop(number, None)
-        if self._alike.get(do) is done:
-            del self._alike[do]
+        if self._coalesced.get(do) is done:
+            del self._coalesced[do]
         if not done.cancelled():
             done.exception()  # seen, also where nobody waits any more
 
@@ -222,7 +221,7 @@ class LoopLink:
             self.events.add("reason", reason, limit=status.get("reason_limit"))
 
 
-class _Life:
+class _ProcessWatch:
     """Whether the loop's process runs, by a descriptor that names it and no successor."""
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ class Part(Protocol):
     def stop(self) -> None:
         """End within a second or two, with everything that is to be kept on the disk."""
 
-    def told(self) -> dict[str, Any]:
+    def status(self) -> dict[str, Any]:
         """Return what a person would want to know of it, as JSON; its numbers become metrics.
 
         Called from another thread, several times a second: no waiting, no I/O.

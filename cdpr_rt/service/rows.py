@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any, Final
 
-from cdpr_rt.runtime.cycle_row import AXES, POSES, SCALARS, Row
-from cdpr_rt.runtime.shared_block import SharedBlock
-from cdpr_rt.runtime.states import LoopState, Reaction
+from cdpr_rt.core.cycle_row import FIELDS, Row
+from cdpr_rt.core.shared_block import SharedBlock
 
-FIELDS: Final = (*SCALARS, *AXES, *POSES)
-_STATES: Final = {state.value: state.label for state in LoopState}
-_REACTIONS: Final = {reaction.value: reaction.label for reaction in Reaction}
+LABELS: Final = {
+    field.name: {label.value: label.label for label in field.labels}
+    for field in FIELDS.values()
+    if field.labels is not None
+}
+"""What the numbers of some fields stand for."""
 
 
 def newest_row(block: SharedBlock) -> Row | None:
@@ -37,11 +40,9 @@ def plain(value: Any) -> Any:
     return value
 
 
-def row_table(row: Row, fields: tuple[str, ...] = FIELDS) -> dict[str, Any]:
-    """Return the fields of one row; arrays become lists, states and reactions their names."""
+def row_table(row: Row, fields: Iterable[str] = FIELDS) -> dict[str, Any]:
+    """Return the fields of one row; arrays become lists, numbers what they stand for."""
     table = {name: plain(row[name].tolist()) for name in fields}
-    if "state" in table:
-        table["state"] = _STATES.get(table["state"], "unknown")
-    if "reaction" in table:
-        table["reaction"] = _REACTIONS.get(table["reaction"], "unknown")
+    for name in LABELS.keys() & table.keys():
+        table[name] = LABELS[name].get(table[name], "unknown")
     return table

@@ -6,33 +6,22 @@ import asyncio
 import logging
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
-from cdpr_rt.runtime.cycle_row import SCALARS
+from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALARS
+from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.runtime.right import PublishedRight
-from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.service.http.tickets import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.link import LoopLink, Reply
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.rows import newest_row, plain, row_table
-from cdpr_rt.service.setpoint_stream import SetpointStream, StreamError
+from cdpr_rt.service.streams.setpoint_stream import SetpointStream, StreamError
 
 _TURN_S = 0.2
 _LOG = logging.getLogger("cdpr.service")
-_AXIS_FIELDS: Final = (
-    "setpoint_rad",
-    "position_rad",
-    "velocity_rad_s",
-    "torque_actual_Nm",
-    "torque_sent_Nm",
-    "tension_N",
-    "tension_measured",
-    "cable_length_m",
-    "statusword",
-    "valid",
-    "alive",
-    "index_known",
-)
+_AXIS_FIELDS: Final = tuple(field.name for field in AXIS_FIELDS if field.status)
 _DESCRIBED: Final = ("name", "bus", "node_id", "winch", "commissioned")
 WAIT_S: Final = {
     "configure": 60.0,
@@ -54,8 +43,10 @@ class Service:
         self.block = block
         self.link = LoopLink(block)
         self.lease = Lease(PublishedRight(block))
+        self.tickets = Tickets()
         self.events = self.link.events
         self.parts: list[Part] = []
+        self._unstarted: dict[str, str] = {}
         self.stream: SetpointStream | None = None
         """That which has started, None where set-points are not received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
@@ -68,21 +59,26 @@ class Service:
         self._noted: Reply | None = None
 
     def count_refusal(self) -> None:
-        """Count a request that was refused at the door."""
+        """Count a request that was refused by the access control."""
         self.counts["refused"] += 1
 
     def start_parts(self, parts: Sequence[Part]) -> None:
-        """Start each; one that cannot start is left out, and an event says why."""
+        """Start each; of one that cannot start, status and events say why."""
         for part in parts:
             try:
                 part.start()
             except Exception as error:
-                self.events.add(part.name, f"{part.name}: cannot start: {error}")
-                _LOG.error("%s: cannot start: %s", part.name, error)
+                self._unstarted[part.name] = f"cannot start: {error}"
+                self.note_failure(part.name, f"{part.name}: cannot start: {error}")
             else:
                 self.parts.append(part)
                 if isinstance(part, SetpointStream):
                     self.stream = part
+
+    def note_failure(self, part: str, text: str) -> None:
+        """Say in the events, and on standard error, that a part does not work; from any thread."""
+        self.events.add(part, text)
+        _LOG.error("%s", text)
 
     def stop_parts(self) -> None:
         """End all that have started, whatever becomes of one."""
@@ -92,7 +88,7 @@ class Service:
             except Exception as error:
                 self.events.add(part.name, f"{part.name}: did not end well: {error}")
 
-    def give_stream(self, token: str | None) -> dict[str, Any]:
+    def issue_stream_session(self, token: str | None) -> dict[str, Any]:
         """Give the holder of the right to move a session of the stream, as `models.StreamSession`.
 
         Raises LeaseError, and StreamError where no stream is received.
@@ -102,12 +98,12 @@ class Service:
                 f"{self.robot}: its daemon takes no set-point stream; allowed: one that was "
                 "started with --stream HOST:PORT"
             )
-        given, (host, port) = self.stream.desk.give(token), self.stream.address
+        given, (host, port) = self.stream.sessions.issue(token), self.stream.address
         return {"session": given.number, "key": given.key.hex(), "host": host, "port": port}
 
     # -- commands
 
-    async def ask(
+    async def command_with_right(
         self,
         do: str,
         client: str,
@@ -121,19 +117,20 @@ class Service:
         `LoopLink.command` raises.
         """
         right = self.lease.renew(token).number
-        work = asyncio.ensure_future(self.tell(do, client, right=right, **fields))
-        while True:
-            done, _ = await asyncio.wait({work}, timeout=_TURN_S)
-            if done:
-                break
-            if not await gone():
-                try:
-                    self.lease.renew(token)
-                except LeaseError:  # given back meanwhile, by the same client
-                    continue
-        return work.result()
+        keeping = asyncio.create_task(self._keep_right(token, gone))
+        try:
+            # begun here and now, so that what the client asks for next comes after it
+            return await self.command(do, client, right=right, **fields)
+        finally:
+            keeping.cancel()
 
-    async def tell(self, do: str, client: str, **fields: Any) -> Reply:
+    async def _keep_right(self, token: str | None, gone: Callable[[], Awaitable[bool]]) -> None:
+        with suppress(LeaseError):  # given back meanwhile, by the same client
+            while not await gone():
+                self.lease.renew(token)
+                await asyncio.sleep(_TURN_S)
+
+    async def command(self, do: str, client: str, **fields: Any) -> Reply:
         """Send a command that anybody may give; raises what `LoopLink.command` raises."""
         reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
         if reply is self._noted:
@@ -184,9 +181,10 @@ class Service:
         """Return what each part tells of itself, and the service's own figures."""
         where = None if self.http is None else f"{self.http[0]}:{self.http[1]}"
         figures: dict[str, dict[str, Any]] = {"service": {"http": where, **self.counts}}
+        figures |= {name: {"error": text} for name, text in self._unstarted.items()}
         for part in self.parts:
             try:
-                figures[part.name] = plain(part.told())
+                figures[part.name] = plain(part.status())
             except Exception as error:
                 figures[part.name] = {"error": str(error)}
         return figures

@@ -1,14 +1,15 @@
-"""CAN buses by URL: packed frames for the cycle, python-can for everything else."""
+"""CAN buses by URL: 16-byte frames for the cycle, python-can for everything else."""
 
 from __future__ import annotations
 
-from drivers.bus.health import BusHealth, BusState
-from drivers.bus.packed import FrameBuffer, FramePort, open_simbus
-from drivers.bus.pythoncan import bus_gone, open_line_port, open_python_can
-from drivers.bus.simbus_socket import Filters, query_status
-from drivers.bus.socketcan import open_socketcan
-from drivers.bus.socketcand import SocketcandPort
-from drivers.bus.url import BusUrl
+from cdpr_drivers.bus.adapters.pythoncan import bus_gone, open_python_can, open_shared_port
+from cdpr_drivers.bus.adapters.simbus_socket import Filters, query_status
+from cdpr_drivers.bus.adapters.socketcan import open_socketcan
+from cdpr_drivers.bus.adapters.socketcand import SocketcandPort
+from cdpr_drivers.bus.frames import FrameBuffer, FramePort
+from cdpr_drivers.bus.health import BusHealth, BusState
+from cdpr_drivers.bus.socket_port import open_simbus
+from cdpr_drivers.bus.url import BusUrl
 
 __all__ = [
     "BusHealth",
@@ -30,12 +31,12 @@ def open_port(
     filters: Filters | None = None,
     health: BusHealth | None = None,
     *,
-    hears_errors: bool = False,
+    receive_errors: bool = False,
 ) -> FramePort:
-    """Open `url` for packed frames; only frames that pass one of `filters` come in.
+    """Return a port on the bus `url` which receives the frames that pass one of `filters`.
 
-    What the port notices of the bus's state goes into `health`, into one of its own without. Who
-    `hears_errors` gets the controller's error frames too, where the interface tells of errors.
+    `health` counts what the port notices of the bus's state (a new one where left out). With
+    `receive_errors` the controller's error frames come in too, where the interface has them.
 
     Raises:
         BusError: the bus cannot be opened.
@@ -43,7 +44,7 @@ def open_port(
     if url.interface == "simbus":
         return open_simbus(url, filters, health)
     if url.interface == "socketcan":
-        return open_socketcan(url, filters, health, hears_errors=hears_errors)
+        return open_socketcan(url, filters, health, receive_errors=receive_errors)
     if url.interface == "socketcand":
-        return SocketcandPort(url, filters, health, hears_errors=hears_errors)
-    return open_line_port(url, filters, health, hears_errors=hears_errors)
+        return SocketcandPort(url, filters, health, receive_errors=receive_errors)
+    return open_shared_port(url, filters, health, receive_errors=receive_errors)

@@ -1,4 +1,4 @@
-"""Bus budget: whether what crosses a bus in one cycle fits into it, by its longest on the wire."""
+"""Bus budget: whether the frames of a cycle fit into its period, at worst-case bit stuffing."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from profiles import DriveProfile, Pdo, Robot, Winch
+from cdpr_profiles import DriveProfile, Pdo, Robot, Winch
 
 _SYNC_BYTES, _HEARTBEAT_BYTES, _FULL_BYTES = 0, 1, 8
-_COMMANDS = (0x6040, 0x6071)
+_COMMAND_OBJECTS = (0x6040, 0x6071)
 _AT_EVERY_SYNC = range(1, 241)
 _ON_REQUEST = (252, 253)
-# how often within what a drive tolerates its master is heard
+# heartbeats of the master within the time that a drive tolerates without one
 HEARTBEATS_IN_TOLERANCE = 4
 
 
@@ -78,13 +78,13 @@ class BusBudget:
 
     @property
     def recovery_cycles(self) -> float:
-        """Cycles until a change in all drives at once has been told; inf without margin."""
+        """Cycles until all drives have sent their PDOs on a change; inf without margin."""
         if self.changes_s == 0.0:
             return 0.0
         return math.inf if self.margin_s <= 0.0 else math.ceil(self.changes_s / self.margin_s)
 
     def __str__(self) -> str:
-        """Return the figures in one sentence, as a refusal tells them."""
+        """Return the figures in one sentence, for messages."""
         return (
             f"bus {self.bus}: {len(self.nodes)} drives need {self.cycle_s * 1e6:.0f} us of each "
             f"cycle in the worst case and {self.heartbeat_share * self.period_s * 1e6:.1f} us for "
@@ -102,8 +102,7 @@ def bus_budget(
 ) -> BusBudget:
     """Return the budget of a bus with `drives`, each a node id and its profile.
 
-    Where it is not told how often the master sends its heartbeat, it follows from what the
-    drives tolerate.
+    `master_heartbeat_s` follows from what the drives tolerate where it is left out.
     """
     every, waiting = _Frames(), _Frames()
     every.add(_SYNC_BYTES)
@@ -116,7 +115,7 @@ def bus_budget(
             every.add(_bytes(pdo))
         for pdo in _pdos_on_change(drive):
             if pdo.cob_id(node) < last:
-                # it goes before a PDO of the cycle, so it may come in every one
+                # it wins arbitration against a PDO of the cycle, so it may come in every one
                 every.add(_bytes(pdo))
                 continue
             waiting.add(_bytes(pdo))
@@ -171,7 +170,7 @@ class _Frames:
 
 def command_pdos(drive: DriveProfile) -> list[Pdo]:
     """Return what the master sends to a drive in every cycle."""
-    return [p for p in drive.rpdos if any(e.index in _COMMANDS for e in p.entries)]
+    return [p for p in drive.rpdos if any(e.index in _COMMAND_OBJECTS for e in p.entries)]
 
 
 def answer_pdos(drive: DriveProfile) -> list[Pdo]:

@@ -1,4 +1,4 @@
-"""How well a CAN controller gets on with its wire: error states and losses, from error frames."""
+"""Error states and losses of a CAN controller, from its error frames."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class BusState(IntEnum):
 
 
 class BusHealth:
-    """What is known of the wire's state; ports and the network of one bus may share one.
+    """State of the wire and counts of its errors; ports and the network of a bus may share one.
 
     Plain attributes, written by whoever reads the bus, read by anybody at any time.
     """
@@ -45,19 +45,19 @@ class BusHealth:
     def __init__(self) -> None:
         self.state = BusState.ACTIVE
         self.errors = 0
-        """Error frames that told of a disturbed wire or controller."""
+        """Error frames that reported a disturbed wire or controller."""
         self.tx_full = 0
         """Times the transmit queue had no room for a frame."""
         self.rx_lost = 0
-        """Received frames that were lost; one for each report where nobody knows how many."""
+        """Received frames that were lost; one for each report without a number."""
         self.bus_offs = 0
         """Times the controller went bus-off."""
         self.restarts = 0
         """Times the controller came back from bus-off."""
         self.counters = (0, 0)
-        """Transmit and receive error counters, where the controller tells them."""
+        """Transmit and receive error counters, where the controller reports them."""
         self.text = ""
-        """The last trouble in words, with the state; empty while there was none."""
+        """The last error in words, with the state; empty while there was none."""
         self.changed_s = 0.0
         """When `state` changed last, monotonic seconds."""
 
@@ -67,7 +67,7 @@ class BusHealth:
         return self.state is not BusState.BUS_OFF
 
     def take_error(self, can_id: int, data: bytes) -> bool:
-        """Take in an error frame: its class bits and its 8 bytes; return whether `state` changed.
+        """Process an error frame: its class bits and its 8 bytes; return whether `state` changed.
 
         Shorter data, as some adapters give, counts as zeros.
         """
@@ -82,12 +82,12 @@ class BusHealth:
             words.append("transmit buffer of the controller overflowed")
         # lost arbitration alone is how a bus works, counters alone are no trouble
         self.errors += bool(words)
-        state = self._state_told(can_id, data[1])
+        state = self._reported_state(can_id, data[1])
         before = self.state
         self.enter(state, ", ".join(words))
         return self.state is not before
 
-    def _state_told(self, can_id: int, detail: int) -> BusState:
+    def _reported_state(self, can_id: int, detail: int) -> BusState:
         if can_id & _BUS_OFF:
             return BusState.BUS_OFF
         if can_id & _CONTROLLER:

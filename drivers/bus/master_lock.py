@@ -1,4 +1,4 @@
-"""One master a bus and machine: a lock that its process holds and the kernel gives back."""
+"""A lock for the one master of a bus on a machine, which the kernel frees with its process."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import hashlib
 import socket
 import struct
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
-from drivers.bus.url import BusUrl
-from drivers.errors import BusError
+from cdpr_drivers.bus.url import BusUrl
+from cdpr_drivers.errors import BusError
 
 _PREFIX = "\0cdpr-rt/master/"
 _LONGEST_NAME = 80
@@ -41,12 +40,7 @@ class MasterLock:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -58,7 +52,7 @@ def refuse_second_master(url: BusUrl) -> None:
 
 
 def _taken(url: BusUrl) -> str:
-    """Return by whom the bus is commanded, empty where by nobody on this machine."""
+    """Return which process commands the bus, empty where none of this machine does."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
         caller.setblocking(False)
         try:

@@ -1,23 +1,25 @@
-"""One who takes part in a bus: its only port there, as a source of the robot's clock."""
+"""A participant of a bus: one port, read whenever the robot's clock waits."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 
-from cdpr_rt.clock import Clock
-from drivers.bus import open_port
-from drivers.bus.health import BusHealth
-from drivers.bus.intake import Intake
-from drivers.bus.leading import LeadingClock
-from drivers.bus.packed import FRAME
-from drivers.bus.simbus_socket import Filters
-from drivers.bus.url import BusUrl
-from drivers.errors import BusError
+from cdpr_drivers.bus import open_port
+from cdpr_drivers.bus.adapters.simbus_socket import Filters
+from cdpr_drivers.bus.frame_reader import FrameReader
+from cdpr_drivers.bus.frames import FRAME
+from cdpr_drivers.bus.health import BusHealth
+from cdpr_drivers.bus.simulated_bus import SimulatedBusClock
+from cdpr_drivers.bus.url import BusUrl
+from cdpr_drivers.errors import BusError
+from cdpr_rt.core.clock import Clock
 
 
 class BusMember(ABC):
-    """Takes in frames whenever somebody waits by `clock`, which leads the bus where it can.
+    """Base of what sends and receives frames on one bus; a source of `clock`.
+
+    Frames come in whenever somebody waits by `clock`, which leads the bus where it can.
 
     Raises BusError when the bus cannot be opened.
     """
@@ -26,31 +28,31 @@ class BusMember(ABC):
         self.url = url
         self.clock = clock
         self.health = BusHealth()
-        """What the controller's error frames tell of the wire."""
-        self.intake = self._open(filters)
-        self.intake.take = self.take
-        self.intake.failed = self._lose
+        """State of the wire by the controller's error frames."""
+        self.reader = self._open(filters)
+        self.reader.take = self.take
+        self.reader.on_failure = self._lose
         clock.add(self)
 
-    def _open(self, filters: Filters) -> Intake:
+    def _open(self, filters: Filters) -> FrameReader:
         clock = self.clock
-        led = clock.lend(self.url) if isinstance(clock, LeadingClock) else None
+        led = clock.acquire(self.url) if isinstance(clock, SimulatedBusClock) else None
         if led is None:
-            return Intake(open_port(self.url, filters, self.health, hears_errors=True))
+            return FrameReader(open_port(self.url, filters, self.health, receive_errors=True))
         led.set_filters(filters)
-        led.settle()  # what is under way still is nobody's
+        led.settle()  # discards what is still under way
         return led
 
     # -- as a source of the clock
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when a frame waits."""
-        return self.intake.port.fileno()
+        return self.reader.port.fileno()
 
     def poll(self) -> bool:
-        """Take in what has come; a bus that is lost is listened to no more."""
+        """Process the frames that have come; a bus that is lost is removed from the clock."""
         try:
-            return self.intake.poll()
+            return self.reader.poll()
         except BusError as error:
             self._lose(error)
             return True
@@ -74,8 +76,8 @@ class BusMember(ABC):
         """Take one frame that has come in."""
 
     def take(self, last: int) -> None:
-        """Take the first `last` frames of the intake."""
-        for row in self.intake.frames.rows[:last]:
+        """Take the first `last` frames of the reader."""
+        for row in self.reader.frames.rows[:last]:
             self.take_frame(row)
 
     def send(self, identifier: int, data: bytes) -> None:
@@ -85,11 +87,11 @@ class BusMember(ABC):
     def send_frame(self, frame: bytes) -> None:
         """Send one packed frame; raises BusError."""
         try:
-            self.intake.port.send(frame)
+            self.reader.port.send(frame)
         except OSError as error:
-            raise self.intake.lost(error) from error
+            raise self.reader.lost(error) from error
 
     def close(self) -> None:
         """Leave the bus; a bus that is lost is no error here, nor is a second time."""
         self.clock.remove(self)
-        self.intake.close()
+        self.reader.close()

@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl, quote
 
 import can
 
-from drivers.errors import BusError
+from cdpr_drivers.errors import BusError
 
 ALLOWED = (
     "allowed: simbus:NAME, socketcan:vcan0, slcan:/dev/ttyACM0?bitrate=1000000, "
@@ -23,7 +23,7 @@ _REMOTE = re.compile(r"//(?P<host>\[[^\]]+\]|[^/:]+):(?P<port>\d+)/(?P<channel>[
 
 @dataclass(frozen=True)
 class BusUrl:
-    """A bus, taken apart: interface, channel and the interface's further options."""
+    """A parsed bus URL: interface, channel and the interface's further options."""
 
     interface: str
     channel: str
@@ -31,7 +31,7 @@ class BusUrl:
 
     @classmethod
     def parse(cls, text: str) -> BusUrl:
-        """Take `text` apart.
+        """Parse `text`.
 
         Raises:
             BusError: the text names no bus; the message tells what is allowed.
@@ -67,12 +67,12 @@ class BusUrl:
 
     @property
     def is_simulated(self) -> bool:
-        """Whether no motor of flesh and blood can hang on this bus."""
+        """Whether only simulated motors can be on this bus."""
         return self.interface == "simbus"
 
     @property
     def asks_for_lockstep(self) -> bool:
-        """Whether the simulator at the other end of a virtual CAN lets time wait for SYNC."""
+        """Whether the simulator behind a virtual CAN interface runs in lockstep."""
         return self.options.get("lockstep") is True
 
     def __str__(self) -> str:

@@ -1,15 +1,15 @@
-"""What the frames on a CANopen bus mean: decoding for monitors, logs and captures; never sends."""
+"""Decoding of CANopen frames for monitors, logs and captures; it never sends."""
 
-from drivers.decode.candump import LogError, Logged, format_line, parse_line, read_log
-from drivers.decode.decoder import Decoder, KnownNode, Record
-from drivers.decode.frame import Frame
+from cdpr_drivers.decode.candump import LogEntry, LogError, format_line, parse_line, read_log
+from cdpr_drivers.decode.decoder import Decoder, KnownNode, Record
+from cdpr_drivers.decode.frame import Frame
 
 __all__ = [
     "Decoder",
     "Frame",
     "KnownNode",
+    "LogEntry",
     "LogError",
-    "Logged",
     "Record",
     "format_line",
     "parse_line",

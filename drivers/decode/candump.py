@@ -1,7 +1,7 @@
 """Log files of candump (`candump -l`, `-L`) in and out, without loss.
 
 python-can's reader and writer of the same format drop the classes of error frames and the length
-of remote frames, so they serve as strangers in the tests only.
+of remote frames, so they serve as an independent reference in the tests only.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from drivers.bus.packed import ERR_FLAG
-from drivers.decode.frame import EFF_MASK, Frame
-from drivers.errors import DriverError
+from cdpr_drivers.bus.frames import ERR_FLAG
+from cdpr_drivers.decode.frame import EFF_MASK, Frame
+from cdpr_drivers.errors import DriverError
 
 _LINE = re.compile(
     r"\((?P<time>[0-9]{1,12}(?:\.[0-9]{1,12})?)\)\s+(?P<channel>\S+)\s+"
@@ -28,7 +28,7 @@ class LogError(DriverError):
     """A log file cannot be read; the message names file and line."""
 
 
-class Logged(NamedTuple):
+class LogEntry(NamedTuple):
     """A frame of a log file, with the name of the bus it was on."""
 
     channel: str
@@ -46,8 +46,8 @@ def format_line(channel: str, frame: Frame) -> str:
     return f"({frame.time_s:017.6f}) {channel} {content}"
 
 
-def parse_line(text: str) -> Logged:
-    """Return what a line tells; raises ValueError with the reason."""
+def parse_line(text: str) -> LogEntry:
+    """Parse a line; raises ValueError with the reason."""
     match = _LINE.fullmatch(text.strip())
     if match is None:
         if _CAN_FD.match(text.strip()):
@@ -67,10 +67,10 @@ def parse_line(text: str) -> Logged:
         error,
         int(match["length"] or 0),
     )
-    return Logged(match["channel"], frame)
+    return LogEntry(match["channel"], frame)
 
 
-def read_log(name: str, lines: Iterable[str]) -> Iterator[Logged]:
+def read_log(name: str, lines: Iterable[str]) -> Iterator[LogEntry]:
     """Yield the frames of a log file; empty lines and comments are passed over.
 
     A last line without its end, which a logger leaves that was cut off, counts as not written.

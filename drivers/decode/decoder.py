@@ -1,4 +1,4 @@
-"""Frames of one bus to records that say what they mean."""
+"""Decodes the frames of one bus into readable records."""
 
 from __future__ import annotations
 
@@ -7,23 +7,22 @@ from dataclasses import dataclass
 
 from canopen.sdo.exceptions import SdoAbortedError
 
-from drivers.decode import messages
-from drivers.decode.error_frames import error_text
-from drivers.decode.frame import Frame
-from drivers.decode.names import ObjectNames
-from drivers.decode.pdo import PdoTable, PdoView
-from drivers.decode.sdo import SdoEvent, SdoWatch, Step
-from drivers.decode.values import Field, NodeView, read_field
-from profiles import DriveProfile, Winch
+from cdpr_drivers.decode import messages
+from cdpr_drivers.decode.error_frames import error_text
+from cdpr_drivers.decode.frame import Frame
+from cdpr_drivers.decode.names import ObjectNames
+from cdpr_drivers.decode.pdo import PdoTable, PdoView
+from cdpr_drivers.decode.sdo import SdoDecoder, SdoEvent, Step
+from cdpr_drivers.decode.values import Field, NodeView, read_field
+from cdpr_profiles import DriveProfile, Winch
 
 _NODE, _FUNCTION = 0x07F, 0x780
-_BOOT_UP = 0
 _CONFIGURATION = range(0x1400, 0x1C00)
 
 
 @dataclass(frozen=True)
 class Record:
-    """What one frame means."""
+    """One decoded frame."""
 
     frame: Frame
     kind: str
@@ -32,7 +31,7 @@ class Record:
     text: str
     fields: tuple[Field, ...] = ()
     problem: bool = False
-    """Whether it tells of an error, or is not as the standard wants it."""
+    """Whether it reports an error or violates the standard."""
 
     def line(self, start_s: float) -> str:
         """Return the record as a line for people, its time counted from `start_s`."""
@@ -46,7 +45,7 @@ class Record:
 
 @dataclass(frozen=True)
 class KnownNode:
-    """What a node is known to be before it has said anything."""
+    """A node as the profiles describe it."""
 
     drive: DriveProfile
     rated_torque_Nm: float | None = None
@@ -61,7 +60,7 @@ class KnownNode:
 class Decoder:
     """Decodes the frames of one bus in their order.
 
-    `known` gives nodes by id; `others`, where given, is what every other node is taken for. PDO
+    `known` are nodes by id; `others`, where given, describes every other node. PDO
     maps, ratings and modes that SDO transfers show on the way are used from then on. No frame,
     whatever it holds, makes it fail.
     """
@@ -72,7 +71,7 @@ class Decoder:
         self._known = dict(known or {})
         self._others = others
         self._nodes: dict[int, NodeView] = {}
-        self._sdo: dict[int, SdoWatch] = {}
+        self._sdo_decoders: dict[int, SdoDecoder] = {}
         self._pdos = PdoTable()
         self._names: dict[object, ObjectNames] = {}
         everybody = range(1, 128) if others is not None else sorted(self._known)
@@ -133,30 +132,32 @@ class Decoder:
         text = messages.heartbeat(frame.data)
         if frame.data[:1] == b"\0":
             self._node(node_id).mode = None
-        odd = len(frame.data) != 1 or frame.data[0] & 0x7F not in messages.NMT_STATES
-        return Record(frame, "heartbeat", node_id, text, problem=odd)
+        malformed = len(frame.data) != 1 or frame.data[0] & 0x7F not in messages.NMT_STATES
+        return Record(frame, "heartbeat", node_id, text, problem=malformed)
 
     def _pdo(self, frame: Frame, pdo: PdoView) -> Record:
-        fields, odd = pdo.read(frame.data)
+        fields, note = pdo.read(frame.data)
         for value in fields:
             self._learn(pdo.node, value.index, value.sub, value.raw)
-        told = [str(value) for value in fields]
-        told += [odd] if odd else []
+        texts = [str(value) for value in fields]
+        texts += [note] if note else []
         kind = f"{pdo.kind}{pdo.number}"
-        problem = bool(odd) and pdo.count is not None
-        return Record(frame, kind, pdo.node.node_id, "; ".join(told), tuple(fields), problem)
+        problem = bool(note) and pdo.count is not None
+        return Record(frame, kind, pdo.node.node_id, "; ".join(texts), tuple(fields), problem)
 
     def _request(self, frame: Frame, node_id: int) -> Record:
-        return self._sdo_record(frame, node_id, "->", self._watch(node_id).request(frame.data))
+        return self._sdo_record(
+            frame, node_id, "->", self._sdo_decoder(node_id).request(frame.data)
+        )
 
     def _response(self, frame: Frame, node_id: int) -> Record:
-        event = self._watch(node_id).response(frame.data)
+        event = self._sdo_decoder(node_id).response(frame.data)
         if event.step in (Step.VALUE, Step.WRITTEN) and event.index is not None and event.data:
             self._learn(self._node(node_id), event.index, event.sub, event.data)
         return self._sdo_record(frame, node_id, "<-", event)
 
-    def _watch(self, node_id: int) -> SdoWatch:
-        return self._sdo.setdefault(node_id, SdoWatch())
+    def _sdo_decoder(self, node_id: int) -> SdoDecoder:
+        return self._sdo_decoders.setdefault(node_id, SdoDecoder())
 
     def _sdo_record(self, frame: Frame, node_id: int, arrow: str, event: SdoEvent) -> Record:
         node = self._node(node_id)
@@ -164,7 +165,7 @@ class Decoder:
         if event.data is not None and event.index is not None and event.step in _WITH_VALUE:
             fields = (read_field(node, event.index, event.sub, event.data),)
         text = f"{arrow} {_sdo_text(node, event, fields)}"
-        problem = event.step in (Step.ABORT, Step.ODD)
+        problem = event.step in (Step.ABORT, Step.UNEXPECTED)
         return Record(frame, "SDO", node_id, text, fields, problem)
 
     def _learn(self, node: NodeView, index: int, sub: int, raw: bytes) -> None:
@@ -188,7 +189,7 @@ def _sdo_text(node: NodeView, event: SdoEvent, fields: tuple[Field, ...]) -> str
     value = fields[0].text if fields else ""
     size = "" if event.size is None else f"{event.size} bytes"
     note = f", {event.note}" if event.note else ""
-    told = {
+    text_of = {
         Step.ASK_READ: f"read {what}{note}",
         Step.ASK_WRITE: f"write {what} = {value or size or 'a value to follow'}{note}",
         Step.ANNOUNCE: f"{what}: {size or 'a value'} to follow{note}",
@@ -196,12 +197,12 @@ def _sdo_text(node: NodeView, event: SdoEvent, fields: tuple[Field, ...]) -> str
         Step.WRITTEN: f"written {what}{f' = {value}' if value else ''}",
         Step.SEGMENT: f"segment of {what}: {size}{note}",
         Step.CONTROL: f"{what}: {event.note}" if what else event.note,
-        Step.ODD: f"not understood: {event.note}",
+        Step.UNEXPECTED: f"not understood: {event.note}",
     }
     if event.step is Step.ABORT:
         reason = SdoAbortedError.CODES.get(event.code, "no reason of the standard")
         return f"abort {what}: {reason} ({event.code:08X}h)"
-    return told[event.step]
+    return text_of[event.step]
 
 
 def _object(node: NodeView, index: int, sub: int) -> str:
@@ -233,7 +234,7 @@ def _lss(data: bytes) -> tuple[str, bool]:
     return f"-> {messages.lss_request(data)}", len(data) != 8
 
 
-def _lss_back(data: bytes) -> tuple[str, bool]:
+def _lss_answer(data: bytes) -> tuple[str, bool]:
     text, problem = messages.lss_answer(data)
     return f"<- {text}", problem
 
@@ -242,7 +243,7 @@ _FIXED: dict[int, tuple[str, _Read]] = {
     0x000: ("NMT", _nmt),
     0x080: ("SYNC", _sync),
     0x100: ("TIME", _time),
-    0x7E4: ("LSS", _lss_back),
+    0x7E4: ("LSS", _lss_answer),
     0x7E5: ("LSS", _lss),
 }
 _SERVICES: dict[int, Callable[[Decoder, Frame, int], Record]] = {

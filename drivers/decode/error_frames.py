@@ -40,14 +40,14 @@ def error_text(classes: int, data: bytes) -> str:
     """Return an error frame in words; `classes` is its identifier without flags."""
     data = data.ljust(8, b"\0")
     details = {0x004: _names(_CONTROLLER, data[1]), 0x008: _names(_PROTOCOL, data[2])}
-    told = []
+    parts = []
     for bit, name in _CLASSES:
         if classes & bit:
             detail = details.get(bit)
-            told.append(f"{name}: {detail}" if detail else name)
+            parts.append(f"{name}: {detail}" if detail else name)
     if classes & _COUNTERS:
-        told.append(f"error counters: transmit {data[6]}, receive {data[7]}")
-    return "; ".join(told) or f"classes {classes:08X}h"
+        parts.append(f"error counters: transmit {data[6]}, receive {data[7]}")
+    return "; ".join(parts) or f"classes {classes:08X}h"
 
 
 def _names(table: tuple[tuple[int, str], ...], value: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from drivers.bus.packed import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG
+from cdpr_drivers.bus.frames import EFF_FLAG, ERR_FLAG, FRAME, RTR_FLAG
 
 EFF_MASK = 0x1FFFFFFF
 SFF_MASK = 0x7FF

@@ -6,7 +6,8 @@ import datetime
 import struct
 from collections.abc import Callable
 
-from drivers.cia402 import fault_text
+from cdpr_drivers.canopen.emergency import register_text
+from cdpr_drivers.cia402 import fault_text
 
 NMT_STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
 _NMT_COMMANDS = {
@@ -16,16 +17,6 @@ _NMT_COMMANDS = {
     129: "reset node",
     130: "reset communication",
 }
-_ERROR_REGISTER = (
-    "generic",
-    "current",
-    "voltage",
-    "temperature",
-    "communication",
-    "device profile",
-    "reserved",
-    "manufacturer",
-)
 _EMCY = struct.Struct("<HB5s")
 _TIME = struct.Struct("<IH")
 _CIA_EPOCH = datetime.datetime(1984, 1, 1)
@@ -39,46 +30,40 @@ def nmt_state(value: int) -> str:
 def nmt_command(data: bytes) -> str:
     """Return an NMT command in words."""
     if len(data) != 2:
-        return _odd("NMT command", data, 2)
-    whom = f"node {data[1]}" if data[1] else "all nodes"
-    return f"{_NMT_COMMANDS.get(data[0], f'command {data[0]}, which there is not')}: {whom}"
+        return _wrong_length("NMT command", data, 2)
+    nodes = f"node {data[1]}" if data[1] else "all nodes"
+    return f"{_NMT_COMMANDS.get(data[0], f'command {data[0]}, which there is not')}: {nodes}"
 
 
 def heartbeat(data: bytes) -> str:
     """Return a heartbeat or boot-up message in words."""
     if len(data) != 1:
-        return _odd("heartbeat", data, 1)
+        return _wrong_length("heartbeat", data, 1)
     return nmt_state(data[0])
 
 
-def error_register(value: int) -> str:
-    """Return the error register (1001h) in words."""
-    names = [name for bit, name in enumerate(_ERROR_REGISTER) if value >> bit & 1]
-    return ", ".join(names) or "no error"
-
-
 def emergency(data: bytes) -> tuple[str, bool]:
-    """Return an EMCY message in words, and whether it tells of an error (or of its end)."""
+    """Return an EMCY message in words, and whether it reports an error (or its end)."""
     if len(data) != 8:
-        return _odd("EMCY", data, 8), True
+        return _wrong_length("EMCY", data, 8), True
     code, register, vendor = _EMCY.unpack(data)
-    told = f"{fault_text(code)}; error register {register:02X}h ({error_register(register)})"
+    text = f"{fault_text(code)}; error register {register:02X}h ({register_text(register)})"
     if any(vendor):
-        told += f"; manufacturer {vendor.hex(' ').upper()}"
-    return told, bool(code >> 8)
+        text += f"; manufacturer {vendor.hex(' ').upper()}"
+    return text, bool(code >> 8)
 
 
 def sync(data: bytes) -> str:
-    """Return a SYNC in words; only one with a counter has something to tell."""
+    """Return a SYNC in words: its counter, where it has one."""
     if not data:
         return ""
-    return f"counter {data[0]}" if len(data) == 1 else _odd("SYNC", data, 1)
+    return f"counter {data[0]}" if len(data) == 1 else _wrong_length("SYNC", data, 1)
 
 
 def time_stamp(data: bytes) -> str:
     """Return a TIME message as date and time."""
     if len(data) != 6:
-        return _odd("TIME", data, 6)
+        return _wrong_length("TIME", data, 6)
     milliseconds, days = _TIME.unpack(data)
     moment = _CIA_EPOCH + datetime.timedelta(days=days, milliseconds=milliseconds & 0x0FFFFFFF)
     return moment.isoformat(sep=" ", timespec="milliseconds")
@@ -108,7 +93,7 @@ _LSS_CONFIGURED = {0x11: "node id", 0x13: "bit rate", 0x17: "storing"}
 def lss_request(data: bytes) -> str:
     """Return what an LSS master asks (CiA 305), in words."""
     if len(data) != 8:
-        return _odd("LSS request", data, 8)
+        return _wrong_length("LSS request", data, 8)
     command, number = data[0], int.from_bytes(data[1:5], "little")
     if command in _LSS_SELECT:
         return f"{_LSS_SELECT[command]} {number:08X}h"
@@ -116,14 +101,14 @@ def lss_request(data: bytes) -> str:
         return f"{_LSS_IDENTIFY[command]} {number:08X}h?"
     if command in _LSS_INQUIRE:
         return f"tell your {_LSS_INQUIRE[command]}"
-    told = _LSS_COMMANDS.get(command)
-    return told(data) if told else f"command {command:02X}h, which there is not"
+    describe = _LSS_COMMANDS.get(command)
+    return describe(data) if describe else f"command {command:02X}h, which there is not"
 
 
 def lss_answer(data: bytes) -> tuple[str, bool]:
     """Return what an LSS slave answers in words, and whether it is an error."""
     if len(data) != 8:
-        return _odd("LSS answer", data, 8), True
+        return _wrong_length("LSS answer", data, 8), True
     command, number = data[0], int.from_bytes(data[1:5], "little")
     if command in _LSS_CONFIGURED:
         done = f"refused (error {data[1]}, {data[2]})" if data[1] else "done"
@@ -131,8 +116,8 @@ def lss_answer(data: bytes) -> tuple[str, bool]:
     if command in _LSS_INQUIRE:
         value = str(data[1]) if command == 0x5E else f"{number:08X}h"
         return f"{_LSS_INQUIRE[command]} is {value}", False
-    told = _LSS_ANSWERS.get(command)
-    return told or f"command {command:02X}h, which there is not", told is None
+    text = _LSS_ANSWERS.get(command)
+    return text or f"command {command:02X}h, which there is not", text is None
 
 
 def _switch_all(data: bytes) -> str:
@@ -169,5 +154,5 @@ _LSS_COMMANDS: dict[int, Callable[[bytes], str]] = {
 }
 
 
-def _odd(what: str, data: bytes, wanted: int) -> str:
+def _wrong_length(what: str, data: bytes, wanted: int) -> str:
     return f"{what} of {len(data)} bytes, not {wanted}: {data.hex(' ').upper()}"

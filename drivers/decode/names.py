@@ -9,8 +9,8 @@ from typing import Any
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
 
-from drivers.data_sheet import load_dictionary
-from profiles import load_drive
+from cdpr_profiles import load_drive
+from cdpr_profiles.eds.dictionary import load_dictionary
 
 _STANDARD_DRIVE = "generic-cia402"
 _SIGNED = frozenset(datatypes.SIGNED_TYPES)

@@ -1,12 +1,12 @@
-"""Which PDO an identifier carries and what lies in it: from profiles, then from what is said."""
+"""PDOs by identifier and their mapping, from profiles and from SDO traffic."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from drivers.decode.values import Field, NodeView, read_field
-from profiles import Pdo
+from cdpr_drivers.decode.values import Field, NodeView, read_field
+from cdpr_profiles import Pdo
 
 _FIRST_ID, _LAST_ID = 0x180, 0x57F
 _NODE, _FUNCTION = 0x07F, 0x780
@@ -35,12 +35,12 @@ class PdoView:
     """"TPDO" or "RPDO"."""
     number: int
     count: int | None = None
-    """Entries in use; None where nobody has told."""
+    """Entries in use; None where not known."""
     entries: dict[int, int] = field(default_factory=dict)
     """Mapping entry (CiA 301: index, sub-index, bits) by position from 1."""
 
     def read(self, data: bytes) -> tuple[list[Field], str]:
-        """Return the values in a frame, and what is odd about it."""
+        """Return the values in a frame, and a note where it does not fit the mapping."""
         values: list[Field] = []
         start = 0
         for position in range(1, (self.count or 0) + 1):

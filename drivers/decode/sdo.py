@@ -18,7 +18,7 @@ class Step(Enum):
     ASK_READ = auto()
     ASK_WRITE = auto()
     ANNOUNCE = auto()
-    """The server tells that a value of `size` bytes will follow."""
+    """The server announces a value of `size` bytes."""
     VALUE = auto()
     """The server has delivered the last of a value; `data` is all of it where all was seen."""
     WRITTEN = auto()
@@ -26,13 +26,13 @@ class Step(Enum):
     SEGMENT = auto()
     CONTROL = auto()
     ABORT = auto()
-    ODD = auto()
-    """Nothing that belongs to the transfer as far as it was seen."""
+    UNEXPECTED = auto()
+    """It does not belong to the transfer as far as that was seen."""
 
 
 @dataclass(frozen=True)
 class SdoEvent:
-    """One SDO frame, understood; index is None where no transfer is known."""
+    """One decoded SDO frame; `index` is None where no transfer is known."""
 
     step: Step
     index: int | None = None
@@ -60,8 +60,8 @@ class _Transfer:
     toggle: int = 0
 
 
-class SdoWatch:
-    """Follows the transfers between whatever client and one server; any bytes are taken."""
+class SdoDecoder:
+    """Decodes the transfers between any client and one server; takes any bytes."""
 
     def __init__(self) -> None:
         self._transfer: _Transfer | None = None
@@ -92,17 +92,17 @@ class SdoWatch:
         """Take a frame of the server (580h + node)."""
         return self._take(data, "server", self._from_server)
 
-    def _take(self, data: bytes, who: str, readers: dict[int, _Reader]) -> SdoEvent:
+    def _take(self, data: bytes, sender: str, readers: dict[int, _Reader]) -> SdoEvent:
         if len(data) != 8:
-            return SdoEvent(Step.ODD, note=f"{len(data)} bytes, not 8")
+            return SdoEvent(Step.UNEXPECTED, note=f"{len(data)} bytes, not 8")
         if data[0] == _ABORT:
             self._transfer, self._streams = None, ""
             index, sub = _MULTIPLEXOR.unpack_from(data, 1)
             return SdoEvent(Step.ABORT, index, sub, code=int.from_bytes(data[4:], "little"))
-        if self._streams == who:
+        if self._streams == sender:
             return self._block_segment(data)
         reader = readers.get(data[0] >> 5)
-        return reader(data) if reader else SdoEvent(Step.ODD, note="no such command")
+        return reader(data) if reader else SdoEvent(Step.UNEXPECTED, note="no such command")
 
     def _begin(self, data: bytes) -> _Transfer:
         index, sub = _MULTIPLEXOR.unpack_from(data, 1)
@@ -127,7 +127,7 @@ class SdoWatch:
 
     def _segment_taken(self, _: bytes) -> SdoEvent:
         if self._transfer is not None and self._transfer.last:
-            return self._ends(Step.WRITTEN)
+            return self._end_transfer(Step.WRITTEN)
         return self._event(Step.CONTROL, note="segment taken")
 
     def _download_confirmed(self, data: bytes) -> SdoEvent:
@@ -136,7 +136,7 @@ class SdoWatch:
         if transfer is None or (transfer.index, transfer.sub) != (index, sub):
             return SdoEvent(Step.WRITTEN, index, sub)
         if transfer.data:
-            return self._ends(Step.WRITTEN)
+            return self._end_transfer(Step.WRITTEN)
         return self._event(Step.CONTROL, note="go on")
 
     # -- upload: the client reads
@@ -160,7 +160,7 @@ class SdoWatch:
     def _upload_segment(self, data: bytes) -> SdoEvent:
         event = self._segment(data)
         if self._transfer is not None and self._transfer.last:
-            return self._ends(Step.VALUE)
+            return self._end_transfer(Step.VALUE)
         return event
 
     # -- segments
@@ -168,7 +168,7 @@ class SdoWatch:
     def _segment(self, data: bytes) -> SdoEvent:
         transfer = self._transfer
         if transfer is None:
-            return SdoEvent(Step.ODD, note="segment of a transfer whose begin was not seen")
+            return SdoEvent(Step.UNEXPECTED, note="segment of a transfer whose begin was not seen")
         toggle = data[0] >> 4 & 1
         if toggle != transfer.toggle or transfer.last:
             transfer.whole = False  # sent again, or one was missed
@@ -176,7 +176,7 @@ class SdoWatch:
         transfer.data += data[1 : 8 - (data[0] >> 1 & 7)]
         return self._event(Step.SEGMENT, note="last" if transfer.last else "")
 
-    def _ends(self, step: Step) -> SdoEvent:
+    def _end_transfer(self, step: Step) -> SdoEvent:
         transfer = self._transfer
         assert transfer is not None  # asked by those who have one
         event = self._event(step, data=bytes(transfer.data) if transfer.whole else None)
@@ -196,9 +196,9 @@ class SdoWatch:
         transfer.last = last
         if last or number >= transfer.block_size:
             self._streams = ""
-        so_far = len(transfer.data) + _SEGMENT_BYTES * len(transfer.block)
+        text = len(transfer.data) + _SEGMENT_BYTES * len(transfer.block)
         note = f"number {number}{', last' if last else ''}"
-        return SdoEvent(Step.SEGMENT, transfer.index, transfer.sub, size=so_far, note=note)
+        return SdoEvent(Step.SEGMENT, transfer.index, transfer.sub, size=text, note=note)
 
     def _acknowledged(self, data: bytes, sender: str) -> SdoEvent:
         transfer = self._transfer
@@ -213,8 +213,8 @@ class SdoWatch:
         again = ", the others again" if missed else ""
         return self._event(Step.CONTROL, note=f"segments up to {data[1]} taken{again}")
 
-    def _cut(self, data: bytes) -> None:
-        """Drop what pads the last segment, told at the end of a block transfer."""
+    def _drop_padding(self, data: bytes) -> None:
+        """Drop the padding of the last segment; the end of a block transfer has its length."""
         unused = data[0] >> 2 & 7
         if self._transfer is not None and unused:
             del self._transfer.data[-unused:]
@@ -222,7 +222,7 @@ class SdoWatch:
     def _block_download_control(self, data: bytes) -> SdoEvent:
         if data[0] & 1:
             self._streams = ""
-            self._cut(data)
+            self._drop_padding(data)
             return self._event(Step.CONTROL, note="end of block transfer")
         transfer = self._begin(data)
         size = int.from_bytes(data[4:], "little") if data[0] & 0x02 else None
@@ -236,11 +236,11 @@ class SdoWatch:
             return self._event(Step.CONTROL, note=f"go on, {data[4]} segments a block")
         if what == 1:
             if self._transfer is not None:
-                return self._ends(Step.WRITTEN)
+                return self._end_transfer(Step.WRITTEN)
             return self._event(Step.WRITTEN)
         if what == 2:
             return self._acknowledged(data, "client")
-        return self._event(Step.ODD, note="no block transfer is under way")
+        return self._event(Step.UNEXPECTED, note="no block transfer is under way")
 
     def _block_upload_control(self, data: bytes) -> SdoEvent:
         what = data[0] & 3
@@ -260,11 +260,11 @@ class SdoWatch:
     def _block_upload_answer(self, data: bytes) -> SdoEvent:
         if data[0] & 1:
             self._streams = ""
-            self._cut(data)
+            self._drop_padding(data)
             if self._transfer is None:
                 return self._event(Step.VALUE)
             # the client still says that it has taken the end
-            return self._ends(Step.VALUE)
+            return self._end_transfer(Step.VALUE)
         index, sub = _MULTIPLEXOR.unpack_from(data, 1)
         size = int.from_bytes(data[4:], "little") if data[0] & 0x02 else None
         return SdoEvent(Step.ANNOUNCE, index, sub, size=size, note="in blocks")

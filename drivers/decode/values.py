@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from drivers.cia402 import fault_text, mode_name, state_of, supported_modes
-from drivers.decode.messages import error_register
-from drivers.decode.names import ObjectNames
-from drivers.drive_units import torque_unit_Nm, velocity_unit_rad_s
-from profiles import DriveProfile
+from cdpr_drivers.canopen.emergency import register_text
+from cdpr_drivers.cia402 import fault_text, mode_name, state_of, supported_modes
+from cdpr_drivers.decode.names import ObjectNames
+from cdpr_drivers.drive_units import torque_unit_Nm, velocity_unit_rad_s
+from cdpr_profiles import DriveProfile
 
 _POSITIONS = frozenset(
     (0x6062, 0x6064, 0x6067, 0x607A, 0x607C, 0x60E4, 0x60F4, *range(0x60BA, 0x60BE))
@@ -51,7 +51,7 @@ class Field:
 
 @dataclass
 class NodeView:
-    """What is known of one node; it grows with what the node and its master say."""
+    """What is known of one node, extended by its traffic."""
 
     node_id: int
     names: ObjectNames
@@ -193,7 +193,7 @@ _PARTS: dict[int, Callable[[int], str]] = {
 }
 _WORDS: dict[int, Callable[[int], str]] = {
     0x1000: _device_type,
-    0x1001: lambda number: error_register(number & 0xFF),
+    0x1001: lambda number: register_text(number & 0xFF),
     0x603F: _error_field,
     0x6060: mode_name,
     0x6061: mode_name,
@@ -206,36 +206,36 @@ _STATUS_BITS = ((7, "warning"), (10, "target reached"), (11, "internal limit"))
 @lru_cache(maxsize=4096)
 def statusword_text(word: int, mode: int | None = None) -> str:
     """Return a statusword in words; bits that depend on the mode need `mode` (6061h)."""
-    told = [state_of(word).label]
-    told += [name for bit, name in _STATUS_BITS if word >> bit & 1]
+    words = [state_of(word).label]
+    words += [name for bit, name in _STATUS_BITS if word >> bit & 1]
     if not word >> 9 & 1:
-        told.append("not remote")
+        words.append("not remote")
     if mode == _HOMING:
-        told += [name for bit, name in ((12, "homed"), (13, "homing error")) if word >> bit & 1]
+        words += [name for bit, name in ((12, "homed"), (13, "homing error")) if word >> bit & 1]
     elif mode in _CYCLIC:
-        told += ["follows commands"] if word >> 12 & 1 else []
-        told += ["following error"] if word >> 13 & 1 and mode == 8 else []
-    return f"{', '.join(told)} ({word:04X}h)"
+        words += ["follows commands"] if word >> 12 & 1 else []
+        words += ["following error"] if word >> 13 & 1 and mode == 8 else []
+    return f"{', '.join(words)} ({word:04X}h)"
 
 
 @lru_cache(maxsize=4096)
 def controlword_text(word: int, mode: int | None = None) -> str:
     """Return the command in a controlword in words."""
     if word & 0x80:
-        told = "fault reset"
+        command = "fault reset"
     elif not word & 0x02:
-        told = "disable voltage"
+        command = "disable voltage"
     elif not word & 0x04:
-        told = "quick stop"
+        command = "quick stop"
     elif not word & 0x01:
-        told = "shutdown"
+        command = "shutdown"
     else:
-        told = "enable operation" if word & 0x08 else "switch on"
+        command = "enable operation" if word & 0x08 else "switch on"
     if mode == _HOMING and word & 0x10:
-        told += ", start homing"
+        command += ", start homing"
     if word & 0x100:
-        told += ", halt"
-    return f"{told} ({word:04X}h)"
+        command += ", halt"
+    return f"{command} ({word:04X}h)"
 
 
 _STATE_WORDS: dict[int, Callable[[int, int | None], str]] = {

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from cdpr_rt.clock import Clock
-from drivers.modbus.io_rules import IoState, interpret
-from drivers.modbus.tcp import ModbusTcp
-from profiles.safety_io import SafetyIoProfile
+from cdpr_drivers.modbus.io_rules import IoState, interpret
+from cdpr_drivers.modbus.tcp import ModbusTcp
+from cdpr_profiles.devices.safety_io import SafetyIoProfile
+from cdpr_rt.core.clock import Clock
 
 
 class IoLink:

@@ -1,4 +1,4 @@
-"""One RS-485 line with Modbus RTU: requests to its units that succeed or say in words why not."""
+"""Modbus RTU master on one RS-485 line."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from pymodbus.pdu import (
 )
 from pymodbus.pdu.register_message import ReadInputRegistersRequest, WriteSingleRegisterRequest
 
-from cdpr_rt.clock import Clock
-from drivers.modbus.tcp import ModbusError, exception_text
-from drivers.modbus.wire import Wire
+from cdpr_drivers.modbus.byte_channel import ByteChannel
+from cdpr_drivers.modbus.tcp import ModbusError, exception_text
+from cdpr_rt.core.clock import Clock
 
 _READS: Final[dict[str, type[ModbusPDU]]] = {
     "holding": ReadHoldingRegistersRequest,
@@ -64,7 +64,7 @@ class ModbusLine:
             "parity": "N" if Path(port).resolve().is_relative_to("/dev/pts") else parity,
             "stopbits": stop_bits,
             "exclusive": True,
-            # VMIN 1: a read that finds nothing is told from a port that is gone
+            # VMIN 1: a read that finds nothing differs from a port that is gone
             "inter_byte_timeout": 0,
         }
         self._clock = clock
@@ -73,19 +73,19 @@ class ModbusLine:
         self._retries = retries
         self.repeated = 0
         """Requests that had to be repeated so far."""
-        self.patient = True
+        self.retrying = True
         """Whether a request that failed is repeated."""
         self._framer = FramerRTU(DecodePDU(False))
         self._port: Any = None
-        self._wire: Wire | None = None
+        self._channel: ByteChannel | None = None
 
     def open(self) -> None:
         """Open the port; raises LineError. Done by the first request where it was not before."""
         self._opened()
 
-    def _opened(self) -> Wire:
-        if self._wire is not None:
-            return self._wire
+    def _opened(self) -> ByteChannel:
+        if self._channel is not None:
+            return self._channel
         try:
             self._port = serial.Serial(self.name, **self._settings)
         except (OSError, ValueError, termios.error) as error:  # SerialException is an OSError
@@ -95,14 +95,14 @@ class ModbusLine:
                 f"{self.name}: cannot be opened: {reason}; is the adapter plugged in, the port "
                 "yours to use, and no other program at it?"
             ) from None
-        self._wire = Wire(self._clock, self._port.fileno())
-        return self._wire
+        self._channel = ByteChannel(self._clock, self._port.fileno())
+        return self._channel
 
     def close(self) -> None:
         """Close the port; a later request opens it again."""
-        if self._wire is not None:
-            self._wire.close()
-            self._wire = None
+        if self._channel is not None:
+            self._channel.close()
+            self._channel = None
             self._port.close()
 
     def registers(
@@ -124,7 +124,7 @@ class ModbusLine:
         self._ask(unit, what, request)
 
     def _ask(self, unit: int, what: str, request: ModbusPDU) -> ModbusPDU:
-        retries = self._retries if self.patient else 0
+        retries = self._retries if self.retrying else 0
         for left in range(retries, -1, -1):
             try:
                 return self._ask_once(unit, what, request)
@@ -137,10 +137,10 @@ class ModbusLine:
         raise AssertionError  # not reached: the last attempt returns or raises
 
     def _ask_once(self, unit: int, what: str, request: ModbusPDU) -> ModbusPDU:
-        wire, code, clock = self._opened(), request.function_code, self._clock
+        channel, code, clock = self._opened(), request.function_code, self._clock
         question, asked_s = self._framer.buildFrame(request), clock.now_s
-        data = wire.ask(question, lambda data: len(data) >= _size(data, code), self._timeout_s)
-        if wire.lost:
+        data = channel.ask(question, lambda data: len(data) >= _size(data, code), self._timeout_s)
+        if channel.lost:
             self.close()
             raise LineError(f"{self.name}: the serial port is gone; was the adapter pulled out?")
         if clock.lockstep:
@@ -151,7 +151,7 @@ class ModbusLine:
         except (ModbusException, ValueError, IndexError, struct.error):
             answer = None
         if answer is None or answer.function_code & 0x7F != code:
-            raise self._wrong(unit, what, self._why_no_answer(data, unit, code))
+            raise self._wrong(unit, what, self._missing_answer_reason(data, unit, code))
         if isinstance(answer, ExceptionResponse):
             number = answer.exception_code
             raise self._wrong(
@@ -159,7 +159,7 @@ class ModbusLine:
             )
         return answer
 
-    def _why_no_answer(self, data: bytes, unit: int, code: int) -> str:
+    def _missing_answer_reason(self, data: bytes, unit: int, code: int) -> str:
         if not data:
             return (
                 f"no answer within {self._timeout_s:g} s; is it powered, its unit id and the "

@@ -1,4 +1,4 @@
-"""A safety I/O polled beside the cycle: trips on what it sees, and on seeing nothing."""
+"""A safety I/O polled beside the cycle: trips on its inputs, and on missing polls."""
 
 from __future__ import annotations
 
@@ -7,34 +7,33 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Final, Self
 
-from cdpr_rt.clock import Clock
+from cdpr_drivers.errors import DriverError
+from cdpr_drivers.modbus.io_link import IoLink
+from cdpr_drivers.modbus.io_rules import IoState, Rules, interpret
+from cdpr_drivers.modbus.tcp import ModbusError
+from cdpr_profiles.devices.safety_io import Brake, SafetyIoProfile
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.task import Task
 from cdpr_rt.state_file import StateFileError, read_state, remove_state, write_state
-from cdpr_rt.task import Task
-from drivers.errors import DriverError
-from drivers.modbus.io_link import IoLink
-from drivers.modbus.io_rules import IoState, Rules, interpret
-from drivers.modbus.tcp import ModbusError
-from profiles.safety_io import Brake, SafetyIoProfile
 
 _STOP_GRACE_S: Final = 2.0
 """Longest time that a controlled stop may take before power is taken all the same."""
-_SHOWN: Final = ("red", "yellow", "green")
+_STATE_COLOURS: Final = ("red", "yellow", "green")
 
 
 class SafetyIoError(DriverError):
-    """The safety I/O forbids what was asked, or did not do it; says which point reads what."""
+    """The safety I/O forbids a request or did not carry it out; names the point and its value."""
 
 
 class SafetyIo:
-    """One safety I/O; implements `cdpr_rt.cycle.Watch`.
+    """One safety I/O; implements `cdpr_rt.core.cycle.Watch`.
 
-    A task of `clock` polls and writes; whoever reads `alarm` or `stop_reason` judges by himself
-    how old the last good poll is, so that a task that waits for an answer trips as well. While
-    nobody waits by the clock nor runs cycles there are no polls: then the device's own watchdog
-    opens the contactor and applies the brakes. A trip stays, also in the file `latch`, until
+    A task of `clock` polls and writes. `stop_reason` checks the age of the last good poll itself,
+    so that a task that waits for an answer trips as well. While nobody waits by the clock nor runs
+    cycles there are no polls: then the device's own watchdog opens the contactor and applies the
+    brakes. A trip stays, also in the file `latch`, until
     `acknowledge`. The contactor closes only by `energise`. Leaving the block applies the brakes and
     opens the contactor.
     """
@@ -49,15 +48,15 @@ class SafetyIo:
         self._contactor = profile.contactor.output.coil
         self._brakes = {a.axis: a.brake for a in profile.axes if a.brake is not None}
         safe = [self._contactor, *(brake.output.coil for brake in self._brakes.values())]
-        self._wanted = dict.fromkeys(safe, False)
+        self._outputs = dict.fromkeys(safe, False)
         self._written: dict[int, bool] = {}
         self._lights: dict[int, bool] = {}
-        self._armed = self._kept_trip = False
+        self._armed = self._trip_saved = False
         self._alarm = self._stop = self._error = ""
         self._stop_at_s = 0.0
         self._timeout_s = profile.trip_timeout_s
-        self._good_at_s = self._asked_at_s = 0.0
-        self._granted_for_s = self._granted_at_s = 0.0
+        self._last_poll_s = self._last_check_s = 0.0
+        self._extended_poll_s = self._extended_at_s = 0.0
         self._state: IoState | None = None
         self._task: Task[None] | None = None
 
@@ -70,22 +69,22 @@ class SafetyIo:
     def stop_reason(self) -> str:
         """Return why the motion must be braked to its end, or an empty text."""
         now = self.clock.now_s
-        good, timeout = self._good_at_s, self._timeout_s
-        if now - good > timeout and self._armed and not self._stop:
-            # cycles that begin after a pause, in which nobody polled, are no silence yet: that is
-            # granted once for each good poll
-            if now - self._asked_at_s > timeout and good != self._granted_for_s:
-                self._granted_for_s, self._granted_at_s = good, now
-            elif good != self._granted_for_s or now - self._granted_at_s > timeout:
-                self._trip(stop=self._unheard())
-        self._asked_at_s = now
+        last_poll_s, timeout = self._last_poll_s, self._timeout_s
+        if now - last_poll_s > timeout and self._armed and not self._stop:
+            # cycles that begin after a pause without polls are no silence yet: the time-out is
+            # extended once for each good poll
+            if now - self._last_check_s > timeout and last_poll_s != self._extended_poll_s:
+                self._extended_poll_s, self._extended_at_s = last_poll_s, now
+            elif last_poll_s != self._extended_poll_s or now - self._extended_at_s > timeout:
+                self._trip(stop=self._silence_reason())
+        self._last_check_s = now
         return self._stop
 
-    # -- for whoever uses it
+    # -- interface
 
     @property
     def state(self) -> IoState:
-        """What the last good poll saw; for how old it is see `IoState.at_s`."""
+        """State at the last good poll, which is that of `IoState.at_s`."""
         assert self._state is not None  # `open` has polled
         return self._state
 
@@ -106,16 +105,16 @@ class SafetyIo:
 
     def energise(self) -> None:
         """Close the contactor and watch from now on; raises SafetyIoError where that is refused."""
-        tripped = self._tripped or self._kept()
+        tripped = self._tripped or self._saved_trip()
         if tripped:
             raise SafetyIoError(f"{tripped}; see to it, then acknowledge it: cdpr io ack")
         self._refuse(self._obstacle(self._next()))
         self._rules.restart(self.clock.now_s)
-        self._armed = self._wanted[self._contactor] = True
+        self._armed = self._outputs[self._contactor] = True
         self._await(lambda state: state.contactor_closed, self.profile.contactor.timeout_s)
 
     def release_brakes(self, *axes: str) -> None:
-        """Have brakes released (all, where none is named); `brakes_released` tells when they are.
+        """Have brakes released (all, where none is named), as `brakes_released` confirms.
 
         Raises SafetyIoError for an axis without brake.
         """
@@ -136,57 +135,52 @@ class SafetyIo:
         self._await(lambda s: all(s.brakes_released[n] == released for n in names), longest)
 
     def de_energise(self) -> str:
-        """Apply the brakes, open the contactor; return what did not follow, empty if all did."""
+        """Apply the brakes, open the contactor; return which did not follow, else an empty text."""
         self._armed = False
         if self._task is not None and self._task.done:  # an interrupt may have ended it
             self._task = self.clock.start(self._run)
         self.apply_brakes()
-        doubt = self._doubt(lambda: self.await_brakes(False))
-        self._wanted[self._contactor] = False
+        unconfirmed = self._problem(lambda: self.await_brakes(False))
+        self._outputs[self._contactor] = False
         timeout_s = self.profile.contactor.timeout_s
-        opened = self._doubt(lambda: self._await(lambda s: not s.contactor_closed, timeout_s))
-        return "; ".join(dict.fromkeys(text for text in (doubt, opened) if text))
+        opened = self._problem(lambda: self._await(lambda s: not s.contactor_closed, timeout_s))
+        return "; ".join(dict.fromkeys(text for text in (unconfirmed, opened) if text))
 
     def acknowledge(self) -> None:
         """Forget a trip whose cause is gone; raises SafetyIoError while it is not."""
         self._refuse(self._obstacle(self._next(), limits=False))
         self._alarm = self._stop = ""
-        self._kept_trip = False
+        self._trip_saved = False
         self._written.clear()
         self._rules.restart(self.clock.now_s)
         if self._latch_file is not None:
             remove_state(self._latch_file)
 
     def close(self) -> str:
-        """Apply the brakes, open the contactor and leave; return what did not follow."""
+        """Apply the brakes, open the contactor and disconnect; return which did not follow."""
         if self._task is None:
             return ""
-        doubt = self.de_energise()
+        unconfirmed = self.de_energise()
         self.clock.cancel(self._task)
         self._task = None
-        self._keep_trip()
+        self._save_trip()
         with contextlib.suppress(ModbusError):
             for colour, output in self.profile.lights.items():
-                if colour in _SHOWN:  # red stays on until the trip is acknowledged
+                if colour in _STATE_COLOURS:  # red stays on until the trip is acknowledged
                     on = colour == "red" and bool(self._tripped)
                     self._link.write(output.coil, on != output.inverted)
         self._link.close()
-        return doubt
+        return unconfirmed
 
     def __enter__(self) -> Self:
         return self.open()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        doubt = self.close()
-        if doubt and error is None:
-            raise SafetyIoError(doubt)
-        if doubt and error is not None:
-            error.add_note(doubt)
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        unconfirmed = self.close()
+        if unconfirmed and error is None:
+            raise SafetyIoError(unconfirmed)
+        if unconfirmed and error is not None:
+            error.add_note(unconfirmed)
 
     # -- the polling task
 
@@ -203,38 +197,38 @@ class SafetyIo:
             except Exception as error:
                 # a task that ended could switch nothing off any more; this counts as silence
                 self._error = f"{type(error).__name__}: {error}"
-            self._keep_trip()
+            self._save_trip()
 
     def _poll(self) -> None:
-        """Write what has changed, read everything, judge it; raises ModbusError."""
+        """Write changed outputs, read all points, check the rules; raises ModbusError."""
         began = self.clock.now_s
         self._link.feed_watchdog()
-        wanted = self._write()
+        outputs = self._write()
         inputs, coils = self._link.read()
         state = interpret(self.profile, inputs, coils, began)
-        self._state, self._good_at_s, self._error = state, began, ""
-        stray = {coil: coils[coil] for coil, on in wanted.items() if coils[coil] != on}
-        alarm = self._rules.alarm(state, inputs, wanted, stray)
+        self._state, self._last_poll_s, self._error = state, began, ""
+        overwritten = {coil: coils[coil] for coil, on in outputs.items() if coils[coil] != on}
+        alarm = self._rules.alarm(state, inputs, outputs, overwritten)
         armed = self._armed
         if armed and alarm:
             self._trip(alarm=f"{self.name}: {alarm}")
         elif armed and state.limits:
             self._trip(stop=f"{self.name}: {state.limits[0]}")
         if self._alarm or (self._stop and began - self._stop_at_s > _STOP_GRACE_S):
-            self._drop()
+            self._switch_off()
         self._light(state)
 
     def _write(self) -> dict[int, bool]:
-        wanted = dict(self._wanted)
-        for coil, on in (wanted | self._lights).items():
+        outputs = dict(self._outputs)
+        for coil, on in (outputs | self._lights).items():
             if self._written.get(coil) != on:
                 self._link.write(coil, on)
                 self._written[coil] = on
-        return wanted
+        return outputs
 
-    def _drop(self) -> None:
+    def _switch_off(self) -> None:
         """Apply all brakes and open the contactor, without waiting for the next poll."""
-        self._wanted = dict.fromkeys(self._wanted, False)
+        self._outputs = dict.fromkeys(self._outputs, False)
         self._write()
 
     def _light(self, state: IoState) -> None:
@@ -257,19 +251,19 @@ class SafetyIo:
         if stop and not self._stop:
             self._stop, self._stop_at_s = stop, self.clock.now_s
 
-    def _keep_trip(self) -> None:
-        """Write a new trip down for later commands; never in the control cycle, as disks wait."""
+    def _save_trip(self) -> None:
+        """Save a new trip for later commands; never in the control cycle, as disks block."""
         reason, latch = self._tripped, self._latch_file
-        if not reason or self._kept_trip or latch is None:
+        if not reason or self._trip_saved or latch is None:
             return
-        self._kept_trip = True
+        self._trip_saved = True
         date = datetime.now(UTC).isoformat(timespec="seconds")
         try:
-            self.clock.aside(partial(write_state, latch, {"reason": reason, "date": date}))
+            self.clock.run_blocking(partial(write_state, latch, {"reason": reason, "date": date}))
         except StateFileError as error:
             self._alarm = f"{reason} ({error})"
 
-    def _kept(self) -> str:
+    def _saved_trip(self) -> str:
         """Return the trip that an earlier command has left, or an empty text."""
         if self._latch_file is None:
             return ""
@@ -279,8 +273,8 @@ class SafetyIo:
             return str(error)
         return "" if held is None else f"tripped on {held.get('date')}: {held.get('reason')}"
 
-    def _unheard(self) -> str:
-        age = self.clock.now_s - self._good_at_s
+    def _silence_reason(self) -> str:
+        age = self.clock.now_s - self._last_poll_s
         return (
             f"{self.name}: no good poll for {age:.2f} s, {self._timeout_s:g} s allowed "
             f"({self._error or 'no answer has come'})"
@@ -293,14 +287,14 @@ class SafetyIo:
                 f"the emergency-stop chain is open (input {self.profile.chain.input}): release "
                 "the buttons and reset the chain"
             )
-        if state.contactor_closed and not self._wanted[self._contactor]:
+        if state.contactor_closed and not self._outputs[self._contactor]:
             feedback = self.profile.contactor.feedback.input
             return (
                 f"the contactor is closed (input {feedback}) though output {self._contactor} is 0; "
                 "is it welded?"
             )
         for axis, brake in self._brakes.items():
-            if state.brakes_released[axis] and not self._wanted[brake.output.coil]:
+            if state.brakes_released[axis] and not self._outputs[brake.output.coil]:
                 return (
                     f"the brake of {axis} is released (input {brake.feedback.input}) though "
                     f"output {brake.output.coil} is 0; is it stuck?"
@@ -326,7 +320,7 @@ class SafetyIo:
         if released and self._tripped:
             raise SafetyIoError(self._tripped)
         for coil in coils:
-            self._wanted[coil] = released
+            self._outputs[coil] = released
 
     def _brake(self, axis: str) -> Brake:
         brake = self._brakes.get(axis)
@@ -336,11 +330,11 @@ class SafetyIo:
         return brake
 
     def _next(self) -> IoState:
-        """Return what a poll begun from now on sees; raises SafetyIoError where none is good."""
+        """Return the state at a poll begun from now on; raises SafetyIoError without one."""
         return self._await(lambda _: True, 0.0)
 
     def _await(self, done: Callable[[IoState], bool], timeout_s: float) -> IoState:
-        """Wait until a poll begun from now on sees `done`; raises SafetyIoError."""
+        """Wait until `done` holds at a poll begun from now on; raises SafetyIoError."""
         clock, asked_s = self.clock, self.clock.now_s
 
         def settled() -> bool:
@@ -356,11 +350,11 @@ class SafetyIo:
         if followed:
             return state
         if clock.now_s - state.at_s > self._timeout_s:
-            raise SafetyIoError(self._unheard())
+            raise SafetyIoError(self._silence_reason())
         raise SafetyIoError(f"{self.name}: {self._obstacle(state) or 'does not follow'}")
 
     @staticmethod
-    def _doubt(wait: Callable[[], object]) -> str:
+    def _problem(wait: Callable[[], object]) -> str:
         try:
             wait()
         except SafetyIoError as error:

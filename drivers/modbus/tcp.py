@@ -1,4 +1,4 @@
-"""One device on Modbus TCP: requests that succeed or say in words why not."""
+"""Modbus TCP client of one device."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from pymodbus.pdu import (
 from pymodbus.pdu.bit_message import ReadDiscreteInputsRequest, WriteSingleCoilRequest
 from pymodbus.pdu.register_message import WriteMultipleRegistersRequest
 
-from cdpr_rt.clock import Clock
-from drivers.errors import DriverError
-from drivers.modbus.wire import Wire
+from cdpr_drivers.errors import DriverError
+from cdpr_drivers.modbus.byte_channel import ByteChannel
+from cdpr_rt.core.clock import Clock
 
 _CONNECT_TIMEOUT_S = 1.0
 _HEADER_BYTES, _LENGTH_AT, _UNIT_AT = 8, 4, 6
@@ -64,14 +64,14 @@ class ModbusTcp:
         self._clock = clock
         self._framer = FramerSocket(DecodePDU(False))
         self._socket: socket.socket | None = None
-        self._wire: Wire | None = None
+        self._channel: ByteChannel | None = None
         self._count = 0
 
     def close(self) -> None:
         """Leave the device; a later request connects again."""
-        if self._wire is not None:
-            self._wire.close()
-            self._wire = None
+        if self._channel is not None:
+            self._channel.close()
+            self._channel = None
         if self._socket is not None:
             self._socket.close()
             self._socket = None
@@ -114,16 +114,16 @@ class ModbusTcp:
         return list(answer.bits[:count])
 
     def _ask(self, what: str, request: ModbusPDU) -> ModbusPDU:
-        wire = self._connect()
+        channel = self._connect()
         self._count = self._count % 0xFFFF + 1
         request.dev_id, request.transaction_id = self._unit, self._count
-        data = wire.ask(self._framer.buildFrame(request), _is_whole, self._timeout_s)
+        data = channel.ask(self._framer.buildFrame(request), _is_whole, self._timeout_s)
         try:
             _, answer = self._framer.handleFrame(data, self._unit, self._count)
         except (ModbusException, ValueError, IndexError, struct.error):
             answer = None
         if answer is None:
-            raise self._wrong(what, self._why_no_answer(data, wire.lost))
+            raise self._wrong(what, self._missing_answer_reason(data, channel.lost))
         if isinstance(answer, ExceptionResponse):
             number = answer.exception_code
             reason = exception_text(number)
@@ -133,14 +133,14 @@ class ModbusTcp:
             raise self._wrong(what, f"function {code} was answered, {asked} was asked")
         return answer
 
-    def _connect(self) -> Wire:
-        if self._wire is not None and not self._wire.lost:
-            return self._wire
+    def _connect(self) -> ByteChannel:
+        if self._channel is not None and not self._channel.lost:
+            return self._channel
         self.close()
         there = (self._host, self._port)
         timeout_s = max(self._timeout_s, _CONNECT_TIMEOUT_S)
         try:
-            sock = self._clock.aside(lambda: socket.create_connection(there, timeout_s))
+            sock = self._clock.run_blocking(lambda: socket.create_connection(there, timeout_s))
             # small requests go out at once
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except OSError as error:
@@ -148,10 +148,10 @@ class ModbusTcp:
             raise ModbusError(
                 f"{self.name}: cannot connect: {reason}; check host, port and cable"
             ) from None
-        self._socket, self._wire = sock, Wire(self._clock, sock.fileno())
-        return self._wire
+        self._socket, self._channel = sock, ByteChannel(self._clock, sock.fileno())
+        return self._channel
 
-    def _why_no_answer(self, data: bytes, lost: bool) -> str:
+    def _missing_answer_reason(self, data: bytes, lost: bool) -> str:
         if not data:
             silent = f"no answer within {self._timeout_s:g} s from unit {self._unit}"
             return "the device has closed the connection" if lost else silent
@@ -162,7 +162,7 @@ class ModbusTcp:
         return f"the answer makes no sense ({data[:16].hex(' ')})"
 
     def _wrong(self, what: str, reason: str) -> ModbusError:
-        """Return the error, after leaving a connection on which nothing can be believed now."""
+        """Return the error, after closing a connection whose state is not known any more."""
         self.close()
         return ModbusError(f"{self.name}: {what}: {reason}")
 

@@ -6,12 +6,9 @@ import struct
 from dataclasses import dataclass
 from typing import Final, Self
 
-from cdpr_rt.clock import Clock
-from cdpr_rt.task import Task
-from cdpr_rt.tension import TensionExchange, TensionFault
-from drivers.modbus.line import LineError, ModbusLine
-from drivers.modbus.tcp import ModbusError
-from profiles.tension_sensor import (
+from cdpr_drivers.modbus.line import LineError, ModbusLine
+from cdpr_drivers.modbus.tcp import ModbusError
+from cdpr_profiles.devices.tension_sensor import (
     MOST_REGISTERS,
     REGISTERS,
     Amplifier,
@@ -20,6 +17,9 @@ from profiles.tension_sensor import (
     TensionSensors,
     ValueMap,
 )
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.task import Task
+from cdpr_rt.core.tension import TensionExchange, TensionFault
 
 _FORMATS: Final[dict[DataType, str]] = {
     "int16": ">h",
@@ -182,7 +182,7 @@ class TensionSampler:
                 continue
             asked_s = self._clock.now_s
             try:
-                self._cells.line.patient = number not in failing
+                self._cells.line.retrying = number not in failing
                 reading = self._cells.read(number)
             except LineError as error:
                 self.errors = [str(error)] * self.exchange.n

@@ -1,4 +1,4 @@
-"""What a device built on the CANopen slave is told."""
+"""Callbacks of a device built on the CANopen slave."""
 
 from __future__ import annotations
 

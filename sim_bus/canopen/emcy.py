@@ -5,16 +5,13 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from sim_bus.canopen import wire
-from sim_bus.canopen.abort import Abort, SdoAbort
-from sim_bus.canopen.application import NmtState
-from sim_bus.canopen.datatypes import Value
-from sim_bus.frame import pack_frame
-
-if TYPE_CHECKING:
-    from sim_bus.canopen.node import CanopenSlave
+from cdpr_sim_bus.canopen import cob_ids
+from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
+from cdpr_sim_bus.canopen.application import NmtState
+from cdpr_sim_bus.canopen.dictionary.datatypes import Value
+from cdpr_sim_bus.canopen.slave import Slave
+from cdpr_sim_bus.frame import pack_frame
 
 SYNC_LENGTH = 0x8240
 HEARTBEAT = 0x8130
@@ -25,7 +22,7 @@ RPDO_TIMEOUT = 0x8250
 COMMUNICATION_BIT = 0x10
 """Communication error in 1001h."""
 COMMUNICATION = "communication"
-"""Who holds the errors that the communication part finds; the application's holder is ""."""
+"""Source of errors that the communication part detects; the application's is ""."""
 
 _INVALID = 0x80000000
 _QUEUE_LENGTH = 16
@@ -33,13 +30,13 @@ _LAYOUT = struct.Struct("<HB5s")
 
 
 class EmergencyProducer:
-    """Errors that stand, what is told of them on the bus, and their history."""
+    """Active errors, their EMCY messages and their history."""
 
-    def __init__(self, slave: CanopenSlave) -> None:
+    def __init__(self, slave: Slave) -> None:
         self._slave = slave
         self._od = od = slave.od
         self._active: dict[int, int] = {}
-        self._holders: dict[int, set[str]] = {}
+        self._sources: dict[int, set[str]] = {}
         self._queue: deque[bytes] = deque(maxlen=_QUEUE_LENGTH)
         self._history: list[int] = []
         self._history_length = len(od.subs(0x1003))
@@ -54,13 +51,13 @@ class EmergencyProducer:
             od.on_write(0x1014, 0, self._check_cob_id)
 
     def raise_error(
-        self, code: int, register_bits: int, vendor: bytes = b"", holder: str = ""
+        self, code: int, register_bits: int, vendor: bytes = b"", source: str = ""
     ) -> None:
-        """Report an error once while it stands: until each `holder` that raised it took it back.
+        """Report an error once, until each `source` that raised it has cleared it.
 
         `register_bits` are its bits in 1001h, `vendor` up to 5 bytes for the EMCY frame.
         """
-        self._holders.setdefault(code, set()).add(holder)
+        self._sources.setdefault(code, set()).add(source)
         if code in self._active:
             return
         self._active[code] = register_bits | 1
@@ -69,28 +66,28 @@ class EmergencyProducer:
         del self._history[self._history_length :]
         self._enqueue(code, vendor)
 
-    def clear(self, code: int | None = None, holder: str = "") -> None:
-        """Take back one error of `holder`, or all errors of everybody.
+    def clear(self, code: int | None = None, source: str = "") -> None:
+        """Clear one error of `source`, or all errors of all sources.
 
-        Error code 0000h goes out, with the register that remains, once nobody holds it.
+        Error code 0000h goes out, with the register that remains, once no source holds it.
         """
         if code is None:
             standing = bool(self._active)
             self._active.clear()
-            self._holders.clear()
+            self._sources.clear()
         else:
-            holders = self._holders.get(code, set())
-            holders.discard(holder)
-            standing = not holders and self._active.pop(code, None) is not None
+            sources = self._sources.get(code, set())
+            sources.discard(source)
+            standing = not sources and self._active.pop(code, None) is not None
         if standing:
             self._update_register()
             self._enqueue(0, b"")
 
     def reset_communication(self) -> None:
         """Forget unsent frames and communication errors; the application's errors stand."""
-        for holders in self._holders.values():
-            holders.discard(COMMUNICATION)
-        self._active = {c: bits for c, bits in self._active.items() if self._holders.get(c)}
+        for sources in self._sources.values():
+            sources.discard(COMMUNICATION)
+        self._active = {c: bits for c, bits in self._active.items() if self._sources.get(c)}
         self._queue.clear()
         self._timer.stop()
         self._free_at = 0.0
@@ -99,7 +96,7 @@ class EmergencyProducer:
     def reset_node(self) -> None:
         """Forget every error and the history."""
         self._active.clear()
-        self._holders.clear()
+        self._sources.clear()
         self._history.clear()
         self._update_register()
 
@@ -123,7 +120,7 @@ class EmergencyProducer:
         slave = self._slave
         if slave.nmt_state not in (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL):
             return
-        cob_id = self._od.get_int(0x1014, 0, wire.EMCY + slave.node_id)
+        cob_id = self._od.get_int(0x1014, 0, cob_ids.EMCY + slave.node_id)
         inhibit_s = self._od.get_int(0x1015, 0, 0) * 1e-4
         while self._queue:
             if now < self._free_at - 1e-9:
@@ -153,5 +150,5 @@ class EmergencyProducer:
         both_valid = not (new | old) & _INVALID
         if new & 0x60000000 or (both_valid and identifier != old & 0x1FFFFFFF):
             raise SdoAbort(Abort.INVALID_VALUE)
-        if not new & _INVALID and wire.is_restricted(identifier):
+        if not new & _INVALID and cob_ids.is_restricted(identifier):
             raise SdoAbort(Abort.INVALID_VALUE)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from sim_bus.canopen import emcy, wire
-from sim_bus.canopen.abort import Abort, SdoAbort
-from sim_bus.canopen.application import NmtState
-from sim_bus.canopen.datatypes import Value
-from sim_bus.frame import pack_frame
-
-if TYPE_CHECKING:
-    from sim_bus.canopen.node import CanopenSlave
+from cdpr_sim_bus.canopen import cob_ids, emcy
+from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
+from cdpr_sim_bus.canopen.application import NmtState
+from cdpr_sim_bus.canopen.dictionary.datatypes import Value
+from cdpr_sim_bus.canopen.slave import Slave
+from cdpr_sim_bus.frame import pack_frame
 
 
 class HeartbeatProducer:
     """Sends the NMT state every 1017h ms, the first one a period after the boot-up message."""
 
-    def __init__(self, slave: CanopenSlave) -> None:
+    def __init__(self, slave: Slave) -> None:
         self._slave = slave
         self._timer = slave.timers.add(self._beat)
         self._period_s = 0.0
@@ -29,7 +25,7 @@ class HeartbeatProducer:
     def boot(self) -> None:
         """Send the boot-up message and take the period from 1017h."""
         slave = self._slave
-        slave.outbox.append(pack_frame(wire.ERROR_CONTROL + slave.node_id, b"\x00"))
+        slave.outbox.append(pack_frame(cob_ids.ERROR_CONTROL + slave.node_id, b"\x00"))
         self._toggle = 0
         self._start(slave.od.get_int(0x1017, 0, 0))
 
@@ -56,13 +52,13 @@ class HeartbeatProducer:
 
     def _send(self, state: int) -> None:
         slave = self._slave
-        slave.outbox.append(pack_frame(wire.ERROR_CONTROL + slave.node_id, bytes([state])))
+        slave.outbox.append(pack_frame(cob_ids.ERROR_CONTROL + slave.node_id, bytes([state])))
 
 
 class _Consumer:
     """Monitor of one node, configured by one sub-index of 1016h."""
 
-    def __init__(self, owner: HeartbeatConsumers, slave: CanopenSlave) -> None:
+    def __init__(self, owner: HeartbeatConsumers, slave: Slave) -> None:
         self._owner = owner
         self._timer = slave.timers.add(lambda _now: self._lose())
         self.node = 0
@@ -105,7 +101,7 @@ class HeartbeatConsumers:
     was lost, which takes the error back.
     """
 
-    def __init__(self, slave: CanopenSlave) -> None:
+    def __init__(self, slave: Slave) -> None:
         self._slave = slave
         self._consumers: list[_Consumer] = []
         for entry in slave.od.subs(0x1016):
@@ -119,10 +115,10 @@ class HeartbeatConsumers:
             value = entry.value
             consumer.configure(value if isinstance(value, int) else 0)
 
-    def handlers(self) -> dict[int, wire.Handler]:
+    def handlers(self) -> dict[int, cob_ids.Handler]:
         """Frame handlers by identifier for the nodes watched now."""
         return {
-            wire.ERROR_CONTROL + consumer.node: consumer.receive
+            cob_ids.ERROR_CONTROL + consumer.node: consumer.receive
             for consumer in self._consumers
             if consumer.node and consumer.period_s
         }

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from sim_bus.canopen import wire
-from sim_bus.canopen.abort import SdoAbort
-from sim_bus.frame import pack_frame
-
-if TYPE_CHECKING:
-    from sim_bus.canopen.node import CanopenSlave
+from cdpr_sim_bus.canopen import cob_ids
+from cdpr_sim_bus.canopen.abort import SdoAbort
+from cdpr_sim_bus.canopen.slave import Slave
+from cdpr_sim_bus.frame import pack_frame
 
 UNCONFIGURED = 255
 """Node id of a node that has none."""
@@ -35,7 +32,7 @@ _STORE_FAILED = 2
 class LssSlave:
     """One LSS slave; the LSS address is 1018h. It listens in every NMT state."""
 
-    def __init__(self, slave: CanopenSlave) -> None:
+    def __init__(self, slave: Slave) -> None:
         self._slave = slave
         self._configuration = False
         self.pending_node_id = slave.node_id
@@ -72,7 +69,7 @@ class LssSlave:
             command(frame[8:16])
 
     def _send(self, data: bytes) -> None:
-        self._slave.outbox.append(pack_frame(wire.LSS_SLAVE, data.ljust(8, b"\x00")))
+        self._slave.outbox.append(pack_frame(cob_ids.LSS_SLAVE, data.ljust(8, b"\x00")))
 
     def _address(self, part: int) -> int:
         return self._slave.od.get_int(0x1018, part + 1, 0)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import struct
 
-from sim_bus.canopen import emcy, wire
-from sim_bus.canopen.application import NmtState, SlaveApplication
-from sim_bus.canopen.emcy import EmergencyProducer
-from sim_bus.canopen.heartbeat import HeartbeatConsumers, HeartbeatProducer
-from sim_bus.canopen.lss import UNCONFIGURED, LssSlave
-from sim_bus.canopen.od import APPLICATION, COMMUNICATION, ObjectDictionary
-from sim_bus.canopen.pdo import PdoService
-from sim_bus.canopen.sdo_server import SdoServer
-from sim_bus.canopen.store import ParameterStore, serve_store
-from sim_bus.canopen.sync import SyncConsumer
-from sim_bus.canopen.timers import Timers
-from sim_bus.canopen.verify import ConfigurationStamp
-from sim_bus.frame import RTR_FLAG
+from cdpr_sim_bus.canopen import cob_ids, emcy
+from cdpr_sim_bus.canopen.application import NmtState, SlaveApplication
+from cdpr_sim_bus.canopen.dictionary.od import APPLICATION, COMMUNICATION, ObjectDictionary
+from cdpr_sim_bus.canopen.dictionary.store import ParameterStore, add_store_objects
+from cdpr_sim_bus.canopen.dictionary.verify import ConfigurationStamp
+from cdpr_sim_bus.canopen.emcy import EmergencyProducer
+from cdpr_sim_bus.canopen.heartbeat import HeartbeatConsumers, HeartbeatProducer
+from cdpr_sim_bus.canopen.lss import UNCONFIGURED, LssSlave
+from cdpr_sim_bus.canopen.pdos.pdo import PdoService
+from cdpr_sim_bus.canopen.sdo.sdo_server import SdoServer
+from cdpr_sim_bus.canopen.sync import SyncConsumer
+from cdpr_sim_bus.canopen.timers import Timers
+from cdpr_sim_bus.frame import RTR_FLAG
 
 _IDENTIFIER = struct.Struct("<I").unpack_from
 _NMT_COMMANDS = {
@@ -67,10 +67,10 @@ class CanopenSlave:
         """Whether it neither sends nor listens: another bit timing, or LSS is switching it."""
         self.timers = Timers()
         self.timers.add(self._boot).arm(0.0)
-        self._handlers: dict[int, wire.Handler] = {}
+        self._handlers: dict[int, cob_ids.Handler] = {}
         od.set_node_id(self.node_id)
         od.power_on(COMMUNICATION)
-        serve_store(self.store, od)
+        add_store_objects(self.store, od)
         self.stamp = ConfigurationStamp(od, self.store)
         self._emcy = EmergencyProducer(self)
         self._heartbeat = HeartbeatProducer(self)
@@ -119,10 +119,6 @@ class CanopenSlave:
         """Take back an error of the communication; the application may hold it still."""
         self._emcy.clear(code, emcy.COMMUNICATION)
 
-    def trigger_tpdo(self, number: int) -> None:
-        """Send an event-driven TPDO (number from 1) for a reason of the application's own."""
-        self.pdo.trigger(number, self.now)
-
     def set_nmt_state(self, state: NmtState) -> None:
         """Change the NMT state, by command or for a reason of the application's own (6007h)."""
         if state == self.nmt_state:
@@ -165,18 +161,18 @@ class CanopenSlave:
 
     def rebuild_handlers(self) -> None:
         """Work out anew which identifiers are listened to."""
-        handlers: dict[int, wire.Handler] = {}
+        handlers: dict[int, cob_ids.Handler] = {}
         state = self.nmt_state
         if state != NmtState.INITIALISING:
             handlers.update(self.pdo.handlers())
             handlers.update(self._consumers.handlers())
             if state != NmtState.STOPPED:
                 handlers[self.sync.identifier] = self.sync.receive
-                handlers[wire.SDO_REQUEST + self.node_id] = self._sdo.receive
-            guarding = wire.ERROR_CONTROL + self.node_id | RTR_FLAG
+                handlers[cob_ids.SDO_REQUEST + self.node_id] = self._sdo.receive
+            guarding = cob_ids.ERROR_CONTROL + self.node_id | RTR_FLAG
             handlers[guarding] = self._heartbeat.answer_guarding
-            handlers[wire.NMT_COMMAND] = self._receive_nmt
-        handlers[wire.LSS_MASTER] = self._lss.receive
+            handlers[cob_ids.NMT_COMMAND] = self._receive_nmt
+        handlers[cob_ids.LSS_MASTER] = self._lss.receive
         if self.muted:
             handlers.clear()
         self._handlers = handlers

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from sim_bus.canopen import emcy, wire
-from sim_bus.canopen.abort import Abort, SdoAbort
-from sim_bus.canopen.application import NmtState
-from sim_bus.canopen.datatypes import Value
-
-if TYPE_CHECKING:
-    from sim_bus.canopen.node import CanopenSlave
+from cdpr_sim_bus.canopen import cob_ids, emcy
+from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
+from cdpr_sim_bus.canopen.application import NmtState
+from cdpr_sim_bus.canopen.dictionary.datatypes import Value
+from cdpr_sim_bus.canopen.slave import Slave
 
 _PRODUCER = 0x40000000
 _MAX_COUNTER = 240
@@ -19,7 +15,7 @@ _MAX_COUNTER = 240
 class SyncConsumer:
     """Takes SYNC in PRE-OPERATIONAL and OPERATIONAL."""
 
-    def __init__(self, slave: CanopenSlave) -> None:
+    def __init__(self, slave: Slave) -> None:
         self._slave = slave
         self.counted = False
         """Whether SYNC carries a counter (1019h not 0)."""
@@ -68,7 +64,7 @@ class SyncConsumer:
 
     def _write_cob_id(self, value: Value) -> None:
         new = int(value)
-        if new & _PRODUCER or wire.is_restricted(new & 0x1FFFFFFF) or new & 0x20000000:
+        if new & _PRODUCER or cob_ids.is_restricted(new & 0x1FFFFFFF) or new & 0x20000000:
             raise SdoAbort(Abort.INVALID_VALUE)
         self._store(0x1005, new)
         self._slave.rebuild_handlers()

@@ -1,18 +1,25 @@
-"""One motor as the drive's firmware sees it: objects of the dictionary in, feedback out."""
+"""One motor under the drive's firmware: objects of the dictionary in, feedback out."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 
-from sim_bus import servo
-from sim_bus.cable_robot import MotorSample, RobotMember
-from sim_bus.canopen.od import ObjectDictionary
-from sim_bus.motor import run
-from sim_bus.motor_state import MotorRatings, Transmission, build_motor, cut_off, let_slip
-from sim_bus.plant import Plant
-from sim_bus.rotor import restart_counter
-from sim_bus.twins import Twin
+from cdpr_sim_bus.canopen.dictionary.od import ObjectDictionary
+from cdpr_sim_bus.cia402.drive_quirks import DriveQuirks
+from cdpr_sim_bus.jit import bound
+from cdpr_sim_bus.robot import servo
+from cdpr_sim_bus.robot.cable_robot import MotorSample, RobotMember
+from cdpr_sim_bus.robot.motor import run
+from cdpr_sim_bus.robot.motor_state import (
+    MotorRatings,
+    Transmission,
+    build_motor,
+    lengthen_cable,
+    remove_cable,
+)
+from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.rotor import restart_counter
 
 _WINDOW_OFF = 0xFFFFFFFF
 
@@ -27,7 +34,7 @@ class Axis:
 
     Positions here are encoder counts from power-up; `position_offset` leads to those of the
     dictionary (position actual = counter + offset). Inner loops work in counts; `velocity` reads
-    objects in the unit that the drive's `twin` speaks.
+    objects in the drive's own unit (see `quirks`).
     """
 
     def __init__(
@@ -36,19 +43,22 @@ class Axis:
         plant: Plant,
         ratings: MotorRatings,
         transmission: Transmission | None = None,
-        twin: Twin | None = None,
+        quirks: DriveQuirks | None = None,
         robot: RobotMember | None = None,
     ) -> None:
         self.od = od
         self.plant = plant
         self.ratings = ratings
-        self.twin = twin or Twin()
-        self.velocity_unit = plant.encoder.counts_per_turn / 60.0 if self.twin.speaks_rpm else 1.0
+        self.quirks = quirks or DriveQuirks()
+        self.velocity_unit = (
+            plant.encoder.counts_per_turn / 60.0 if self.quirks.velocity_in_rpm else 1.0
+        )
         """Counts/s of one velocity unit, counts/s² of one acceleration unit."""
         self.motor = build_motor(plant, ratings, transmission)
         self._robot = robot
         if robot is not None:
             self.motor = robot.adopt(self.motor, self._command)
+        self._advance = bound(run, self.motor, then=(0.0, 0, 0.0))
         self.kind = servo.OFF
         self.target = 0.0
         self.setpoint: Callable[[], float] | None = None
@@ -79,7 +89,10 @@ class Axis:
     def _run(self, until: float) -> MotorSample:
         if self._robot is not None:
             return self._robot.step(until)
-        return run(self.motor, until, *self._command())
+        if self.setpoint is not None:
+            self.target = self.setpoint()
+        sample: MotorSample = self._advance(until, self.kind, self.target)
+        return sample
 
     def _command(self) -> tuple[int, float]:
         if self.setpoint is not None:
@@ -115,14 +128,14 @@ class Axis:
         if self._robot is not None:
             self._robot.cut()
             return True
-        return cut_off(self.motor)
+        return remove_cable(self.motor)
 
     def slip_cable(self, metres: float) -> bool:
         """Let so much cable slip through its fastening on the drum; return whether there is one."""
         if self._robot is not None:
             self._robot.slip(metres)
             return True
-        return let_slip(self.motor, metres)
+        return lengthen_cable(self.motor, metres)
 
     def read(self, field: str) -> float:
         """Return a field of the motor's record."""
@@ -139,7 +152,7 @@ class Axis:
     def configure(self) -> None:
         """Take limits and windows from the dictionary."""
         get, m = self.od.get_int, self.motor
-        unit = self.twin.torque_unit_Nm or get(0x6076) * 1e-6
+        unit = self.quirks.torque_unit_Nm or get(0x6076) * 1e-6
         m["torque_unit"] = unit
         constant = self.ratings.torque_constant_Nm_per_Arms
         m["rated_current"] = get(0x6075) * 1e-3 * constant

@@ -1,11 +1,11 @@
-"""Faults that a drive finds by itself, and whom it tells of them."""
+"""Faults that a drive detects by itself, and the interface to report them."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
-from sim_bus import servo
-from sim_bus.cia402.words import ErrorCode
+from cdpr_sim_bus.cia402.words import ErrorCode
+from cdpr_sim_bus.robot import servo
 
 FAULTS = (
     (servo.OVERCURRENT, ErrorCode.OVERCURRENT, True),
@@ -19,7 +19,7 @@ ALWAYS_WATCHED = LASTING | servo.I2T_TRIP | servo.FOLLOWING_ERROR
 
 
 class ErrorReporter(Protocol):
-    """What the state machine tells the communication part."""
+    """Interface through which the state machine reports errors."""
 
     def emergency(self, code: int, register_bits: int) -> None:
         """Report an error."""

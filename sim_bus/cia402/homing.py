@@ -11,10 +11,10 @@ from enum import Enum, auto
 
 from typing_extensions import override
 
-from sim_bus import rotor, servo
-from sim_bus.cia402.axis import Axis
-from sim_bus.cia402.modes import Mode
-from sim_bus.cia402.words import BIT_4, BIT_12, BIT_13, TARGET_REACHED, ModeNumber
+from cdpr_sim_bus.cia402.axis import Axis
+from cdpr_sim_bus.cia402.modes import Mode
+from cdpr_sim_bus.cia402.words import BIT_4, BIT_12, BIT_13, TARGET_REACHED, ModeNumber
+from cdpr_sim_bus.robot import rotor, servo
 
 _TURNS_WITHOUT_INDEX = 2
 
@@ -83,8 +83,8 @@ class Homing(Mode):
 
     def __init__(self, axis: Axis) -> None:
         super().__init__(axis)
-        self._reversed = axis.twin.homing_reversed
-        self._shows_rest = axis.twin.bit_10_in_homing
+        self._reversed = axis.quirks.homing_reversed
+        self._bit_10_shown = axis.quirks.bit_10_in_homing
         self._phase = _Phase.IDLE
         self._method = METHODS[33]
         self._direction = 0
@@ -220,7 +220,7 @@ class Homing(Mode):
     @override
     def status(self) -> int:
         word = self._progress()
-        if self._shows_rest:
+        if self._bit_10_shown:
             return word
         if self._phase is _Phase.STOPPING:
             word &= ~BIT_12
@@ -237,7 +237,7 @@ class Homing(Mode):
 
     @override
     def idle_status(self) -> int:
-        rest = TARGET_REACHED if self._shows_rest else 0
+        rest = TARGET_REACHED if self._bit_10_shown else 0
         return rest | (BIT_12 if self.homed else 0)
 
 

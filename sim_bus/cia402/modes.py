@@ -6,9 +6,8 @@ from typing import Any
 
 from typing_extensions import override
 
-from sim_bus import servo
-from sim_bus.cia402.axis import Axis
-from sim_bus.cia402.words import (
+from cdpr_sim_bus.cia402.axis import Axis
+from cdpr_sim_bus.cia402.words import (
     BIT_4,
     BIT_5,
     BIT_6,
@@ -17,6 +16,7 @@ from sim_bus.cia402.words import (
     TARGET_REACHED,
     ModeNumber,
 )
+from cdpr_sim_bus.robot import servo
 
 
 class Mode:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from sim_bus import rotor
-from sim_bus.canopen.abort import Abort, SdoAbort
-from sim_bus.canopen.datatypes import Value
-from sim_bus.canopen.od import Entry
-from sim_bus.cia402.axis import Axis, to_int32
+from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
+from cdpr_sim_bus.canopen.dictionary.datatypes import Value
+from cdpr_sim_bus.canopen.dictionary.od import Entry
+from cdpr_sim_bus.cia402.axis import Axis, to_int32
+from cdpr_sim_bus.robot import rotor
 
 _ENABLE = 0x01
 _CONTINUOUS = 0x02

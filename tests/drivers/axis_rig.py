@@ -11,16 +11,16 @@ from pathlib import Path
 
 import canopen
 
-from cdpr_rt.clock import PacedClock
-from drivers.axis_group import AxisGroup
-from drivers.axis_layout import AxisConfig
-from drivers.boot import BootReport, BootSettings, boot_all
-from drivers.bus import BusUrl
-from drivers.bus.leading import open_clock
-from drivers.cia402 import Mode, State
-from drivers.network import CanNetwork
-from profiles import DriveProfile, load_drive
-from tools.simulator import OwnSimulator
+from cdpr_drivers.axes.axis_group import AxisGroup
+from cdpr_drivers.axes.axis_layout import AxisConfig
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.simulated_bus import open_clock
+from cdpr_drivers.canopen.boot.boot import BootReport, BootSettings, boot_all
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.cia402 import Mode, State
+from cdpr_profiles import DriveProfile, load_drive
+from cdpr_rt.core.clock import PacedClock
+from cdpr_tools.composition.simulator import OwnSimulator
 
 MASTER = 127
 PERIOD_S = 1e-3

@@ -7,19 +7,17 @@ import subprocess
 import sys
 import uuid
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from axis_rig import Rig, open_network, open_rig
+from tests.drivers.axis_rig import Rig, open_network, open_rig
 
 
 @pytest.fixture(scope="module")
 def simulated_bus() -> Iterator[str]:
     """A bus with the drives 1 and 2, whose time stands for a short while only after a SYNC."""
     bus = f"simbus:axes-{os.getpid()}-{uuid.uuid4().hex[:6]}"
-    command = [sys.executable, "-m", "tools.cli", "sim", "up", "winch-mpp0923d", "--bus", bus]
+    command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", "winch-mpp0923d", "--bus", bus]
     command += ["--nodes", "2", "--exit-with-stdin"]
     simulator = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert simulator.stdout is not None
@@ -33,11 +31,11 @@ def simulated_bus() -> Iterator[str]:
 @pytest.fixture(autouse=True)
 def brief_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulated drives are there at once: do not wait as long as for real ones."""
-    monkeypatch.setattr("drivers.boot._BOOT_UP_TIMEOUT_S", 0.4)
-    monkeypatch.setattr("drivers.boot._LISTEN_SHARE", 0.1)
-    monkeypatch.setattr("drivers.boot._LISTEN_LEAST_S", 0.05)
-    monkeypatch.setattr("drivers.network._LOOK_S", 0.02)
-    monkeypatch.setattr("drivers.axis_shutdown._TIMEOUT_S", 0.4)
+    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._BOOT_UP_TIMEOUT_S", 0.4)
+    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._LISTEN_SHARE", 0.1)
+    monkeypatch.setattr("cdpr_drivers.canopen.boot.boot._LISTEN_LEAST_S", 0.05)
+    monkeypatch.setattr("cdpr_drivers.canopen.network._LOOK_S", 0.02)
+    monkeypatch.setattr("cdpr_drivers.axes.axis_group._POWER_OFF_TIMEOUT_S", 0.4)
 
 
 @pytest.fixture

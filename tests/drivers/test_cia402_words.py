@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from canopen.profiles.p402 import State402
 
-from drivers.cia402 import CONTROLWORD_TABLE, TARGETS, State, fault_text, state_of, supports
+from cdpr_drivers.cia402 import CONTROLWORD_TABLE, TARGETS, State, fault_text, state_of, supports
 
 S = State
 _NAMES = {
@@ -20,7 +20,7 @@ _NAMES = {
 }
 
 
-def test_every_statusword_is_read_as_a_stranger_reads_it() -> None:
+def test_every_statusword_is_read_as_a_third_party_reads_it() -> None:
     for word in range(1 << 16):
         theirs = [
             _NAMES[n] for n, (mask, value) in State402.SW_MASK.items() if word & mask == value

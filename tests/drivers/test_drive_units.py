@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from drivers.axis_layout import AxisConfig
-from drivers.drive_units import torque_settings, torque_unit_Nm
-from profiles import DriveProfile, load_drive
+from cdpr_drivers.axes.axis_layout import AxisConfig
+from cdpr_drivers.drive_units import torque_settings, torque_unit_Nm
+from cdpr_profiles import DriveProfile, load_drive
 
 GENERIC = load_drive("generic-cia402")
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import httpx
 
-from tools.simulator import OwnSimulator
+from cdpr_tools.composition.simulator import OwnSimulator
 
 # slow enough for a machine on which other tests run: its paced simulator must answer in time
 _ROBOT = """
@@ -40,6 +40,8 @@ node_id = 2
 """
 NAME, PERIOD_S = "slow-2", 0.01
 PATIENCE_S = 60.0
+# the first start on a machine compiles the loop's kernels and the physics
+START_S = 300.0
 _names = itertools.count()
 
 
@@ -96,7 +98,7 @@ class RealDaemon:
             bus = f"simbus:paced-{os.getpid()}-{next(_names)}"
             self._simulator = OwnSimulator(str(self.robot), bus, paced=True)
         asked = ("run", str(self.robot), "--bus", bus, *self.at)
-        command = [sys.executable, "-P", "-m", "tools.cli", *asked]
+        command = [sys.executable, "-P", "-m", "cdpr_tools.cli", *asked]
         self.process = subprocess.Popen(
             [*command, *options],
             stdout=subprocess.PIPE,
@@ -116,7 +118,7 @@ class RealDaemon:
 
     def _first_line(self) -> str:
         assert self.process.stdout is not None
-        told, _, _ = select.select([self.process.stdout], [], [], PATIENCE_S)
+        told, _, _ = select.select([self.process.stdout], [], [], START_S)
         line = self.process.stdout.readline() if told else ""
         assert line, self.errors()
         return line
@@ -180,5 +182,5 @@ class RealDaemon:
 
 def cdpr(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """Run a command to its end."""
-    command = [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)

@@ -22,7 +22,7 @@ class Proxy:
     """Passes datagrams on, in both directions, through the same bad network; counts them."""
 
     def __init__(self, port: int, seed: int, altered: float) -> None:
-        self._chance = random.Random(seed)
+        self._rng = random.Random(seed)
         self._altered = altered
         self._front = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._front.bind(("127.0.0.1", 0))
@@ -68,17 +68,17 @@ class Proxy:
     def _copies(self) -> list[float]:
         """Return when a datagram is passed on: never, once, or twice."""
         weights = (LOSS, 1.0 - LOSS - COPIES, COPIES)
-        count = self._chance.choices((0, 1, 2), weights)[0]
+        count = self._rng.choices((0, 1, 2), weights)[0]
         now_s = time.monotonic()
-        return [now_s + self._chance.uniform(0.0, JITTER_S) for _ in range(count)]
+        return [now_s + self._rng.uniform(0.0, JITTER_S) for _ in range(count)]
 
     def _spoil(self, data: bytes) -> bytes:
         """Make some set-points say NaN, or a metre from where the hand is."""
-        if data[_KIND_AT] != _SETPOINT or self._chance.random() >= self._altered:
+        if data[_KIND_AT] != _SETPOINT or self._rng.random() >= self._altered:
             return data
         self.spoilt += 1
         (x,) = struct.unpack_from("<d", data, _POSITION_AT)
-        wrong = self._chance.choice((math.nan, x + 1.0, x - 1.0, 1e300))
+        wrong = self._rng.choice((math.nan, x + 1.0, x - 1.0, 1e300))
         spoilt = bytearray(data)
         struct.pack_into("<d", spoilt, _POSITION_AT, wrong)
         return bytes(spoilt)

@@ -16,18 +16,18 @@ import can
 import canopen
 import pytest
 
-from profiles import load_winch
+from cdpr_profiles import load_winch
 
 pytestmark = pytest.mark.alone
 
 WINCH = "winch-mpp0923d"
 EDS = load_winch(WINCH).drive.eds
 OFF, ENABLED, FAULT = 0x40, 0x27, 0x08
-CDPR = (sys.executable, "-m", "tools.cli")
+CDPR = (sys.executable, "-m", "cdpr_tools.cli")
 
 
 class Lab:
-    """A simulated drive reachable three ways, and a stranger's master on the simulated bus."""
+    """A simulated drive reachable three ways, and a third party's master on the simulated bus."""
 
     def __init__(self) -> None:
         self.name = name = f"adapters-{os.getpid()}-{uuid.uuid4().hex[:6]}"

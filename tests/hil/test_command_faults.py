@@ -19,8 +19,8 @@ import canopen
 import numpy as np
 import pytest
 
-from cdpr_rt.rawlog import read_raw_log
-from profiles import load_winch
+from cdpr_profiles import load_winch
+from cdpr_rt.core.rawlog import read_raw_log
 
 WINCH = "winch-mpp0923d"
 PROFILES = Path(sys.modules[load_winch.__module__].__file__ or "").parent
@@ -32,7 +32,7 @@ OFF, ENABLED, FAULT = 0x40, 0x27, 0x08
 
 
 class Lab:
-    """A simulated drive on a bus of its own, and a stranger's master who only looks and spoils."""
+    """A simulated drive on a bus of its own, and a third-party master that reads and disturbs."""
 
     def __init__(self, *options: str | Path) -> None:
         self.bus = f"simbus:lab-{os.getpid()}-{uuid.uuid4().hex[:6]}"
@@ -66,11 +66,11 @@ class Lab:
         word = self.node.sdo[0x6041].raw
         return int(word & (0x6F if word & 0x20 else 0x4F))
 
-    def misbehave(self, sub: int, value: int) -> None:
+    def inject_fault(self, sub: int, value: int) -> None:
         self.node.sdo[0x2F00][sub].raw = value
 
     def leave(self) -> None:
-        """Take the stranger away, whose receiving thread would print the end of the bus."""
+        """Take the third party away, whose receiving thread would print the end of the bus."""
         self._network.disconnect()
 
     def close(self) -> None:
@@ -93,7 +93,7 @@ def lab(shared_lab: Lab) -> Lab:
 
 
 def _cdpr(*arguments: str | Path) -> list[str]:
-    return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
 
 
 def begin(*arguments: str | Path) -> Command:
@@ -193,7 +193,7 @@ def test_another_drive_than_the_profile_says(
 
 
 def test_a_node_in_fault_is_told_in_words(lab: Lab) -> None:
-    lab.misbehave(1, 0x3210)
+    lab.inject_fault(1, 0x3210)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "node 1" in told
     assert "3210h DC link over-voltage" in told
@@ -201,7 +201,7 @@ def test_a_node_in_fault_is_told_in_words(lab: Lab) -> None:
 
 
 def test_a_drive_that_refuses_the_mode(lab: Lab) -> None:
-    lab.misbehave(3, 1)
+    lab.inject_fault(3, 1)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "10 (cyclic torque) was refused" in told
     assert lab.state() == OFF
@@ -211,7 +211,7 @@ def test_a_drive_that_refuses_the_mode(lab: Lab) -> None:
 def test_a_drive_in_another_mode_than_asked_is_not_enabled(
     lab: Lab, sub: int, value: int, shown: str
 ) -> None:
-    lab.misbehave(sub, value)
+    lab.inject_fault(sub, value)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "asked for mode 10 (cyclic torque)" in told
     assert f"reports {shown}" in told
@@ -219,7 +219,7 @@ def test_a_drive_in_another_mode_than_asked_is_not_enabled(
 
 
 def test_a_drive_without_heartbeat(lab: Lab) -> None:
-    lab.misbehave(5, 1)
+    lab.inject_fault(5, 1)
     told = fails("drive", "enable", WINCH, "--bus", lab.bus)
     assert "step K" in told
     assert lab.state() == OFF
@@ -244,7 +244,7 @@ def test_an_index_that_never_comes(tmp_path: Path) -> None:
 def test_an_emergency_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path, "--json") as command:
         assert lab.state() == ENABLED
-        lab.misbehave(1, 0x7305)
+        lab.inject_fault(1, 0x7305)
         told = complaint(command, FAILED)
     assert "7305h incremental encoder 1" in told
     assert str(tmp_path / "raw") in told
@@ -254,7 +254,7 @@ def test_an_emergency_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
 
 def test_a_drive_that_changes_its_mode_in_mid_sweep(lab: Lab, tmp_path: Path) -> None:
     with sweeping(lab, tmp_path) as command:
-        lab.misbehave(4, 9)
+        lab.inject_fault(4, 9)
         told = complaint(command, FAILED)
     assert "reports mode 9 (cyclic velocity)" in told
     assert lab.state() == OFF

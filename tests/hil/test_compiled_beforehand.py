@@ -8,13 +8,13 @@ import sys
 SCRIPT = """
 import sys
 from numba.core.registry import CPUDispatcher
-from tools.trials.lockstep import LockstepRobot
+from cdpr_tools.trials.lockstep import LockstepRobot
 
 def compiled():
     return {
         (module.__name__, name): len(kernel.signatures)
         for module in list(sys.modules.values())
-        if getattr(module, "__name__", "").startswith(("cdpr_rt", "drivers", "tools"))
+        if getattr(module, "__name__", "").startswith(("cdpr_rt", "cdpr_drivers", "cdpr_tools"))
         for name, kernel in vars(module).items()
         if isinstance(kernel, CPUDispatcher)
     }
@@ -25,13 +25,13 @@ with LockstepRobot("planar-3") as robot:
     robot.carry_out("tighten", 30.0)
     robot.carry_out("pose", 30.0, position_m=[0.1, 1.5])
     robot.program("pose", stream=True)
-    hand, place = robot.stream.hand(), [0.0, 0.0, 0.0]
+    hand, place = robot.stream.sender(), [0.0, 0.0, 0.0]
     for _ in range(30):
         place[0] += 1e-4
         robot.turn(20)
         hand.answer_of(robot.stream.take(hand.packet(robot.now_s, place)))
-    assert robot.loop.program.progress()["accepted"] > 20
-    robot.misbehave(1, 1, 0x7305)
+    assert robot.loop.engine.program.progress()["accepted"] > 20
+    robot.inject_fault(1, 1, 0x7305)
     robot._turn_until(lambda: robot.loop.busy, 3.0, "a reaction")
     robot._turn_until(lambda: not robot.loop.busy, 60.0, "the power off")
     assert "7305h" in robot.loop.life.reason

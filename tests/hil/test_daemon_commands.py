@@ -23,7 +23,7 @@ from daemon_lab import (
 )
 from daemon_rig import NAME, RealDaemon, until
 
-from tools.cli import main
+from cdpr_tools.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +157,7 @@ def handles_sigterm(pid: int) -> bool:
 
 
 def test_status_goes_on_until_ctrl_c(active: RealDaemon) -> None:
-    command = [sys.executable, "-m", "tools.cli", "status", "--watch", "--json", *active.at]
+    command = [sys.executable, "-m", "cdpr_tools.cli", "status", "--watch", "--json", *active.at]
     watching = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     until(lambda: handles_sigterm(watching.pid))
     time.sleep(0.5)

@@ -23,12 +23,12 @@ from test_daemon_kills import (
     expect_stop,
     in_motion,
     slow_daemon,
-    stranger,
+    third_party,
 )
 
-from drivers.cia402 import POWER_OFF, State, state_of
-from tools.daemon import estop as emergency_stop
-from tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
+from cdpr_drivers.cia402 import POWER_OFF, State, state_of
+from cdpr_tools.daemon import estop as emergency_stop
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
 
 SILENT, FOR_GOOD = 6, 0xFFFF  # of 2F00h
 
@@ -36,7 +36,7 @@ SILENT, FOR_GOOD = 6, 0xFFFF  # of 2F00h
 def estop(*arguments: str | Path, **env: str) -> tuple[int, dict[str, Any]]:
     """Return the exit status and the JSON of the command."""
     done = subprocess.run(
-        [sys.executable, "-P", "-m", "tools.cli", "estop", *map(str, arguments), "--json"],
+        [sys.executable, "-P", "-m", "cdpr_tools.cli", "estop", *map(str, arguments), "--json"],
         env={**os.environ, **env},
         capture_output=True,
         text=True,
@@ -126,7 +126,7 @@ def test_a_drive_that_does_not_answer_is_not_called_stopped(
     daemon = slow_daemon(tmp_path)
     try:
         with in_motion(daemon) as ear:
-            with stranger(ear.bus) as network:
+            with third_party(ear.bus) as network:
                 network.write(NODES[0], 0x2F00, SILENT, FOR_GOOD)
             one = emergency_stop.EmergencyStop(daemon.socket.with_suffix(".loop"))
             with closing(one):
@@ -191,7 +191,8 @@ def test_nothing_is_loaded_from_the_working_directory(tmp_path: Path) -> None:
     planted = tmp_path / "planted"
     planted.mkdir()
     text = f"open({str(tmp_path / 'loaded')!r}, 'a').write(__name__ + ' ')\nraise SystemExit(3)\n"
-    for package in ("tools", "cdpr_rt", "drivers", "sim_bus", "profiles", "multiprocessing"):
+    packages = ("cdpr_rt", "cdpr_drivers", "cdpr_profiles", "cdpr_sim_bus", "cdpr_tools")
+    for package in (*packages, "tools", "drivers", "profiles", "sim_bus", "multiprocessing"):
         (planted / package).mkdir()
         (planted / package / "__init__.py").write_text(text)
     for module in ("fastapi", "uvicorn", "numpy", "json"):

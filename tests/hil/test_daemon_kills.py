@@ -16,13 +16,13 @@ import httpx
 import pytest
 from daemon_rig import RealDaemon, until
 
-from cdpr_rt.clock import PacedClock
-from drivers.bus import BusUrl, open_port
-from drivers.bus.packed import FRAME
-from drivers.cia402 import POWER_OFF, State, state_of
-from drivers.data_sheet import load_dictionary
-from drivers.network import CanNetwork
-from profiles import load_drive
+from cdpr_drivers.bus import BusUrl, open_port
+from cdpr_drivers.bus.frames import FRAME
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.cia402 import POWER_OFF, State, state_of
+from cdpr_profiles import load_drive
+from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_rt.core.clock import PacedClock
 
 pytestmark = pytest.mark.alone
 
@@ -123,7 +123,7 @@ def speed_of(ear: Ear, node: int) -> float:
 
 
 @contextmanager
-def stranger(bus: BusUrl) -> Iterator[CanNetwork]:
+def third_party(bus: BusUrl) -> Iterator[CanNetwork]:
     """Join the drives' bus beside their master."""
     eds = load_drive("generic-cia402").eds
     network = CanNetwork(bus, PacedClock(), NODES, 126, 1.0)
@@ -136,8 +136,8 @@ def stranger(bus: BusUrl) -> Iterator[CanNetwork]:
 
 
 def ask_drives(bus: BusUrl) -> list[State]:
-    """Ask every drive by SDO, as a stranger."""
-    with stranger(bus) as network:
+    """Ask every drive by SDO, as a third party."""
+    with third_party(bus) as network:
         return [state_of(network.read_int(node, 0x6041)) for node in NODES]
 
 

@@ -22,8 +22,8 @@ from daemon_lab import KEY, with_key
 from daemon_rig import RealDaemon, cdpr, until
 from test_daemon_stream import port_of
 
-from cdpr_rt.service.stream_packet import StreamSetpoint
-from tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
+from cdpr_rt.service.streams.stream_packet import StreamSetpoint
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
 
 NOBODY = 65534
 IS_ROOT = os.geteuid() == 0
@@ -157,17 +157,26 @@ def bind(kind: socket.SocketKind, port: int) -> None:
             sock.listen()
 
 
+def live_port_of(daemon: RealDaemon) -> int:
+    return int(until(daemon.status)["parts"]["live_view"]["url"].rpartition(":")[2])
+
+
 def test_a_port_is_not_to_be_had_while_the_service_is_away(daemon: RealDaemon) -> None:
-    ports = {socket.SOCK_STREAM: http_port_of(daemon), socket.SOCK_DGRAM: port_of(daemon)}
+    http, live, stream = http_port_of(daemon), live_port_of(daemon), port_of(daemon)
+    ports = {
+        http: socket.SOCK_STREAM,
+        live: socket.SOCK_STREAM,
+        stream: socket.SOCK_DGRAM,
+    }
     service = daemon.children()["service"]
 
     def take() -> object:
         refused, got, end_s = 0, [], time.monotonic() + 0.5
         while time.monotonic() < end_s:
-            for kind, port in ports.items():
+            for port, kind in ports.items():
                 try:
                     bind(kind, port)
-                    got.append(kind.name)
+                    got.append(port)
                 except OSError:
                     refused += 1
         return refused > 10, sorted(set(got))
@@ -176,17 +185,18 @@ def test_a_port_is_not_to_be_had_while_the_service_is_away(daemon: RealDaemon) -
     until(lambda: "service" not in daemon.children())
     assert as_nobody(take) == "(True, [])"
     # who asks meanwhile is answered by the service that comes
-    with httpx.Client(base_url=f"http://127.0.0.1:{ports[socket.SOCK_STREAM]}") as client:
+    with httpx.Client(base_url=f"http://127.0.0.1:{http}") as client:
         assert client.get("/status", timeout=60.0).status_code == 200
-    assert (http_port_of(daemon), port_of(daemon)) == tuple(ports.values())
+    assert [http_port_of(daemon), live_port_of(daemon), port_of(daemon)] == list(ports)
     assert daemon.children()["service"] != service
 
 
-@pytest.mark.parametrize("option", ["--http", "--stream"])
+@pytest.mark.parametrize("option", ["--http", "--stream", "--live"])
 def test_no_daemon_starts_where_its_port_is_anothers(
     daemon: RealDaemon, tmp_path: Path, option: str
 ) -> None:
-    port = http_port_of(daemon) if option == "--http" else port_of(daemon)
+    ports = {"--http": http_port_of, "--stream": port_of, "--live": live_port_of}
+    port = ports[option](daemon)
     at = ("--socket", str(tmp_path / "other.sock"), option, str(port))
     second = cdpr("run", daemon.robot, "--bus", "simbus:", "--no-record", *at)
     assert second.returncode == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -12,19 +13,31 @@ from pathlib import Path
 import pytest
 from daemon_rig import RealDaemon, cdpr, until
 
-import profiles
+import cdpr_profiles
 
 PERIOD_S = 0.004
-SHIPPED = Path(profiles.__file__).parent / "robots" / "planar-3.toml"
+SHIPPED = Path(cdpr_profiles.__file__).parent / "robots"
 
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
-    """The shipped robot in cycles that leave room for what runs beside it."""
-    folder = tmp_path_factory.mktemp("platform")
+    """The shipped robot with three cables."""
+    yield from running("planar-3", tmp_path_factory.mktemp("platform"))
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealDaemon]:
+    """The shipped robot whose four cables turn its platform, too."""
+    yield from running("planar-4", tmp_path_factory.mktemp("turning"))
+
+
+def running(name: str, folder: Path) -> Iterator[RealDaemon]:
+    """Yield the daemon of a shipped robot in cycles that leave room for what runs beside it."""
     robot = folder / "planar.toml"
     period = f"sync_period_s = {PERIOD_S}"
-    robot.write_text(SHIPPED.read_text().replace("sync_period_s = 0.001", period))
+    robot.write_text(
+        (SHIPPED / f"{name}.toml").read_text().replace("sync_period_s = 0.001", period)
+    )
     one = RealDaemon(folder, "--no-record", robot=robot, env={"XDG_STATE_HOME": str(folder)})
     try:
         assert cdpr("enable", *one.at).returncode == 0, one.errors()
@@ -63,25 +76,59 @@ def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
     assert re.search(r"platform at \d+\.\d, 16\d\d\.\d mm; target 50\.0, 1620\.0 mm", shown)
 
     for command, named in (
-        (("move", "--to", "0", "9000"), "allowed: 1.4 to 2.4 m, the workspace"),
+        (("move", "--to", "0", "9000"), "--to 0 9000: y 9000 mm; allowed: 1400 to 2400 mm"),
+        (("move", "--to", "0.3", "2.0"), "--to 0.3 2.0: y 2 mm; allowed: 1400 to 2400 mm"),
         (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
+        (("move", "--rotate", "5"), "--rotate 5: no angle of this platform is controlled"),
+        (("tighten", "--from", "home"), "tighten --from home: the cables are tight already"),
         (("controller", "idle"), "lower it first"),
     ):
         status, why = refused(daemon, *command)
         assert status in (1, 2)
         assert named in why
 
-    command = [sys.executable, "-m", "tools.cli", "move", "--to", "-300", "1900", "--speed", "100"]
+    command = [
+        sys.executable,
+        "-m",
+        "cdpr_tools.cli",
+        "move",
+        "--to",
+        "-300",
+        "1900",
+        "--speed",
+        "100",
+    ]
     with subprocess.Popen([*command, *daemon.at], stderr=subprocess.PIPE, text=True) as going:
         target = pytest.approx([-0.3, 1.9])
         until(lambda: daemon.status()["program_progress"].get("target_m") == target)
         paused = told(daemon, "pause")
         assert paused["program"] == "hold"
         assert paused["position_m"] != pytest.approx([-0.3, 1.9], abs=0.05)
-        assert "pose was ended" in going.communicate()[1]
+        assert "pose was ended: hold by" in going.communicate()[1]
     assert going.returncode == 1
     assert told(daemon, "resume")["position_m"] == pytest.approx([-0.3, 1.9], abs=0.005)
 
     lowered = told(daemon, "lower")
     assert lowered["program"] == "hold"
     assert until(lambda: daemon.status()["program_progress"].get("tight") is False)
+
+
+def test_a_platform_is_turned_as_it_is_typed(turning: RealDaemon) -> None:
+    told(turning, "tighten")
+    moved = told(turning, "move", "--to", "50", "1500", "--rotate", "-5")
+    assert moved["position_m"] == pytest.approx([0.05, 1.5], abs=0.005)
+    assert moved["rotation_rad"] == pytest.approx([math.radians(-5.0)], abs=0.01)
+    turned = told(turning, "move", "--rotate", "3", "--relative", "--speed", "200")
+    assert turned["rotation_rad"] == pytest.approx([math.radians(-2.0)], abs=0.01)
+    shown = cdpr("status", *turning.at).stdout
+    assert "target 50.0, 1500.0 mm, turned by -2.00 deg" in shown
+
+    told(turning, "move", "--to", "0", "100", "--relative", "--frame", "platform")
+    target_m = turning.status()["program_progress"]["target_m"]
+    way = 0.1 * math.sin(math.radians(2.0)), 0.1 * math.cos(math.radians(2.0))
+    assert target_m == pytest.approx([0.05 + way[0], 1.5 + way[1]], abs=1e-6)
+
+    status, why = refused(turning, "move", "--rotate", "20")
+    assert status == 2
+    assert "--rotate 20: 20 deg from the orientation at home; allowed: up to 15 deg" in why
+    told(turning, "lower")

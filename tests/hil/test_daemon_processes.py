@@ -52,7 +52,9 @@ def manager(tmp_path_factory: pytest.TempPathFactory) -> Manager:
 
 @pytest.fixture(scope="module")
 def daemon(tmp_path_factory: pytest.TempPathFactory, manager: Manager) -> Iterator[RealDaemon]:
-    daemon = RealDaemon(tmp_path_factory.mktemp("run"), "--no-record", env=manager.env)
+    # /proc tells of a forked process with what environment the server was started
+    env = {**manager.env, "CDPR_TEST_FORKS": "0"}
+    daemon = RealDaemon(tmp_path_factory.mktemp("run"), "--no-record", env=env)
     yield daemon
     daemon.end()
 

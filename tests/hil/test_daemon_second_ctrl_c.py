@@ -12,10 +12,10 @@ import pytest
 from daemon_rig import RealDaemon, cdpr, until
 from test_daemon_kills import Ear
 
-import profiles
-from drivers.cia402 import POWER_OFF, state_of
+import cdpr_profiles
+from cdpr_drivers.cia402 import POWER_OFF, state_of
 
-SHIPPED = Path(profiles.__file__).parent / "robots" / "planar-3.toml"
+SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 PERIOD_S = 0.004
 NODES = (1, 2, 3)
 # disable voltage goes out with the next SYNC's answers, acts at the SYNC after it, is told then

@@ -15,11 +15,11 @@ import pytest
 from daemon_rig import RealDaemon, cdpr, until
 from hostile_proxy import hostile
 
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.service.recording_reader import RecordingReader
-from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import Standing, StreamSession, StreamSetpoint
-from profiles import load_winch
+from cdpr_profiles import load_winch
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.service.recordings.recording_reader import RecordingReader
+from cdpr_rt.service.streams.stream_client import StreamClient
+from cdpr_rt.service.streams.stream_packet import Standing, StreamSession, StreamSetpoint
 
 WINCH = load_winch("winch-mpp0923d")
 PERIOD_S = 0.01
@@ -121,9 +121,9 @@ def test_who_has_no_key_and_no_session_moves_nothing_even_when_the_holder_is_sil
     daemon.http.delete("/control", headers={"X-Control-Token": token})
     guesses = StreamSession(7, bytes(32)), b"a key that is long enough"
     for access in guesses:
-        with StreamClient("127.0.0.1", port_of(daemon), access) as stranger:
-            lead(stranger, lambda t: 0.2 * t, 0.5)
-            assert stranger.answered == 0
+        with StreamClient("127.0.0.1", port_of(daemon), access) as third_party:
+            lead(third_party, lambda t: 0.2 * t, 0.5)
+            assert third_party.answered == 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as keyless:
         for k in range(30):
             packet = StreamSetpoint(9, k, k, (0.01 * k, 0.0, 0.0)).pack()

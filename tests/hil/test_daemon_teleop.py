@@ -20,17 +20,17 @@ from daemon_rig import RealDaemon, until
 from hostile_proxy import hostile
 from typer.testing import CliRunner
 
-import profiles
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.runtime.stream_buttons import confirmation
-from cdpr_rt.service.recording_reader import RecordingReader
-from profiles import load_robot
-from tools.commands.teleop import app
-from tools.errors import BadInputError, CommandError
-from tools.teleop import session as session_module
+import cdpr_profiles
+from cdpr_profiles import load_robot
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.motion.stream_buttons import confirmation
+from cdpr_rt.service.recordings.recording_reader import RecordingReader
+from cdpr_tools.commands.daemon.teleop import app
+from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.teleop import session as session_module
 
 PERIOD_S = 0.004
-SHIPPED = Path(profiles.__file__).parent / "robots" / "planar-3.toml"
+SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 PLATFORM = load_robot("planar-3").platform
 RIGHT = b"\x1b[C"
 
@@ -78,7 +78,7 @@ def place(daemon: RealDaemon) -> np.ndarray:
 
 
 def teleop(daemon: RealDaemon, *options: str | Path) -> list[str]:
-    command = [sys.executable, "-m", "tools.cli", "teleop", str(daemon.robot), *daemon.at]
+    command = [sys.executable, "-m", "cdpr_tools.cli", "teleop", str(daemon.robot), *daemon.at]
     return [*command, *map(str, options)]
 
 

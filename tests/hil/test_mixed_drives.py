@@ -8,16 +8,16 @@ from contextlib import ExitStack, closing
 import canopen
 import numpy as np
 import pytest
-from twin_rig import DRIVES, MixedSimulator, write_winch
+from profile_rig import DRIVES, MixedSimulator, write_winch
 
-from drivers.axis_group import AxisGroup
-from drivers.axis_layout import AxisConfig
-from drivers.boot import BootSettings, boot_all
-from drivers.bus import BusUrl
-from drivers.bus.leading import open_clock
-from drivers.cia402 import Mode, State
-from drivers.errors import ModeRefusedError
-from drivers.network import CanNetwork
+from cdpr_drivers.axes.axis_group import AxisGroup
+from cdpr_drivers.axes.axis_layout import AxisConfig
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.simulated_bus import open_clock
+from cdpr_drivers.canopen.boot.boot import BootSettings, boot_all
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.cia402 import Mode, State
+from cdpr_drivers.errors import ModeRefusedError
 
 MASTER, PERIOD_S, HEARTBEAT_S = 127, 1e-3, 0.1
 

@@ -21,19 +21,30 @@ from pymodbus.client import ModbusTcpClient
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
-from safety_rig import CLOCK, PANEL, Twin, board_file, patient_profile, ready, start, wait_until
+from safety_rig import (
+    CLOCK,
+    PANEL,
+    SafetyIoProcess,
+    board_file,
+    patient_profile,
+    ready,
+    start,
+    wait_until,
+)
 
-from drivers.errors import DriverError
-from drivers.modbus.rail import ModbusRailAxis
-from drivers.modbus.safety_io import SafetyIoError
-from drivers.rail import RailError
-from profiles import load_winch
-from profiles.rail import SHIPPED, load_rail
-from sim_bus.physics_board import BoardAxis, PhysicsBoard
-from sim_bus.rail_twin import RailFault
-from sim_bus.safety_twin import Fault
-from tools.commands import rail as rail_commands
-from tools.errors import BadInputError
+from cdpr_drivers.errors import DriverError
+from cdpr_drivers.modbus.safety_io import SafetyIoError
+from cdpr_drivers.rails.rail import RailError
+from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
+from cdpr_profiles import load_winch
+from cdpr_profiles.devices.rail import load_rail
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_sim_bus.devices.sim_rail import RailFault
+from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from cdpr_tools import cli
+from cdpr_tools.commands import rail as rail_commands
+from cdpr_tools.errors import BAD_INPUT, BadInputError
 
 FAILED = 1
 M_PER_RAD = 0.02 / math.tau
@@ -44,7 +55,7 @@ class Rails:
     """A rail on CiA 402 with its safety I/O, one on Modbus, and the load cell of a winch."""
 
     bus: str
-    twin: Twin
+    io_device: SafetyIoProcess
     winch: BoardAxis
     rail: BoardAxis
     modbus: Path
@@ -60,7 +71,7 @@ class Rails:
 
     def begin(self, *arguments: str | Path) -> subprocess.Popen[str]:
         return subprocess.Popen(
-            [sys.executable, "-m", "tools.cli", "rail", *map(str, arguments), "--json"],
+            [sys.executable, "-m", "cdpr_tools.cli", "rail", *map(str, arguments), "--json"],
             env={**os.environ, "XDG_STATE_HOME": str(self.home)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -82,7 +93,7 @@ class Rails:
         slack = slack or ("--cables-slack-checked",)
         if kind == "modbus":
             return ("move", str(self.modbus), "--to", str(to_m), "--yes", *slack)
-        where = ("--bus", self.bus, "--safety-io", self.twin.reference)
+        where = ("--bus", self.bus, "--safety-io", self.io_device.reference)
         return ("move", "rail-cia402", "--to", str(to_m), *where, *slack)
 
     def position_m(self, kind: str) -> float:
@@ -110,7 +121,7 @@ class Rails:
 
     def wear_brake(self, kind: str) -> None:
         if kind == "cia402":
-            self.twin.break_(Fault.BRAKES_WORN)
+            self.io_device.break_(SafetyIoFault.BRAKES_WORN)
         else:
             self.break_modbus(RailFault.BRAKE_WORN)
 
@@ -128,7 +139,7 @@ class Rails:
         self._state_file().write_text(json.dumps(told))
 
     def acknowledge_trip(self) -> None:
-        name = f"safety-io.io.127.0.0.1.{self.twin.port}.json"
+        name = f"safety-io.io.127.0.0.1.{self.io_device.port}.json"
         (self.home / "cdpr-rt" / name).unlink()
 
     def _state_file(self) -> Path:
@@ -150,14 +161,16 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rails]:
             ready(drive)
             cells = start("tension", "rtu-load-cell-1", "--board", on_winch)
             port = int(ready(other)["port"])
-            text = (SHIPPED / "rail-modbus.toml").read_text()
+            text = (SHIPPED / "rails" / "rail-modbus.toml").read_text()
             modbus.write_text(text.replace("port = 502", f"port = {port}"))
-            twin = Twin(patient_profile(folder, 3.0), "--board", on_winch, "--board", on_rail)
+            io_device = SafetyIoProcess(
+                patient_profile(folder, 3.0), "--board", on_winch, "--board", on_rail
+            )
             with PhysicsBoard.attach(on_rail) as rail:
                 tty = ready(cells)["port"]
                 axes = winch.axis(0), rail.axis(0)
-                yield Rails(bus, twin, *axes, modbus, port, tty, folder / "state")
-            twin.close()
+                yield Rails(bus, io_device, *axes, modbus, port, tty, folder / "state")
+            io_device.close()
             for process in (drive, other, cells):
                 process.communicate(b"", timeout=10)
 
@@ -165,7 +178,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rails]:
 @pytest.fixture
 def rails(parts: Rails) -> Rails:
     parts.pull(0.0)
-    parts.twin.mend()
+    parts.io_device.mend()
     parts.break_modbus(RailFault(0))
     parts.forget()
     return parts
@@ -278,15 +291,15 @@ def test_a_winch_with_power_refuses_the_move_and_ends_it(rails: Rails) -> None:
 
 def test_a_rail_on_modbus_heeds_the_safety_io_and_one_command(rails: Rails) -> None:
     before = rails.position_m("modbus")
-    slack = ("--cables-slack-checked", "--safety-io", rails.twin.reference)
+    slack = ("--cables-slack-checked", "--safety-io", rails.io_device.reference)
     command = rails.move("modbus", before + 0.5, *slack)
     await_motion(rails, "modbus", command, before + 0.005)
     with pytest.raises(RailError, match="enabled already: another command moves it"):
         ModbusRailAxis(load_rail(rails.modbus), CLOCK).open()
-    rails.twin.press()
+    rails.io_device.press()
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
     assert rails.braked("modbus")
-    rails.twin.press(False)
+    rails.io_device.press(False)
     rails.acknowledge_trip()
 
 
@@ -332,7 +345,7 @@ def test_a_safety_io_that_falls_silent_ends_a_move(rails: Rails) -> None:
     before = rails.position_m("cia402")
     command = rails.move("cia402", before + 0.3)
     await_motion(rails, "cia402", command, before + 0.005)
-    rails.twin.break_(Fault.SILENT)
+    rails.io_device.break_(SafetyIoFault.SILENT)
     assert "no good poll" in result(command, FAILED)["error"]
     assert rails.position_m("cia402") < before + 0.2
     assert not rails.rail.state().power_on
@@ -343,11 +356,11 @@ def test_the_emergency_stop_ends_a_move(rails: Rails) -> None:
     before = rails.position_m("cia402")
     command = rails.move("cia402", before + 0.5)
     await_motion(rails, "cia402", command, before + 0.005)
-    rails.twin.press()
+    rails.io_device.press()
     wait_until(lambda: rails.braked("cia402"), 2)
     assert "the emergency-stop chain is open" in result(command, FAILED)["error"]
-    rails.twin.press(False)
-    where = ["reset", "rail-cia402", "--bus", rails.bus, "--safety-io", rails.twin.reference]
+    rails.io_device.press(False)
+    where = ["reset", "rail-cia402", "--bus", rails.bus, "--safety-io", rails.io_device.reference]
     runner = CliRunner(env={"XDG_STATE_HOME": str(rails.home)})
     with pytest.raises(SafetyIoError, match="tripped on"):
         runner.invoke(rail_commands.app, where, catch_exceptions=False)
@@ -372,5 +385,5 @@ def test_what_a_move_needs_is_said_before_anything_moves(
 ) -> None:
     command = ["move", "rail-cia402", "--bus", "simbus:nobody", *arguments]
     outcome = CliRunner().invoke(rail_commands.app, command)
-    assert isinstance(outcome.exception, BadInputError)
+    assert cli.exit_status(outcome.exception) == BAD_INPUT
     assert said in str(outcome.exception)

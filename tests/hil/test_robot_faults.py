@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdpr_rt.runtime.states import LoopState
-from tools.errors import WorkFailedError
-from tools.trials.lockstep import LockstepRobot
-from tools.trials.pose_log import read_pose_log
-from tools.trials.stream import Hand
+from cdpr_rt.core.states import LoopState
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.trials.lockstep import LockstepRobot
+from cdpr_tools.trials.pose_log import read_pose_log
+from cdpr_tools.trials.streams.stream import StreamSender
 
 UPPER_LEFT, UPPER_RIGHT, LOWER = range(3)
 HIGH = (0.1, 1.65)
@@ -102,13 +102,13 @@ def test_the_winches_that_are_left_let_the_platform_down(
         hanging.block.post_command({"do": "disable", "client": "test"})
         hanging.run(0.3)
     truth = Truth(hanging)
-    hanging.misbehave(*what)
+    hanging.inject_fault(*what)
     end_of_fault(hanging)
     assert hanging.state is LoopState.FAULT
     for text in told:
         assert text in hanging.loop.life.reason
     # how far its cables are out is not known any more, but after the fault of a drive
-    assert hanging.loop.parts.estimator.estimate.length_known.all() == (told == ("7305h",))
+    assert hanging.loop.engine.parts.estimator.estimate.length_known.all() == (told == ("7305h",))
     records = truth.read()
     down_m_s = -records["velocity_m_s"][:, 1].min()
     if carries:
@@ -128,11 +128,11 @@ def test_a_lowering_that_fails_does_not_leave_motors_with_power(hanging: Lockste
     def mistaken(*_: object) -> None:
         raise ValueError("a mistake")
 
-    lower = hanging.loop.parts.programs["lower"]
+    lower = hanging.loop.engine.parts.programs["lower"]
     lower.update = mistaken  # type: ignore[method-assign]
     begun_s = hanging.now_s
     with pytest.raises(WorkFailedError):
-        hanging.order("disable")
+        hanging.command("disable")
     hanging._turn_until(lambda: not hanging.loop.busy, 10.0, "the power off")
     assert hanging.now_s - begun_s < 5.0
     assert hanging.state is LoopState.FAULT
@@ -154,10 +154,10 @@ def test_a_target_out_of_the_workspace_is_refused_and_nothing_moves(
     healthy.run(0.3)
     speeds = np.linalg.norm(truth.read()["velocity_m_s"], axis=1)
     assert speeds.max() < 0.02
-    assert healthy.loop.program.name == "pose"
+    assert healthy.loop.engine.program.name == "pose"
 
 
-def lead(robot: LockstepRobot, hand: Hand, places: list[list[float]]) -> Any:
+def lead(robot: LockstepRobot, hand: StreamSender, places: list[list[float]]) -> Any:
     """Send a place every 20 ms; return the rows of all cycles meanwhile."""
     rows = []
     for place in places:
@@ -168,7 +168,7 @@ def lead(robot: LockstepRobot, hand: Hand, places: list[list[float]]) -> Any:
 
 def test_a_hand_that_leaps_by_a_metre_moves_nothing_at_a_step(healthy: LockstepRobot) -> None:
     healthy.program("pose", stream=True)
-    hand = healthy.stream.hand()
+    hand = healthy.stream.sender()
     lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
     truth = Truth(healthy)
     rows = lead(healthy, hand, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]] * 15)
@@ -181,7 +181,7 @@ def test_a_hand_that_leaps_by_a_metre_moves_nothing_at_a_step(healthy: LockstepR
 
 def test_a_hand_that_is_no_number_is_not_followed(healthy: LockstepRobot) -> None:
     healthy.program("pose", stream=True)
-    hand = healthy.stream.hand()
+    hand = healthy.stream.sender()
     lead(healthy, hand, [[0.0, 0.0, 0.0]] * 20)
     truth = Truth(healthy)
     lead(healthy, hand, [[math.nan, 0.0, 0.0], [0.0, math.inf, 0.0]] * 15)
@@ -196,7 +196,7 @@ def test_a_master_that_disappears_in_motion_leaves_the_platform_held(
     healthy.program("pose", position_m=[-0.4, 2.1], speed_m_s=0.2)
     healthy.run(0.5)
     healthy.right.fall_silent()
-    healthy.until(lambda: healthy.loop.program.name == "hold", 5.0)
+    healthy.until(lambda: healthy.loop.engine.program.name == "hold", 5.0)
     assert "nobody holds the right to move" in healthy.loop.life.reason
     healthy.run(1.0)
     truth = Truth(healthy)
@@ -216,7 +216,7 @@ def test_what_was_paused_goes_on_to_where_it_was_going(healthy: LockstepRobot) -
     target = [-0.3, 1.6]
     healthy.program("pose", position_m=target)
     healthy.run(0.4)
-    healthy.order("hold")
+    healthy.command("hold")
     healthy.run(0.5)
     away_m = np.abs(healthy.truth()["position_m"][:2] - target).max()
     assert away_m > 0.05
@@ -228,23 +228,23 @@ def test_what_was_paused_goes_on_to_where_it_was_going(healthy: LockstepRobot) -
 def test_no_platform_is_dropped_by_a_word(healthy: LockstepRobot) -> None:
     with pytest.raises(WorkFailedError, match="the platform hangs on its cables; lower it first"):
         healthy.program("idle")
-    assert healthy.loop.program.name == "pose"
+    assert healthy.loop.engine.program.name == "pose"
 
 
 def test_a_stop_leaves_the_next_start_its_lengths_and_the_platform_on_its_stand(
     tmp_path: Path,
 ) -> None:
     with LockstepRobot("planar-3") as robot:
-        last, platform = robot.loop.parts.last, robot.robot.platform
+        last, platform = robot.loop.engine.parts.last, robot.robot.platform
         assert last is not None
         assert platform is not None
         last.path = tmp_path / "lengths.json"
         aloft(robot)
         robot.carry_out("lower", 30.0, blind=True)  # beside where it stood
-        robot.order("disable")
+        robot.command("disable")
         assert robot.state is LoopState.READY
         # as if the daemon and its drives had been without power meanwhile
-        robot.loop.parts.estimator.forget_lengths()
+        robot.loop.engine.parts.estimator.forget_lengths()
         last.take()
         last.load(3, 3.0)
         aloft(robot, **{"from": "last"})

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.robots.checks import refuse_impossible
-from tools.robots.statics import statics_of
-from tools.trials.lockstep import LockstepRobot
+from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.statics import statics_of
+from cdpr_tools.trials.lockstep import LockstepRobot
 
 OTHERS = sorted((Path(__file__).parent / "others").glob("*.toml"))
 START_m = 0.003

@@ -20,17 +20,17 @@ import pytest
 from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers" / "modbus"))
-from safety_rig import CLOCK, Twin, board_file, patient_profile, ready, start, wait_until
+from safety_rig import CLOCK, SafetyIoProcess, board_file, patient_profile, ready, start, wait_until
 
+from cdpr_drivers.errors import DriverError
+from cdpr_drivers.modbus.safety_io import SafetyIo
+from cdpr_profiles import load_winch
 from cdpr_rt.errors import ControlError
-from drivers.errors import DriverError
-from drivers.modbus.safety_io import SafetyIo
-from profiles import load_winch
-from sim_bus.physics_board import BoardAxis, PhysicsBoard
-from sim_bus.safety_twin import Fault
-from tools.commands import drive as drive_commands
-from tools.commands import io as io_commands
-from tools.errors import BadInputError, WorkFailedError
+from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from cdpr_tools.commands import io as io_commands
+from cdpr_tools.commands.drive import drive as drive_commands
+from cdpr_tools.errors import BadInputError, WorkFailedError
 
 WINCH = "winch-mpp0923d"
 # what may pass from the reaction of a busy machine until the next look
@@ -49,10 +49,10 @@ class Lab:
     board_path: Path
     winch: BoardAxis
     folder: Path
-    twin: Twin
+    io_device: SafetyIoProcess
 
     def begin(self, *arguments: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "tools.cli", *arguments, "--json"]
+        command = [sys.executable, "-m", "cdpr_tools.cli", *arguments, "--json"]
         return subprocess.Popen(
             command,
             env={**os.environ, "XDG_STATE_HOME": str(self.folder)},
@@ -62,24 +62,31 @@ class Lab:
         )
 
     def jog(self, seconds: float) -> subprocess.Popen[str]:
-        behind = ("--safety-io", self.twin.reference, "--seconds", str(seconds))
+        behind = ("--safety-io", self.io_device.reference, "--seconds", str(seconds))
         return self.begin("drive", "jog", WINCH, "--bus", self.bus, "--speed-deg-s", "600", *behind)
 
     def refused_jog(self, seconds: float) -> str:
         """Jog in this process, which is quicker; return why it failed."""
-        behind = ["--bus", self.bus, "--safety-io", self.twin.reference, "--seconds", str(seconds)]
+        behind = [
+            "--bus",
+            self.bus,
+            "--safety-io",
+            self.io_device.reference,
+            "--seconds",
+            str(seconds),
+        ]
         runner = CliRunner(env={"XDG_STATE_HOME": str(self.folder)})
         outcome = runner.invoke(drive_commands.app, ["jog", WINCH, *behind])
         assert isinstance(outcome.exception, DriverError | ControlError), outcome.output
         return str(outcome.exception)
 
     def drive(self, action: str) -> dict[str, Any]:
-        behind = ("--safety-io", self.twin.reference)
+        behind = ("--safety-io", self.io_device.reference)
         return result(self.begin("drive", action, WINCH, "--bus", self.bus, *behind))
 
     def io(self, action: str) -> dict[str, Any]:
         runner = CliRunner(env={"XDG_STATE_HOME": str(self.folder)})
-        arguments = [action, self.twin.reference, "--json"]
+        arguments = [action, self.io_device.reference, "--json"]
         outcome = runner.invoke(io_commands.app, arguments, catch_exceptions=False)
         told: dict[str, Any] = json.loads(outcome.stdout.splitlines()[-1])
         return told
@@ -107,21 +114,25 @@ def simulator() -> Iterator[tuple[str, Path]]:
 
 
 @pytest.fixture(scope="module")
-def lasting_twin(
+def module_io_device(
     simulator: tuple[str, Path], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Twin]:
-    twin = Twin(patient_profile(tmp_path_factory.mktemp("io")), "--board", simulator[1])
-    yield twin
-    twin.close()
+) -> Iterator[SafetyIoProcess]:
+    io_device = SafetyIoProcess(
+        patient_profile(tmp_path_factory.mktemp("io")), "--board", simulator[1]
+    )
+    yield io_device
+    io_device.close()
 
 
 @pytest.fixture
-def lab(simulator: tuple[str, Path], lasting_twin: Twin, tmp_path: Path) -> Iterator[Lab]:
+def lab(
+    simulator: tuple[str, Path], module_io_device: SafetyIoProcess, tmp_path: Path
+) -> Iterator[Lab]:
     bus, path = simulator
     with PhysicsBoard.attach(path) as board:
         _mend_drive(bus)  # a master that does not lead: bus time goes on with the wall
-        lasting_twin.mend()
-        yield Lab(bus, path, board.axis(0), tmp_path, lasting_twin)
+        module_io_device.mend()
+        yield Lab(bus, path, board.axis(0), tmp_path, module_io_device)
 
 
 def _mend_drive(bus: str) -> None:
@@ -141,12 +152,12 @@ def test_the_emergency_stop_takes_the_torque_in_motion(lab: Lab) -> None:
     command = lab.jog(600)
     wait_until(lab.moving, 30)
     assert lab.winch.brake_released
-    lab.twin.press()
+    lab.io_device.press()
     assert wait_until(lambda: not lab.winch.state().power_on) < SLACK_S
     assert wait_until(lambda: not lab.winch.brake_released) < SLACK_S
     error = result(command, status=1)["error"]
     assert "the emergency-stop chain is open (input 0 reads 0)" in error
-    lab.twin.press(False)
+    lab.io_device.press(False)
     assert "chain is open" in lab.io("ack")["acknowledged"]["reason"]
     assert lab.drive("reset")["state"] == "switch on disabled"
 
@@ -154,19 +165,19 @@ def test_the_emergency_stop_takes_the_torque_in_motion(lab: Lab) -> None:
 def test_an_io_that_falls_silent_for_longer_than_allowed_stops_the_motion(lab: Lab) -> None:
     command = lab.jog(600)
     wait_until(lab.moving, 30)
-    lab.twin.process.send_signal(signal.SIGSTOP)
+    lab.io_device.process.send_signal(signal.SIGSTOP)
     time.sleep(0.1)
-    lab.twin.process.send_signal(signal.SIGCONT)  # shorter than the trip time-out: nothing
+    lab.io_device.process.send_signal(signal.SIGCONT)  # shorter than the trip time-out: nothing
     time.sleep(0.5)
     wait_until(lab.moving)
     assert command.poll() is None
-    lab.twin.break_(Fault.SILENT)
+    lab.io_device.break_(SafetyIoFault.SILENT)
     wait_until(lambda: not lab.winch.state().power_on)
     assert "no good poll" in result(command, status=1)["error"]
 
 
 def test_an_open_chain_refuses_before_anything_is_energised(lab: Lab) -> None:
-    lab.twin.press()
+    lab.io_device.press()
     error = lab.refused_jog(1)
     assert "the emergency-stop chain is open (input 0)" in error
     assert "release the buttons" in error
@@ -174,31 +185,31 @@ def test_an_open_chain_refuses_before_anything_is_energised(lab: Lab) -> None:
 
 
 def test_a_welded_contactor_is_told_at_the_end(lab: Lab) -> None:
-    lab.twin.break_(Fault.CONTACTOR_WELDED)
+    lab.io_device.break_(SafetyIoFault.CONTACTOR_WELDED)
     assert "is it welded?" in lab.refused_jog(0.1)
     assert not lab.winch.brake_released
 
 
 def test_a_brake_that_stays_applied_ends_the_session(lab: Lab) -> None:
-    lab.twin.break_(Fault.BRAKES_STUCK)
+    lab.io_device.break_(SafetyIoFault.BRAKES_STUCK)
     error = lab.refused_jog(1)
     assert "the brake of winch 1 is not released" in error
     wait_until(lambda: not lab.winch.state().power_on)
 
 
 def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
-    lamp = lab.begin("io", "light", lab.twin.reference, "green", "--seconds", "0.5")
-    wait_until(lambda: lab.twin.coil(10), 20)
+    lamp = lab.begin("io", "light", lab.io_device.reference, "green", "--seconds", "0.5")
+    wait_until(lambda: lab.io_device.coil(10), 20)
     assert result(lamp)["ok"]
-    assert not lab.twin.coil(10)
-    brake = ("brake", lab.twin.reference, "winch 1", "--seconds", "0.5")
+    assert not lab.io_device.coil(10)
+    brake = ("brake", lab.io_device.reference, "winch 1", "--seconds", "0.5")
     refused(*brake, said="not confirmed")
     command = lab.begin("io", *brake[:-1], "60", "--yes")
     wait_until(lambda: lab.winch.brake_released, 20)
     command.terminate()
     assert result(command)["ok"]
     assert not lab.winch.brake_released
-    with SafetyIo(lab.twin.profile(), CLOCK) as other:
+    with SafetyIo(lab.io_device.profile(), CLOCK) as other:
         other.energise()
         with pytest.raises(WorkFailedError, match="another command uses it"):
             CliRunner().invoke(io_commands.app, [*brake, "--yes"], catch_exceptions=False)
@@ -206,20 +217,22 @@ def test_lamps_and_brakes_by_hand(lab: Lab) -> None:
         assert lab.io("off")["contactor_closed"] is False
         assert not lab.winch.power_allowed
         wait_until(other.alarm)  # it may not switch on again
-    refused("light", lab.twin.reference, "pink", said="red, yellow, green")
-    refused("brake", lab.twin.reference, "winch 9", said="'winch 1', 'rail 1'")
+    refused("light", lab.io_device.reference, "pink", said="red, yellow, green")
+    refused("brake", lab.io_device.reference, "winch 9", said="'winch 1', 'rail 1'")
 
 
 def test_watching_tells_what_changes_and_changes_nothing(lab: Lab) -> None:
-    pressing = threading.Timer(0.3, lab.twin.press)
+    pressing = threading.Timer(0.3, lab.io_device.press)
     pressing.start()
-    outcome = CliRunner().invoke(io_commands.app, ["watch", lab.twin.reference, "--seconds", "0.8"])
+    outcome = CliRunner().invoke(
+        io_commands.app, ["watch", lab.io_device.reference, "--seconds", "0.8"]
+    )
     pressing.join()
     lines = outcome.stdout.splitlines()
     told = [line for line in lines if "emergency-stop chain" in line]
     assert [line.split("chain")[1].strip() for line in told] == ["closed (ok)", "OPEN"]
     assert len(lines) == 6 + 1  # once each, and the change
-    assert not lab.twin.coil(8)  # not even the red lamp
+    assert not lab.io_device.coil(8)  # not even the red lamp
 
 
 def refused(*arguments: str, said: str) -> None:
@@ -232,7 +245,7 @@ def test_a_lost_io_brakes_the_motion_under_control(lab: Lab) -> None:
     """The last test here: its safety I/O does not come back."""
     command = lab.jog(600)
     wait_until(lab.moving, 30)
-    os.kill(lab.twin.process.pid, signal.SIGKILL)
+    os.kill(lab.io_device.process.pid, signal.SIGKILL)
     # nobody can reach contactor or brake now: what stops the motor is its drive
     assert lab.winch.brake_released
     slowed = wait_until(lambda: lab.winch.state().motor_rad_s < 0.1)

@@ -18,11 +18,11 @@ from typing import Any
 
 import pytest
 
-from profiles import load_winch
-from profiles.tension_sensor import SHIPPED
-from profiles.winch_calibration import load_winch_calibration
-from sim_bus.physics_board import PhysicsBoard
-from tools.cli import main
+from cdpr_profiles import load_winch
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.winch_calibration import load_winch_calibration
+from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_tools.cli import main
 
 WINCH = "winch-mpp0923d"
 ANCHOR = "[load]\nkind = 'fixed_anchor'\npretension_N = 2.0\nanchor_stiffness_N_m = 500.0\n"
@@ -30,7 +30,7 @@ FAILED, BAD_INPUT = 1, 2
 
 
 def cdpr(*arguments: str | Path) -> list[str]:
-    return [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
 
 
 def invoke(*arguments: str | Path, status: int = 0) -> str:
@@ -159,7 +159,7 @@ def test_masses_give_gain_and_friction(
 
 def tare(folder: Path, port: str) -> None:
     """By the file where the amplifier cannot, then by the amplifier."""
-    shipped = (SHIPPED / "rtu-load-cell-1.toml").read_text()
+    shipped = (SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml").read_text()
     start, end = shipped.index("[amplifier.tare]"), shipped.index("[[sensors]]")
     plain = folder / "plain.toml"
     plain.write_text(shipped[:start] + shipped[end:])
@@ -177,7 +177,7 @@ def tare(folder: Path, port: str) -> None:
 def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
     """Load cells beside `cdpr drive` keep it from what it would do."""
     tight = folder / "tight.toml"
-    text = (SHIPPED / "rtu-load-cell-1.toml").read_text()
+    text = (SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml").read_text()
     tight.write_text("stop_above_N = 50.0\n" + text + "zero_N = -100.0\n")
     watched = (WINCH, "--bus", bus, "--seconds", "0.2", "--port", cells.port, "--sensors")
     assert run("drive", "jog", *watched, "rtu-load-cell-1")["ok"]

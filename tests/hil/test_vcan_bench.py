@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.bus import BusUrl
-from tools.bench.bus import OwnWay, _on_vcan
-from tools.output import Output
+from cdpr_drivers.bus import BusUrl
+from cdpr_tools.bench.bus import OwnAccess, _on_vcan
+from cdpr_tools.output import Output
 
 pytestmark = pytest.mark.vcan
 
 
 def test_frames_on_vcan_are_measured_both_ways() -> None:
-    told = _on_vcan(150, Output(as_json=True))
+    told = _on_vcan(1000, Output(as_json=True))
     assert told["url"] == "socketcan:vcan0"
     for way in ("ours", "python-can"):
         assert told[way]["frames_per_s"] > 100
@@ -21,7 +21,7 @@ def test_frames_on_vcan_are_measured_both_ways() -> None:
 
 
 def test_nobody_answering_is_told() -> None:
-    way = OwnWay(BusUrl.parse("socketcan:vcan1"))
+    way = OwnAccess(BusUrl.parse("socketcan:vcan1"))
     way.open()
     way.port.settimeout(0.1)
     with pytest.raises(Exception, match="time-out"):

@@ -8,9 +8,9 @@ import time
 import can
 import pytest
 
-from drivers.bus.socketcan import open_socketcan
-from drivers.bus.url import BusUrl
-from drivers.errors import BusError
+from cdpr_drivers.bus.adapters.socketcan import open_socketcan
+from cdpr_drivers.bus.url import BusUrl
+from cdpr_drivers.errors import BusError
 
 pytestmark = pytest.mark.vcan
 
@@ -53,7 +53,7 @@ def test_raw_socket_carries_the_packed_frame(raw: socket.socket):
         assert FRAME.unpack(raw.recv(16)) == (0x181, 8, bytes(range(8)))
 
 
-def test_the_packed_port_filters_waits_and_drains():
+def test_the_socket_port_filters_waits_and_drains():
     url = BusUrl.parse("socketcan:vcan0")
     port = open_socketcan(url, [(0x181, 0x7FF), (0x080, 0x7FF)])
     other = open_socketcan(url, None)

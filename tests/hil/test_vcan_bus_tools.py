@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import canopen
 import pytest
 
-from drivers.bus import BusUrl
-from drivers.decode import Frame
-from profiles import load_winch
-from tools.busview.replay import Sender
-from tools.busview.roster import entry, there
-from tools.busview.scan import Scan
-from tools.busview.source import PythonCanSource, open_source
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.decode import Frame
+from cdpr_profiles import load_winch
+from cdpr_tools.busview.replay import Sender
+from cdpr_tools.busview.roster import entry, responding
+from cdpr_tools.busview.scan import Scan
+from cdpr_tools.busview.source import PythonCanSource, open_source
 
 pytestmark = pytest.mark.vcan
 
@@ -42,10 +42,10 @@ def slave() -> Iterator[canopen.LocalNode]:
     network.disconnect()
 
 
-def test_scan_finds_a_strangers_slave(slave: canopen.LocalNode) -> None:
+def test_scan_finds_a_third_partys_slave(slave: canopen.LocalNode) -> None:
     with Scan(URL, range(5, 15)) as scan:
         scan.ask()
-    (found,) = there(scan.found)
+    (found,) = responding(scan.found)
     told = entry(found, {"generic": DRIVE})
     assert told["node_id"] == 9
     assert told["state"] == "operation enabled"
@@ -58,7 +58,7 @@ def frames_of(source: PythonCanSource, n: int) -> list[Frame]:
     found: list[Frame] = []
     until = time.monotonic() + 5.0
     while len(found) < n and time.monotonic() < until:
-        source.take_in(0.1)
+        source.receive(0.1)
         found += source.next_frames(100)
     return found
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from daemon_rig import RealDaemon, write_robot
 
-pytestmark = [pytest.mark.vcan, pytest.mark.alone]
+pytestmark = pytest.mark.vcan
 
 BUS = "can0=socketcan:vcan0"
 PERIOD_S = 0.02  # the guest's kernel is slow, and has one processor for all of it
@@ -33,7 +33,7 @@ def robot(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def drives(robot: Path) -> Iterator[None]:
-    command = [sys.executable, "-m", "tools.cli", "sim", "up", str(robot), "--bus", BUS]
+    command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", str(robot), "--bus", BUS]
     process = subprocess.Popen(
         [*command, "--paced", "--exit-with-stdin"],
         stdin=subprocess.PIPE,

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tools.can_interfaces import list_interfaces
-from tools.host_checks import look_around
+from cdpr_tools.host.can_interfaces import list_interfaces
+from cdpr_tools.host.host_checks import look_around
 
 pytestmark = pytest.mark.vcan
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_rt.clock import PacedClock
-from drivers.bus import BusUrl, open_port
-from drivers.bus.packed import FRAME
-from drivers.listening import HeardBus, ListeningDevice, heard_axis
-from profiles import load_winch
+from cdpr_drivers.axes.listening import ListeningDevice, MonitoredBus, monitored_axis
+from cdpr_drivers.bus import BusUrl, open_port
+from cdpr_drivers.bus.frames import FRAME
+from cdpr_profiles import load_winch
+from cdpr_rt.core.clock import PacedClock
 
 pytestmark = pytest.mark.vcan
 
@@ -22,8 +22,8 @@ SENT = Path("/sys/class/net/vcan0/statistics/tx_packets")
 def test_what_is_said_is_heard_and_nothing_added() -> None:
     winch, url = load_winch("winch-mpp0923d"), BusUrl.parse("socketcan:vcan0")
     talker = open_port(url, [])
-    axis = heard_axis(winch, 1)
-    with ListeningDevice([HeardBus("can0", url, [axis], [0])], 0.001, PacedClock()) as device:
+    axis = monitored_axis(winch, 1)
+    with ListeningDevice([MonitoredBus("can0", url, [axis], [0])], 0.001, PacedClock()) as device:
         before = int(SENT.read_text())
         for k in range(100):
             talker.send(FRAME.pack(0x080, 0, bytes(8)))

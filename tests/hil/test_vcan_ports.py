@@ -8,16 +8,16 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.bus import BusUrl, FrameBuffer, open_port, open_python_can
-from drivers.bus.packed import FRAME
-from drivers.errors import BusError
+from cdpr_drivers.bus import BusUrl, FrameBuffer, open_port, open_python_can
+from cdpr_drivers.bus.frames import FRAME
+from cdpr_drivers.errors import BusError
 
 pytestmark = pytest.mark.vcan
 
 SIMULATOR = """
 import math
-from sim_bus.frame import pack_frame
-from sim_bus.server import serve
+from cdpr_sim_bus.frame import pack_frame
+from cdpr_sim_bus.bus.server import serve
 
 class Node:
     node_id = 1

@@ -23,10 +23,10 @@ import pytest
 import serial
 import vcan_replay
 
-from drivers.bus import BusHealth, BusState, BusUrl, bus_gone, open_port, open_python_can
-from drivers.bus.packed import ERR_FLAG, FRAME
-from drivers.bus.socketcan import SocketCanPort
-from drivers.errors import BusError
+from cdpr_drivers.bus import BusHealth, BusState, BusUrl, bus_gone, open_port, open_python_can
+from cdpr_drivers.bus.adapters.socketcan import SocketCanPort
+from cdpr_drivers.bus.frames import ERR_FLAG, FRAME
+from cdpr_drivers.errors import BusError
 
 pytestmark = pytest.mark.vcan
 
@@ -221,8 +221,8 @@ def test_an_adapter_pulled_out_takes_its_interface_away(stalled_adapter: tuple[i
 
 SIMULATOR = """
 import math
-from sim_bus.frame import pack_frame
-from sim_bus.server import serve
+from cdpr_sim_bus.frame import pack_frame
+from cdpr_sim_bus.bus.server import serve
 
 class Node:
     node_id, sync_period_s, accepts = 1, 0.001, frozenset((0x80, 0x201))

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import pytest
 
-from cdpr_rt.clock import PacedClock
-from drivers.bus import BusState, BusUrl, open_port
-from drivers.bus.packed import ERR_FLAG, FRAME
-from drivers.network import CanNetwork
+from cdpr_drivers.bus import BusState, BusUrl, open_port
+from cdpr_drivers.bus.frames import ERR_FLAG, FRAME
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_rt.core.clock import PacedClock
 
-pytestmark = [pytest.mark.vcan, pytest.mark.alone]
+pytestmark = pytest.mark.vcan
 
 VCAN0 = BusUrl.parse("socketcan:vcan0")
 

@@ -12,11 +12,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from cdpr_rt.controllers.proportional import Proportional
-from cdpr_rt.trajectory import Leg
-from profiles import load_robot
-from tools.output import Output
-from tools.session import open_robot
+from cdpr_profiles import load_robot
+from cdpr_rt.control.proportional import Proportional
+from cdpr_rt.motion.trajectory import Leg
+from cdpr_tools.composition.session import open_robot
+from cdpr_tools.output import Output
 
 pytestmark = pytest.mark.vcan
 
@@ -27,7 +27,7 @@ FRAME = struct.Struct("=IB3x8s")
 
 @pytest.fixture
 def drives() -> Iterator[dict[str, object]]:
-    command = [sys.executable, "-m", "tools.cli", "sim", "up", "spatial-8", *SIMULATED]
+    command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", "bench-8", *SIMULATED]
     process = subprocess.Popen(
         [*command, "--exit-with-stdin"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
@@ -73,7 +73,7 @@ def test_four_drives_on_each_of_two_interfaces(
     drives: dict[str, object], listeners: list[socket.socket]
 ) -> None:
     assert list(drives) == ["can0", "can1"]
-    robot = load_robot("spatial-8")
+    robot = load_robot("bench-8")
     with open_robot(robot, BUSES, Output(as_json=True)) as session:
         device = session.device
         assert device.lockstep

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from profiles import ProfileError, load_motor
-from profiles.bounded_input import parse_json, read_toml
-from profiles.motor import Motor
-from profiles.reader import validated
+from cdpr_profiles import ProfileError, load_motor
+from cdpr_profiles.motor import Motor
+from cdpr_profiles.reading.bounded_input import parse_json, read_toml
+from cdpr_profiles.reading.reader import validated
 
 
 @pytest.mark.parametrize(

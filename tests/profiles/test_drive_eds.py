@@ -9,10 +9,10 @@ import canopen
 import pytest
 from canopen.objectdictionary import ODVariable
 
-import profiles
-from profiles import DriveProfile, load_drive, load_motor
+import cdpr_profiles
+from cdpr_profiles import DriveProfile, load_drive, load_motor
 
-NAMES = sorted(p.stem for p in (Path(profiles.__file__).parent / "drives").glob("*.toml"))
+NAMES = sorted(p.stem for p in (Path(cdpr_profiles.__file__).parent / "drives").glob("*.toml"))
 NODE_ID = 5
 GENERIC = load_drive("generic-cia402")
 

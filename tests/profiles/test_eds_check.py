@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from profiles import ProfileError, load_drive
-from profiles.eds_check import EdsFile, read_eds, require
-from profiles.eds_text import Number, integer, number
-from profiles.eds_write import render_eds
+from cdpr_profiles import ProfileError, load_drive
+from cdpr_profiles.eds.eds_check import EdsFile, read_eds, require
+from cdpr_profiles.eds.eds_text import Number, integer, number
+from cdpr_profiles.eds.eds_write import render_eds
 
 GENERIC = load_drive("generic-cia402").eds
 
@@ -78,7 +78,7 @@ def test_a_clean_file_has_no_remarks() -> None:
     assert eds.number(0x1400, 1) == 0x200
 
 
-def test_the_written_file_means_the_same_to_us_and_to_a_stranger(tmp_path: Path) -> None:
+def test_the_written_file_means_the_same_to_us_and_to_a_third_party(tmp_path: Path) -> None:
     eds = read_eds(GENERIC)
     path = write(tmp_path, render_eds(eds))
     again = read_eds(path)
@@ -199,9 +199,9 @@ def test_short_forms_are_written_out(tmp_path: Path) -> None:
     assert eds.number(0x1804, 1) == 0x80000000
     assert eds.number(0x1400, 1) == 0x200
     assert [o.writable for o in eds.subs(0x1A00)] == [True] * 8
-    stranger = canopen.import_od(str(write(tmp_path, render_eds(eds), "mended.eds")), 3)
-    assert stranger[0x2100][3].default == 9
-    assert stranger[0x1800][1].default == 0x183
+    third_party = canopen.import_od(str(write(tmp_path, render_eds(eds), "mended.eds")), 3)
+    assert third_party[0x2100][3].default == 9
+    assert third_party[0x1800][1].default == 0x183
 
 
 def test_a_dcf_gives_node_id_bit_rate_and_values(tmp_path: Path) -> None:
@@ -212,9 +212,9 @@ def test_a_dcf_gives_node_id_bit_rate_and_values(tmp_path: Path) -> None:
     assert (eds.node_id, eds.bitrate_bit_s) == (16, 500_000)
     assert eds.number(0x2000) == 2
     assert eds.number(0x1800, 1) == 0x280
-    stranger = canopen.import_od(str(write(tmp_path, render_eds(eds), "mended.dcf")))
-    assert (stranger.node_id, stranger.bitrate) == (16, 500_000)
-    assert (stranger[0x2000].value, stranger[0x1800][1].value) == (2, 0x290)
+    third_party = canopen.import_od(str(write(tmp_path, render_eds(eds), "mended.dcf")))
+    assert (third_party.node_id, third_party.bitrate) == (16, 500_000)
+    assert (third_party[0x2000].value, third_party[0x1800][1].value) == (2, 0x290)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252", "latin-1"])
@@ -290,9 +290,9 @@ def test_no_text_whatsoever_raises_anything_else(
     mended.write_text(render_eds(eds), encoding="utf-8")
     again = read_eds(mended)
     assert again.objects == eds.objects
-    stranger = canopen.import_od(str(mended), 1)
+    third_party = canopen.import_od(str(mended), 1)
     for (index, sub), entry in eds.objects.items():
-        theirs = stranger[index] if index not in eds.records else stranger[index][sub]
+        theirs = third_party[index] if index not in eds.records else third_party[index][sub]
         assert theirs.data_type == entry.data_type
         if isinstance(entry.default, int) and entry.data_type != 0x0F:
             assert theirs.default == entry.default + entry.relative

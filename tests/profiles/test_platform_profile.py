@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
-from profiles import ProfileError, load_robot
-from profiles.catalogue import SHIPPED
+from cdpr_profiles import ProfileError, load_robot
+from cdpr_profiles.reading.places import SHIPPED
 
 PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
 
@@ -33,6 +34,39 @@ def test_the_shipped_platform_hangs_on_three_cables() -> None:
         if p != q
     ]
     assert sides == pytest.approx([0.15] * 6, abs=1e-4)  # the thesis' triangle
+
+
+def test_what_the_file_leaves_out_is_filled_in() -> None:
+    platform = load_robot("planar-3").platform
+    assert platform is not None
+    assert platform.controlled == ("x", "y")  # three cables leave a plane's angle free
+    assert (platform.inertia_kg_m2, platform.home_rotation_rad) == (None, (0.0,))
+    assert (platform.centre_of_mass_m, platform.pulley_radius_m) == ((0.0, 0.0), (0.0,) * 3)
+    assert platform.pulley_axes == ((0.0, 1.0),) * 3
+    assert platform.angular_speed_rad_s == pytest.approx(0.5 / 0.1)  # an arm of 0.1 m at least
+    in_space = load_robot("suspended-8").platform
+    assert in_space is not None
+    assert in_space.controlled == ("x", "y", "z", "rx", "ry", "rz")
+    assert in_space.home_rotation_rad == in_space.centre_of_mass_m == (0.0,) * 3
+
+
+def test_what_the_file_says_arrives(tmp_path: Path) -> None:
+    said = (
+        "mass_kg = 2.0\ninertia_kg_m2 = 0.01\ncentre_of_mass_m = [0.0, -0.01]\n"
+        'home_rotation_rad = 0.1\ncontrolled = ["y", "x"]\ncable_model = "catenary"\n'
+        'tension_distribution = "closed-form"'
+    )
+    pulley = "pulley_radius_m = 0.03\npulley_axis = [0.0, -2.0]\nexit_point_m = [0.0, 0.0]"
+    path = changed(tmp_path, ("mass_kg = 2.0", said), ("exit_point_m = [0.0, 0.0]", pulley))
+    platform = load_robot(path).platform
+    assert platform is not None
+    assert platform.inertia_kg_m2 == (0.01,)
+    assert platform.centre_of_mass_m == (0.0, -0.01)
+    assert platform.home_rotation_rad == (0.1,)
+    assert platform.controlled == ("x", "y")
+    assert (platform.cable_model, platform.tension_distribution) == ("catenary", "closed-form")
+    assert platform.pulley_radius_m == (0.0, 0.0, 0.03)
+    assert platform.pulley_axes == ((0.0, 1.0), (0.0, 1.0), (0.0, -1.0))
 
 
 @pytest.mark.parametrize(
@@ -64,14 +98,84 @@ def test_what_no_platform_can_be_is_refused(
     assert problem in str(caught.value)
 
 
+WALL = (SHIPPED / "robots" / "planar-4.toml").read_text()
+HALL = (SHIPPED / "robots" / "suspended-8.toml").read_text()
+CAMERA = (SHIPPED / "robots" / "point-4.toml").read_text()
+INERTIA = "inertia_kg_m2 = [16.7, 16.7, 16.7, 0.0, 0.0, 0.0]"
+HOME = "home_m = [0.0, 0.0, 0.5]"
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new", "key", "problem"),
+    [
+        (WALL, "= 0.05\n", "= 0.0\n", "platform.inertia_kg_m2", "all above 0"),
+        (WALL, "= 0.05\n", "= 5e4\n", "platform.inertia_kg_m2", "is it in kg m2?"),
+        (WALL, "= 0.05\n", "= [1, 1]\n", "platform.inertia_kg_m2", "2 numbers; allowed: 1 in a"),
+        (HALL, INERTIA, "inertia_kg_m2 = 1.0", "platform.inertia_kg_m2", "allowed: 6 in space"),
+        (HALL, "16.7, 0.0,", "16.7, 17.0,", "platform.inertia_kg_m2", "all above 0"),
+        (HALL, "16.7, 0.0,", "40.0, 0.0,", "platform.inertia_kg_m2", "sum of the two others"),
+        (HALL, HOME, HOME + "\nhome_rotation_rad = [0.0, 0.0, 90.0]",
+         "platform.home_rotation_rad", "is it in degrees?"),
+        (HALL, HOME, HOME + "\nhome_rotation_rad = 0.1", "platform.home_rotation_rad",
+         "3 in space"),
+        (HALL, HOME, HOME + "\ncentre_of_mass_m = [0.0, 0.0, 500.0]",
+         "platform.centre_of_mass_m", "not beyond the frame"),
+        (HALL, "angle_rad = 0.2618", "angle_rad = 15.0", "platform.workspace_angle_rad",
+         "less than"),
+        (HALL, "angular_speed_rad_s = 0.25\n", "", "platform.angular_speed_rad_s", "missing; "),
+        (HALL, HOME, HOME + '\ncontrolled = ["x", "y"]', "platform.controlled", "x, y, z, and any"),
+        (WALL, "mass_kg", 'controlled = ["x", "y", "z"]\nmass_kg', "platform.controlled",
+         "x, y, and"),
+        (WALL, "mass_kg", 'controlled = ["x", "why"]\nmass_kg', "platform.controlled[1]",
+         "'angle'"),
+        (WALL, "mass_kg", 'cable_model = "rope"\nmass_kg', "platform.cable_model", "'catenary'"),
+        (WALL, "mass_kg", 'tension_distribution = "x"\nmass_kg',
+         "platform.tension_distribution", "'closed-form'"),
+        (CAMERA, "[0.0, 0.0, 0.0]", "[0.1, 0.0, 0.0]", "axes", "all anchor points alike"),
+        (CAMERA, "mass_kg", 'controlled = ["x", "y", "z", "rz"]\nmass_kg', "platform.controlled",
+         "no angle where all anchor points are alike"),
+        (CAMERA, "mass_kg", "workspace_angle_rad = 0.1\nmass_kg", "platform.workspace_angle_rad",
+         "allowed: 0 where no angle is controlled"),
+        (WALL, "exit_point_m = [-2.0, 3.0]", "exit_point_m = [-200.0, 3.0]", "axes[0].exit_point_m",
+         "are they in millimetres?"),
+    ],
+)  # fmt: skip
+def test_sizes_and_directions_that_no_robot_has_are_refused(
+    tmp_path: Path, text: str, old: str, new: str, key: str, problem: str
+) -> None:
+    assert old in text
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ProfileError) as caught:
+        load_robot(path)
+    assert key == caught.value.key and problem in str(caught.value), caught.value
+
+
+def test_anchor_points_a_millimetre_apart_are_no_platform(tmp_path: Path) -> None:
+    text = re.sub(r"anchor_point_m = \[(.*), (.*)\]", r"anchor_point_m = [\1e-3, \2e-3]", WALL)
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(ProfileError, match=r"anchor points are 0\.000\d+ m apart at most"):
+        load_robot(path)
+
+
+def test_a_polygon_of_tensions_takes_two_cables_more_than_directions(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    polygon = 'controlled = ["x", "y", "z"]\ntension_distribution = "polygon-centroid"\nmass_kg'
+    text = re.sub(r"workspace_angle_rad.*\n", "", HALL.replace("mass_kg", polygon, 1))
+    path.write_text(text)
+    with pytest.raises(ProfileError, match="allowed: for up to 5 cables"):
+        load_robot(path)
+
+
 def test_points_without_a_platform_and_cables_too_few_are_refused(tmp_path: Path) -> None:
     start, end = PLANAR.index("[platform]"), PLANAR.index("[limits]")
     path = tmp_path / "mine.toml"
     path.write_text(PLANAR[:start] + PLANAR[end:])
     with pytest.raises(ProfileError, match=r"axes\[0\]: .*along with \[platform\]"):
         load_robot(path)
-    path.write_text(PLANAR[: PLANAR.rindex("[[axes]]")])
-    with pytest.raises(ProfileError, match="axes: 2; allowed: 3 and more"):
+    path.write_text(PLANAR[: PLANAR.index("[[axes]]", PLANAR.index("[[axes]]") + 1)])
+    with pytest.raises(ProfileError, match="axes: 1; allowed: 2 and more to control x, y"):
         load_robot(path)
 
 

@@ -10,18 +10,18 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-import profiles
-from profiles import ProfileError
-from profiles.cable import Cable, CableSeries
-from profiles.catalogue import KINDS, SHIPPED
-from profiles.drive import DriveProfile
-from profiles.motor import Motor, MotorRatings, MotorSeries
-from profiles.rail import RailProfile
-from profiles.reader import Profile, read_toml_model
-from profiles.robot import RobotFile
-from profiles.safety_io import SafetyIoProfile
-from profiles.tension_sensor import TensionSensors
-from profiles.winch import WinchFile
+import cdpr_profiles
+from cdpr_profiles import ProfileError
+from cdpr_profiles.cable import Cable, CableSeries
+from cdpr_profiles.devices.rail import RailProfile
+from cdpr_profiles.devices.safety_io import SafetyIoProfile
+from cdpr_profiles.devices.tension_sensor import TensionSensors
+from cdpr_profiles.drive import DriveProfile
+from cdpr_profiles.motor import Motor, MotorRatings, MotorSeries
+from cdpr_profiles.reading.places import KINDS, SHIPPED
+from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.robot import RobotFile
+from cdpr_profiles.winch import WinchFile
 
 FILES: dict[Path, type[Profile]] = {
     SHIPPED / "motors" / "parker-mpp-mpj.series.toml": MotorSeries,
@@ -29,12 +29,22 @@ FILES: dict[Path, type[Profile]] = {
     SHIPPED / "drives" / "mnm-profile-torque.toml": DriveProfile,
     SHIPPED / "drives" / "parker-compax3-canopen.toml": DriveProfile,
     SHIPPED / "cables" / "barry-dyneema.series.toml": CableSeries,
+    SHIPPED / "cables" / "cogiro.toml": Cable,
+    SHIPPED / "cables" / "dyneema-3.2mm.toml": Cable,
     SHIPPED / "cables" / "dyneema-4.8mm.toml": Cable,
+    SHIPPED / "winches" / "winch-1kn.toml": WinchFile,
+    SHIPPED / "winches" / "winch-300n.toml": WinchFile,
+    SHIPPED / "winches" / "winch-45n.toml": WinchFile,
     SHIPPED / "winches" / "winch-mpp0923d.toml": WinchFile,
     SHIPPED / "robots" / "bench-2.toml": RobotFile,
     SHIPPED / "robots" / "one-bus-8.toml": RobotFile,
     SHIPPED / "robots" / "planar-3.toml": RobotFile,
+    SHIPPED / "robots" / "planar-4.toml": RobotFile,
+    SHIPPED / "robots" / "point-4.toml": RobotFile,
+    SHIPPED / "robots" / "bench-8.toml": RobotFile,
     SHIPPED / "robots" / "spatial-8.toml": RobotFile,
+    SHIPPED / "robots" / "suspended-6.toml": RobotFile,
+    SHIPPED / "robots" / "suspended-8.toml": RobotFile,
     SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml": TensionSensors,
     SHIPPED / "tension_sensors" / "rtu-load-cells-8.toml": TensionSensors,
     SHIPPED / "safety_io" / "modbus-remote-io.toml": SafetyIoProfile,
@@ -84,8 +94,8 @@ def test_every_file_is_covered_here():
 
 
 def test_load_all_holds_every_listed_profile():
-    everything = profiles.load_all()
-    for kind, names in profiles.list_profiles().items():
+    everything = cdpr_profiles.load_all()
+    for kind, names in cdpr_profiles.list_profiles().items():
         assert set(names) <= set(everything[kind])
         assert names
     complete = [m for m in everything["motors"].values() if isinstance(m, Motor)]
@@ -182,9 +192,9 @@ def test_a_file_that_is_not_toml(content: bytes, part: str, tmp_path: Path):
 
 def test_missing_file_and_folder(tmp_path: Path):
     with pytest.raises(ProfileError, match="cannot be read: No such file"):
-        profiles.load_motor(tmp_path / "none.toml")
+        cdpr_profiles.load_motor(tmp_path / "none.toml")
     with pytest.raises(ProfileError, match="is no regular file"):
-        profiles.load_motor(tmp_path)
+        cdpr_profiles.load_motor(tmp_path)
 
 
 def test_nested_keys_are_dotted_and_answered(tmp_path: Path):
@@ -252,34 +262,34 @@ def test_a_row_of_another_length_is_named(tmp_path: Path):
 
 
 def test_peak_below_rated_is_refused(tmp_path: Path):
-    motor = profiles.load_motor("MPP0923D").model_dump(mode="json") | {"peak_torque_Nm": 2.0}
+    motor = cdpr_profiles.load_motor("MPP0923D").model_dump(mode="json") | {"peak_torque_Nm": 2.0}
     path = tmp_path / "weak.toml"
     path.write_text(_document(motor), encoding="utf-8")
     with pytest.raises(ProfileError, match=r"peak_torque_Nm: value 2\.0; allowed: not below rated"):
-        profiles.load_motor(path)
+        cdpr_profiles.load_motor(path)
 
 
 def test_unknown_names_are_answered_with_the_likely_one():
     with pytest.raises(ProfileError, match="no profile named 'mpp923d'; did you mean 'MPP0923D'"):
-        profiles.load_motor("mpp923d")
+        cdpr_profiles.load_motor("mpp923d")
     with pytest.raises(ProfileError, match="did you mean 'winch-mpp0923d'"):
-        profiles.load_winch("winch-mpp923d")
+        cdpr_profiles.load_winch("winch-mpp923d")
     with pytest.raises(ProfileError, match="allowed: generic-cia402"):
-        profiles.load_drive("zzz")
+        cdpr_profiles.load_drive("zzz")
 
 
 def test_a_motor_with_ratings_only_says_so():
-    assert profiles.load_motor_ratings("MPP1152C").peak_torque_Nm == 15.69
+    assert cdpr_profiles.load_motor_ratings("MPP1152C").peak_torque_Nm == 15.69
     with pytest.raises(ProfileError, match="ratings of MPP1152C only"):
-        profiles.load_motor("MPP1152C")
+        cdpr_profiles.load_motor("MPP1152C")
     with pytest.raises(ProfileError, match="no profile named 'MPJ0923D'"):
-        profiles.load_motor_ratings("MPJ0923D")
+        cdpr_profiles.load_motor_ratings("MPJ0923D")
 
 
 def test_the_shipped_winch():
-    winch = profiles.load_winch("winch-mpp0923d")
-    assert winch.motor == profiles.load_motor("MPP0923D")
-    assert winch.drive == profiles.load_drive("generic-cia402")
+    winch = cdpr_profiles.load_winch("winch-mpp0923d")
+    assert winch.motor == cdpr_profiles.load_motor("MPP0923D")
+    assert winch.drive == cdpr_profiles.load_drive("generic-cia402")
     assert winch.drive.eds.is_absolute()
     assert winch.profile == "winch-mpp0923d"
     # 22 deg/s at the motor move the cable by 10 mm/s; a turn by 163 mm.
@@ -288,19 +298,19 @@ def test_the_shipped_winch():
 
 
 def test_a_users_winch_finds_its_own_profiles_beside_it_then_the_shipped_ones(tmp_path: Path):
-    own = profiles.load_motor("MPP0922D").model_dump(mode="json") | {"model": "mine"}
+    own = cdpr_profiles.load_motor("MPP0922D").model_dump(mode="json") | {"model": "mine"}
     (tmp_path / "my-motor.toml").write_text(_document(own), encoding="utf-8")
     shutil.copy(SHIPPED / "cables" / "dyneema-4.8mm.toml", tmp_path / "rope.toml")
     source = SHIPPED / "winches" / "winch-mpp0923d.toml"
     table = _read(source) | {"motor": "my-motor", "cable": "rope.toml"}
     path = _write(tmp_path, source, table)
-    winch = profiles.load_winch(path)
+    winch = cdpr_profiles.load_winch(path)
     assert winch.motor.model == "mine"
-    assert winch.cable == profiles.load_cable("dyneema-4.8mm")
+    assert winch.cable == cdpr_profiles.load_cable("dyneema-4.8mm")
     assert winch.drive.name == "Generic CiA 402 torque servo"
     path.write_text(_document(table | {"motor": "my-moter"}), encoding="utf-8")
     with pytest.raises(ProfileError) as caught:
-        profiles.load_winch(str(path))
+        cdpr_profiles.load_winch(str(path))
     assert str(caught.value).startswith(f"{path}: motor: no profile named 'my-moter'")
     assert "did you mean 'my-motor'?" in str(caught.value)
 
@@ -309,13 +319,13 @@ def test_a_node_cannot_be_its_own_master(tmp_path: Path):
     source = SHIPPED / "winches" / "winch-mpp0923d.toml"
     path = _write(tmp_path, source, _read(source) | {"node_id": 127})
     with pytest.raises(ProfileError, match="node_id: value 127; allowed: another than master"):
-        profiles.load_winch(path)
+        cdpr_profiles.load_winch(path)
 
 
 def test_a_drive_without_its_eds(tmp_path: Path):
     shutil.copy(SHIPPED / "drives" / "generic-cia402.toml", tmp_path)
     with pytest.raises(ProfileError, match=r"eds: value 'generic-cia402\.eds'; allowed: a file"):
-        profiles.load_drive(tmp_path / "generic-cia402.toml")
+        cdpr_profiles.load_drive(tmp_path / "generic-cia402.toml")
 
 
 def test_cable_table_agrees_with_itself_and_with_the_cable_in_use():
@@ -331,7 +341,7 @@ def test_cable_table_agrees_with_itself_and_with_the_cable_in_use():
         assert lb_per_100_ft == pytest.approx(size.mass_lb_per_100_ft, abs=0.1)
         kgf = size.breaking_force_lbf * 0.45359237
         assert kgf == pytest.approx(size.breaking_force_kgf, rel=0.012)
-    cable = profiles.load_cable("dyneema-4.8mm")
+    cable = cdpr_profiles.load_cable("dyneema-4.8mm")
     row = next(s for s in series.sizes if s.code == cable.data_sheet_code)
     assert cable.diameter_m == pytest.approx(row.diameter_mm * 1e-3)
     assert cable.breaking_force_kgf == row.breaking_force_kgf
@@ -344,5 +354,24 @@ def test_the_examples_of_the_manual_load(tmp_path: Path):
     examples = page.read_text(encoding="utf-8").split("```toml\n")[1:]
     for name, example in zip(("winch", "my-motor", "my-cable"), examples, strict=True):
         (tmp_path / f"{name}.toml").write_text(example.split("```")[0], encoding="utf-8")
-    assert profiles.load_winch(tmp_path / "winch.toml").motor.model == "My motor"
-    assert profiles.load_cable(tmp_path / "my-cable.toml").min_tension_N == 20
+    assert cdpr_profiles.load_winch(tmp_path / "winch.toml").motor.model == "My motor"
+    assert cdpr_profiles.load_cable(tmp_path / "my-cable.toml").min_tension_N == 20
+
+
+def test_own_profiles_are_found_by_name_before_shipped_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    winches = tmp_path / "cdpr-rt" / "profiles" / "winches"
+    winches.mkdir(parents=True)
+    text = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
+    (winches / "mine.toml").write_text(text)
+    assert "mine" in cdpr_profiles.list_profiles()["winches"]
+    mine = cdpr_profiles.load_winch("mine")
+    assert mine.reference == str(winches / "mine.toml")  # for a service that has another home
+    assert cdpr_profiles.load_winch("winch-mpp0923d").reference == "winch-mpp0923d"
+    (winches / "winch-mpp0923d.toml").write_text(text)
+    assert cdpr_profiles.load_winch("winch-mpp0923d").path.parent == winches
+    hidden = cdpr_profiles.load_winch(SHIPPED / "winches" / "winch-mpp0923d.toml")
+    assert hidden.reference == str(hidden.path)
+    assert cdpr_profiles.load_machine("mine") == mine

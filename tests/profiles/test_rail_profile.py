@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from profiles import ProfileError
-from profiles.rail import SHIPPED, load_rail
-from profiles.rail_drive import load_rail_drive
+from cdpr_profiles import ProfileError
+from cdpr_profiles.devices.rail import load_rail
+from cdpr_profiles.devices.rail_drive import load_rail_drive
+from cdpr_profiles.reading.places import SHIPPED
 
-CIA402 = (SHIPPED / "rail-cia402.toml").read_text()
-MODBUS = (SHIPPED / "rail-modbus.toml").read_text()
+CIA402 = (SHIPPED / "rails" / "rail-cia402.toml").read_text()
+MODBUS = (SHIPPED / "rails" / "rail-modbus.toml").read_text()
 
 
 def test_the_shipped_ones_load() -> None:

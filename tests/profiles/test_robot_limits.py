@@ -12,17 +12,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.limits import DEFAULT_REACTIONS, Limit
-from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
-from cdpr_rt.runtime.states import Reaction
-from drivers.bus.budget import machine_budget
-from profiles import ProfileError, load_robot
-from profiles.bounded_input import read_toml
-from profiles.catalogue import SHIPPED
-from profiles.platform import PlatformFile
-from profiles.reader import validated
-from profiles.robot_limits import Reactions, RobotLimits
-from profiles.winch_calibration import WinchCalibration
+from cdpr_drivers.bus.budget import machine_budget
+from cdpr_profiles import ProfileError, load_robot
+from cdpr_profiles.limits.robot_limits import Reactions, RobotLimits
+from cdpr_profiles.platform import PlatformFile
+from cdpr_profiles.reading.bounded_input import read_toml
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.reading.reader import validated
+from cdpr_profiles.winch_calibration import WinchCalibration
+from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limit
+from cdpr_rt.core.states import Reaction
+from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
 
 FILE = """
 name = "Two"
@@ -303,7 +303,7 @@ def test_the_documented_robot_is_one(tmp_path: Path) -> None:
     assert figures == [key for key in RobotLimits.model_fields if key != "reactions"]
     path.write_text(platform)
     documented = validated(path, read_toml(path)["platform"], PlatformFile)
-    shipped = load_robot("planar-3").platform
+    shipped = load_robot("planar-4").platform
     assert shipped is not None
     assert all(getattr(shipped, key) == value for key, value in documented)
     keys = re.findall(r"^(\w+) = ", platform, re.M)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-import profiles
-from profiles import ProfileError, Robot, Winch, load_machine, load_robot
+import cdpr_profiles
+from cdpr_profiles import ProfileError, Robot, Winch, load_machine, load_robot
 
 TWO_AXES = """
 name = "Two"
@@ -40,8 +40,8 @@ def test_the_shipped_robot_has_four_winches_on_each_of_two_buses():
     assert robot.sync_period_s == 0.001
     assert all(axis.mandatory for axis in robot.axes)
     assert robot.reference == "spatial-8"
-    assert "spatial-8" in profiles.list_profiles()["robots"]
-    assert isinstance(profiles.load_all()["robots"]["spatial-8"], Robot)
+    assert "spatial-8" in cdpr_profiles.list_profiles()["robots"]
+    assert isinstance(cdpr_profiles.load_all()["robots"]["spatial-8"], Robot)
 
 
 def test_winches_are_told_what_the_robot_decides(tmp_path: Path):
@@ -91,14 +91,16 @@ def test_a_machine_is_a_winch_or_a_robot(tmp_path: Path):
     assert isinstance(load_machine("spatial-8"), Robot)
     assert isinstance(load_machine(robot_file(tmp_path)), Robot)
     winch = tmp_path / "winch.toml"
-    winch.write_text((profiles.catalogue.SHIPPED / "winches/winch-mpp0923d.toml").read_text())
+    winch.write_text(
+        (cdpr_profiles.reading.places.SHIPPED / "winches/winch-mpp0923d.toml").read_text()
+    )
     assert isinstance(load_machine(winch), Winch)
     with pytest.raises(ProfileError, match="did you mean 'spatial-8'"):
         load_machine("spatial8")
 
 
 def test_devices_beside_the_drives_are_found_from_anywhere(tmp_path: Path):
-    shipped = profiles.catalogue.SHIPPED / "safety_io/modbus-remote-io.toml"
+    shipped = cdpr_profiles.reading.places.SHIPPED / "safety_io/modbus-remote-io.toml"
     (tmp_path / "io.toml").write_text(shipped.read_text())
     top = 'safety_io = "./io.toml@127.0.0.1:1502"\nrails = ["rail-modbus", "sub/mine.toml"]'
     robot = load_robot(robot_file(tmp_path, top=top, node=1))

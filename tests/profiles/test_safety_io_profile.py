@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from profiles import ProfileError
-from profiles.safety_io import SHIPPED, load_safety_io
+from cdpr_profiles import ProfileError
+from cdpr_profiles.devices.safety_io import load_safety_io
+from cdpr_profiles.reading.places import SHIPPED
 
-TEXT = (SHIPPED / "modbus-remote-io.toml").read_text()
+TEXT = (SHIPPED / "safety_io" / "modbus-remote-io.toml").read_text()
 
 
 def test_the_shipped_one_loads_and_can_be_moved_to_another_place() -> None:

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from profiles.errors import ProfileError
-from profiles.tension_sensor import SHIPPED, load_tension_sensors
-from profiles.winch_calibration import WinchCalibration, load_winch_calibration
+from cdpr_profiles.devices.tension_sensor import load_tension_sensors
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.winch_calibration import WinchCalibration, load_winch_calibration
 
-TEXT = (SHIPPED / "rtu-load-cell-1.toml").read_text(encoding="utf-8")
+TEXT = (SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

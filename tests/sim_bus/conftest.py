@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from sim_bus.clock import ClockMode
-from sim_bus.frame import SYNC_ID, pack_frame
-from sim_bus.hub import Hub
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.frame import SYNC_ID, pack_frame
 
 _numbers = itertools.count()
 

@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from drivers.decode.candump import Logged, read_log
-from sim_bus.frame import EFF_FLAG, RTR_FLAG, pack_frame
-from sim_bus.frame_log import FrameEar, FrameLog
+from cdpr_drivers.decode.candump import LogEntry, read_log
+from cdpr_sim_bus.frame import EFF_FLAG, RTR_FLAG, pack_frame
+from cdpr_sim_bus.frame_log import FrameListener, FrameLog
 
 StartBus = Callable[..., Any]
 SYNC = pack_frame(0x080)
 
 
-def logged(path: Path) -> list[Logged]:
+def logged(path: Path) -> list[LogEntry]:
     with path.open() as file:
         return list(read_log(path.name, file))
 
@@ -37,7 +37,7 @@ def test_every_frame_is_there_at_bus_time_in_the_order_of_the_bus(
     answers = (pack_frame(0x182, b"\xab\x01"), pack_frame(0x181, b""))
     node = stub_node(1, sync_period_s=0.01, answers=answers, timers=(0.0, 0.025))
     log = FrameLog(path)
-    bus = start_bus(node, log.ear("can3"))
+    bus = start_bus(node, log.listener("can3"))
     member = bus.join()
     member.lead()
     for k in range(3):
@@ -68,13 +68,13 @@ def test_every_frame_is_there_at_bus_time_in_the_order_of_the_bus(
 def play(path: Path, *order: int) -> bytes:
     """Have two buses heard, at each instant in this order; return the file."""
     log = FrameLog(path)
-    ears = [log.ear("left"), log.ear("right")]
+    ears = [log.listener("left"), log.listener("right")]
     for k in range(5000):
         for number in order:
             ears[number].advance(0.001 * k)
             ears[number].receive(pack_frame(0x100 + k % 7, bytes([number])), 0.001 * k)
-    for ear in ears:
-        ear.close()
+    for listener in ears:
+        listener.close()
     return path.read_bytes()
 
 
@@ -88,12 +88,12 @@ def test_which_bus_was_looked_at_first_makes_no_difference(tmp_path: Path) -> No
 def test_a_bus_that_stands_for_ever_fills_no_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sim_bus.frame_log._MOST_WAITING", 8192)
+    monkeypatch.setattr("cdpr_sim_bus.frame_log._MOST_WAITING", 8192)
     log = FrameLog(tmp_path / "frames.log")
-    speaks, stands = log.ear("left"), log.ear("right")
+    speaks, stands = log.listener("left"), log.listener("right")
     for k in range(20_000):
         speaks.receive(SYNC, 0.001 * k)
-    assert isinstance(stands, FrameEar) and len(speaks.take(float("inf"))) < 8192
+    assert isinstance(stands, FrameListener) and len(speaks.take(float("inf"))) < 8192
     log.close()
 
 
@@ -103,7 +103,7 @@ def test_two_simulators_do_not_write_one_file(tmp_path: Path) -> None:
     log = FrameLog(path)
     with pytest.raises(OSError, match="another simulator writes it"):
         FrameLog(path)
-    log.ear("can0").receive(SYNC, 0.5)
+    log.listener("can0").receive(SYNC, 0.5)
     log.close()
     assert path.read_text() == "(0000000000.500000) can0 080#\n"
     FrameLog(path).close()
@@ -112,17 +112,17 @@ def test_two_simulators_do_not_write_one_file(tmp_path: Path) -> None:
 
 def test_a_full_disk_ends_the_log_and_not_the_bus(capsys: pytest.CaptureFixture[str]) -> None:
     log = FrameLog(Path("/dev/full"))
-    ear = log.ear("can0")
+    listener = log.listener("can0")
     for k in range(10_000):
-        ear.receive(SYNC, 0.001 * k)
-    ear.close()
+        listener.receive(SYNC, 0.001 * k)
+    listener.close()
     assert capsys.readouterr().err == "frame log /dev/full: No space left on device; it ends here\n"
 
 
 def test_the_command_logs_where_the_environment_says(tmp_path: Path) -> None:
     path = tmp_path / "frames.log"
     script = """
-from tools.simulator import OwnSimulator
+from cdpr_tools.composition.simulator import OwnSimulator
 for name in ("first", "second"):
     OwnSimulator("winch-mpp0923d", f"simbus:frame-log-{name}").stop()
 """
@@ -130,8 +130,8 @@ for name in ("first", "second"):
     subprocess.run([sys.executable, "-c", script], env=environment, check=True, cwd=tmp_path)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["frames-2.log", "frames.log"]
     done = subprocess.run(
-        [sys.executable, "-m", "tools.cli", "sim", "up", "winch-mpp0923d", "--bus", "simbus:fl-x",
-         "--frame-log", str(tmp_path / "nowhere" / "frames.log")],
+        [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", "winch-mpp0923d",
+         "--bus", "simbus:fl-x", "--frame-log", str(tmp_path / "nowhere" / "frames.log")],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 2 and "nowhere/frames.log: No such file" in done.stderr

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_bus.frame import EFF_FLAG, RTR_FLAG, arbitration_key, bits_by_length, worst_case_bits
+from cdpr_sim_bus.frame import EFF_FLAG, RTR_FLAG, arbitration_key, bits_by_length, worst_case_bits
 
 LAW = settings(derandomize=True, max_examples=300, deadline=None)
 standard_ids = st.integers(0, 0x7FF)

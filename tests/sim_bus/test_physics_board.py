@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sim_bus.errors import BusSetupError
-from sim_bus.physics_board import BoardState, PhysicsBoard
+from cdpr_sim_bus.errors import BusSetupError
+from cdpr_sim_bus.physics_board import BoardState, PhysicsBoard
 
 
 def _write_until(path: Path, stop: float) -> None:

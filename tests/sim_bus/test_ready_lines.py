@@ -8,7 +8,7 @@ import os
 import pty
 from contextlib import redirect_stdout, suppress
 
-from sim_bus.ready import tell_ready
+from cdpr_sim_bus.ready import print_ready
 
 READY = {"bus": "simbus:lab", "pid": 7, "mode": "lockstep", "nodes": [1, 2], "slcan": "/dev/pts/3"}
 
@@ -16,7 +16,7 @@ READY = {"bus": "simbus:lab", "pid": 7, "mode": "lockstep", "nodes": [1, 2], "sl
 def test_a_program_gets_one_line_of_json() -> None:
     out = io.StringIO()
     with redirect_stdout(out):
-        tell_ready(READY)
+        print_ready(READY)
     assert json.loads(out.getvalue()) == {"ready": READY}
     assert out.getvalue().count("\n") == 1
 
@@ -24,8 +24,8 @@ def test_a_program_gets_one_line_of_json() -> None:
 def test_a_terminal_gets_what_a_person_wants_to_know() -> None:
     ours, theirs = pty.openpty()
     with os.fdopen(theirs, "w") as terminal, redirect_stdout(terminal):
-        tell_ready(READY)
-        tell_ready({"robot": "r", "pid": 7, "buses": {"a": READY, "b": {"bus": "simbus:b"}}})
+        print_ready(READY)
+        print_ready({"robot": "r", "pid": 7, "buses": {"a": READY, "b": {"bus": "simbus:b"}}})
     text = b""
     with suppress(OSError):  # how the end of a terminal reads
         while part := os.read(ours, 4096):

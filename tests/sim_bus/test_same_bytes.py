@@ -18,11 +18,11 @@ from pathlib import Path
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sim_bus.frame import pack_frame
+from cdpr_sim_bus.frame import pack_frame
 
 LAW = settings(
     derandomize=True,
-    max_examples=12,
+    max_examples=6,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
@@ -34,12 +34,13 @@ SIMULATOR = """
 import sys
 from pathlib import Path
 import numpy as np
-from profiles import load_winch
-from sim_bus.cable_robot import CableRobot, RobotShape
-from sim_bus.drive import SimDrive, transmission_of
-from sim_bus.fleet import FleetBus, serve_fleet
-from sim_bus.pose_log import PoseLog
-from sim_bus.robot_plant import RobotPlant
+from cdpr_profiles import load_winch
+from cdpr_sim_bus.robot.cable_robot import CableRobot
+from cdpr_sim_bus.robot.platform_record import RobotShape
+from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
+from cdpr_sim_bus.fleet import FleetBus, serve_fleet
+from cdpr_sim_bus.robot.pose_log import PoseLog
+from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from dataclasses import replace
 
 name, log = sys.argv[1], Path(sys.argv[2])

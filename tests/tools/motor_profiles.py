@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_rt.cogging_profile import (
+from cdpr_drivers.robot.commissioned import folder_of
+from cdpr_profiles import Robot, Winch
+from cdpr_rt.identification.cogging_profile import (
     CoggingProfile,
     DriveIdentity,
     StoredFriction,
     StoredMethod,
 )
-from profiles import Robot, Winch
-from sim_bus.plant import Plant
-from tools.commissioned import folder_of
+from cdpr_sim_bus.robot.plant import Plant
 
 SAMPLES = 512
 

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-import profiles
-from cdpr_rt.controllers.proportional import Proportional
-from cdpr_rt.trajectory import Leg
-from tools.output import Output
-from tools.session import Session
+import cdpr_profiles
+from cdpr_drivers.robot.session import Session
+from cdpr_rt.control.proportional import Proportional
+from cdpr_rt.motion.trajectory import Leg
+from cdpr_tools.output import Output
 
 OUT = Output(as_json=True)
 ROOT = Path(__file__).parents[2]
@@ -42,7 +42,7 @@ def robot_file(
     lines += ["master_heartbeat_s = 0.4"] * (period_s >= 0.01)
     for bus in dict.fromkeys(bus for bus, _ in axes):
         lines += ["[[buses]]", f'name = "{bus}"']
-    shipped = (Path(profiles.__file__).parent / "winches/winch-mpp0923d.toml").read_text()
+    shipped = (Path(cdpr_profiles.__file__).parent / "winches/winch-mpp0923d.toml").read_text()
     for drive in drives:
         (folder / f"with-{drive}.toml").write_text(
             shipped.replace('"generic-cia402"', f'"{drive}"')
@@ -61,7 +61,7 @@ class Simulator:
 
     def __init__(self, *arguments: str) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "tools.cli", "sim", "up", *arguments, "--exit-with-stdin"],
+            [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", *arguments, "--exit-with-stdin"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -19,45 +19,44 @@ import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.errors import ControlError
-from cdpr_rt.measurement import recording
-from cdpr_rt.raw_rows import column_names
-from cdpr_rt.rawlog import RawLogWriter, read_raw_log
-from cdpr_rt.runtime.last_lengths import LastLengths
-from cdpr_rt.runtime.robot_arrays import described, limits_of, winches_of
-from cdpr_rt.tuning import design_pid
-from drivers.data_sheet import load_dictionary
-from drivers.errors import DriverError
-from profiles import load_motor, load_robot
-from profiles.catalogue import SHIPPED
-from profiles.eds_check import read_eds
-from profiles.errors import ProfileError
-from profiles.motor import Motor
-from profiles.motor_bounds import MotorBounds
-from profiles.rail import load_rail
-from profiles.reader import dotted
-from profiles.safety_io import load_safety_io
-from profiles.tension_sensor import load_tension_sensors
-from profiles.winch_calibration import load_winch_calibration
-from sim_bus.canopen.od import ObjectDictionary
-from sim_bus.drive import SimDrive
-from sim_bus.errors import SimulatorError
-from sim_bus.plant import Plant
-from sim_bus.robot_plant import RobotPlant
-from sim_bus.safety_plant import SafetyPlant
-from sim_bus.tension_twin import AmplifierPlant
+from cdpr_drivers.errors import DriverError
+from cdpr_drivers.robot.bus_fit import require_fit
+from cdpr_drivers.robot.commissioned import load_profile
+from cdpr_profiles import load_motor, load_robot
+from cdpr_profiles.devices.rail import load_rail
+from cdpr_profiles.devices.safety_io import load_safety_io
+from cdpr_profiles.devices.tension_sensor import load_tension_sensors
+from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_profiles.eds.eds_check import read_eds
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_profiles.motor import Motor
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_profiles.reading.reader import dotted
+from cdpr_profiles.winch_calibration import load_winch_calibration
+from cdpr_rt.control.tuning import design_pid
+from cdpr_rt.core.rawlog import RawLogWriter, column_names, read_raw_log
+from cdpr_rt.errors import ControlError, InvalidRequestError
+from cdpr_rt.procedures.commissioning.commission_files import Paths
+from cdpr_rt.procedures.commissioning.results import read_run
+from cdpr_rt.procedures.measurement import recording
+from cdpr_rt.robots.last_lengths import LastLengths
+from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
+from cdpr_sim_bus.canopen.dictionary.od import ObjectDictionary
+from cdpr_sim_bus.cia402.drive import SimDrive
+from cdpr_sim_bus.devices.safety_plant import SafetyPlant
+from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant
+from cdpr_sim_bus.errors import SimulatorError
+from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from cdpr_tools.errors import CommandError
+from cdpr_tools.report import tables, words
+from cdpr_tools.stored_settings import load_settings
+from cdpr_tools.teleop.script import read_script
+from cdpr_tools.trials.trial import TrialSettings
 from tests.cdpr_here import cdpr_here
 from tests.profiles.test_robot_limits import calibration
 from tests.tools.motor_profiles import leave_profiles, profile_of
-from tools.bus_fit import require_fit
-from tools.commission_files import Paths
-from tools.commissioned import load_profile
-from tools.errors import BadInputError, CommandError
-from tools.kept import kept
-from tools.report import tables, words
-from tools.results import read_run
-from tools.teleop.script import read_script
-from tools.trials.trial import Asked
 
 OURS = (ControlError, DriverError, ProfileError, SimulatorError, CommandError)
 CPU_S = 1.0
@@ -179,7 +178,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Kind]:
         "bus": {"url": "simbus:", "period_s": 1e-3, "cycles": 5000, "wall_s": 2.5},
     }))  # fmt: skip
     asked = folder / "trial.json"
-    asked.write_text(json.dumps(asdict(Asked("line", "r", None, 1, 2.0, None, True))))
+    asked.write_text(json.dumps(asdict(TrialSettings("line", "r", None, 1, 2.0, None, True))))
     script = folder / "script.txt"
     script.write_text("0 0 0 clutch\n1.5 10 -20\n2 20 0 confirm\n")
     plant, robot_plant = folder / "plant.toml", folder / "robot-plant.toml"
@@ -213,7 +212,7 @@ def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Kind]:
         "lengths": Kind(lengths, lambda: use_lengths(lengths)),
         "stored parameters": Kind(store, lambda: use_store(store)),
         "run": Kind(run, lambda: tell_of_run(read_run(Paths(folder)))),
-        "trial": Kind(asked, lambda: kept(asked, Asked)),
+        "trial": Kind(asked, lambda: load_settings(asked, TrialSettings)),
         "script": Kind(script, lambda: read_script(script)),
         "plant": Kind(plant, lambda: Plant.load_file(plant)),
         "robot's plant": Kind(robot_plant, lambda: RobotPlant.load_file(robot_plant)),
@@ -339,7 +338,7 @@ def test_a_report_names_what_is_wrong_with_its_run(
     inner[keys[-1]] = value
     try:
         path.write_text(json.dumps(table))
-        with pytest.raises(BadInputError, match=re.escape(f"{path}: {dotted(keys)}")):
+        with pytest.raises(InvalidRequestError, match=re.escape(f"{path}: {dotted(keys)}")):
             read_run(Paths(path.parent))
     finally:
         path.write_bytes(sound)

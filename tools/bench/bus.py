@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 import subprocess
@@ -16,13 +15,14 @@ import can
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.realtime import one_core
-from drivers.bus import BusUrl, FrameBuffer, FramePort, open_port
-from drivers.bus.socketcan import interface_problem
-from drivers.errors import BusError
-from tools.bench.echo_bus import ANSWERED, ASKED, FRAMES
-from tools.errors import WorkFailedError
-from tools.output import Output
+from cdpr_drivers.bus import BusUrl, FrameBuffer, FramePort, open_port
+from cdpr_drivers.bus.adapters.socketcan import interface_problem
+from cdpr_drivers.errors import BusError
+from cdpr_rt.runtime.realtime import one_core
+from cdpr_tools.bench.echo_bus import ANSWERED, ASKED, FRAMES
+from cdpr_tools.bench.timing import Times, percentiles, timed
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.output import Output
 
 PERCENTILES = (50.0, 99.9)
 VCAN = "vcan0"
@@ -37,11 +37,9 @@ _RESOLUTION_US = 0.01
 _STOP_TIMEOUT_S = 10.0
 _DELIVERIES = 200
 
-Times = NDArray[np.int64]
 
-
-class Way(Protocol):
-    """One way to use a bus, taking part from `open` to `close` only."""
+class BusAccess(Protocol):
+    """An implementation of bus access, on the bus from `open` to `close` only."""
 
     name: str
 
@@ -55,7 +53,7 @@ class Way(Protocol):
         """Leave the bus."""
 
 
-class OwnWay:
+class OwnAccess:
     """A FramePort, as the cyclic exchange uses it."""
 
     name = "ours"
@@ -89,7 +87,7 @@ class OwnWay:
         self.port.close()
 
 
-class PythonCanWay:
+class PythonCanAccess:
     """A stock python-can bus, with its own filters."""
 
     name = "python-can"
@@ -124,9 +122,9 @@ class PythonCanWay:
 
 
 def measure(exchanges: int, out: Output) -> dict[str, Any]:
-    """Measure `exchanges` of each way on each bus and return the figures, times in us.
+    """Measure `exchanges` of each variant on each bus and return the figures, times in us.
 
-    The ways take turns in blocks, so that what else the machine does hits both alike. Raises
+    The variants take turns in blocks, so that what else the machine does hits both alike. Raises
     WorkFailedError, BusError.
     """
     buses: dict[str, Any] = {}
@@ -135,15 +133,15 @@ def measure(exchanges: int, out: Output) -> dict[str, Any]:
         pid = int(ready["pid"])
         remote = BusUrl.parse(ready["socketcand"])
         for url, stock, core in (
-            (BusUrl.parse(f"simbus:{name}"), PythonCanWay("simbus", name), one_core(pid)),
-            (remote, PythonCanWay("socketcand", name, **remote.options), nullcontext()),
+            (BusUrl.parse(f"simbus:{name}"), PythonCanAccess("simbus", name), one_core(pid)),
+            (remote, PythonCanAccess("socketcand", name, **remote.options), nullcontext()),
             (
                 BusUrl.parse(f"slcan:{ready['slcan']}?bitrate=1000000"),
-                PythonCanWay("slcan", ready["slcan"], bitrate=1_000_000, sleep_after_open=0.1),
+                PythonCanAccess("slcan", ready["slcan"], bitrate=1_000_000, sleep_after_open=0.1),
                 nullcontext(),
             ),
         ):
-            out.note(f"{exchanges} exchanges of each way on {url.interface} ...")
+            out.note(f"{exchanges} exchanges of each variant on {url.interface} ...")
             with core:
                 buses[url.interface] = _compare(url, stock, exchanges)
     buses["socketcan"] = _on_vcan(exchanges, out)
@@ -160,80 +158,72 @@ def _on_vcan(exchanges: int, out: Output) -> dict[str, Any]:
     problem = interface_problem(url)
     if problem:
         return {"missing": problem}
-    out.note(f"{exchanges} exchanges of each way on {url} ...")
+    out.note(f"{exchanges} exchanges of each variant on {url} ...")
     with _echo(str(url)) as ready, one_core(int(ready["pid"])):
-        own = OwnWay(url)
-        figures = _compare(url, PythonCanWay("socketcan", VCAN), exchanges)
+        own = OwnAccess(url)
+        figures = _compare(url, PythonCanAccess("socketcan", VCAN), exchanges)
         figures["delivery_us"] = _delivery(own)
     return figures
 
 
-def _compare(url: BusUrl, stock: PythonCanWay, exchanges: int) -> dict[str, Any]:
-    ways: list[Way] = [OwnWay(url), stock]
-    times: dict[str, list[tuple[Times, Times]]] = {way.name: [] for way in ways}
+def _compare(url: BusUrl, stock: PythonCanAccess, exchanges: int) -> dict[str, Any]:
+    variants: list[BusAccess] = [OwnAccess(url), stock]
+    times: dict[str, list[tuple[Times, Times]]] = {variant.name: [] for variant in variants}
     share = -(-exchanges // _BLOCKS)
     left = exchanges
     while left > 0:
-        for way in ways:
-            times[way.name].append(_run(way, min(share, left)))
+        for variant in variants:
+            times[variant.name].append(_run(variant, min(share, left)))
         left -= share
     figures: dict[str, Any] = {"url": str(url)}
-    for way in ways:
-        cpu = np.concatenate([pair[0] for pair in times[way.name]]) / FRAMES_AN_EXCHANGE
-        wall = np.concatenate([pair[1] for pair in times[way.name]]) / FRAMES_AN_EXCHANGE
-        figures[way.name] = {
+    for variant in variants:
+        cpu = np.concatenate([pair[0] for pair in times[variant.name]]) / FRAMES_AN_EXCHANGE
+        wall = np.concatenate([pair[1] for pair in times[variant.name]]) / FRAMES_AN_EXCHANGE
+        figures[variant.name] = {
             "frames_per_s": round(1e9 / float(wall.mean())),
             "cpu_us_per_frame": _percentiles(cpu),
             "wall_us_per_frame": _percentiles(wall),
         }
     # of the means: some kernels count process time in ticks of 10 ms
-    costs = [figures[way.name]["cpu_us_per_frame"]["mean"] for way in ways]
+    costs = [figures[variant.name]["cpu_us_per_frame"]["mean"] for variant in variants]
     figures["python_can_over_ours"] = round(costs[1] / max(costs[0], _RESOLUTION_US), 2)
     return figures
 
 
 def _percentiles(times_ns: NDArray[np.float64]) -> dict[str, float]:
-    values = np.percentile(times_ns, PERCENTILES) * _US
-    told = {f"p{p:g}": round(float(v), 2) for p, v in zip(PERCENTILES, values, strict=True)}
-    return {"mean": round(float(times_ns.mean()) * _US, 2), **told}
+    times_us = times_ns * _US
+    return {"mean": round(float(times_us.mean()), 2)} | percentiles(
+        times_us, *PERCENTILES, digits=2
+    )
 
 
-def _run(way: Way, exchanges: int) -> tuple[Times, Times]:
+def _run(variant: BusAccess, exchanges: int) -> tuple[Times, Times]:
     """Return process time (of all threads) and wall time of each exchange, ns."""
-    cpu, wall = np.zeros(exchanges, np.int64), np.zeros(exchanges, np.int64)
-    cpu_clock, wall_clock, exchange = time.process_time_ns, time.perf_counter_ns, way.exchange
-    way.open()
+    variant.open()
     try:
-        for _ in range(_WARM_UP):
-            exchange()
-        gc.collect()
-        for k in range(exchanges):
-            wall_start, cpu_start = wall_clock(), cpu_clock()
-            exchange()
-            cpu[k], wall[k] = cpu_clock() - cpu_start, wall_clock() - wall_start
+        return timed(variant.exchange, exchanges, _WARM_UP)
     finally:
-        way.close()
-    return cpu, wall
+        variant.close()
 
 
-def _delivery(way: OwnWay) -> dict[str, float]:
+def _delivery(variant: OwnAccess) -> dict[str, float]:
     """Return how long after the kernel's stamp the last answer of an exchange is in hand."""
-    way.open()
+    variant.open()
     try:
         late_ns = np.zeros(_DELIVERIES)
         for k in range(_DELIVERIES):
-            way.exchange()
-            late_ns[k] = (time.time() - way.port.arrival_s()) * 1e9
+            variant.exchange()
+            late_ns[k] = (time.time() - variant.port.arrival_s()) * 1e9
     finally:
-        way.close()
+        variant.close()
     return _percentiles(late_ns)
 
 
 @contextmanager
 def _echo(bus: str) -> Iterator[dict[str, Any]]:
-    """Run the far end on `bus`; yield what it told when it was up."""
+    """Run the far end on `bus`; yield what it reported when it was up."""
     process = subprocess.Popen(
-        [sys.executable, "-P", "-m", "tools.bench.echo_bus", bus],
+        [sys.executable, "-P", "-m", "cdpr_tools.bench.echo_bus", bus],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -1,8 +1,7 @@
-"""What one exchange with eight axes costs the host, three ways on one bus in one run."""
+"""What one exchange with eight axes costs the host, by three variants on one bus."""
 
 from __future__ import annotations
 
-import gc
 import os
 import time
 from collections.abc import Iterator, Sequence
@@ -10,19 +9,19 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cdpr_rt.realtime import one_core
-from drivers.axis_group import AxisConfig, AxisGroup
-from drivers.boot import BootReport, BootSettings, boot
-from drivers.bus import BusUrl, query_status
-from drivers.bus.leading import open_clock
-from drivers.data_sheet import load_dictionary
-from drivers.network import CanNetwork
-from profiles import Winch, load_winch
-from tools.bench.contenders import Exchange, FloorExchange, LibraryExchange, OwnExchange
-from tools.output import Output
-from tools.simulator import OwnSimulator
+from cdpr_drivers.axes.axis_group import AxisConfig, AxisGroup
+from cdpr_drivers.bus import BusUrl, query_status
+from cdpr_drivers.bus.simulated_bus import open_clock
+from cdpr_drivers.canopen.boot.boot import BootReport, BootSettings, boot
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_profiles import Winch, load_winch
+from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_rt.runtime.realtime import one_core
+from cdpr_tools.bench.exchanges import Exchange, FloorExchange, LibraryExchange, OwnExchange
+from cdpr_tools.bench.timing import Times, percentiles, timed
+from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.output import Output
 
 AXES = 8
 PERIOD_S = 2e-3
@@ -36,25 +35,25 @@ _BLOCK = 500
 _WARM_UP = 50
 _US = 1e-3  # of a ns
 
-Times = NDArray[np.int64]
-
 
 def measure(cycles: int, out: Output) -> dict[str, Any]:
-    """Measure `cycles` exchanges of each way and return the figures, times in µs.
+    """Measure `cycles` exchanges of each variant and return the figures, times in µs.
 
-    The ways take turns in blocks, so that what else the machine does hits all alike. Raises
+    The variants take turns in blocks, so that what else the machine does hits all alike. Raises
     BusError when an axis does not answer.
     """
     blocks = [_BLOCK] * (cycles // _BLOCK) + [cycles % _BLOCK] * (cycles % _BLOCK > 0)
-    with _contenders(out) as (bus, ways):
-        times: dict[str, list[tuple[Times, Times]]] = {way.name: [] for way in ways}
-        frames = {way.name: [0, 0] for way in ways}
+    with _exchanges(out) as (bus, variants):
+        times: dict[str, list[tuple[Times, Times]]] = {variant.name: [] for variant in variants}
+        frames = {variant.name: [0, 0] for variant in variants}
         # no progress bar: the thread that draws it would be measured with them
-        out.note(f"{cycles} exchanges of each of {len(ways)} ways, some seconds per 10000 ...")
+        out.note(
+            f"{cycles} exchanges of each of {len(variants)} variants, some seconds per 10000 ..."
+        )
         for block in blocks:
-            for way in ways:
-                times[way.name].append(_run(way, block, bus, frames[way.name]))
-        statuswords = {way.name: way.statuswords() for way in ways}
+            for variant in variants:
+                times[variant.name].append(_run(variant, block, bus, frames[variant.name]))
+        statuswords = {variant.name: variant.statuswords() for variant in variants}
     own_cost = _clock_cost_ns()
     cpu = {name: np.concatenate([t[0] for t in of]) - own_cost for name, of in times.items()}
     wall = {name: np.concatenate([t[1] for t in of]) for name, of in times.items()}
@@ -88,30 +87,21 @@ def _judge(cpu_us: dict[str, dict[str, float]]) -> dict[str, Any]:
 
 
 def _percentiles(times_ns: Times) -> dict[str, float]:
-    values = np.percentile(times_ns, PERCENTILES) * _US
-    return {f"p{p:g}": round(float(v), 2) for p, v in zip(PERCENTILES, values, strict=True)}
+    return percentiles(times_ns * _US, *PERCENTILES, digits=2)
 
 
-def _run(way: Exchange, cycles: int, bus: str, frames: list[int]) -> tuple[Times, Times]:
+def _run(variant: Exchange, cycles: int, bus: str, frames: list[int]) -> tuple[Times, Times]:
     """Return process and wall time of each cycle of one block, ns; add to frames and SYNCs."""
-    cpu, wall = np.zeros(cycles, np.int64), np.zeros(cycles, np.int64)
-    cpu_clock, wall_clock, cycle = time.process_time_ns, time.perf_counter_ns, way.cycle
-    way.open()
+    variant.open()
     try:
         before = query_status(bus)
-        for _ in range(_WARM_UP):
-            cycle()
-        gc.collect()
-        for k in range(cycles):
-            wall_start, cpu_start = wall_clock(), cpu_clock()
-            cycle()
-            cpu[k], wall[k] = cpu_clock() - cpu_start, wall_clock() - wall_start
+        times = timed(variant.cycle, cycles, _WARM_UP)
         after = query_status(bus)
     finally:
-        way.close()
+        variant.close()
     frames[0] += after["frames"] - before["frames"]
     frames[1] += after["sync_count"] - before["sync_count"]
-    return cpu, wall
+    return times
 
 
 def _clock_cost_ns() -> int:
@@ -121,8 +111,8 @@ def _clock_cost_ns() -> int:
 
 
 @contextmanager
-def _contenders(out: Output) -> Iterator[tuple[str, Sequence[Exchange]]]:
-    """Boot eight simulated drives in a process of their own; yield the bus and the three ways."""
+def _exchanges(out: Output) -> Iterator[tuple[str, Sequence[Exchange]]]:
+    """Boot eight simulated drives in a process of their own; yield the bus and the variants."""
     winch = load_winch(_WINCH)
     bus = f"bench-{os.getpid()}"
     url = BusUrl.parse(f"simbus:{bus}")

@@ -1,7 +1,7 @@
 """The far end of `cdpr bench bus`: a node that answers each of eight frames with another.
 
-A program of its own, `python -m tools.bench.echo_bus BUS`, which ends with its standard input. On
-a simulated bus it can be reached through a serial adapter and by socketcand as well.
+A program of its own, `python -m cdpr_tools.bench.echo_bus BUS`, which ends with its standard input.
+On a simulated bus it can be reached through a serial adapter and by socketcand as well.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import sys
 
-from sim_bus.clock import ClockMode
-from sim_bus.errors import SimulatorError
-from sim_bus.frame import HEADER, pack_frame
-from sim_bus.server import serve
+from cdpr_sim_bus.bus.server import serve
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.errors import SimulatorError
+from cdpr_sim_bus.frame import HEADER, pack_frame
 
 ASKED, ANSWERED = 0x200, 0x180
 """The frames asked with and answered by, plus a number from 1 on."""

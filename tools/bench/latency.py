@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from tools.bench.wakeups import Times
-from tools.errors import BadInputError, WorkFailedError
-from tools.output import Output
-from tools.report.style import COLOURS, canvas, legend_above
+from cdpr_tools.bench.timing import percentiles
+from cdpr_tools.bench.wakeups import Times
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.report.style import COLOURS, canvas, legend_above
 
-WAYS = {"ordinary": "ordinary process", "realtime": "real-time settings"}
+VARIANTS = {"ordinary": "ordinary process", "realtime": "real-time settings"}
 LOADS = {"idle": "nothing else asked of the machine", "loaded": "every processor kept busy"}
 
 _ROUNDS = 2
@@ -35,24 +36,24 @@ Lateness = dict[str, dict[str, Times]]
 
 
 def measure(rate_Hz: float, seconds: float, out: Output) -> tuple[dict[str, Any], Lateness]:
-    """Return figures and the lateness of every wake-up in ns, by load and way.
+    """Return figures and the lateness of every wake-up in ns, by load and variant.
 
-    The ways take turns, so that what else the machine does hits both. Raises WorkFailedError.
+    The variants take turns, so that what else the machine does hits both. Raises WorkFailedError.
     """
     cycles = max(1, round(rate_Hz * seconds / _ROUNDS))
     late: Lateness = {}
     not_allowed: list[str] = []
-    with out.progress("waking up", seconds * len(LOADS) * len(WAYS)) as advance:
+    with out.progress("waking up", seconds * len(LOADS) * len(VARIANTS)) as advance:
         for load in LOADS:
-            parts: dict[str, list[Times]] = {way: [] for way in WAYS}
+            parts: dict[str, list[Times]] = {variant: [] for variant in VARIANTS}
             with _load(load == "loaded"):
-                for done in range(_ROUNDS * len(WAYS)):
-                    way = list(WAYS)[done % len(WAYS)]
-                    notices, times = _probe(1.0 / rate_Hz, cycles, way)
-                    parts[way].append(times)
+                for done in range(_ROUNDS * len(VARIANTS)):
+                    variant = list(VARIANTS)[done % len(VARIANTS)]
+                    notices, times = _probe(1.0 / rate_Hz, cycles, variant)
+                    parts[variant].append(times)
                     not_allowed = notices or not_allowed
-                    advance(seconds * (len(late) * len(WAYS) + (done + 1) / _ROUNDS))
-            late[load] = {way: np.concatenate(times) for way, times in parts.items()}
+                    advance(seconds * (len(late) * len(VARIANTS) + (done + 1) / _ROUNDS))
+            late[load] = {variant: np.concatenate(times) for variant, times in parts.items()}
     figures = {
         "rate_Hz": rate_Hz,
         "wakeups": _ROUNDS * cycles,
@@ -60,8 +61,8 @@ def measure(rate_Hz: float, seconds: float, out: Output) -> tuple[dict[str, Any]
         "processors": len(os.sched_getaffinity(0)),
         "not_allowed": not_allowed,
         "late_us": {
-            load: {way: _figures(times) for way, times in ways.items()}
-            for load, ways in late.items()
+            load: {variant: _figures(times) for variant, times in variants.items()}
+            for load, variants in late.items()
         },
     }
     return figures, late
@@ -70,11 +71,13 @@ def measure(rate_Hz: float, seconds: float, out: Output) -> tuple[dict[str, Any]
 def draw(figures: dict[str, Any], late: Lateness, path: Path) -> None:
     """Write the histograms as a picture; raises BadInputError where it cannot be written."""
     figure, axes = canvas(1, len(LOADS), height=3.2, sharey=True)
-    most = max(float(times.max()) for ways in late.values() for times in ways.values()) * _US
+    most = (
+        max(float(times.max()) for variants in late.values() for times in variants.values()) * _US
+    )
     bins = np.logspace(0.0, np.log10(max(most, 10.0)) + 0.02, _bins(most))
     for ax, (load, text) in zip(axes, LOADS.items(), strict=True):
-        for way, label in WAYS.items():
-            _histogram(ax, late[load][way], bins, label, _COLOURS[way])
+        for variant, label in VARIANTS.items():
+            _histogram(ax, late[load][variant], bins, label, _COLOURS[variant])
         ax.axvline(1e6 / figures["rate_Hz"], color="#555555", lw=0.9, ls="--")
         ax.set_title(text)
         ax.set_xlabel("wake-up behind its deadline, µs")
@@ -113,12 +116,21 @@ def _histogram(ax: Axes, times: Times, bins: Any, label: str, colour: str) -> No
 
 
 def _figures(times: Times) -> dict[str, float]:
-    found = {f"p{p:g}": float(np.percentile(times, p)) * _US for p in _PERCENTILES}
-    return {key: round(v, 1) for key, v in {**found, "max": float(times.max()) * _US}.items()}
+    late_us = times * _US
+    most_us = round(float(late_us.max()), 1)
+    return percentiles(late_us, *_PERCENTILES, digits=1) | {"max": most_us}
 
 
-def _probe(period_s: float, cycles: int, way: str) -> tuple[list[str], Times]:
-    command = [sys.executable, "-P", "-m", "tools.bench.wakeups", repr(period_s), str(cycles), way]
+def _probe(period_s: float, cycles: int, variant: str) -> tuple[list[str], Times]:
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "cdpr_tools.bench.wakeups",
+        repr(period_s),
+        str(cycles),
+        variant,
+    ]
     run = subprocess.run(command, capture_output=True, check=False)
     head, _, data = run.stdout.partition(b"\n")
     if run.returncode != 0 or not data:

@@ -7,14 +7,14 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import profiles
+import cdpr_profiles
 
 BOUND_MS = 100.0
 
 
 def measure(repeats: int) -> dict[str, Any]:
     """Return the best of `repeats` wall times of both, in ms, and their ratio."""
-    files = sorted(Path(profiles.__file__).parent.glob("*/*.toml"))
+    files = sorted(Path(cdpr_profiles.__file__).parent.glob("*/*.toml"))
     load_ms = round(1e3 * min(_load_s() for _ in range(repeats)), 2)
     parse_ms = round(1e3 * min(_parse_s(files) for _ in range(repeats)), 2)
     return {
@@ -29,7 +29,7 @@ def measure(repeats: int) -> dict[str, Any]:
 
 def _load_s() -> float:
     start = time.perf_counter()
-    profiles.load_all()
+    cdpr_profiles.load_all()
     return time.perf_counter() - start
 
 

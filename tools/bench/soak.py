@@ -12,15 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.controllers.proportional import Proportional
+from cdpr_drivers.bus.budget import answer_pdos, command_pdos
+from cdpr_drivers.errors import DriverError
+from cdpr_drivers.robot.session import Session
+from cdpr_profiles import Robot
+from cdpr_rt.control.proportional import Proportional
 from cdpr_rt.errors import ControlError
-from cdpr_rt.trajectory import Leg
-from drivers.bus.budget import answer_pdos, command_pdos
-from drivers.errors import DriverError
-from profiles import Robot
-from tools.errors import WorkFailedError
-from tools.output import Output
-from tools.session import Session, open_robot
+from cdpr_rt.motion.trajectory import Leg
+from cdpr_tools.composition.session import open_robot
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.output import Output
 
 MEMORY_LIMIT_KiB = 2048
 """What each process may gain after it has warmed up: the allocator's own coming and going."""
@@ -73,7 +74,7 @@ class Counts:
     def all(cls, session: Session) -> dict[str, Counts]:
         """Take the counts of every bus, by the robot's name of it."""
         status = session.bus_status()
-        return {name: cls.of(session, name, told) for name, told in status.items()}
+        return {name: cls.of(session, name, one) for name, one in status.items()}
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ class BusVerdict:
     overruns: int
     """Cycles whose frames did not fit into the bus time between two SYNCs."""
     tolerance: int
-    """Heartbeats whose moment lies just inside or outside."""
+    """Heartbeats that may fall just inside or outside of the interval."""
 
     @property
     def lost(self) -> int:

@@ -14,10 +14,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.clock import PacedClock
-from cdpr_rt.cycle import Cycle
-from cdpr_rt.exchange import AxisDevice
-from cdpr_rt.realtime import settle_memory, stay_punctual
+from cdpr_rt.core.clock import PacedClock
+from cdpr_rt.core.cycle import Cycle
+from cdpr_rt.core.exchange import AxisDevice
+from cdpr_rt.runtime.realtime import enable_realtime, freeze_memory
 
 Times = NDArray[np.int64]
 _WARM_UP = 100
@@ -63,7 +63,7 @@ def measure(period_s: float, cycles: int) -> Times:
 def main(arguments: Sequence[str]) -> None:
     """Measure and write what was found."""
     period_s, cycles, how = float(arguments[0]), int(arguments[1]), arguments[2]
-    notices = [*settle_memory(), *stay_punctual()] if how == "realtime" else []
+    notices = [*freeze_memory(), *enable_realtime()] if how == "realtime" else []
     late = measure(period_s, cycles)
     sys.stdout.buffer.write(json.dumps({"not_allowed": notices}).encode() + b"\n")
     sys.stdout.buffer.write(late.astype("<i8").tobytes())

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from drivers.bus.packed import EFF_FLAG
-from tools.errors import BadInputError
+from cdpr_drivers.bus.frames import EFF_FLAG
+from cdpr_tools.errors import BadInputError
 
 _LAST = 0x7FF
 _LAST_NODE = 127

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from drivers.bus import BusUrl
-from drivers.decode import Decoder, KnownNode
-from profiles import Robot, load_drive, load_robot, load_winch
-from tools.errors import BadInputError
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.decode import Decoder, KnownNode
+from cdpr_profiles import Robot, load_drive, load_robot, load_winch
+from cdpr_tools.errors import BadInputError
 
 _USUAL_BITRATE_bit_s = 1_000_000
 
@@ -46,8 +46,8 @@ def known_bus(
 
 
 def _bitrate(url: BusUrl | None, otherwise: int) -> int:
-    told = url.options.get("bitrate") if url is not None else None
-    return told if isinstance(told, int) and told > 0 else otherwise
+    bitrate = url.options.get("bitrate") if url is not None else None
+    return bitrate if isinstance(bitrate, int) and bitrate > 0 else otherwise
 
 
 def _of_robot(robot: Robot, name: str, url: BusUrl | None) -> KnownBus:

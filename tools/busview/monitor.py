@@ -9,13 +9,12 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import TextIO
 
-from drivers.decode import Decoder, Frame, format_line
-from tools.busview.source import Source
-from tools.busview.summary import Summary
-from tools.errors import BadInputError, WorkFailedError
+from cdpr_drivers.decode import Decoder, Frame, format_line
+from cdpr_tools.busview.source import Source
+from cdpr_tools.busview.summary import Summary
+from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _BATCH = 200
 _WAIT_S = 0.1
@@ -58,12 +57,7 @@ class LineWriter:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._blocks.put(None)
         self._thread.join()
 
@@ -125,12 +119,7 @@ class LogFile:
     def __enter__(self) -> LogFile:
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with suppress(OSError):
             self._file.close()
 
@@ -142,9 +131,9 @@ def watch(
     seconds: float | None,
     stop_wanted: Callable[[], bool],
 ) -> None:
-    """Show what comes until the time is up, the user wants an end, or the bus has gone.
+    """Show what comes until the time is up, the user wants an end, or the bus is lost.
 
-    Frames that have arrived are taken in before any is decoded, so that a fast bus fills our
+    Frames that have arrived are received before any is decoded, so that a fast bus fills our
     memory and not the bus' buffer, where they would be lost.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
@@ -153,7 +142,7 @@ def watch(
         left_s = _WAIT_S if deadline is None else min(_WAIT_S, deadline - time.monotonic())
         ended = left_s <= 0.0 or stop_wanted() or viewer.closed or source.lost is not None
         if not ended:
-            source.take_in(0.0 if more else left_s)
+            source.receive(0.0 if more else left_s)
         frames = source.next_frames(_BATCH)
         if ended and not frames:
             return

@@ -8,18 +8,17 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 
 import can
 
-from drivers.bus import BusUrl, FramePort, open_port
-from drivers.decode import Frame, Logged, read_log
-from drivers.errors import BusError
-from profiles.bounded_input import open_regular
-from profiles.errors import ProfileError
-from tools.busview.monitor import Viewer
-from tools.busview.source import frame_of
-from tools.errors import BadInputError, WorkFailedError
+from cdpr_drivers.bus import BusUrl, FramePort, open_port
+from cdpr_drivers.decode import Frame, LogEntry, read_log
+from cdpr_drivers.errors import BusError
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import open_regular
+from cdpr_tools.busview.monitor import Viewer
+from cdpr_tools.busview.source import frame_of
+from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _LOOK_S = 0.1
 BLOCK = 200
@@ -31,7 +30,7 @@ _COMMANDS = (0x200, 0x300, 0x400, 0x500, _SDO_REQUEST)
 _CANDUMP = (".log", ".txt", ".candump", "")
 
 
-def recorded(path: Path, channel: str | None) -> Iterator[Logged]:
+def read_frames(path: Path, channel: str | None) -> Iterator[LogEntry]:
     """Yield the frames of one bus in a file; `-` is standard input.
 
     Files of candump are read by their own format, others (.asc, .blf, .trc, ...) by python-can.
@@ -53,16 +52,16 @@ def recorded(path: Path, channel: str | None) -> Iterator[Logged]:
 
 
 def check(path: Path, channel: str | None) -> None:
-    """Read a file to its end, so that nothing of one that is broken is sent; see `recorded`.
+    """Read a file to its end, so that nothing of one that is broken is sent; see `read_frames`.
 
     Standard input can be read only once: there is nothing to check before it is sent.
     """
     if str(path) != "-":
-        for _ in recorded(path, channel):
+        for _ in read_frames(path, channel):
             pass
 
 
-def _frames(path: Path) -> Iterator[Logged]:
+def _frames(path: Path) -> Iterator[LogEntry]:
     try:
         if str(path) == "-":
             yield from read_log("standard input", sys.stdin)
@@ -71,7 +70,7 @@ def _frames(path: Path) -> Iterator[Logged]:
                 yield from read_log(str(path), lines)
         else:
             os.close(open_regular(path))  # python-can opens what has this name, of any kind
-            yield from _foreign(path)
+            yield from _python_can_frames(path)
     except ProfileError as error:
         raise BadInputError(str(error)) from None
     except OSError as error:
@@ -80,13 +79,13 @@ def _frames(path: Path) -> Iterator[Logged]:
         raise BadInputError("standard input: is no text, so no log of candump") from error
 
 
-def _foreign(path: Path) -> Iterator[Logged]:
+def _python_can_frames(path: Path) -> Iterator[LogEntry]:
     """Yield the frames of a file that python-can knows."""
     try:
         with can.LogReader(path) as reader:
             for message in reader:
                 if not message.is_fd:
-                    yield Logged(str(message.channel), frame_of(message))
+                    yield LogEntry(str(message.channel), frame_of(message))
     except OSError:
         raise
     except Exception as error:  # whatever a reader of python-can makes of a broken file
@@ -149,31 +148,26 @@ class Sender:
 
     def _power_off(self) -> None:
         """Ask every node that was commanded to take its power off."""
-        told = []
+        asked = []
         for node_id in sorted(self._commanded):
             # a bus that is gone carries nothing; the drives watch for that
             with suppress(OSError):
                 self._port.send(Frame(0.0, _SDO_REQUEST + node_id, _DISABLE_VOLTAGE).pack())
-                told.append(str(node_id))
-        if told:
-            self._note(f"asked to switch their power off: node {', '.join(told)}")
+                asked.append(str(node_id))
+        if asked:
+            self._note(f"asked to switch their power off: node {', '.join(asked)}")
 
     def __enter__(self) -> Sender:
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if not self.complete or not self._url.is_simulated:
             self._power_off()
         self._port.close()
         self._note(f"sent {self.sent} frames to {self._url}")
 
 
-def chosen(log: Iterable[Logged], identifiers: frozenset[int] | None) -> Iterator[Logged]:
+def filtered(log: Iterable[LogEntry], identifiers: frozenset[int] | None) -> Iterator[LogEntry]:
     """Yield what of a log has one of these 11-bit identifiers; everything for None."""
     for logged in log:
         frame = logged.frame
@@ -182,7 +176,7 @@ def chosen(log: Iterable[Logged], identifiers: frozenset[int] | None) -> Iterato
 
 
 def play(
-    log: Iterable[Logged],
+    log: Iterable[LogEntry],
     viewer: Viewer,
     pacer: Pacer,
     stop_wanted: Callable[[], bool],
@@ -193,7 +187,7 @@ def play(
 
     Raises WorkFailedError when sending ended early.
     """
-    pending: list[Logged] = []
+    pending: list[LogEntry] = []
     try:
         for logged in log:
             pacer.wait_for(logged.frame)
@@ -212,7 +206,7 @@ def play(
         sender.complete = True
 
 
-def _show(viewer: Viewer, pending: list[Logged]) -> None:
+def _show(viewer: Viewer, pending: list[LogEntry]) -> None:
     if pending:
         viewer.show(pending[0].channel, [logged.frame for logged in pending])
         pending.clear()

@@ -1,17 +1,16 @@
-"""Find out who is on a bus by listening and by reading objects of all nodes at once."""
+"""Scan of a bus: listening, then reading objects of all nodes at once."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from types import TracebackType
 
-from drivers.bus import BusUrl, FramePort, open_port
-from drivers.decode import Frame
-from drivers.errors import BusError
-from tools.busview.asking import SETTLE_S, Asking, Found
-from tools.errors import BadInputError
+from cdpr_drivers.bus import BusUrl, FramePort, open_port
+from cdpr_drivers.decode import Frame
+from cdpr_drivers.errors import BusError
+from cdpr_tools.busview.node_reader import SETTLE_S, NodeInfo, NodeReader
+from cdpr_tools.errors import BadInputError
 
 LISTEN_S = 1.2
 """Long enough for heartbeats of a second."""
@@ -31,7 +30,7 @@ class Traffic:
     """What others say on the bus."""
 
     sdo_requests: set[int] = field(default_factory=set)
-    """Nodes that somebody else reads or writes."""
+    """Nodes that another SDO client reads or writes."""
     heard: set[str] = field(default_factory=set)
     """SYNC, NMT, RPDO: signs of a master at work."""
 
@@ -44,8 +43,8 @@ class Scan:
 
     def __init__(self, url: BusUrl, node_ids: Iterable[int]) -> None:
         self.traffic = Traffic()
-        self.found = {node_id: Found(node_id) for node_id in node_ids}
-        self._asking: dict[int, Asking] = {}
+        self.found = {node_id: NodeInfo(node_id) for node_id in node_ids}
+        self._asking: dict[int, NodeReader] = {}
         self._packet = bytearray(_CONTROL_BYTES)
         try:
             self._port: FramePort = open_port(url, _FILTERS)
@@ -54,17 +53,17 @@ class Scan:
         self._port.settimeout(_POLL_S)
 
     def listen(self, seconds: float) -> None:
-        """Take in what is said without being asked."""
+        """Receive for so long without sending."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self._receive()
 
     def ask(self) -> None:
-        """Read the objects of all nodes, many at once; several answers are told apart."""
-        waiting = [Asking(found) for found in self.found.values()]
+        """Read the objects of all nodes, many at once, and note who answers one request twice."""
+        waiting = [NodeReader(found) for found in self.found.values()]
         waiting.reverse()
         self._asking = {asking.found.node_id: asking for asking in waiting}
-        active: list[Asking] = []
+        active: list[NodeReader] = []
         while waiting or active:
             while waiting and len(active) < _IN_FLIGHT:
                 active.append(waiting.pop())
@@ -77,7 +76,7 @@ class Scan:
                     break
         self.listen(SETTLE_S)
         for node_id in self.traffic.sdo_requests & self.found.keys():
-            # somebody else may have asked for what came
+            # another client may have asked for what came
             self.found[node_id].repeated.clear()
             self.found[node_id].differing.clear()
 
@@ -90,7 +89,7 @@ class Scan:
             raise self._port.lost(error) from error
 
     def _receive(self) -> bool:
-        """Take in one frame, or wait a little for it; return whether one came."""
+        """Receive and process one frame, or wait a little for it; return whether one came."""
         try:
             length = self._port.recv_into(self._packet)
         except BlockingIOError:
@@ -127,10 +126,5 @@ class Scan:
     def __enter__(self) -> Scan:
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._port.close()

@@ -1,4 +1,4 @@
-"""Frames of a bus as they come, taken in before anything else is done with them."""
+"""Frames of a bus, received and kept until they are decoded."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Protocol
 
 import can
 
-from drivers.bus import BusUrl, Filters, bus_gone, open_port, open_python_can, query_status
-from drivers.decode import Frame
-from drivers.errors import BusError
-from tools.errors import BadInputError
+from cdpr_drivers.bus import BusUrl, Filters, bus_gone, open_port, open_python_can, query_status
+from cdpr_drivers.decode import Frame
+from cdpr_drivers.errors import BusError
+from cdpr_tools.errors import BadInputError
 
 _MOST_WAITING = 1 << 20
 """Frames kept for decoding; what comes on top stays in the bus' own buffer."""
@@ -31,14 +31,14 @@ class Source(Protocol):
     lost: BusError | None
     """Why nothing comes any more."""
 
-    def take_in(self, timeout_s: float) -> None:
+    def receive(self, timeout_s: float) -> None:
         """Keep some of what has arrived, waiting up to `timeout_s` for the first.
 
         At the end of the bus `lost` is set.
         """
 
     def next_frames(self, most: int) -> list[Frame]:
-        """Return frames that were taken in, the oldest first."""
+        """Return frames that were received, the oldest first."""
 
     def close(self) -> None:
         """Leave the bus."""
@@ -60,7 +60,7 @@ class SimbusSource:
         self._waiting: deque[tuple[float, bytes]] = deque()
         self._seen = 0
 
-    def take_in(self, timeout_s: float) -> None:
+    def receive(self, timeout_s: float) -> None:
         """Keep what has arrived; see Source."""
         if self.lost or len(self._waiting) >= _MOST_WAITING:
             return
@@ -86,7 +86,7 @@ class SimbusSource:
             self.lost = self._port.lost(error)
 
     def next_frames(self, most: int) -> list[Frame]:
-        """Return frames that were taken in, the oldest first."""
+        """Return frames that were received, the oldest first."""
         count = min(most, len(self._waiting))
         return [Frame.unpack(*self._waiting.popleft()) for _ in range(count)]
 
@@ -98,7 +98,7 @@ class SimbusSource:
 
     @property
     def seen(self) -> int | None:
-        """Frames taken in so far; None where filters keep some away."""
+        """Frames received so far; None where filters keep some away."""
         return None if self._filtered else self._seen
 
     def close(self) -> None:
@@ -116,7 +116,7 @@ class PythonCanSource:
         self._bus = open_python_can(url, filters)
         self._waiting: deque[can.Message] = deque()
 
-    def take_in(self, timeout_s: float) -> None:
+    def receive(self, timeout_s: float) -> None:
         """Keep what has arrived; see Source."""
         try:
             for i in range(_AT_ONCE):
@@ -132,7 +132,7 @@ class PythonCanSource:
             self.lost = bus_gone(self._url, error)
 
     def next_frames(self, most: int) -> list[Frame]:
-        """Return frames that were taken in, the oldest first."""
+        """Return frames that were received, the oldest first."""
         count = min(most, len(self._waiting))
         messages = [self._waiting.popleft() for _ in range(count)]
         return [frame_of(message) for message in messages if not message.is_fd]
@@ -165,8 +165,8 @@ def open_source(url: BusUrl, filters: Filters | None = None) -> SimbusSource | P
         raise BadInputError(str(error)) from error
 
 
-def named_bus(text: str) -> BusUrl:
-    """Return the bus that `text` names, one that is there already; raises BadInputError."""
+def running_bus(text: str) -> BusUrl:
+    """Return the bus that `text` names, which has to exist; raises BadInputError."""
     try:
         url = BusUrl.parse(text)
     except BusError as error:

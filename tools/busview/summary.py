@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from drivers.bus.budget import worst_case_bits
-from drivers.decode import Frame, Record
+from cdpr_drivers.bus.budget import worst_case_bits
+from cdpr_drivers.decode import Frame, Record
 
 _MORE_BITS_EXTENDED = 25
 """20 bits of the identifier and the 5 that they may have stuffed."""
@@ -56,7 +56,7 @@ class Summary:
 
     @property
     def duration_s(self) -> float:
-        """Return what the traffic took: told, or from the first frame to the last."""
+        """Return what the traffic took: as reported, or from the first frame to the last."""
         if self.time_s is not None:
             return self.time_s
         return 0.0 if self.first_s is None else self.last_s - self.first_s
@@ -103,12 +103,12 @@ class Summary:
         """Return the summary for people."""
         whose = " of bus time" if self.time_s is not None else ""
         what = "1 frame" if self.frames == 1 else f"{self.frames} frames"
-        told = [f"{what} in {self.duration_s:.3f} s{whose}"]
+        totals = [f"{what} in {self.duration_s:.3f} s{whose}"]
         if self.load is not None:
             rate = f"{self.bitrate_bit_s / 1e3:g} kbit/s"
-            told.append(f"bus load {100 * self.load:.1f} % of {rate}, stuffed as badly as can be")
-        told.append(f"{self.problems} told of trouble (marked !)")
-        lines = ["; ".join(told)]
+            totals.append(f"bus load {100 * self.load:.1f} % of {rate}, stuffed as badly as can be")
+        totals.append(f"{self.problems} told of trouble (marked !)")
+        lines = ["; ".join(totals)]
         if self.missed:
             lines.append(
                 f"{self.missed} frames went by unseen: the bus was faster than the monitor"

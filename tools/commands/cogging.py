@@ -3,81 +3,119 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdpr_rt.cogging_profile import CoggingProfileError, DriveIdentity
+from cdpr_drivers.robot.commissioned import load_profile
+from cdpr_profiles import Winch, load_robot, load_winch
+from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_rt.core.rawlog import read_raw_log
 from cdpr_rt.errors import RawLogError
-from cdpr_rt.rawlog import read_raw_log
-from profiles import Winch, load_winch
-from profiles.motor_bounds import MotorBounds
-from tools import summary
-from tools.commands.commission import keeping_raw_data, prepare
-from tools.commands.options import (
-    BusOption,
+from cdpr_rt.identification.cogging_profile import CoggingProfileError, DriveIdentity
+from cdpr_rt.procedures.commissioning.commission_files import Paths
+from cdpr_rt.procedures.commissioning.evaluation import METHODS, compare
+from cdpr_rt.procedures.commissioning.identified import identify, store_profile, validation_name
+from cdpr_rt.procedures.commissioning.procedure import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
+from cdpr_rt.procedures.commissioning.results import assemble, identification, read_run
+from cdpr_tools.client.axis_sweep import AxisSweep, SweptAxis, write_passes
+from cdpr_tools.client.client import open_daemon
+from cdpr_tools.commands.commission import prepare
+from cdpr_tools.commands.options import (
     IndexOption,
     JsonOption,
-    PlantOption,
-    WinchArgument,
+    OverwriteOption,
+    RobotOption,
+    SocketOption,
     YesOption,
 )
-from tools.commission_files import Paths
-from tools.commissioned import load_profile
-from tools.commissioning import METHODS
-from tools.errors import BadInputError
-from tools.evaluation import compare
-from tools.output import Output
-from tools.procedure import (
-    DEFAULT_BANDWIDTH_HZ,
-    Commissioning,
-    Plan,
-    identify,
-    store_profile,
-    validation_name,
-)
-from tools.report import build
-from tools.results import assemble, identification, read_run
-from tools.session import confirm_motion, open_bus, open_winch
-from tools.truth import Truth
+from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
+from cdpr_tools.commission import summary
+from cdpr_tools.composition.session import confirm_motion, open_winch
+from cdpr_tools.consent import require_consent
+from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.output import Output
+from cdpr_tools.raw_data import keeping_raw_data
+from cdpr_tools.recordings.truth import true_angle
+from cdpr_tools.report import build
+from cdpr_tools.signals import stop_on_signals
 
-app = typer.Typer(help="Cogging: sweep, fit, validate, report.", no_args_is_help=True)
+app = typer.Typer(
+    name="cogging", help="Cogging: sweep, fit, validate, report.", no_args_is_help=True
+)
 
 _OutOption = Annotated[Path, typer.Option("--out", help="Folder for the recordings.")]
 
 
-def register(parent: typer.Typer) -> None:
-    """Add the command group."""
-    parent.add_typer(app, name="cogging")
-
-
 @app.command()
+@with_winch
 def sweep(
-    winch: WinchArgument,
-    bus: BusOption,
+    winch: WinchOnBus,
+    out: Output,
     out_dir: _OutOption,
-    plant: PlantOption = None,
     turns: Annotated[int, typer.Option(min=1, max=20, help="Turns in each direction.")] = 2,
     speed_deg_s: Annotated[
         float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
     ] = 3.0,
-    overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
+    overwrite: OverwriteOption = False,
     index: IndexOption = "homing",
     yes: YesOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Record the slow sweeps and the fast legs from which `fit` identifies the motor."""
-    out = Output(as_json)
-    profile, url = load_winch(winch), open_bus(bus)
     paths = prepare(out_dir, overwrite)
-    confirm_motion(url, yes, "the sweep turns the motor")
-    with keeping_raw_data(paths), open_winch(profile, url, out, plant, paths.truth) as session:
+    confirm_motion(winch.url, yes, "the sweep turns the motor")
+    with (
+        keeping_raw_data(paths.raw_folder),
+        open_winch(winch.profile, winch.url, out, winch.plant, paths.truth) as session,
+    ):
         plan = Plan(sweep_speed_rad_s=math.radians(speed_deg_s), turns=turns)
         steps = Commissioning(session, out, paths, plan)
         steps.prepare(index)
         steps.measure()
     recorded = [str(p) for name in ("sweep", "fast") for p in paths.passes(name)]
+    for path in recorded:
+        out.say(f"recorded {path}")
+    out.result({"ok": True, "recorded": recorded})
+
+
+@app.command()
+def sweep_axis(
+    axis: Annotated[str, typer.Argument(help="Axis of the running robot.")],
+    out_dir: _OutOption,
+    turns: Annotated[int, typer.Option(min=1, max=20, help="Turns in each direction.")] = 2,
+    speed_deg_s: Annotated[
+        float, typer.Option("--speed-deg-s", min=0.5, max=60.0, help="Speed of the sweep.")
+    ] = 3.0,
+    overwrite: OverwriteOption = False,
+    robot: RobotOption = None,
+    socket: SocketOption = None,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Have this machine's daemon turn a motor as `sweep` does, for `fit`, without ending it.
+
+    Its programs turn the motor and its recording holds the data; the other axes hold. Ctrl-C stops
+    the motor, and its drives have no power afterwards, however the command ends.
+    """
+    out = Output(as_json)
+    with open_daemon(robot, socket, None, None) as daemon:
+        swept = SweptAxis.of(daemon, axis, load_robot(daemon.get("/description")["reference"]))
+        paths = prepare(out_dir, overwrite)
+        what = f"the sweep turns the motor of {axis}: its cable has to be off the drum."
+        require_consent(what, yes or swept.is_simulated)
+        with stop_on_signals() as stop_requested, daemon.control() as control:
+            control.post("/enable", {})
+            try:
+                speed_rad_s = math.radians(speed_deg_s)
+                span = AxisSweep(control, swept, stop_requested).run(turns, speed_rad_s)
+            except BaseException:
+                with suppress(CommandError):  # where a fault has taken the power already
+                    daemon.post("/disable")
+                raise
+            daemon.post("/disable")
+    recorded = [str(path) for path in write_passes(span.rows(), swept, paths)]
     for path in recorded:
         out.say(f"recorded {path}")
     out.result({"ok": True, "recorded": recorded})
@@ -119,28 +157,28 @@ def _recorded_identity(paths: Paths) -> tuple[str, DriveIdentity, float | None]:
 
 
 @app.command()
+@with_winch
 def validate(
-    winch: WinchArgument,
+    winch: WinchOnBus,
+    out: Output,
     cogging_profile: Annotated[Path, typer.Argument(help="Cogging profile of this motor.")],
-    bus: BusOption,
     out_dir: _OutOption,
-    plant: PlantOption = None,
     bandwidth_Hz: Annotated[
         float, typer.Option("--bandwidth-hz", min=1.0, max=100.0)
     ] = DEFAULT_BANDWIDTH_HZ,
-    overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
+    overwrite: OverwriteOption = False,
     index: IndexOption = "homing",
     yes: YesOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Follow ramps without and with the profile's compensation, under one PID."""
-    out = Output(as_json)
-    profile, url = load_winch(winch), open_bus(bus)
-    bounds = MotorBounds(profile.motor)
+    bounds = MotorBounds(winch.profile.motor)
     learnt = load_profile(cogging_profile, bounds)
     paths = prepare(out_dir, overwrite)
-    confirm_motion(url, yes, "the validation turns the motor")
-    with keeping_raw_data(paths), open_winch(profile, url, out, plant, paths.truth) as session:
+    confirm_motion(winch.url, yes, "the validation turns the motor")
+    with (
+        keeping_raw_data(paths.raw_folder),
+        open_winch(winch.profile, winch.url, out, winch.plant, paths.truth) as session,
+    ):
         try:  # before the motor moves
             learnt.compensation("better", session.drive_identity, bounds)
         except CoggingProfileError as error:
@@ -149,7 +187,7 @@ def validate(
         steps = Commissioning(session, out, paths, plan)
         steps.prepare(index)
         steps.validate(learnt, bandwidth_Hz)
-    truth = Truth(paths.truth) if paths.truth.exists() else None
+    truth = true_angle(paths.truth)
     runs = {m: paths.passes(validation_name(m, bandwidth_Hz)) for m in METHODS}
     result = compare(runs, truth)
     validation = {"judged_on": "encoder" if truth is None else "true angle", **result}
@@ -168,7 +206,7 @@ def report(
     run = read_run(paths)
     profile: Winch = load_winch(run["winch"])
     found = identify(profile, run["latency_s"], paths)
-    results = assemble(paths, run, found)
+    results = assemble(paths, run, found, true_angle(paths.truth))
     build(paths, profile, results, found)
     out.say(f"report: {paths.page}")
     out.result(results)

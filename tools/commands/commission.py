@@ -3,42 +3,52 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from cdpr_rt.errors import ControlError
-from drivers.bus import BusUrl
-from drivers.errors import DriverError
-from profiles import Robot, Winch, load_machine
-from tools import summary
-from tools.commands.options import (
+from cdpr_drivers.bus import BusUrl
+from cdpr_profiles import Robot, Winch, load_machine
+from cdpr_rt.procedures.commissioning.commission_files import Paths
+from cdpr_rt.procedures.commissioning.finding_index import Index
+from cdpr_rt.procedures.commissioning.identified import identify
+from cdpr_rt.procedures.commissioning.procedure import (
+    DEFAULT_BANDWIDTH_HZ,
+    QUICK,
+    THOROUGH,
+    Commissioning,
+    Plan,
+)
+from cdpr_rt.procedures.commissioning.results import assemble
+from cdpr_tools.commands.options import (
     IndexOption,
     JsonOption,
+    OverwriteOption,
     PlantOption,
     SafetyIoOption,
     YesOption,
 )
-from tools.commission_files import Paths
-from tools.errors import BadInputError, WorkFailedError
-from tools.finding_index import Index
-from tools.output import Output, to_json
-from tools.procedure import DEFAULT_BANDWIDTH_HZ, QUICK, THOROUGH, Commissioning, Plan, identify
-from tools.report import build
-from tools.results import assemble
-from tools.robot_commissioning import MotorOfRobot, chosen_axes, free_motors, lines_for_robot
-from tools.session import confirm_motion, open_bus, open_winch
+from cdpr_tools.commission import summary
+from cdpr_tools.commission.robot_commissioning import (
+    MotorOfRobot,
+    chosen_axes,
+    detached_motors,
+    lines_for_robot,
+)
+from cdpr_tools.composition.session import confirm_motion, open_bus, open_winch
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output, to_json
+from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
+from cdpr_tools.recordings.truth import true_angle
+from cdpr_tools.report import build
 
 _TURNS = "turns the motor for about 20 minutes"
 
 
-def register(parent: typer.Typer) -> None:
-    """Add the command."""
-    parent.command()(commission)
+app = typer.Typer()
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,7 @@ class _Wanted:
     safety_io: str | None
 
 
+@app.command()
 def commission(
     machine: Annotated[
         str,
@@ -87,9 +98,7 @@ def commission(
             "--bandwidth-hz", min=1.0, max=100.0, help="Closed-loop bandwidth of the PID."
         ),
     ] = DEFAULT_BANDWIDTH_HZ,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace an earlier commissioning in --out.")
-    ] = False,
+    overwrite: OverwriteOption = False,
     quick: Annotated[
         bool, typer.Option("--quick", help="A rough look in a fifth of the time.")
     ] = False,
@@ -107,7 +116,7 @@ def commission(
         motors = chosen_axes(profile, axis or (), every, folder)
         for motor in motors:
             prepare(motor.paths.out, overwrite)
-        with free_motors(profile, bus or (), motors, out, plant) as urls:
+        with detached_motors(profile, bus or (), motors, out, plant) as urls:
             _ask(motors, urls, yes)
             out.result(_commission_robot(profile, motors, urls, wanted, out))
         return
@@ -143,8 +152,7 @@ def _commission_robot(
     for motor, url in zip(motors, urls, strict=True):
         out.say(f"axis {motor.axis.name}, node {motor.axis.node_id} on {url}")
         results[motor.axis.name] = _commission(motor.winch, url, motor.paths, wanted, out)
-    for line in lines_for_robot(robot, motors):
-        out.say(line)
+    out.say(*lines_for_robot(robot, motors))
     folder = motors[0].paths.out.parent
     return {"ok": True, "robot": robot.reference, "commissioned": str(folder), "axes": results}
 
@@ -158,14 +166,14 @@ def _commission(
     plant: Path | None = None,
 ) -> dict[str, Any]:
     """Commission the motor of `winch`; return what was found, as the report tells it."""
-    with keeping_raw_data(paths):
+    with keeping_raw_data(paths.raw_folder):
         with open_winch(winch, url, out, plant, paths.truth, wanted.safety_io) as session:
             run = Commissioning(session, out, paths, wanted.plan).run(
                 wanted.bandwidth_Hz, wanted.index
             )
         write(paths.run, to_json(run, indent=1))
         found = identify(winch, run["latency_s"], paths)
-        results = assemble(paths, run, found)
+        results = assemble(paths, run, found, true_angle(paths.truth))
         build(paths, winch, results, found)
     summary.show(out, results)
     return results
@@ -174,13 +182,9 @@ def _commission(
 def prepare(folder: Path, overwrite: bool) -> Paths:
     """Return the paths in `folder`; raises BadInputError where an earlier run would be lost."""
     paths = Paths(folder)
-    raw = folder / "raw"
-    if raw.exists() and any(raw.iterdir()):
-        if not overwrite:
-            raise BadInputError(
-                f"--out {folder}: holds the data of an earlier run; choose another folder, "
-                "or replace it with --overwrite"
-            )
+    raw = paths.raw_folder
+    refuse_loss(folder, raw, overwrite)
+    if raw.is_dir() and any(raw.iterdir()):
         shutil.rmtree(raw)
         for path in (paths.run, paths.results, paths.page, paths.profile, paths.truth):
             path.unlink(missing_ok=True)
@@ -197,15 +201,3 @@ def write(path: Path, text: str) -> None:
         path.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise WorkFailedError(f"{path}: cannot be written: {error.strerror}") from error
-
-
-@contextmanager
-def keeping_raw_data(paths: Paths) -> Iterator[None]:
-    """Add to an error's message where the recordings made so far are."""
-    raw = paths.out / "raw"
-    try:
-        yield
-    except (ControlError, DriverError) as error:
-        if not any(raw.glob("*.raw")):
-            raise
-        raise WorkFailedError(f"{error} (recorded so far: {raw})") from error

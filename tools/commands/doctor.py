@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
 
 import typer
 
-from tools.errors import FAILED
-from tools.host_checks import look_around
-from tools.output import Output
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import FAILED
+from cdpr_tools.host.host_checks import look_around
+from cdpr_tools.output import Output
+
+app = typer.Typer()
 
 
-def register(parent: typer.Typer) -> None:
-    """Add the command."""
-    parent.command()(doctor)
-
-
-def doctor(as_json: Annotated[bool, typer.Option("--json", help="One JSON line.")] = False) -> None:
+@app.command()
+def doctor(as_json: JsonOption = False) -> None:
     """Look at this machine and say what to mend before a robot runs on it.
 
     Changes nothing. A `problem` must be mended, a `note` makes cycles more punctual.

@@ -9,29 +9,24 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_rt.clock import PacedClock
-from drivers.modbus.io_link import IoLink
-from drivers.modbus.io_rules import IoState
-from drivers.modbus.tcp import ModbusError
-from profiles.safety_io import Brake, Contactor, load_safety_io
-from tools.commands.options import JsonOption, YesOption
-from tools.consent import require_consent
-from tools.errors import BadInputError, WorkFailedError
-from tools.output import Output
-from tools.safety import connect, kept_trip
-from tools.signals import stop_on_signals
+from cdpr_drivers.modbus.io_link import IoLink
+from cdpr_drivers.modbus.io_rules import IoState
+from cdpr_drivers.modbus.tcp import ModbusError
+from cdpr_drivers.robot.safety import connect, kept_trip
+from cdpr_profiles.devices.safety_io import Brake, Contactor, load_safety_io
+from cdpr_rt.core.clock import PacedClock
+from cdpr_tools.commands.options import JsonOption, YesOption
+from cdpr_tools.consent import require_consent
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import stop_on_signals
 
-app = typer.Typer(help="The safety I/O beside the drives.", no_args_is_help=True)
+app = typer.Typer(name="io", help="The safety I/O beside the drives.", no_args_is_help=True)
 
 _IoArgument = Annotated[
     str, typer.Argument(help="Profile: a name, a file, NAME@HOST:PORT.", metavar="IO")
 ]
 _Seconds = Annotated[float, typer.Option(min=0.1, max=86400.0, help="How long; Ctrl-C ends it.")]
-
-
-def register(parent: typer.Typer) -> None:
-    """Add the command group."""
-    parent.add_typer(app, name="io")
 
 
 @app.command()
@@ -41,11 +36,10 @@ def show(io: _IoArgument, as_json: JsonOption = False) -> None:
     with _link(io) as link:
         state = link.state()
     kept = kept_trip(io)
-    for line in _lines(state):
-        out.say(line)
+    out.say(*_lines(state))
     if kept is not None:
         out.say(f"tripped on {kept.get('date')}: {kept.get('reason')} (cdpr io ack {io})")
-    out.result({"ok": True, **_told(state), "trip": kept})
+    out.result({"ok": True, **_as_dict(state), "trip": kept})
 
 
 @app.command()
@@ -68,7 +62,7 @@ def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = Fal
                 state = link.state()
         except KeyboardInterrupt:
             out.note("stopped on request")
-    out.result({"ok": True, **_told(state)})
+    out.result({"ok": True, **_as_dict(state)})
 
 
 @app.command()
@@ -154,11 +148,10 @@ def off(io: _IoArgument, as_json: JsonOption = False) -> None:
             raise WorkFailedError("; ".join(dict.fromkeys(refused)))
         link.clock.sleep(max(device.timeout_s for device in devices))
         state = link.state()
-    for line in _lines(state):
-        out.say(line)
+    out.say(*_lines(state))
     if state.contactor_closed or any(state.brakes_released.values()):
         raise WorkFailedError(f"{link.name}: contactor or brakes do not follow their outputs")
-    out.result({"ok": True, **_told(state)})
+    out.result({"ok": True, **_as_dict(state)})
 
 
 @app.command()
@@ -217,7 +210,7 @@ def _keep(
         link.clock.sleep(link.profile.poll_period_s)
 
 
-def _told(state: IoState) -> dict[str, Any]:
+def _as_dict(state: IoState) -> dict[str, Any]:
     return {
         "chain_ok": state.chain_ok,
         "contactor_asked": state.contactor_asked,

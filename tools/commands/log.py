@@ -7,16 +7,18 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.options import JsonOption
-from tools.errors import BadInputError
-from tools.output import Output
-from tools.recordings.export import check_target, export
-from tools.recordings.picture import FIELDS, draw
-from tools.recordings.selection import Selection, fields_of, files_of
-from tools.recordings.summary import summarise, told
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.recordings.export import check_target, export
+from cdpr_tools.recordings.picture import FIELDS, draw
+from cdpr_tools.recordings.selection import Selection, fields_of, files_of
+from cdpr_tools.recordings.summary import summarise, told
 
 app = typer.Typer(
-    help="The daemon's recordings: what is in them, as tables and pictures.", no_args_is_help=True
+    name="log",
+    help="The daemon's recordings: what is in them, as tables and pictures.",
+    no_args_is_help=True,
 )
 
 _FilesArgument = Annotated[
@@ -31,11 +33,6 @@ _UntilOption = Annotated[
 _EVENTS_SHOWN = 30
 
 
-def register(parent: typer.Typer) -> None:
-    """Add the command group."""
-    parent.add_typer(app, name="log")
-
-
 @app.command()
 def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
     """Say what is in recordings: how long, what happened, what is missing, how they ended."""
@@ -43,8 +40,7 @@ def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
     results = []
     for path in files_of(files):
         results.append(summarise(path, out))
-        for line in told(results[-1], _EVENTS_SHOWN):
-            out.say(line)
+        out.say(*told(results[-1], _EVENTS_SHOWN))
     out.result({"ok": True, "recordings": results})
 
 

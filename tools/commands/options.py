@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.finding_index import Index
+from cdpr_rt.procedures.commissioning.finding_index import Index
 
 WinchArgument = Annotated[
     str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")
@@ -58,4 +58,31 @@ SensorsOption = Annotated[
 ]
 SensorsPortOption = Annotated[
     str | None, typer.Option("--port", help="Serial port of the tension sensors' line.")
+]
+
+RobotOption = Annotated[
+    str | None, typer.Option("--robot", help="Which robot's daemon, where several run.")
+]
+SocketOption = Annotated[
+    Path | None, typer.Option("--socket", help="The daemon's Unix socket, if not this user's.")
+]
+UrlOption = Annotated[
+    str | None, typer.Option("--url", metavar="http://HOST:PORT", help="A daemon elsewhere.")
+]
+KeyFileOption = Annotated[
+    Path | None, typer.Option("--key-file", help="File with the key for --url.")
+]
+OverwriteOption = Annotated[
+    bool, typer.Option("--overwrite", help="Replace what is in --out already.")
+]
+ExitWithStdinOption = Annotated[
+    bool, typer.Option("--exit-with-stdin", help="Stop when standard input, a pipe, ends.")
+]
+RobotBusOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--bus",
+        help="simbus: (a simulator of its own), simbus:NAME, or BUS=URL once for each bus.",
+        metavar="URL",
+    ),
 ]

@@ -9,39 +9,36 @@ from typing import Annotated, Any
 import typer
 from pydantic import BaseModel
 
-import profiles as catalogue
-from profiles import RobotAxis
-from profiles.reader import closest
-from tools.errors import BadInputError
-from tools.output import Output
+import cdpr_profiles as catalogue
+from cdpr_profiles import RobotAxis
+from cdpr_profiles.catalogue import load_profile
+from cdpr_profiles.reading.reader import closest
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
 
 app = typer.Typer(
-    help="Profiles of motors, drives, cables, winches and robots.", no_args_is_help=True
+    name="profiles",
+    help="Profiles of motors, drives, cables, winches and robots.",
+    no_args_is_help=True,
 )
-
-_JsonFlag = Annotated[bool, typer.Option("--json", help="One JSON line.")]
-
-
-def register(parent: typer.Typer) -> None:
-    """Add the command group."""
-    parent.add_typer(app, name="profiles")
 
 
 @app.command("list")
-def list_(as_json: _JsonFlag = False) -> None:
-    """List the shipped profiles by kind."""
+def list_(as_json: JsonOption = False) -> None:
+    """List the profiles by kind: those shipped, and your own."""
     out = Output(as_json)
     names = catalogue.list_profiles()
     for kind, of_kind in names.items():
         out.say(f"{kind}:")
         out.say("  " + ", ".join(of_kind))
-    out.result({"ok": True, **names})
+    out.result({"ok": True} | dict(names.items()))
 
 
 @app.command()
 def show(
     name: Annotated[str, typer.Argument(help="A name from `cdpr profiles list`.")],
-    as_json: _JsonFlag = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show everything that a profile says."""
     out = Output(as_json)
@@ -50,8 +47,8 @@ def show(
         names = itertools.chain(*catalogue.list_profiles().values())
         meant = closest(name, names)
         hint = f"did you mean {meant!r}?" if meant else "`cdpr profiles list` shows what there is"
-        raise BadInputError(f"profile {name!r}: not among the shipped ones; {hint}")
-    content = _plain(catalogue.load_all()[kinds[0]][name])
+        raise BadInputError(f"profile {name!r}: not there; {hint}")
+    content = _plain(load_profile(kinds[0], name))
     out.say(f"{kinds[0]}: {name}")
     for key, value in _flat(content):
         out.say(f"  {key} = {value}")

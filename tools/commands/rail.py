@@ -7,15 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cdpr_rt.calibration_state import calibration_state
-from drivers.rail import Conditions, move
-from drivers.rail_cia402 import Cia402RailAxis
-from profiles.rail import load_rail
-from tools.commands.options import JsonOption, SafetyIoOption, YesOption
-from tools.consent import require_consent
-from tools.errors import BadInputError
-from tools.output import Output
-from tools.rail_session import (
+from cdpr_drivers.rails.rail import MoveConditions, move
+from cdpr_drivers.rails.rail_cia402 import Cia402RailAxis
+from cdpr_drivers.rails.rail_session import (
     open_rail,
     position_of,
     power_watch,
@@ -23,9 +17,15 @@ from tools.rail_session import (
     require_options,
     slack_watch,
 )
-from tools.signals import stop_on_signals
+from cdpr_profiles.devices.rail import load_rail
+from cdpr_rt.robots.calibration_state import calibration_state
+from cdpr_tools.commands.options import JsonOption, SafetyIoOption, YesOption
+from cdpr_tools.consent import require_consent
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import stop_on_signals
 
-app = typer.Typer(help="The rails on which winches stand.", no_args_is_help=True)
+app = typer.Typer(name="rail", help="The rails on which winches stand.", no_args_is_help=True)
 
 _RailArgument = Annotated[
     str, typer.Argument(help="Rail profile: a name or the path of a file.", metavar="RAIL")
@@ -34,11 +34,6 @@ _BusOption = Annotated[
     str | None,
     typer.Option("--bus", help="CAN bus of a rail on CiA 402: simbus:NAME, socketcan:can0, ..."),
 ]
-
-
-def register(parent: typer.Typer) -> None:
-    """Add the command group."""
-    parent.add_typer(app, name="rail")
 
 
 @app.command()
@@ -52,8 +47,8 @@ def show(rail: _RailArgument, bus: _BusOption = None, as_json: JsonOption = Fals
     known = "calibrated" if state.calibrated else "NOT calibrated"
     since = f" since {state.date}" if state.date else ""
     out.say(f"robot {state.robot}: {known}{since}: {state.why}")
-    told = dataclasses.asdict(state)
-    out.result({"ok": True, "position_m": position, "calibration": told})
+    calibration = dataclasses.asdict(state)
+    out.result({"ok": True, "position_m": position, "calibration": calibration})
 
 
 @app.command()
@@ -119,7 +114,7 @@ def move_(
     with (
         stop_on_signals() as stop_requested,
         rail_clock(profile, bus, winch_bus or ()) as clock,
-        slack_watch(profile, tension, tension_port, cables_slack_checked, clock) as tight,
+        slack_watch(profile, tension, tension_port, cables_slack_checked, clock) as cables_tight,
         power_watch(profile, bus, winch_bus or (), out, clock) as powered,
         open_rail(rail, profile, bus, safety_io, out, clock) as axis,
     ):
@@ -131,8 +126,8 @@ def move_(
                 axis,
                 clock,
                 to_m,
-                Conditions(
-                    tight,
+                MoveConditions(
+                    cables_tight,
                     powered,
                     stop_requested,
                     lambda here: advance(abs(here - begun) / profile.speed_m_s),

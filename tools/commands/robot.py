@@ -7,16 +7,20 @@ from typing import Annotated
 
 import typer
 
-from profiles import Robot, load_robot
-from profiles.platform import Platform
-from tools.commands import robot_trial
-from tools.commands.options import JsonOption
-from tools.errors import BAD_INPUT, BadInputError
-from tools.output import Output
-from tools.robots import checks, new_robot, summary
-from tools.robots.questions import Question
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.platform import Platform
+from cdpr_rt.robots import checks
+from cdpr_tools.commands import robot_trial
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import BAD_INPUT, BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.robots import new_robot, summary
+from cdpr_tools.robots.kinds import KINDS
+from cdpr_tools.robots.questions import Question
 
-app = typer.Typer(help="Describe a cable robot, look at it, try it.", no_args_is_help=True)
+app = typer.Typer(
+    name="robot", help="Describe a cable robot, look at it, try it.", no_args_is_help=True
+)
 
 _Robot = Annotated[
     str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
@@ -24,10 +28,7 @@ _Robot = Annotated[
 _Picture = Annotated[Path | None, typer.Option("--png", help="Draw it into this file.")]
 
 
-def register(parent: typer.Typer) -> None:
-    """Add the command group."""
-    robot_trial.add(app)
-    parent.add_typer(app, name="robot")
+app.add_typer(robot_trial.app)
 
 
 @app.callback()
@@ -49,11 +50,8 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
             f"{profile.path}: platform: this robot has none, its winches have nothing in common; "
             f"`cdpr profiles show` tells what else there is"
         )
-    if png is not None and not platform.is_planar:
-        raise BadInputError(f"--png: {profile.path} is no planar robot; only these are drawn")
-    told = summary.figures(profile, platform)
-    for line in summary.lines(profile, platform, told):
-        out.say(line)
+    figures = summary.figures(profile, platform)
+    out.say(*summary.lines(profile, platform, figures))
     if png is not None:
         _draw(profile, platform, png, out)
     found = checks.findings(profile)
@@ -61,9 +59,11 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
     _say_findings(out, found)
     if not found:
         out.say("nothing to object to")
-    told["findings"] = [{"key": f.key, "text": f.text, "impossible": f.impossible} for f in found]
+    figures["findings"] = [
+        {"key": f.key, "text": f.text, "impossible": f.impossible} for f in found
+    ]
     possible = not any(finding.impossible for finding in found)
-    out.result({"ok": possible, **told})
+    out.result({"ok": possible, **figures})
     if not possible:
         raise typer.Exit(BAD_INPUT)
 
@@ -78,12 +78,15 @@ def new(
     yes: Annotated[
         bool, typer.Option("--yes", help="Take the defaults for all that is not answered.")
     ] = False,
+    png: _Picture = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Ask what is to be known of a planar robot on three cables, and write its file.
+    """Ask what is to be known of a cable robot, and write its file.
 
-    Each question has a default, most of them following from the answers before. Never writes over
-    a file. Ends with status 2 where the robot that was described cannot work.
+    It describes robots in a plane and in space, with 3 to 8 cables; the first question says which
+    kinds there are, and why each takes as many cables. Each question has a default, most of them
+    following from the answers before. Never writes over a file. Ends with status 2 where the robot
+    that was described cannot work.
     """
     out = Output(as_json)
     if path.exists():
@@ -91,11 +94,16 @@ def new(
     if path.suffix != ".toml" or not path.parent.is_dir():
         raise BadInputError(f"{path}: allowed: NAME.toml in a folder that is there")
     given = dict(_key_and_value(text) for text in answers or ())
-    told = new_robot.answers_of(path, given, _default if yes else _ask)
-    profile = new_robot.write_robot(told, path)
+    if "kind" not in given and not yes:
+        for name, what in KINDS.items():
+            typer.echo(f"{name:12} {what}", err=True)
+    complete = new_robot.answers_of(path, given, _default if yes else _ask)
+    profile = new_robot.write_robot(complete, path)
     out.say(f"{path}: written")
     impossible = [finding for finding in checks.findings(profile) if finding.impossible]
     _say_findings(out, checks.findings(profile))
+    if png is not None and profile.platform is not None:
+        _draw(profile, profile.platform, png, out)
     out.say(f"next: cdpr robot show {path}")
     if not impossible:
         out.say(f"      cdpr run {path} --bus simbus:      # on simulated winches")
@@ -136,7 +144,7 @@ def _say_findings(out: Output, found: list[checks.Finding]) -> None:
 
 
 def _draw(profile: Robot, platform: Platform, path: Path, out: Output) -> None:
-    from tools.robots.picture import draw_robot  # noqa: PLC0415  # slow to load
+    from cdpr_tools.robots.picture import draw_robot  # noqa: PLC0415  # slow to load
 
     try:
         draw_robot(profile, platform, path)

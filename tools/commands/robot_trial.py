@@ -9,10 +9,11 @@ from typing import Annotated
 
 import typer
 
-from profiles import load_robot
-from tools.commands.options import JsonOption
-from tools.errors import BadInputError
-from tools.output import Output
+from cdpr_profiles import load_robot
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import interrupted_by_sigterm
 
 
 class KindOfTrial(StrEnum):
@@ -22,13 +23,13 @@ class KindOfTrial(StrEnum):
     LINE = "line"
     RANDOM = "random"
     STREAM = "stream"
+    TAPE = "tape"
 
 
-def add(parent: typer.Typer) -> None:
-    """Add the command."""
-    parent.command("trial")(trial)
+app = typer.Typer()
 
 
+@app.command()
 def trial(
     robot: Annotated[
         str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
@@ -36,8 +37,9 @@ def trial(
     kind: Annotated[
         KindOfTrial,
         typer.Argument(
-            help="targets: accuracy at rest; line: 10 mm/s with compensation and without; random: "
-            "targets at the limits; stream: a hand that leads through a bad network."
+            help="targets: accuracy at rest; line: lines and turns with compensation and without; "
+            "random: targets at the limits; stream: a hand that leads through a bad network; "
+            "tape: exit points 20 to 50 mm off what the robot's file says."
         ),
     ],
     plant: Annotated[
@@ -47,6 +49,9 @@ def trial(
     minutes: Annotated[
         float | None,
         typer.Option(min=0.05, max=600.0, help="How long, in the robot's time; not for line."),
+    ] = None,
+    speed_mm_s: Annotated[
+        float | None, typer.Option(min=0.1, help="Of lines, 10 where left out.")
     ] = None,
     commissioned: Annotated[
         Path | None,
@@ -71,7 +76,7 @@ def trial(
     Every cycle crosses the simulated bus to the daemon's own loop, in bus time: ten minutes take a
     few. Ends with exit status 0 once it has judged, whether all that is wanted is reached or not.
     """
-    from tools.trials import trial as trials  # noqa: PLC0415  # slow to load
+    from cdpr_tools.trials import trial as trials  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     if again:
@@ -85,9 +90,11 @@ def trial(
         name = f"trial-{profile.profile}-{kind}-{time.strftime('%Y%m%d-%H%M%S')}"
         folder = out_dir or Path("out") / name
         usual = trials.KINDS[kind]
-        if minutes is not None and usual.fixed:
+        if minutes is not None and usual.compares:
             raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
-        asked = trials.Asked(
+        if speed_mm_s is not None and kind is not KindOfTrial.LINE:
+            raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line")
+        settings = trials.TrialSettings(
             kind=kind.value,
             robot=robot,
             plant=None if plant is None else str(plant.absolute()),
@@ -95,9 +102,10 @@ def trial(
             minutes=usual.minutes if minutes is None else minutes,
             commissioned=None if commissioned is None else str(commissioned.absolute()),
             compensated=not without_compensation,
+            **({} if speed_mm_s is None else {"speed_m_s": 1e-3 * speed_mm_s}),
         )
-        result = trials.perform(asked, folder, out)
-    for line in result.pop("lines"):
-        out.say(line)
+        with interrupted_by_sigterm():
+            result = trials.perform(settings, folder, out)
+    out.say(*result.pop("lines"))
     out.say(f"picture: {result['picture']}")
     out.result({"ok": True, **result})

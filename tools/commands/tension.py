@@ -4,50 +4,49 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdpr_rt.clock import Clock, PacedClock
-from cdpr_rt.errors import ControlError
-from cdpr_rt.realtime import one_core
-from drivers.bus import BusUrl
-from drivers.errors import DriverError
-from drivers.modbus.tension import LoadCells, TensionSampler
-from profiles import Winch, load_winch
-from profiles.tension_sensor import TensionSensors, load_tension_sensors
-from tools.commands.options import (
-    BusOption,
-    JsonOption,
-    PlantOption,
-    SafetyIoOption,
-    WinchArgument,
-    YesOption,
-)
-from tools.errors import BadInputError, WorkFailedError
-from tools.output import Output
-from tools.session import confirm_motion, open_bus, open_winch
-from tools.signals import stop_on_signals
-from tools.simulator import OwnSimulator
-from tools.tension import calibration
-from tools.tension import watch as watching
-from tools.tension.anchor import TOLERANCE, AnchorPlan, measure_anchored, plan_anchor
-from tools.tension.hoist import HoistPlan
-from tools.tension.masses import (
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.modbus.tension import LoadCells, TensionSampler
+from cdpr_profiles import Winch, load_winch
+from cdpr_profiles.devices.tension_sensor import TensionSensors, load_tension_sensors
+from cdpr_rt.core.clock import Clock, PacedClock
+from cdpr_rt.procedures.tension import calibration
+from cdpr_rt.procedures.tension.anchor import TOLERANCE, AnchorPlan, measure_anchored, plan_anchor
+from cdpr_rt.procedures.tension.hoist import HoistPlan
+from cdpr_rt.procedures.tension.masses import (
     Hang,
-    by_prompt,
     check_masses,
     hoist_tolerance,
     measure_masses,
-    on_board,
     plan_hoist,
 )
+from cdpr_rt.runtime.realtime import one_core
+from cdpr_tools.commands.options import (
+    JsonOption,
+    OverwriteOption,
+    SafetyIoOption,
+    YesOption,
+)
+from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
+from cdpr_tools.composition.session import confirm_motion, open_bus, open_winch
+from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
+from cdpr_tools.signals import stop_on_signals
+from cdpr_tools.tension import watch as watching
+from cdpr_tools.tension.hanging import by_prompt, on_board
+from cdpr_tools.tension.summary import show
 
-app = typer.Typer(help="Cable tensions: watch, tare, calibrate.", no_args_is_help=True)
+app = typer.Typer(
+    name="tension", help="Cable tensions: watch, tare, calibrate.", no_args_is_help=True
+)
 
 _SensorsOption = Annotated[
     str, typer.Option("--sensors", help="Tension sensors: a name or a file.", metavar="SENSORS")
@@ -60,11 +59,6 @@ _FIRST_READING_S = 2.0
 _STANDARD_GRAVITY = 9.80665
 _MASS_SPEED_mm_s, _ANCHOR_SPEED_mm_s = 40.0, 5.0
 _MASS_PLANT = '[load]\nkind = "hung_mass"\n'
-
-
-def register(parent: typer.Typer) -> None:
-    """Add the command group."""
-    parent.add_typer(app, name="tension")
 
 
 @app.command()
@@ -120,16 +114,16 @@ def tare(
         after = _means(cells, chosen, clock, seconds) if profile.amplifier.tare else before
     finally:
         cells.close()
-    told = []
+    tared = []
     for number, was, now in zip(chosen, before, after, strict=True):
         sensor = profile.sensors[number]
-        told.append({"cable": sensor.cable, "before_N": was, "after_N": now})
+        tared.append({"cable": sensor.cable, "before_N": was, "after_N": now})
         if profile.amplifier.tare is not None:
             out.say(f"{sensor.cable:12} {was:8.2f} N  ->  {now:8.2f} N")
         else:
-            told[-1]["zero_N"] = zero = sensor.zero_N + was
+            tared[-1]["zero_N"] = zero = sensor.zero_N + was
             out.say(f'{sensor.cable:12} write zero_N = {zero:.3f} beside cable = "{sensor.cable}"')
-    out.result({"ok": True, "cables": told})
+    out.result({"ok": True, "cables": tared})
 
 
 def _means(cells: LoadCells, chosen: list[int], clock: Clock, seconds: float) -> list[float]:
@@ -154,9 +148,10 @@ def _number_of(profile: TensionSensors, cable: str | None) -> int:
 
 
 @app.command()
+@with_winch
 def calibrate(
-    winch: WinchArgument,
-    bus: BusOption,
+    winch: WinchOnBus,
+    out: Output,
     masses: Annotated[
         str | None, typer.Option(help="Masses to hang, in kg, as 2,5,10: at least three.")
     ] = None,
@@ -170,7 +165,7 @@ def calibrate(
         str | None, typer.Option(help="The load cell's cable; the first by default.")
     ] = None,
     out_dir: _OutOption = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite")] = False,
+    overwrite: OverwriteOption = False,
     speed_mm_s: Annotated[
         float | None,
         typer.Option(
@@ -189,24 +184,21 @@ def calibrate(
     travel_mm: Annotated[
         float, typer.Option("--travel-mm", min=1.0, help="Wound in at most, the cable made fast.")
     ] = 500.0,
-    plant: PlantOption = None,
     board: Annotated[
         Path | None,
         typer.Option(help="Physics board of a simulator: masses are hung there, not asked for."),
     ] = None,
     safety_io: SafetyIoOption = None,
     yes: YesOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Identify a winch's tension-to-torque gain and friction, from masses or from a load cell."""
-    profile = load_winch(winch)
-    folder = out_dir or Path("out") / f"tension-{profile.profile}"
-    run = _Run(profile, open_bus(bus), Output(as_json), folder, plant, safety_io)
+    profile = winch.profile
+    run = _Run(winch, out_dir or Path("out") / f"tension-{profile.profile}", safety_io)
     if (masses is None) == (sensors is None):
         raise BadInputError("give either --masses or --sensors")
     if sensors is None and (port is not None or cable is not None):
         raise BadInputError("--port and --cable go with --sensors, not with --masses")
-    if board is not None and (sensors is not None or run.url.starts_own_simulator):
+    if board is not None and (sensors is not None or winch.url.starts_own_simulator):
         raise BadInputError("--board goes with --masses on a running simulator (simbus:NAME)")
     if masses is not None:
         kilograms = _masses(masses)
@@ -226,34 +218,31 @@ def calibrate(
         cell = cells.model_copy(update={"sensors": (cells.sensors[number],)})
         run.prepare(overwrite, yes, "the made-fast cable is pulled by the winch")
         run.by_load_cell(pull, cell, port)
-    run.finish()
+    _finish(out, run.folder, profile)
 
 
 @dataclass(frozen=True)
 class _Run:
     """One calibration: where it measures and where it leaves its files."""
 
-    winch: Winch
-    url: BusUrl
-    out: Output
+    winch: WinchOnBus
     folder: Path
-    plant: Path | None
     safety_io: str | None
 
     def prepare(self, overwrite: bool, yes: bool, what: str) -> None:
         """Make room for recordings and ask before a real motor is energised."""
-        _refuse_loss(self.folder, overwrite)
-        confirm_motion(self.url, yes, what)
+        refuse_loss(self.folder, calibration.raw_folder(self.folder), overwrite)
+        confirm_motion(self.winch.url, yes, what)
         _make_room(self.folder)
 
     def by_masses(
         self, plan: HoistPlan, masses_kg: list[float], gravity: float, board: Path | None
     ) -> None:
         """Record the raising and lowering of masses."""
-        winch, out = self.winch, self.out
+        winch, out = self.winch.profile, self.winch.out
         with ExitStack() as stack:
-            url, hang = _hands(stack, winch, self.url, out, self.plant, board)
-            stack.enter_context(_keeping(self.folder))
+            url, hang = _bus_and_hanging(stack, self.winch, board)
+            stack.enter_context(keeping_raw_data(calibration.raw_folder(self.folder)))
             tolerance = hoist_tolerance(plan)
             opened = open_winch(winch, url, out, safety_io=self.safety_io, tolerance=tolerance)
             session = stack.enter_context(opened)
@@ -262,21 +251,17 @@ class _Run:
 
     def by_load_cell(self, plan: AnchorPlan, cell: TensionSensors, port: str) -> None:
         """Record the pull at a made-fast cable."""
-        winch, out = self.winch, self.out
+        at, out = self.winch, self.winch.out
         with ExitStack() as stack:
-            stack.enter_context(_keeping(self.folder))
+            stack.enter_context(keeping_raw_data(calibration.raw_folder(self.folder)))
             opened = open_winch(
-                winch, self.url, out, self.plant, safety_io=self.safety_io, tolerance=TOLERANCE
+                at.profile, at.url, out, at.plant, safety_io=self.safety_io, tolerance=TOLERANCE
             )
             session = stack.enter_context(opened)
             sampler = stack.enter_context(TensionSampler(cell, port, session.device.clock))
-            session.beside(lambda: sampler.await_readings(_FIRST_READING_S))
+            session.run_task(lambda: sampler.await_readings(_FIRST_READING_S))
             path = calibration.pull_file(self.folder)
-            measure_anchored(session, out, path, plan, sampler)
-
-    def finish(self) -> None:
-        """Identify, and say and store what was found."""
-        _finish(self.out, self.folder, self.winch)
+            measure_anchored(session, out, path, plan, sampler.exchange)
 
 
 @app.command()
@@ -293,13 +278,18 @@ def fit(
 
 
 def _finish(out: Output, folder: Path, winch: Winch) -> None:
-    with _keeping(folder):
-        found = calibration.calibrate(folder, winch)
-    path = folder / calibration.FILE_NAME
-    calibration.show(out, found, path)
+    with keeping_raw_data(calibration.raw_folder(folder)):
+        found, points = calibration.calibrate(folder, winch)
+    path, picture = folder / calibration.FILE_NAME, folder / calibration.PICTURE
+    from cdpr_tools.tension.picture import draw_calibration  # noqa: PLC0415  # slow to load
+
+    try:
+        draw_calibration(picture, points, found)
+    except OSError as error:
+        raise WorkFailedError(f"{picture}: cannot be written: {error.strerror}") from error
+    show(out, found, path)
     result = found.model_dump(mode="json")
-    picture = str(folder / calibration.PICTURE)
-    out.result({"ok": True, "calibration": str(path), "picture": picture, **result})
+    out.result({"ok": True, "calibration": str(path), "picture": str(picture), **result})
 
 
 def _masses(text: str) -> list[float]:
@@ -307,16 +297,6 @@ def _masses(text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise BadInputError(f"--masses {text}: numbers in kg are wanted, as 2,5,10") from None
-
-
-def _refuse_loss(folder: Path, overwrite: bool) -> None:
-    """Raise BadInputError where earlier recordings would be lost."""
-    raw = calibration.raw_folder(folder)
-    if raw.is_dir() and any(raw.iterdir()) and not overwrite:
-        raise BadInputError(
-            f"--out {folder}: holds the data of an earlier run; choose another folder, or "
-            "replace it with --overwrite"
-        )
 
 
 def _make_room(folder: Path) -> None:
@@ -328,27 +308,11 @@ def _make_room(folder: Path) -> None:
         raise BadInputError(f"--out {folder}: cannot be written: {error.strerror}") from error
 
 
-@contextmanager
-def _keeping(folder: Path) -> Iterator[None]:
-    """Add to an error's message where the recordings are."""
-    raw = calibration.raw_folder(folder)
-    try:
-        yield
-    except (ControlError, DriverError) as error:
-        if not any(raw.glob("*.raw")):
-            raise
-        raise WorkFailedError(f"{error} (recorded so far: {raw})") from error
-
-
-def _hands(
-    stack: ExitStack,
-    winch: Winch,
-    url: BusUrl,
-    out: Output,
-    plant: Path | None,
-    board: Path | None,
+def _bus_and_hanging(
+    stack: ExitStack, winch: WinchOnBus, board: Path | None
 ) -> tuple[BusUrl, Hang]:
-    """Return the bus and who hangs masses there, with a simulator of our own for `simbus:`."""
+    """Return the bus and what hangs masses there, with a simulator of our own for `simbus:`."""
+    url, plant = winch.url, winch.plant
     if not url.starts_own_simulator:
         if plant is not None:
             raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
@@ -359,8 +323,8 @@ def _hands(
         plant = place / "plant.toml"
         plant.write_text(_MASS_PLANT)
     url = open_bus(f"simbus:own-{os.getpid()}")
-    out.note("starting the simulated drive ...")
-    simulator = OwnSimulator(winch.reference, str(url), plant, board=board)
+    winch.out.note("starting the simulated drive ...")
+    simulator = OwnSimulator(winch.profile.reference, str(url), plant, board=board)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return url, on_board(board)

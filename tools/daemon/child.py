@@ -1,4 +1,4 @@
-"""What both of a daemon's processes do at their start: end with their launcher."""
+"""The link of a daemon's processes to their launcher: they end when it ends."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import signal
 _PR_SET_PDEATHSIG = 1
 
 
-def end_with(launcher_pid: int) -> None:
+def end_with_launcher(launcher_pid: int) -> None:
     """Have the kernel send this process SIGTERM when its launcher ends, however it ends.
 
     Call it once the process handles SIGTERM; a launcher that has ended already counts as well.
@@ -18,11 +18,11 @@ def end_with(launcher_pid: int) -> None:
     if launcher_pid == 0:
         return
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-    if orphaned(launcher_pid):
+    if launcher_ended(launcher_pid):
         os.kill(os.getpid(), signal.SIGTERM)
 
 
-def orphaned(launcher_pid: int) -> bool:
+def launcher_ended(launcher_pid: int) -> bool:
     """Whether the launcher that this process was started by has ended."""
     return launcher_pid not in (0, os.getppid())
 

@@ -1,4 +1,4 @@
-"""One of the daemon's two processes, as their launcher has it."""
+"""One of the daemon's two processes, as their launcher sees it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from tools.daemon.settings import RunSettings
+from cdpr_tools.daemon.settings import RunSettings
 
 # one thread for each library: the loop's process has one core to itself
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
@@ -35,14 +35,14 @@ class Child:
 
     @property
     def end(self) -> str:
-        """How it ended, in words; empty while it lives."""
+        """How it ended, as text; empty while it runs."""
         code = self.process.poll()
         if code is None:
             return ""
         return f"killed by signal {-code}" if code < 0 else f"ended with exit status {code}"
 
     def stop(self, timeout_s: float) -> bool:
-        """Ask it to end and wait; whether it did so by itself in time."""
+        """Terminate it and wait; return whether it ended before it had to be killed."""
         if self.process.poll() is None:
             self.process.terminate()
         try:
@@ -56,7 +56,7 @@ class Child:
             self.close()
 
     def close(self) -> None:
-        """Let go of the descriptor; safe to repeat."""
+        """Close the descriptor; safe to repeat."""
         if self.pidfd >= 0:
             os.close(self.pidfd)
             self.pidfd = -1

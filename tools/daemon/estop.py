@@ -1,4 +1,4 @@
-"""Takes the power from a robot by its loop's process alone, whatever the daemon's service does."""
+"""Emergency stop by a signal to the loop's process, independent of the daemon's service."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from cdpr_rt.runtime.shared_block import SharedBlock, SharedBlockError
-from cdpr_rt.runtime.states import LoopState
-from drivers.cia402 import POWER_OFF, state_of
-from profiles.errors import brief
-from tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
-from tools.errors import WorkFailedError
+from cdpr_drivers.cia402 import POWER_OFF, state_of
+from cdpr_profiles.errors import brief
+from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
+from cdpr_rt.core.states import LoopState
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
+from cdpr_tools.errors import WorkFailedError
 
 _LOOK_S = 0.02
 # the drives are asked over and over, and once more by SDO, where one does not confirm
@@ -25,32 +25,32 @@ _CONFIRM_S: Final = 15.0
 _STALLED_S: Final = 1.0
 _KILLED_S: Final = 2.0
 _UNHEARD_S: Final = 1.0
-# a daemon that only listens hears of what was told to the master in the same breath
+# a daemon that only listens sees the effect of a signal sent to the master at the same time
 _LISTENS_S: Final = 2.0
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What has become of one robot's power."""
+    """Result of the emergency stop of one robot."""
 
     robot: str
     confirmed: bool
-    """Whether every drive has said that it has no power."""
+    """Whether every drive has confirmed that its power is off."""
     text: str
 
 
 class EmergencyStop:
-    """One robot's loop, told to take the power as soon as this is made; `outcome` waits for it."""
+    """Signals one robot's loop to remove the power when made; `outcome` waits for the drives."""
 
     def __init__(self, path: Path) -> None:
         """Tell the loop that the file at `path` names."""
         self._robot = path.stem
         self._pidfd = -1
         self._block: SharedBlock | None = None
-        self._known: Outcome | None = self._tell(path)
+        self._known: Outcome | None = self._signal_loop(path)
         self._asked_ns = time.monotonic_ns()
 
-    def _tell(self, path: Path) -> Outcome | None:
+    def _signal_loop(self, path: Path) -> Outcome | None:
         """Send the signal; return what is known without waiting, None where there is to wait."""
         try:
             found = self._found = LoopFile.read(path)
@@ -59,7 +59,7 @@ class EmergencyStop:
         except WorkFailedError as error:
             return self._failed(str(error))
         if pidfd is None:
-            return self._failed(f"its loop has ended; {_by_themselves(found)}")
+            return self._failed(f"its loop has ended; {_own_stop_notice(found)}")
         self._pidfd = pidfd
         try:  # to one that only listens as well: only its memory says so, and it lets it be
             signal.pidfd_send_signal(pidfd, POWER_OFF_SIGNAL)
@@ -67,17 +67,17 @@ class EmergencyStop:
             whose = _user(found.uid)
             return self._failed(f"its loop is {whose}'s: `sudo -u {whose} cdpr estop` may stop it")
         except ProcessLookupError:
-            return self._failed(f"its loop has ended; {_by_themselves(found)}")
+            return self._failed(f"its loop has ended; {_own_stop_notice(found)}")
         return None
 
     def close(self) -> None:
-        """Let go of the process."""
+        """Close the descriptor of the process."""
         if self._pidfd >= 0:
             os.close(self._pidfd)
             self._pidfd = -1
 
     def outcome(self) -> Outcome:
-        """Wait until every drive has said that it has no power, or it is known that none will.
+        """Wait until every drive has confirmed, or it is known that some will not.
 
         A loop that does not turn is killed: its drives stop by themselves without its heartbeat.
         One that only listens is left alone.
@@ -90,17 +90,17 @@ class EmergencyStop:
             return self._failed(f"what its drives say cannot be seen: {error}")
         while not (off := self._power_is_off()):
             if self._ended(_LOOK_S):
-                return self._failed("its loop has ended; " + _by_themselves(self._found))
+                return self._failed("its loop has ended; " + _own_stop_notice(self._found))
             alive_ns = int(block.counters["loop_alive_ns"][0])
             stalled = self._since_s(max(alive_ns, self._asked_ns)) > _STALLED_S
             if stalled and not self._listens():
                 return self._kill()
-            if doubt := self._doubt():
-                return self._failed(f"{doubt} ({self._told()})")
+            if failure := self._failure_reason():
+                return self._failed(f"{failure} ({self._reported_state()})")
         return Outcome(self._robot, True, off)
 
-    def _doubt(self) -> str:
-        """Return why nothing more is to be waited for, empty until then."""
+    def _failure_reason(self) -> str:
+        """Return why waiting ends without a confirmation, empty until then."""
         since_s = self._since_s(self._asked_ns)
         if self._listens():
             waits = since_s <= _LISTENS_S
@@ -116,7 +116,7 @@ class EmergencyStop:
         killed = "was killed" if self._ended(_KILLED_S) else "does not even end when it is killed"
         return self._failed(
             f"its loop has not turned for {_STALLED_S:g} s and {killed}; "
-            + _by_themselves(self._found)
+            + _own_stop_notice(self._found)
         )
 
     def _failed(self, text: str) -> Outcome:
@@ -139,7 +139,7 @@ class EmergencyStop:
         )
 
     def _power_is_off(self) -> str:
-        """Return in words that every drive says so in a cycle begun since; empty until then."""
+        """Return that every drive confirms in a cycle begun since, as text; empty until then."""
         block = self._block
         assert block is not None  # attached
         if not self._cycling():
@@ -148,7 +148,7 @@ class EmergencyStop:
         off = all(state_of(int(word)) in POWER_OFF for word in row["statusword"])
         if row["state"] == LoopState.ACTIVE or not off or not row["alive"].all():
             return ""
-        return f"power is off, every drive says so ({self._told()})"
+        return f"power is off, every drive says so ({self._reported_state()})"
 
     def _listens(self) -> bool:
         """Whether the loop only listens, and commands no drive."""
@@ -158,23 +158,23 @@ class EmergencyStop:
         except SharedBlockError:  # it died in the middle of writing
             return False
 
-    def _told(self) -> str:
+    def _reported_state(self) -> str:
         assert self._block is not None  # attached
         try:
-            told = self._block.status()
+            status = self._block.status()
         except SharedBlockError as error:
             return str(error)
-        state, reason = str(told.get("state")), told.get("reason")
+        state, reason = str(status.get("state")), status.get("reason")
         return brief(f"{state}: {reason}" if reason else state)
 
 
 def _attach(found: LoopFile) -> SharedBlock:
-    # who looks on must not be able to write, and what is no memory must not keep anybody waiting
+    # read only, and not waiting where the descriptor is no shared memory (a FIFO, a terminal)
     flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
     return SharedBlock.attach(os.open(f"/proc/{found.pid}/fd/{found.block_fd}", flags))
 
 
-def _by_themselves(found: LoopFile) -> str:
+def _own_stop_notice(found: LoopFile) -> str:
     return (
         "drives that had power from it stop by themselves, without its heartbeat, within "
         f"{found.drives_stop_s:g} s: look whether they have"

@@ -11,19 +11,19 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any, Final
 
-from cdpr_rt.runtime.shared_block import SharedBlock, SharedBlockError
-from cdpr_rt.runtime.stop_requests import CUT_SHORT
-from tools.daemon.child_process import Child, move_to
-from tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
-from tools.daemon.notify import ServiceManager
-from tools.daemon.settings import RunSettings
-from tools.errors import BAD_INPUT, DONE, FAILED
-from tools.simulator import OwnSimulator
+from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
+from cdpr_rt.runtime.control_loop.stop_requests import CUT_SHORT
+from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.daemon.child_process import Child, move_to
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
+from cdpr_tools.daemon.notify import ServiceManager
+from cdpr_tools.daemon.settings import RunSettings
+from cdpr_tools.errors import BAD_INPUT, DONE, FAILED
 
-LOOP: Final = "tools.daemon.loop_process"
-SERVICE: Final = "tools.daemon.service_process"
+LOOP: Final = "cdpr_tools.daemon.loop_process"
+SERVICE: Final = "cdpr_tools.daemon.service_process"
 DEAD: Final = "dead"
-"""The state that is told of a loop that has died; no state of a loop that lives."""
+"""The state that is reported of a loop that has died; no state of a loop that lives."""
 
 _TURN_S = 0.2
 # a controlled stop from full speed, and brakes that follow, take less, besides a lowering
@@ -48,21 +48,21 @@ _STEADY_S = 30.0
 class Launcher:
     """Runs the daemon until it is told to stop, or until its loop has stopped on command.
 
-    `tell` gets a line for people now and then, `ready` the loop's status once both are up.
+    `say` gets a line for people now and then, `ready` the loop's status once both are up.
     """
 
     def __init__(
         self,
         settings: RunSettings,
         block: SharedBlock,
-        tell: Callable[[str], None],
+        say: Callable[[str], None],
         ready: Callable[[dict[str, Any]], None],
         manager: ServiceManager,
         simulator: OwnSimulator | None = None,
     ) -> None:
         self._settings = settings
         self._block = block
-        self._tell = tell
+        self._say = say
         self._ready = ready
         self._simulator = simulator
         self._manager = manager
@@ -73,7 +73,7 @@ class Launcher:
         self._stalled = False
         self._left_core = False
         self._loop_file: LoopFile | None = None
-        self._told = ""
+        self._reported = ""
         self._fault: tuple[Any, str] | None = None
         self._fed = 0.0
         self._failure = FAILED
@@ -82,7 +82,7 @@ class Launcher:
 
     def run(self) -> int:
         """Run both processes; return the exit status for the shell."""
-        with _noted_signals(self._signals) as wakeup:
+        with _recorded_signals(self._signals) as wakeup:
             # it stays as long as the loop does, whatever becomes of this process
             lifeline = () if self._simulator is None else (self._simulator.lifeline,)
             self._loop, self._wakeup = Child(LOOP, self._settings, lifeline), wakeup
@@ -122,10 +122,10 @@ class Launcher:
         if code == DONE:
             return True
         if code is not None and not self._up:
-            self._could_not_begin("loop", self._loop)
+            self._start_failed("loop", self._loop)
         return not self._up and bool(self.reason)
 
-    def _could_not_begin(self, name: str, child: Child) -> None:
+    def _start_failed(self, name: str, child: Child) -> None:
         self.reason = f"the {name} could not begin: {child.end}"
         if child.process.returncode == BAD_INPUT:
             self._failure = BAD_INPUT
@@ -133,16 +133,16 @@ class Launcher:
     def _turn(self) -> None:
         now = time.monotonic()
         self._leave_core()
-        self._name_loop()
+        self._write_loop_file()
         self._watch_loop()
         self._watch_service(now)
         status = self._status()
         reachable = self._loop_file is not None and self._settings.socket.exists()
         if not self._up and _settled(status) and reachable:
             self._up = True
-            self._manager.tell(READY=1)
+            self._manager.notify(READY=1)
             self._ready(status)
-        self._tell_of_faults(status)
+        self._report_faults(status)
         if self._manager.asks:
             self._report(status, now)
 
@@ -153,18 +153,20 @@ class Launcher:
                 self._block.write_status(
                     {**self._status(), "state": DEAD, "reason": self.reason, "reason_limit": None}
                 )
-                self._tell(f"{self.reason}; the drives stop by themselves. The service stays")
+                self._say(f"{self.reason}; the drives stop by themselves. The service stays")
             return
         stalled = self._up and self._silence_s("loop_alive_ns") > _LOOP_STALLED_S
         if stalled != self._stalled:
             self._stalled = stalled
-            self._tell(
+            if self._status().get("lockstep"):  # time stands still with it: nothing is missed
+                return
+            self._say(
                 f"the loop has not turned for {_LOOP_STALLED_S:g} s"
                 if stalled
                 else "the loop turns again"
             )
 
-    def _name_loop(self) -> None:
+    def _write_loop_file(self) -> None:
         """Say in the runtime folder which process `cdpr estop` goes to, once it would obey.
 
         A daemon whose loop cannot be named ends, before it has said that it is ready.
@@ -210,12 +212,12 @@ class Launcher:
             # an address that is taken may be free again in a moment, bad input stays bad
             hopeless = self._service.process.returncode == BAD_INPUT
             if not self._up and (hopeless or self._restarts >= len(_RESTART_S)):
-                self._could_not_begin("service", self._service)
+                self._start_failed("service", self._service)
                 return
             lived = now - self._service.started
             self._restarts = 1 if lived > _STEADY_S else self._restarts + 1
             pause = _RESTART_S[min(self._restarts, len(_RESTART_S)) - 1]
-            self._tell(f"the service {self._service.end}; it starts again in {pause:g} s")
+            self._say(f"the service {self._service.end}; it starts again in {pause:g} s")
             self._service.close()
             self._service, self._restart_at = None, now + pause
         elif now >= self._restart_at:
@@ -227,61 +229,61 @@ class Launcher:
         if not self._block.counters["service_alive_ns"][0]:  # it has not turned even once
             silent_s, allowed_s = time.monotonic() - service.started, _SERVICE_START_S
         if silent_s > allowed_s:
-            self._tell(f"the service has not turned for {allowed_s:g} s and is killed")
+            self._say(f"the service has not turned for {allowed_s:g} s and is killed")
             service.process.kill()
             service.process.wait()
 
-    def _tell_of_faults(self, status: dict[str, Any]) -> None:
+    def _report_faults(self, status: dict[str, Any]) -> None:
         """Say why the motion ended, at the terminal or in the journal; once each time."""
         if not self._up or not status or status.get("state") == DEAD:
             return
         is_fault = status.get("state") == "fault"
         fault = (status.get("since_ns"), _summary(status)) if is_fault else None
         if fault is not None and fault != self._fault:
-            self._tell(fault[1])
+            self._say(fault[1])
         self._fault = fault
 
     def _report(self, status: dict[str, Any], now: float) -> None:
         """Keep the service manager informed; its watchdog is fed while the loop lives and turns."""
         text = _summary(status)
-        if text == self._told:
-            self._manager.tell_again()
+        if text == self._reported:
+            self._manager.retry()
         else:
-            self._told = text
-            self._manager.tell(STATUS=text)
+            self._reported = text
+            self._manager.notify(STATUS=text)
         due = self._manager.watchdog_s and now - self._fed > self._manager.watchdog_s / 4.0
         if due and not self._loop.end and not self._stalled and self._manager.feed():
             self._fed = now
 
     def _stop(self) -> int:
         """End the loop under control, then the service, so that the recording is whole."""
-        self._manager.tell(STOPPING=1, STATUS="stopping")
+        self._manager.notify(STOPPING=1, STATUS="stopping")
         failure = self._stop_loop()
         self.reason = self.reason or failure
         if self._service is not None and not self._service.stop(_SERVICE_STOP_S):
-            self._tell("the service did not end by itself and was killed")
-        self._manager.tell_again()
+            self._say("the service did not end by itself and was killed")
+        self._manager.retry()
         return self._failure if self.reason else DONE
 
     def _stop_loop(self) -> str:
         """End the loop; return why it did not end well, empty when it did."""
-        patience_s = self._described("lowering_s") + _LOOP_STOP_S
+        timeout_s = self._described("lowering_s") + _LOOP_STOP_S
         if self._status().get("driving"):
-            self._tell(self._what_a_stop_does(patience_s))
-        patience_s = _LOOP_STALLED_S if self._stalled else patience_s
+            self._say(self._stop_notice(timeout_s))
+        timeout_s = _LOOP_STALLED_S if self._stalled else timeout_s
         self._loop.process.terminate()
         began_s, at_once = time.monotonic(), False
-        while not self._loop.end and time.monotonic() < began_s + patience_s:
+        while not self._loop.end and time.monotonic() < began_s + timeout_s:
             self._wait()
-            self._manager.tell_again()
+            self._manager.retry()
             if not at_once and self._asked_twice():
-                at_once, began_s, patience_s = True, time.monotonic(), _AT_ONCE_S
-                self._tell("the power is taken at once")
+                at_once, began_s, timeout_s = True, time.monotonic(), _AT_ONCE_S
+                self._say("the power is taken at once")
                 self._loop.process.send_signal(POWER_OFF_SIGNAL)
         if not self._loop.end:
             self._loop.process.kill()
             self._loop.process.wait()
-            return f"the loop did not stop within {patience_s:g} s and was killed"
+            return f"the loop did not stop within {timeout_s:g} s and was killed"
         if CUT_SHORT in (reason := str(self._status().get("reason", ""))):
             return reason
         code = self._loop.process.returncode
@@ -289,16 +291,16 @@ class Launcher:
         loading = code == -signal.SIGTERM and not self._block.counters["loop_alive_ns"][0]
         return "" if code == DONE or loading else f"the loop {self._loop.end}"
 
-    def _what_a_stop_does(self, patience_s: float) -> str:
+    def _stop_notice(self, timeout_s: float) -> str:
         lowers = self._described("lowering_s") > 0.0
         what = "the platform is let down, unless brakes hold it" if lowers else "the axes brake"
         return (
-            f"stopping: {what}, then the power goes off; this may take up to {patience_s:.0f} s. "
+            f"stopping: {what}, then the power goes off; this may take up to {timeout_s:.0f} s. "
             "A second Ctrl-C takes the power at once"
         )
 
     def _asked_twice(self) -> bool:
-        """Whether somebody has asked for the end again; a terminal that closes asks nothing."""
+        """Whether the end was asked for twice; SIGHUP of a closing terminal does not count."""
         times = [at_s for number, at_s in self._signals if number != signal.SIGHUP]
         return bool(times) and times[-1] - self._signals[0][1] > _SAME_PRESS_S
 
@@ -330,7 +332,7 @@ def _summary(status: dict[str, Any]) -> str:
 
 
 @contextmanager
-def _noted_signals(noted: list[tuple[int, float]]) -> Iterator[int]:
+def _recorded_signals(noted: list[tuple[int, float]]) -> Iterator[int]:
     """Note what asks the daemon to end, and yield a descriptor that can be read after each."""
 
     def note(number: int, _frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""The file that names a daemon's loop, so that its process can be told to take the power at once.
+"""The file that names a daemon's loop, so that a signal can have its process take the power.
 
 It lies beside the daemon's socket. The launcher writes it once the loop obeys `POWER_OFF_SIGNAL`.
 What it says is believed of its owner's own processes only: who reads it may be root.
@@ -16,10 +16,10 @@ from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from profiles.bounded_input import open_regular, parse_json
-from profiles.errors import ProfileError, brief
-from tools.daemon.paths import LOOP_SUFFIX, is_trusted
-from tools.errors import WorkFailedError
+from cdpr_profiles.errors import ProfileError, brief
+from cdpr_profiles.reading.bounded_input import open_regular, parse_json
+from cdpr_tools.daemon.paths import LOOP_SUFFIX, is_trusted
+from cdpr_tools.errors import WorkFailedError
 
 POWER_OFF_SIGNAL: Final = signal.SIGUSR1
 """Has a loop take torque and power from its drives at once and latch a fault."""
@@ -35,7 +35,7 @@ class LoopFile(BaseModel):
 
     robot: Annotated[str, AfterValidator(brief)]
     uid: int = Field(ge=0)
-    """Whose process and whose file it is."""
+    """User id of the process, who owns the file as well."""
     pid: int = Field(gt=1, le=_MOST_PID)
     started: int = Field(ge=0)
     """When it was started, in clock ticks since the machine was: no other process has both."""
@@ -68,7 +68,7 @@ class LoopFile(BaseModel):
 
     @classmethod
     def read(cls, path: Path) -> LoopFile:
-        """Return what is in the file; raises WorkFailedError, also for a stranger's."""
+        """Return what is in the file; raises WorkFailedError, also for another user's."""
         try:
             with os.fdopen(open_regular(path, links=False), "rb") as file:
                 owner = os.fstat(file.fileno()).st_uid
@@ -121,9 +121,9 @@ class LoopFile(BaseModel):
             lines = Path(f"/proc/{self.pid}/status").read_text().splitlines()
         except OSError:
             return False
-        told = dict(line.split(":\t", 1) for line in lines if ":\t" in line)
-        caught = int(told["SigCgt"], 16) >> (POWER_OFF_SIGNAL - 1) & 1
-        return set(told["Uid"].split()) == {str(self.uid)} and bool(caught)
+        fields = dict(line.split(":\t", 1) for line in lines if ":\t" in line)
+        caught = int(fields["SigCgt"], 16) >> (POWER_OFF_SIGNAL - 1) & 1
+        return set(fields["Uid"].split()) == {str(self.uid)} and bool(caught)
 
 
 def started(pid: int) -> int:

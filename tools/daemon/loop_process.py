@@ -10,34 +10,36 @@ from dataclasses import asdict
 from types import FrameType
 from typing import Any
 
+from cdpr_drivers.errors import DriverError
+from cdpr_drivers.robot.bus_fit import require_fit
+from cdpr_drivers.robot.commissioned import compensation_of, load_profiles, with_commissioned
+from cdpr_drivers.robot.listening_machine import ListeningMachine
+from cdpr_drivers.robot.machine import RobotMachine
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.errors import ProfileError
+from cdpr_rt.core.estimate import Estimator
+from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.errors import ControlError
-from cdpr_rt.realtime import settle_memory, stay_punctual
-from cdpr_rt.rehearsal import rehearse_judgement
-from cdpr_rt.runtime.estimate import Estimator
-from cdpr_rt.runtime.loop import ControlLoop
-from cdpr_rt.runtime.loop_parts import LoopParts
-from cdpr_rt.runtime.machine import Machine
-from cdpr_rt.runtime.programs.lower import lowering_s
-from cdpr_rt.runtime.programs.model import model_of
-from cdpr_rt.runtime.programs.registry import (
+from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
+from cdpr_rt.programs.registry import (
     build_programs,
     platform_parts,
-    rehearse_programs,
+    warm_up_programs,
 )
-from cdpr_rt.runtime.robot_arrays import described, limits_of, supervised, winches_of
-from cdpr_rt.runtime.shared_block import SharedBlock
+from cdpr_rt.robots.robot_arrays import described, limits_of, supervised, winches_of
+from cdpr_rt.runtime.control_loop.loop import ControlLoop
+from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
+from cdpr_rt.runtime.machine import Machine
+from cdpr_rt.runtime.realtime import enable_realtime, freeze_memory
+from cdpr_rt.runtime.warm_up import warm_up_supervision
 from cdpr_rt.state_file import state_path
-from cdpr_rt.supervisor import Supervisor
-from profiles import Robot, load_robot
-from profiles.errors import ProfileError
-from tools.bus_fit import require_fit
-from tools.commissioned import compensation_of, load_profiles, with_commissioned
-from tools.daemon.child import end_with
-from tools.daemon.listening_machine import ListeningMachine
-from tools.daemon.loop_file import POWER_OFF_SIGNAL
-from tools.daemon.machine import RobotMachine
-from tools.daemon.settings import RunSettings
-from tools.errors import BAD_INPUT, DONE, FAILED, CommandError
+from cdpr_tools.daemon.child import end_with_launcher
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
+from cdpr_tools.daemon.settings import RunSettings
+from cdpr_tools.errors import BAD_INPUT, DONE, FAILED
 
 
 def main() -> int:
@@ -54,56 +56,59 @@ def main() -> int:
             machine = RobotMachine(
                 robot, settings.buses, settings.safety_io, settings.tension_port, real_time=True
             )
-        parts = loop_parts(robot, block)
-    except (ProfileError, CommandError, ControlError) as error:
+        limits = limits_of(robot)
+        parts = loop_parts(robot, limits, block)
+    except (ProfileError, DriverError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)
         return BAD_INPUT
-    block.write_description(description(robot, parts))
+    block.write_description(description(robot, limits, parts))
     if parts.last is not None and robot.platform is not None:
         parts.last.path = state_path("lengths", robot.profile)
         parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
     loop = ControlLoop(block, machine, parts)
-    loop.notices += settle_memory()
+    loop.engine.notices += freeze_memory()
     _obey_signals(loop)
-    end_with(settings.launcher_pid)
+    end_with_launcher(settings.launcher_pid)
     counters = block.counters
     if counters["start_monotonic_ns"][0] == 0:
         counters["start_monotonic_ns"] = time.monotonic_ns()
         counters["start_realtime_ns"] = time.time_ns()
     counters["loop_pid"] = os.getpid()
     loop.run()
-    if loop.doubt:
-        print(f"cdpr: {loop.doubt}", file=sys.stderr)
+    if unconfirmed := loop.transitions.power_off_unconfirmed:
+        print(f"cdpr: {unconfirmed}", file=sys.stderr)
         return FAILED
     return DONE
 
 
-def loop_parts(robot: Robot, block: SharedBlock) -> LoopParts:
-    """Return what the loop of `robot` runs, compiled and ready."""
+def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
+    """Return what the loop of `robot` runs within `limits`, compiled and ready."""
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
-    limits = limits_of(robot)
     latencies = [axis.winch.latency_s for axis in axes]
     known = compensation_of(robot, load_profiles(robot))
     model = model_of(axes, period_s, latencies, limits, known)
     estimator = Estimator(n, period_s, winches_of(axes))
     platform = platform_parts(robot, limits, model, estimator)
     programs = build_programs(model, block, platform)
+    lowering = None
+    if platform is not None:
+        lowering = Lowering(LowerProgram.name, lowering_s(platform.platform))
     names = [axis.name for axis in axes]
     parts = LoopParts(
         programs=programs,
         supervisor=Supervisor(supervised(limits, robot), n, period_s, names),
         estimator=estimator,
         lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
-        lowering_s=0.0 if platform is None else lowering_s(platform.platform),
+        lowering=lowering,
         last=None if platform is None else platform.last,
-        punctual=stay_punctual,
+        enable_realtime=enable_realtime,
     )
-    rehearse_programs(programs, n, platform)
-    rehearse_judgement(estimator, parts.supervisor, n)
+    warm_up_programs(programs, n, platform)
+    warm_up_supervision(estimator, parts.supervisor, n)
     return parts
 
 
-def description(robot: Robot, parts: LoopParts) -> dict[str, Any]:
+def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:
     """Return what people and programs should know of a robot that is run."""
     return {
         "robot": robot.name,
@@ -124,9 +129,9 @@ def description(robot: Robot, parts: LoopParts) -> dict[str, Any]:
             }
             for axis in robot.axes
         ],
-        "limits": described(limits_of(robot), len(robot.axes)),
+        "limits": described(limits, len(robot.axes)),
         "programs": list(parts.programs),
-        "lowering_s": parts.lowering_s,
+        "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
         "platform": None if robot.platform is None else asdict(robot.platform),
         "notes": list(robot.notes),
     }
@@ -136,12 +141,12 @@ def _obey_signals(loop: ControlLoop) -> None:
     def stop(_number: int, _frame: FrameType | None) -> None:
         loop.request_stop()
 
-    def take_power(_number: int, _frame: FrameType | None) -> None:
+    def remove_power(_number: int, _frame: FrameType | None) -> None:
         loop.request_power_off()
 
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, stop)
-    signal.signal(POWER_OFF_SIGNAL, take_power)
+    signal.signal(POWER_OFF_SIGNAL, remove_power)
 
 
 if __name__ == "__main__":

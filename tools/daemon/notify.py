@@ -1,4 +1,4 @@
-"""What systemd is told of the daemon, as sd_notify(3) describes it; nothing where nobody asks."""
+"""Notifications to systemd as of sd_notify(3), where it asks for them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MOST_CHARS: Final = 900
 class ServiceManager:
     """The manager that started this process with Type=notify, if one did.
 
-    What tells so is taken out of the environment: children do not speak for the daemon.
+    Its variables are removed from the environment: children do not notify in our place.
     """
 
     def __init__(self) -> None:
@@ -22,31 +22,31 @@ class ServiceManager:
         microseconds = os.environ.pop("WATCHDOG_USEC", "")
         whose = os.environ.pop("WATCHDOG_PID", "")
         self._address = "\0" + address[1:] if address.startswith("@") else address
-        self._owed: dict[str, str] = {}
+        self._pending: dict[str, str] = {}
         watched = microseconds.isdigit() and whose in ("", str(os.getpid()))
         self.watchdog_s = int(microseconds) / 1e6 if watched else 0.0
-        """Silence of this length has the daemon restarted; 0 where nobody watches."""
+        """Watchdog time-out, 0 without a watchdog."""
 
     @property
     def asks(self) -> bool:
-        """Whether somebody wants to be told."""
+        """Whether a manager asks for notifications."""
         return bool(self._address)
 
-    def tell(self, **fields: str | int) -> None:
+    def notify(self, **fields: str | int) -> None:
         """Send assignments such as READY=1; what the manager does not take now is kept.
 
-        Of each name the newest is kept, until `tell_again` finds that it is taken.
+        Of each name the newest is kept, until `retry` finds that it is taken.
         """
-        self._owed.update({key: _one_line(str(value)) for key, value in fields.items()})
-        self.tell_again()
+        self._pending.update({key: _one_line(str(value)) for key, value in fields.items()})
+        self.retry()
 
-    def tell_again(self) -> None:
-        """Send what is owed, if anything is; never waits."""
-        if self._owed and self._sent(self._owed):
-            self._owed.clear()
+    def retry(self) -> None:
+        """Send what the manager has not taken yet; never waits."""
+        if self._pending and self._sent(self._pending):
+            self._pending.clear()
 
     def feed(self) -> bool:
-        """Feed the watchdog; whether that was taken. It is not kept: it tells of this moment."""
+        """Feed the watchdog; return whether that was taken. It is of no use later."""
         return self._sent({"WATCHDOG": "1"})
 
     def _sent(self, fields: Mapping[str, str]) -> bool:

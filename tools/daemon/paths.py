@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 from typing import Final
 
-from tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError
 
 LOOP_SUFFIX: Final = ".loop"
 SOCKET_SUFFIX: Final = ".sock"
@@ -26,7 +26,7 @@ def default_socket(robot: str) -> Path:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
         raise BadInputError(f"{folder}: cannot be made: {error.strerror}; give --socket") from None
-    if not _is_kept_by(folder, os.geteuid()):
+    if not _is_owned_by(folder, os.geteuid()):
         raise BadInputError(f"{folder}: is open to others or not this user's; give --socket")
     return folder / f"{robot}{SOCKET_SUFFIX}"
 
@@ -45,30 +45,30 @@ def find_loop_files(robot: str | None = None) -> list[Path]:
     return _find(robot, LOOP_SUFFIX)
 
 
-def left_out() -> str:
+def unsearched_folders() -> str:
     """Return in words where daemons were not looked for though some may be there."""
-    own, told = _runtime_folder(), []
-    if os.path.lexists(own) and not _is_kept_by(own, os.geteuid()):
-        told.append(f"{own} is open to others or not this user's, and was not looked into")
+    own, reasons = _runtime_folder(), []
+    if os.path.lexists(own) and not _is_owned_by(own, os.geteuid()):
+        reasons.append(f"{own} is open to others or not this user's, and was not looked into")
     if _SYSTEM.is_dir() and not os.access(_SYSTEM, os.R_OK | os.X_OK):
-        told.append(f"{_SYSTEM} is closed to this user, try it with `sudo`")
-    return "; ".join(told)
+        reasons.append(f"{_SYSTEM} is closed to this user, try it with `sudo`")
+    return "; ".join(reasons)
 
 
 def is_trusted(path: Path, owner: int) -> bool:
     """Whether a file of this owner at `path` is this user's, or of who owns its folder."""
     try:
         return owner in (os.geteuid(), path.parent.stat().st_uid)
-    except OSError:  # the folder has gone meanwhile
+    except OSError:  # the folder has been removed meanwhile
         return False
 
 
 def _find(robot: str | None, suffix: str) -> list[Path]:
     found = []
-    # only root makes folders in /run: whoever it has given ours to, is the daemons' user
+    # only root makes folders in /run: the owner of ours is the daemons' user
     for folder, owner in ((_runtime_folder(), os.geteuid()), (_SYSTEM, None)):
         try:
-            files = folder.iterdir() if _is_kept_by(folder, owner) else ()
+            files = folder.iterdir() if _is_owned_by(folder, owner) else ()
             found += sorted(
                 path for path in files if path.suffix == suffix and robot in (None, path.stem)
             )
@@ -77,7 +77,7 @@ def _find(robot: str | None, suffix: str) -> list[Path]:
     return found
 
 
-def _is_kept_by(folder: Path, owner: int | None) -> bool:
+def _is_owned_by(folder: Path, owner: int | None) -> bool:
     """Whether there is a folder, no link to one, of this owner alone; None for any."""
     try:
         held = folder.lstat()

@@ -16,27 +16,26 @@ from typing import Any
 
 from starlette.types import ASGIApp
 
+from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.errors import ControlError
-from cdpr_rt.runtime.shared_block import SharedBlock
-from cdpr_rt.service.app import create_app
-from cdpr_rt.service.auth import Door, Gate
 from cdpr_rt.service.bounded_log import BoundedLog
-from cdpr_rt.service.connections import Turns
-from cdpr_rt.service.foxglove_view import LiveView
+from cdpr_rt.service.http.access_control import AccessControl, AccessPolicy
+from cdpr_rt.service.http.app import create_app
+from cdpr_rt.service.http.connections import FairQueue
+from cdpr_rt.service.http.server import Server
 from cdpr_rt.service.listening import listen_unix
 from cdpr_rt.service.part import Part
-from cdpr_rt.service.recording import Recorder
-from cdpr_rt.service.server import Server
+from cdpr_rt.service.recordings.recording import Recorder
 from cdpr_rt.service.service import Service
-from cdpr_rt.service.setpoint_stream import SetpointStream
-from tools.daemon.child import end_with, is_running, orphaned
-from tools.daemon.settings import RunSettings
-from tools.errors import DONE, FAILED, CommandError
+from cdpr_rt.service.streams.setpoint_stream import SetpointStream
+from cdpr_rt.service.view.foxglove_view import LiveView
+from cdpr_tools.daemon.child import end_with_launcher, is_running, launcher_ended
+from cdpr_tools.daemon.settings import RunSettings
+from cdpr_tools.errors import DONE, FAILED, CommandError
 
 _LOOP_STOP_S, _TURN_S = 70.0, 0.05
 _MOST_FILES = 4096
 _SWITCH_S = 5e-4
-_LOG = logging.getLogger("cdpr.service")
 
 
 def main() -> int:
@@ -62,7 +61,7 @@ def main() -> int:
 
 
 def _allow_many_files() -> None:
-    """So that clients who open connections without end do not keep the recorder from its files."""
+    """Raise the limit of open files: many connections are not to use up the recorder's."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     # bounded all the same: each connection takes memory
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, _MOST_FILES), most))
@@ -73,15 +72,18 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     parts: list[Part] = []
     block, lease = service.block, service.lease
     if settings.record is not None:
-        ended = partial(_recording_ended, service)
+        ended = partial(service.note_failure, Recorder.name)
         recorder = Recorder(block, settings.record, settings.name, ended=ended)
         service.events.listeners.append(partial(_note, recorder))
         parts.append(recorder)
     if settings.live is not None:
-        parts.append(LiveView(block, settings.name, settings.live, settings.live_origins))
+        ended = partial(service.note_failure, LiveView.name)
+        listener = socket.socket(fileno=settings.live_fd)
+        parts.append(LiveView(block, settings.name, listener, settings.live_origins, ended))
     if settings.stream is not None:
+        ended = partial(service.note_failure, SetpointStream.name)
         sock = socket.socket(fileno=settings.stream_fd)
-        parts.append(SetpointStream(block, lease, sock, settings.key()))
+        parts.append(SetpointStream(block, lease, sock, settings.key(), ended))
     return parts
 
 
@@ -89,11 +91,6 @@ def _note(recorder: Recorder, text: str, kind: str, detail: dict[str, Any]) -> N
     """Have an event recorded, beside the states and reasons that the recorder finds by itself."""
     if kind not in ("state", "reason"):
         recorder.remark(text, kind=kind, **detail)
-
-
-def _recording_ended(service: Service, text: str) -> None:
-    service.events.add("recording", text)
-    _LOG.error("%s", text)
 
 
 async def _serve(settings: RunSettings, service: Service) -> None:
@@ -106,10 +103,10 @@ async def _serve(settings: RunSettings, service: Service) -> None:
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, ended.set)
-    end_with(settings.launcher_pid)
+    end_with_launcher(settings.launcher_pid)
     watching = asyncio.create_task(service.watch())
     serving = [asyncio.create_task(server.run_until_told()) for server in servers]
-    waiting = asyncio.create_task(_told_to_end(ended, settings, service.block))
+    waiting = asyncio.create_task(_wait_for_end(ended, settings, service.block))
     try:
         done, _ = await asyncio.wait(
             {watching, waiting, *serving}, return_when=asyncio.FIRST_COMPLETED
@@ -126,29 +123,29 @@ async def _serve(settings: RunSettings, service: Service) -> None:
         settings.socket.unlink(missing_ok=True)
 
 
-async def _told_to_end(ended: asyncio.Event, settings: RunSettings, block: SharedBlock) -> None:
+async def _wait_for_end(ended: asyncio.Event, settings: RunSettings, block: SharedBlock) -> None:
     """Wait for the signal; where the launcher has died, for the loop's controlled stop as well.
 
     Otherwise the launcher has seen to it that the loop has ended first.
     """
     await ended.wait()
     pid, end_s = int(block.counters["loop_pid"][0]), time.monotonic() + _LOOP_STOP_S
-    while orphaned(settings.launcher_pid) and is_running(pid) and time.monotonic() < end_s:
+    while launcher_ended(settings.launcher_pid) and is_running(pid) and time.monotonic() < end_s:
         await asyncio.sleep(_TURN_S)
 
 
 def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Server]:
     """Return the servers: at the Unix socket, and at what the launcher has bound on TCP."""
-    watched = (service.count_refusal, service.lease.is_held_by)
-    turns = Turns()
-    tell = partial(service.events.add, "http")
+    shared = (service.count_refusal, service.lease.is_held_by, service.tickets)
+    queue = FairQueue()
+    note = partial(service.events.add, "http")
     unix = listen_unix(settings.socket)
-    servers = [Server(Gate(app, Door(local=True), *watched), unix, turns, tell)]
+    servers = [Server(AccessControl(app, AccessPolicy(local=True), *shared), unix, queue, note)]
     if (address := settings.http) is not None:
-        door = Door.named(settings.key(), address.host, loopback=address.is_loopback)
+        policy = AccessPolicy.on_tcp(settings.key(), address.host, loopback=address.is_loopback)
         listener = socket.socket(fileno=settings.http_fd)
         service.http = listener.getsockname()[:2]
-        servers.append(Server(Gate(app, door, *watched), listener, turns, tell))
+        servers.append(Server(AccessControl(app, policy, *shared), listener, queue, note))
     return servers
 
 

@@ -12,16 +12,17 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import open_regular
 from cdpr_rt.service.listening import ListenError, listen_tcp
-from cdpr_rt.service.setpoint_stream import StreamError, listen_udp
-from profiles.bounded_input import open_regular
-from profiles.errors import ProfileError
-from tools.errors import BadInputError, WorkFailedError
+from cdpr_rt.service.streams.setpoint_stream import StreamError, listen_udp
+from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _SECRET_CHARS, _MOST_KEY_BYTES = 16, 4096
 _ALL_SEALS = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL
 _OPEN_TO_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _HIGHEST_PORT = 65535
+_LIVE_HOST = "127.0.0.1"
 
 
 def is_loopback(host: str) -> bool:
@@ -48,7 +49,8 @@ class Address(BaseModel):
         """
         host, _, port = text.rpartition(":")
         host = host.removeprefix("[").removesuffix("]") or "127.0.0.1"
-        if not (port.isascii() and port.isdigit()) or int(port) > _HIGHEST_PORT:
+        is_port = port.isascii() and port.isdigit() and int(port) <= _HIGHEST_PORT
+        if not is_port or "[" in host or "]" in host:
             raise BadInputError(f"{option} {text}: allowed: HOST:PORT, [IPV6]:PORT or PORT alone")
         return cls(host=host, port=int(port))
 
@@ -106,7 +108,8 @@ class RunSettings(BaseModel):
     """The key's descriptor, inherited by the service alone, in place of `key_file`."""
     http_fd: int = -1
     stream_fd: int = -1
-    """Sockets at `http` and `stream`, which the service inherits as well."""
+    live_fd: int = -1
+    """Sockets at `http`, `stream` and `live`, which the service inherits as well."""
 
     @model_validator(mode="after")
     def _reachable_with_key_only(self) -> Self:
@@ -125,8 +128,8 @@ class RunSettings(BaseModel):
         """Whether there is a shared key."""
         return self.key_file is not None or self.key_fd >= 0
 
-    def with_key_kept(self) -> RunSettings:
-        """Return settings that need the key's file no more: it is read now, once.
+    def with_key_loaded(self) -> RunSettings:
+        """Return settings that do not need the key's file: it is read now, once.
 
         Processes that are started later inherit the key in sealed memory, whatever becomes of the
         file. Raises BadInputError.
@@ -140,28 +143,34 @@ class RunSettings(BaseModel):
         return self.model_copy(update={"key_file": None, "key_fd": fd})
 
     def with_ports_bound(self) -> RunSettings:
-        """Return settings with sockets at `http` and `stream`: they are bound now, once.
+        """Return settings with sockets at `http`, `stream` and `live`: they are bound now, once.
 
-        Between two services nobody else gets a port to which clients send the key. Raises
-        WorkFailedError.
+        Between two services nobody else gets a port that clients trust. Raises WorkFailedError.
         """
-        http_fd = stream_fd = -1
+        http_fd = stream_fd = live_fd = -1
+        option = "--http"
         try:
             if self.http is not None:
                 http_fd = listen_tcp(self.http.host, self.http.port).detach()
+            option = "--live"
+            if self.live is not None:
+                live_fd = listen_tcp(_LIVE_HOST, self.live).detach()
             if self.stream is not None:
                 host, port = self.stream.host, self.stream.port
                 stream_fd = listen_udp(host, port, self.has_key).detach()
         except ListenError as error:
-            raise WorkFailedError(f"--http {error}") from None
+            raise WorkFailedError(f"{option} {error}") from None
         except StreamError as error:
             raise WorkFailedError(f"--stream: {error}") from None
-        return self.model_copy(update={"http_fd": http_fd, "stream_fd": stream_fd})
+        return self.model_copy(
+            update={"http_fd": http_fd, "stream_fd": stream_fd, "live_fd": live_fd}
+        )
 
     @property
     def service_fds(self) -> tuple[int, ...]:
         """The descriptors that each service inherits, beside the shared memory's."""
-        return tuple(fd for fd in (self.key_fd, self.http_fd, self.stream_fd) if fd >= 0)
+        fds = (self.key_fd, self.http_fd, self.stream_fd, self.live_fd)
+        return tuple(fd for fd in fds if fd >= 0)
 
     def key(self) -> bytes | None:
         """Return the shared key that the launcher has kept, None where there is none."""

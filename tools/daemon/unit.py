@@ -8,10 +8,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cdpr_rt.runtime.programs.lower import lowering_s
-from cdpr_rt.runtime.robot_arrays import can_lower
-from drivers.bus import BusUrl
-from profiles import Robot
+from cdpr_drivers.bus import BusUrl
+from cdpr_profiles import Robot
+from cdpr_rt.programs.platform.lower import lowering_s
+from cdpr_rt.robots.robot_arrays import can_lower
 
 _STOP_S = 60.0
 """What the launcher takes to end the loop and the recording, besides a lowering."""

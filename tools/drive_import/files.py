@@ -9,11 +9,11 @@ from typing import Any
 from canopen.objectdictionary import ObjectDictionary, ODVariable
 from canopen.objectdictionary.eds import import_eds
 
-from profiles.bounded_input import read_bytes
-from profiles.eds_check import EdsFile
-from profiles.eds_text import MOST_EDS_BYTES
-from profiles.eds_write import render_eds
-from tools.drive_import.proposal import Proposal
+from cdpr_profiles.eds.eds_check import EdsFile
+from cdpr_profiles.eds.eds_text import MOST_EDS_BYTES
+from cdpr_profiles.eds.eds_write import render_eds
+from cdpr_profiles.reading.bounded_input import read_bytes
+from cdpr_tools.drive_import.proposal import Proposal
 
 _NODE = 1
 _NAMES = {

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from profiles.eds_check import EdsFile
-from profiles.errors import ProfileError
+from cdpr_profiles.eds.eds_check import EdsFile
+from cdpr_profiles.errors import ProfileError
 
 CONTROL, TARGET_TORQUE = 0x6040, 0x6071
 STATUS, POSITION, TORQUE = 0x6041, 0x6064, 0x6077
@@ -132,13 +132,13 @@ def _choose(
                 [offer.table(entries, _EVERY_SYNC)],
                 "a map of our own, which by the EDS the drive lets be written",
             )
-    spread = _spread(usable, as_they_are, wanted, lambda index: _mappable(eds, index))
+    spread = _over_several_pdos(usable, as_they_are, wanted, lambda index: _mappable(eds, index))
     if spread is not None:
         return Choice(spread, "spread over several PDOs, since none has room for all")
     raise ProfileError(eds.path, kind, _reason(offers, usable, blocked, wanted, kind))
 
 
-def _spread(
+def _over_several_pdos(
     usable: Iterable[PdoOffer],
     as_they_are: Iterable[PdoOffer],
     wanted: tuple[int, ...],
@@ -175,8 +175,8 @@ def _reason(
     if not usable:
         return problem + "none can answer every SYNC (transmission type 1 cannot be written)"
     if blocked:
-        told = ", ".join(f"[{index:04X}] PDOMapping" for index in blocked)
-        return problem + f"{told} is not 1, and no map by default has it"
+        objects = ", ".join(f"[{index:04X}] PDOMapping" for index in blocked)
+        return problem + f"{objects} is not 1, and no map by default has it"
     return problem + "the maps are fixed, or have too few entries that can be written"
 
 

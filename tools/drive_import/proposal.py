@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from drivers.cia402 import Mode, supported_modes
-from profiles.eds_check import EdsFile, require
-from profiles.errors import ProfileError
-from tools.drive_import.pdo_maps import BITS, choose_rpdos, choose_tpdos
+from cdpr_drivers.cia402 import Mode, supported_modes
+from cdpr_profiles.eds.eds_check import EdsFile, require
+from cdpr_profiles.errors import ProfileError
+from cdpr_tools.drive_import.pdo_maps import BITS, choose_rpdos, choose_tpdos
 
 _MANUAL, _ASSUMED = "manual", "assumed"
 _USUAL_HOMING = (33, 34)
@@ -35,10 +35,14 @@ class Proposal:
     """Status and source of each key."""
     unknown: list[Unknown] = field(default_factory=list)
 
-    def know(self, key: str, value: Any, status: str, how: str) -> None:
+    def set(self, key: str, value: Any, status: str, how: str) -> None:
         """Set a key, with where its value comes from."""
         self.table[key] = value
         self.verified[key] = status, how
+
+    def find_out(self, what: str, why: str, how: str) -> None:
+        """Add a fact that has to be found out; see `Unknown`."""
+        self.unknown.append(Unknown(what, why, how))
 
 
 def propose(eds: EdsFile) -> Proposal:
@@ -82,53 +86,47 @@ def _identity(made: Proposal, eds: EdsFile) -> None:
         (2, "product_code", "ProductNumber"),
         (3, "revision", "RevisionNumber"),
     ):
-        own, told = eds.number(0x1018, sub), eds.info_number(info)
-        if own and told and own != told:
+        own, declared = eds.number(0x1018, sub), eds.info_number(info)
+        if own and declared and own != declared:
             eds.remarks.add(
                 f"[DeviceInfo] {info}",
-                f"value {told:#x}, but 1018h:{sub} is {own:#x}, which counts",
+                f"value {declared:#x}, but 1018h:{sub} is {own:#x}, which counts",
             )
-        value = own or told or 0
+        value = own or declared or 0
         if not 0 <= value <= 0xFFFFFFFF:
             value = 0
         source = f"1018h:{sub} in the EDS" if own else f"[DeviceInfo] {info} in the EDS"
-        made.know(
+        made.set(
             key, value, *((_MANUAL, source) if value else (_ASSUMED, "the EDS does not give it"))
         )
         if not value:
-            made.unknown.append(
-                Unknown(
-                    f"{key} (1018h:{sub})",
-                    "the boot refuses a drive whose identity differs",
-                    "`cdpr bus scan --bus URL` shows it; write it into the profile",
-                )
+            made.find_out(
+                f"{key} (1018h:{sub})",
+                "the boot refuses a drive whose identity differs",
+                "`cdpr bus scan --bus URL` shows it; write it into the profile",
             )
     if made.table["revision"]:
-        made.unknown.append(
-            Unknown(
-                "revision of your drive",
-                "makers ship newer firmware than the EDS is for, which the boot refuses (step N)",
-                "`cdpr bus scan --bus URL`; ask the maker whether the EDS fits that firmware",
-            )
+        made.find_out(
+            "revision of your drive",
+            "makers ship newer firmware than the EDS is for, which the boot refuses (step N)",
+            "`cdpr bus scan --bus URL`; ask the maker whether the EDS fits that firmware",
         )
 
 
 def _modes(made: Proposal, eds: EdsFile) -> None:
     mask = eds.number(0x6502) or 0
     modes = [int(mode) for mode in supported_modes(mask)] if mask > 0 else []
-    told = bool(modes)
-    if not told:
+    listed = bool(modes)
+    if not listed:
         modes = _modes_by_objects(eds)
-        made.unknown.append(
-            Unknown(
-                "modes of operation",
-                "the EDS has no value of 6502h; they are guessed from the objects that are there",
-                _LOOK.format(what="6502") + ", bit 3 is PT, bit 9 CST",
-            )
+        made.find_out(
+            "modes of operation",
+            "the EDS has no value of 6502h; they are guessed from the objects that are there",
+            _LOOK.format(what="6502") + ", bit 3 is PT, bit 9 CST",
         )
     source = (
         (_MANUAL, "default of 6502h in the EDS")
-        if told
+        if listed
         else (_ASSUMED, "from the objects in the EDS")
     )
     torque = [mode for mode in (Mode.CYCLIC_TORQUE, Mode.PROFILE_TORQUE) if mode in modes]
@@ -139,8 +137,8 @@ def _modes(made: Proposal, eds: EdsFile) -> None:
             f"value {mask:#x} has the modes {', '.join(map(str, modes))} only; allowed: one with 4 "
             "(PT, bit 3) or 10 (CST, bit 9), since winches are driven by torque",
         )
-    made.know("supported_modes", modes, *source)
-    made.know("mode_torque", int(torque[0]), *source)
+    made.set("supported_modes", modes, *source)
+    made.set("mode_torque", int(torque[0]), *source)
     if torque[0] == Mode.PROFILE_TORQUE:
         _torque_slope(made, eds)
 
@@ -151,16 +149,14 @@ def _torque_slope(made: Proposal, eds: EdsFile) -> None:
     if slope is not None and slope.high and rated_mNm and slope.high < 0xFFFFFFFF:
         steepest = slope.high * 1e-3 * rated_mNm * 1e-3
         how = "upper limit of 6087h by the default of 6076h in the EDS"
-        made.know("torque_slope_Nm_s", round(steepest, 3), _MANUAL, how)
+        made.set("torque_slope_Nm_s", round(steepest, 3), _MANUAL, how)
     else:
         how = "steep enough not to be felt"
-        made.know("torque_slope_Nm_s", _DEFAULT_SLOPE_Nm_s, _ASSUMED, how)
-    made.unknown.append(
-        Unknown(
-            "torque_slope_Nm_s (6087h)",
-            "in PT the torque follows a ramp, which is a lag in the loop",
-            "the steepest that 6087h takes: manual, or upper limit in the EDS",
-        )
+        made.set("torque_slope_Nm_s", _DEFAULT_SLOPE_Nm_s, _ASSUMED, how)
+    made.find_out(
+        "torque_slope_Nm_s (6087h)",
+        "in PT the torque follows a ramp, which is a lag in the loop",
+        "the steepest that 6087h takes: manual, or upper limit in the EDS",
     )
 
 
@@ -180,121 +176,107 @@ def _homing(made: Proposal, eds: EdsFile) -> None:
         }
     )
     if methods:
-        made.know("homing_methods", methods, _MANUAL, "60E3h in the EDS")
+        made.set("homing_methods", methods, _MANUAL, "60E3h in the EDS")
     elif eds.has(_IN_PLACE):
-        made.know("homing_methods", list(_USUAL_HOMING), _ASSUMED, "the standard's, to the index")
-        made.unknown.append(
-            Unknown(
-                "homing methods",
-                "the EDS has no list of them (60E3h)",
-                "manual; `cdpr drive home WINCH --method 34 --bus URL` shows whether it takes one",
-            )
+        made.set("homing_methods", list(_USUAL_HOMING), _ASSUMED, "the standard's, to the index")
+        made.find_out(
+            "homing methods",
+            "the EDS has no list of them (60E3h)",
+            "manual; `cdpr drive home WINCH --method 34 --bus URL` shows whether it takes one",
         )
     else:
-        made.know("homing_methods", [], _MANUAL, "6098h is not in the EDS")
+        made.set("homing_methods", [], _MANUAL, "6098h is not in the EDS")
 
 
 def _units_and_signs(made: Proposal, eds: EdsFile) -> None:
-    made.know("torque_unit", "per_mille_of_rated", _ASSUMED, "as CiA 402-2 has it for 6071h")
-    made.know("velocity_unit", "counts_per_s", _ASSUMED, "as CiA 402-2 has it without scaling")
-    made.know("acceleration_unit", "counts_per_s2", _ASSUMED, "as CiA 402-2 has it without scaling")
+    made.set("torque_unit", "per_mille_of_rated", _ASSUMED, "as CiA 402-2 has it for 6071h")
+    made.set("velocity_unit", "counts_per_s", _ASSUMED, "as CiA 402-2 has it without scaling")
+    made.set("acceleration_unit", "counts_per_s2", _ASSUMED, "as CiA 402-2 has it without scaling")
     for key in ("position_sign", "torque_sign", "homing_sign"):
-        made.know(key, 1, _ASSUMED, "no EDS tells it")
-    made.unknown += [
-        Unknown(
-            "torque_unit (6071h, 6077h)",
-            "a wrong one makes every torque wrong by a factor",
-            "manual (a drive without 6076h rather counts in mNm); 6077h beside the current of "
-            "6078h while the motor is held",
-        ),
-        Unknown(
-            "velocity_unit, acceleration_unit (6099h, 609Ah)",
-            "a wrong one makes homing run too fast or too slow",
-            "manual; watch 606Ch while the shaft is turned by hand",
-        ),
-        Unknown(
-            "position_sign",
-            "the controller must know which way 6064h counts",
-            "turn the shaft by hand the way that is to be positive; "
-            + _LOOK.format(what="6064")
-            + ", it must grow",
-        ),
-        Unknown(
-            "torque_sign",
-            "with a wrong one the first motion runs away, and is stopped",
-            "`cdpr drive jog WINCH --bus URL` on a free shaft: it ends at once when wrong",
-        ),
-        Unknown(
-            "homing_sign",
-            "method 34 must turn the way position grows",
-            "`cdpr drive home WINCH --method 34 --bus URL` on a free shaft",
-        ),
-        Unknown(
-            "quirks: halt before a change of mode, homing without bit 10",
-            "drives differ from the standard there",
-            "manual; a mode that is never confirmed is told by the command",
-        ),
-    ]
+        made.set(key, 1, _ASSUMED, "no EDS tells it")
+    made.find_out(
+        "torque_unit (6071h, 6077h)",
+        "a wrong one makes every torque wrong by a factor",
+        "manual (a drive without 6076h rather counts in mNm); 6077h beside the current of "
+        "6078h while the motor is held",
+    )
+    made.find_out(
+        "velocity_unit, acceleration_unit (6099h, 609Ah)",
+        "a wrong one makes homing run too fast or too slow",
+        "manual; watch 606Ch while the shaft is turned by hand",
+    )
+    made.find_out(
+        "position_sign",
+        "the controller must know which way 6064h counts",
+        "turn the shaft by hand the way that is to be positive; "
+        + _LOOK.format(what="6064")
+        + ", it must grow",
+    )
+    made.find_out(
+        "torque_sign",
+        "with a wrong one the first motion runs away, and is stopped",
+        "`cdpr drive jog WINCH --bus URL` on a free shaft: it ends at once when wrong",
+    )
+    made.find_out(
+        "homing_sign",
+        "method 34 must turn the way position grows",
+        "`cdpr drive home WINCH --method 34 --bus URL` on a free shaft",
+    )
+    made.find_out(
+        "quirks: halt before a change of mode, homing without bit 10",
+        "drives differ from the standard there",
+        "manual; a mode that is never confirmed is told by the command",
+    )
     if not eds.number(0x6076):
-        made.unknown.append(
-            Unknown(
-                "rated torque (6076h)",
-                "torques are per mille of it, and the boot compares it with the motor's",
-                _LOOK.format(what="6076") + "; in mNm, set by the drive's own setup program",
-            )
+        made.find_out(
+            "rated torque (6076h)",
+            "torques are per mille of it, and the boot compares it with the motor's",
+            _LOOK.format(what="6076") + "; in mNm, set by the drive's own setup program",
         )
 
 
 def _times(made: Proposal) -> None:
-    made.know("mode_display_timeout_s", 0.5, _ASSUMED, "generous")
-    made.know("state_timeout_s", 1.0, _ASSUMED, "generous")
-    made.know("feedback_delay_s", 0.0005, _ASSUMED, "usual for a drive which samples at 2 kHz")
-    made.know("torque_delay_s", 0.00032, _ASSUMED, "first-order lag of a 500 Hz current loop")
-    made.know("heartbeat_producer_s", 0.1, _ASSUMED, "our choice, written to 1017h")
-    made.know("heartbeat_consumer_s", 0.5, _ASSUMED, "our choice, written to 1016h")
-    made.unknown += [
-        Unknown(
-            "feedback_delay_s, torque_delay_s",
-            "the compensation looks ahead by them",
-            "manual: cycle of the position and current loop; the commissioning's report shows a "
-            "residue that grows with speed when they are wrong",
-        ),
-        Unknown(
-            "state_timeout_s, mode_display_timeout_s",
-            "drives with a brake or a slow power stage need longer",
-            "manual; `cdpr drive enable WINCH --bus URL` tells which state was not reached",
-        ),
-    ]
+    made.set("mode_display_timeout_s", 0.5, _ASSUMED, "generous")
+    made.set("state_timeout_s", 1.0, _ASSUMED, "generous")
+    made.set("feedback_delay_s", 0.0005, _ASSUMED, "usual for a drive which samples at 2 kHz")
+    made.set("torque_delay_s", 0.00032, _ASSUMED, "first-order lag of a 500 Hz current loop")
+    made.set("heartbeat_producer_s", 0.1, _ASSUMED, "our choice, written to 1017h")
+    made.set("heartbeat_consumer_s", 0.5, _ASSUMED, "our choice, written to 1016h")
+    made.find_out(
+        "feedback_delay_s, torque_delay_s",
+        "the compensation looks ahead by them",
+        "manual: cycle of the position and current loop; the commissioning's report shows a "
+        "residue that grows with speed when they are wrong",
+    )
+    made.find_out(
+        "state_timeout_s, mode_display_timeout_s",
+        "drives with a brake or a slow power stage need longer",
+        "manual; `cdpr drive enable WINCH --bus URL` tells which state was not reached",
+    )
 
 
 def _pdos(made: Proposal, eds: EdsFile) -> None:
     rpdos, tpdos = choose_rpdos(eds), choose_tpdos(eds)
     for key, choice in (("rpdos", rpdos), ("tpdos", tpdos)):
         status = _MANUAL if choice.how.startswith("map by default") else _ASSUMED
-        made.know(key, choice.pdos, status, choice.how)
+        made.set(key, choice.pdos, status, choice.how)
         if status == _ASSUMED:
-            made.unknown.append(
-                Unknown(
-                    f"{key}: {choice.how}",
-                    "a drive may refuse a map that its EDS allows",
-                    "the boot writes it and says which object was refused (step J)",
-                )
+            made.find_out(
+                f"{key}: {choice.how}",
+                "a drive may refuse a map that its EDS allows",
+                "the boot writes it and says which object was refused (step J)",
             )
     if 0x6061 not in tpdos.indexes:
-        made.unknown.append(
-            Unknown(
-                "mode display in a PDO",
-                "6061h is in no map, so the mode is asked for by SDO",
-                "nothing to do; a TPDO with 6061h is quicker",
-            )
+        made.find_out(
+            "mode display in a PDO",
+            "6061h is in no map, so the mode is asked for by SDO",
+            "nothing to do; a TPDO with 6061h is quicker",
         )
     if not {0x60B9, 0x60BA} <= tpdos.indexes:
-        made.unknown.append(
-            Unknown(
-                "touch probe (60B8h, 60B9h, 60BAh)",
-                "not in the maps: the index can be found by homing only",
-                "manual: zero pulse as a source of the touch probe",
-            )
+        made.find_out(
+            "touch probe (60B8h, 60B9h, 60BAh)",
+            "not in the maps: the index can be found by homing only",
+            "manual: zero pulse as a source of the touch probe",
         )
 
 
@@ -315,6 +297,4 @@ _CONSEQUENCES = {
 def _absences(made: Proposal, eds: EdsFile) -> None:
     for index, why in _CONSEQUENCES.items():
         if not eds.has(index):
-            made.unknown.append(
-                Unknown(f"{index:04X}h is not in the EDS", why, "ask the maker, or a newer EDS")
-            )
+            made.find_out(f"{index:04X}h is not in the EDS", why, "ask the maker, or a newer EDS")

@@ -14,22 +14,22 @@ from typing import Any, Final
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from profiles import load_robot
-from profiles.bounded_input import read_bytes
-from profiles.errors import ProfileError
-from tools.errors import BadInputError, WorkFailedError
-from tools.experiment import figures
-from tools.experiment.path import centre_m, targets_m
-from tools.experiment.points import Points, points_of_perfect_robot, points_of_session
-from tools.experiment.report import lines
-from tools.experiment.session import Asked, run_session
-from tools.experiment.statistics import rows, variance_analysis
-from tools.kept import kept
-from tools.output import Output, to_json
-from tools.trials.run import platform_of
+from cdpr_profiles import load_robot
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import read_bytes
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.experiment import figures
+from cdpr_tools.experiment.path import centre_m, targets_m
+from cdpr_tools.experiment.points import Points, points_of_perfect_robot, points_of_session
+from cdpr_tools.experiment.report import lines
+from cdpr_tools.experiment.session import ExperimentSettings, run_session
+from cdpr_tools.experiment.statistics import rows, variance_analysis
+from cdpr_tools.output import Output, to_json
+from cdpr_tools.stored_settings import load_settings
+from cdpr_tools.trials.directions import platform_of
 
-ASKED: Final = "experiment.json"
+SETTINGS: Final = "experiment.json"
 RESULT: Final = "result.json"
 _SESSIONS: Final = "sessions"
 _DONE: Final = "done"
@@ -38,47 +38,49 @@ _SESSION_S: Final = 300.0
 """What one session takes in the robot's time, for the progress shown."""
 
 
-def begin(asked: Asked, folder: Path) -> None:
+def begin(settings: ExperimentSettings, folder: Path) -> None:
     """Make the folder of an experiment, or find in it what was begun with the same wishes.
 
     Raises BadInputError where the robot has no room for the pattern, or the folder holds another
     experiment.
     """
-    robot = load_robot(asked.robot)
-    for place in asked.places:
+    robot = load_robot(settings.robot)
+    for place in settings.places:
         centre_m(robot, place)
-    path = folder / ASKED
+    path = folder / SETTINGS
     if path.exists():
-        if load(folder) != asked:
+        if load(folder) != settings:
             raise BadInputError(f"{path}: holds an experiment with other options; choose --out")
         return
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise BadInputError(f"{folder}: not empty; allowed: a new folder, or an experiment's")
-        path.write_text(to_json(asked.as_dict(), indent=1), encoding="utf-8")
+        path.write_text(to_json(settings.as_dict(), indent=1), encoding="utf-8")
     except OSError as error:
         raise BadInputError(f"{folder}: {error.strerror}") from error
 
 
-def load(folder: Path) -> Asked:
+def load(folder: Path) -> ExperimentSettings:
     """Return what the experiment in `folder` was asked for; raises BadInputError."""
-    path = folder / ASKED
-    return kept(path, Asked)
+    path = folder / SETTINGS
+    return load_settings(path, ExperimentSettings)
 
 
-def perform(asked: Asked, folder: Path, jobs: int, out: Output) -> None:
+def perform(settings: ExperimentSettings, folder: Path, jobs: int, out: Output) -> None:
     """Run the sessions that are still to be run, `jobs` side by side.
 
     Where some fail the others are run all the same; raises WorkFailedError then.
     """
-    missing = [name for name in asked.sessions() if not (_session(folder, name) / _DONE).exists()]
-    total = len(asked.sessions())
+    missing = [
+        name for name in settings.sessions() if not (_session(folder, name) / _DONE).exists()
+    ]
+    total = len(settings.sessions())
     if not missing:
         return
     out.note(f"{total - len(missing)} of {total} sessions are there; {jobs} side by side ...")
     done, failed = total - len(missing), []
-    work = partial(_perform_session, asked, folder)
+    work = partial(_perform_session, settings, folder)
     with _processes(jobs) as pool, out.progress("sessions", total * _SESSION_S) as advance:
         for name, error in pool.imap_unordered(work, missing):
             if error:
@@ -98,13 +100,13 @@ def _processes(jobs: int) -> Pool:
     return own.Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN))
 
 
-def _perform_session(asked: Asked, folder: Path, name: str) -> tuple[str, str]:
+def _perform_session(settings: ExperimentSettings, folder: Path, name: str) -> tuple[str, str]:
     """Run one session; return its name and why it failed, nothing where it did not."""
     session = _session(folder, name)
     if session.exists():  # it was broken off
         session.rename(_unused(session))
     try:
-        run_session(asked, asked.sessions()[name], session)
+        run_session(settings, settings.sessions()[name], session)
         points_of_session(session)
     except Exception as error:  # whatever it is, the other sessions go on
         return name, str(error) or repr(error)
@@ -123,9 +125,9 @@ def _session(folder: Path, name: str) -> Path:
     return folder / _SESSIONS / name
 
 
-def finished(asked: Asked, folder: Path) -> list[Path]:
+def finished(settings: ExperimentSettings, folder: Path) -> list[Path]:
     """Return the folders of the sessions that have ended, in their order."""
-    sessions = (_session(folder, name) for name in asked.sessions())
+    sessions = (_session(folder, name) for name in settings.sessions())
     return [session for session in sessions if (session / _DONE).exists()]
 
 
@@ -135,9 +137,9 @@ def measured(sessions: Iterable[Path], jobs: int) -> Points:
         return np.concatenate(pool.map(points_of_session, list(sessions)))
 
 
-def without_robot(asked: Asked, sessions: Iterable[str]) -> Points:
+def perfect_robot_points(settings: ExperimentSettings, sessions: Iterable[str]) -> Points:
     """Return what the same operator reaches with a perfect robot in sessions of these names."""
-    robot = load_robot(asked.robot)
+    robot = load_robot(settings.robot)
     platform = platform_of(robot)
     return np.concatenate(
         [
@@ -145,32 +147,34 @@ def without_robot(asked: Asked, sessions: Iterable[str]) -> Points:
                 platform,
                 centre_m(robot, condition.place),
                 condition,
-                asked.operator,
-                asked.station,
-                asked.seed,
+                settings.operator,
+                settings.station,
+                settings.seed,
             )
             for name in sessions
-            for condition in asked.sessions()[name]
+            for condition in settings.sessions()[name]
         ]
     )
 
 
-def operator_alone(asked: Asked) -> dict[str, Any]:
+def operator_alone(settings: ExperimentSettings) -> dict[str, Any]:
     """Return the tables of the same operator with a perfect robot, with `lines` for people."""
-    points = without_robot(asked, asked.sessions())
+    points = perfect_robot_points(settings, settings.sessions())
     table = rows(points)
     result: dict[str, Any] = {
-        **asked.as_dict(),
+        **settings.as_dict(),
         "rows": table,
         "variance_analysis": variance_analysis(points),
     }
     return result | {"lines": lines(result)}
 
 
-def _drawn(asked: Asked, points: Points, alone: Points, session: Path, folder: Path) -> list[Path]:
+def _drawn(
+    settings: ExperimentSettings, points: Points, alone: Points, session: Path, folder: Path
+) -> list[Path]:
     """Draw all pictures, the path with the way of one of the session's runs."""
     ticks = min(session.glob("*.npy"))
-    targets = targets_m(centre_m(load_robot(asked.robot), session.name.split("-")[0]))
+    targets = targets_m(centre_m(load_robot(settings.robot), session.name.split("-")[0]))
     path = folder / "figure-2.8.png"
     figures.path(targets, _truth_m(ticks)).savefig(path)
     return [path, *figures.draw(points, alone, folder)]
@@ -193,22 +197,22 @@ def judge(folder: Path, jobs: int) -> dict[str, Any]:
     Returns the result, with `lines` for people; it is kept beside the sessions. Raises
     CommandError.
     """
-    asked = load(folder)
-    sessions = finished(asked, folder)
+    settings = load(folder)
+    sessions = finished(settings, folder)
     if not sessions:
         raise BadInputError(f"{folder}: no session has ended")
     points = measured(sessions, jobs)
-    alone = without_robot(asked, [session.name for session in sessions])
+    alone = perfect_robot_points(settings, [session.name for session in sessions])
     table = rows(points)
     compared = [row["reached"] for row in table if "reached" in row]
     result: dict[str, Any] = {
-        **asked.as_dict(),
-        "sessions": f"{len(sessions)} of {len(asked.sessions())}",
+        **settings.as_dict(),
+        "sessions": f"{len(sessions)} of {len(settings.sessions())}",
         "rows": table,
         "operator_alone": rows(alone),
         "variance_analysis": variance_analysis(points),
         "reached": bool(compared) and all(compared),
-        "pictures": [str(path) for path in _drawn(asked, points, alone, sessions[0], folder)],
+        "pictures": [str(path) for path in _drawn(settings, points, alone, sessions[0], folder)],
     }
     np.save(folder / "points.npy", points)
     (folder / RESULT).write_text(to_json(result, indent=1), encoding="utf-8")

@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_rt.exchange import FloatArray
-from tools.experiment import thesis
-from tools.experiment.points import Points
-from tools.experiment.statistics import PARTS, levels, spread_mm, thesis_row
-from tools.report.style import canvas, legend_above
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.experiment import thesis
+from cdpr_tools.experiment.points import Points
+from cdpr_tools.experiment.statistics import PARTS, levels, spread_mm, thesis_row
+from cdpr_tools.report.style import canvas, legend_above
 
 _OURS: Final = ("#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0")
 _THESIS: Final = "#8a8f98"

@@ -8,16 +8,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.exchange import FloatArray
-from cdpr_rt.runtime.stream_buttons import confirmation
-from profiles.platform import Platform
-from tools.errors import WorkFailedError
-from tools.experiment.parameters import OperatorParameters, Station
-from tools.experiment.path import targets_m
-from tools.experiment.plants import PerfectRobot
-from tools.experiment.session import MARK
-from tools.experiment.trial import Condition, run_trial
-from tools.trials.recorded import Recorded
+from cdpr_profiles.platform import Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.motion.stream_buttons import confirmation
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
+from cdpr_tools.experiment.model.plants import PerfectRobot
+from cdpr_tools.experiment.path import plane_of, targets_m
+from cdpr_tools.experiment.session import MARK
+from cdpr_tools.experiment.trial import Condition, run_trial
+from cdpr_tools.trials.recorded import Recorded
 
 Points = NDArray[np.void]
 POINT: Final = np.dtype(
@@ -55,7 +55,8 @@ def _points_of_path(recorded: Recorded, path: dict[str, Any]) -> Points:
             f"{recorded.folder}: {len(found)} confirmations recorded, {len(path['points'])} given"
         )
     points = np.zeros(len(found), POINT)
-    true_m, setpoint_m = recorded.true_m, recorded.setpoint_m
+    plane = list(plane_of(recorded.directions.k))
+    true_m, setpoint_m = recorded.true_m[:, plane], recorded.setpoint_m[:, plane]
     for point, row, told in zip(points, found, path["points"], strict=True):
         look = slice(*(recorded.row(cycle) + end for end, cycle in enumerate(told["look_cycles"])))
         _fill(point, condition, told)
@@ -76,7 +77,7 @@ def points_of_perfect_robot(
     station: Station,
     seed: int,
 ) -> Points:
-    """Return what the same operator, hand and eyes alike, reaches with a robot without error."""
+    """Return the points of the same operator, hand and vision with a robot without error."""
     robot = PerfectRobot(platform, centre_m)
     targets = targets_m(centre_m)
     trial = run_trial(robot, condition, targets, operator, station, seed)

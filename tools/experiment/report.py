@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from tools.experiment import thesis
+from cdpr_tools.experiment import thesis
 
 _NAMES: Final = {
     thesis.OPERATION: "round trip",

@@ -9,13 +9,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from cdpr_rt.service.stream_packet import Standing
-from tools.errors import WorkFailedError
-from tools.experiment.parameters import OperatorParameters, Station
-from tools.experiment.path import centre_m, targets_m
-from tools.experiment.trial import Condition, run_trial
-from tools.trials.run import TrialRun, trial_run
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.service.streams.stream_packet import Standing
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
+from cdpr_tools.experiment.path import centre_m, place_of, plane_of, targets_m
+from cdpr_tools.experiment.trial import Condition, run_trial
+from cdpr_tools.trials.run import TrialRun, trial_run
 
 MARK = "path"
 """What the recording's events say of each run: the condition, and what the operator did."""
@@ -25,8 +25,8 @@ _PLAYED_S: Final = 0.3
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What an experiment is asked for; kept beside what it measures."""
+class ExperimentSettings:
+    """Settings of an experiment, stored beside what it measures."""
 
     robot: str
     plant: str | None
@@ -54,17 +54,18 @@ class Asked:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as it is kept."""
+        """Return it as it is stored."""
         return asdict(self)
 
 
-class LedRobot:
-    """The plant of a run: packets go to the daemon's own desk, cycles over the bus."""
+class RobotPlant:
+    """The plant of a run: packets go to the daemon's own session manager, cycles over the bus."""
 
     def __init__(self, run: TrialRun) -> None:
         self._rig = run.rig
+        self._plane = list(plane_of(run.directions.k))
         self._stay = run.stay
-        self._hand = run.rig.stream.hand()
+        self._hand = run.rig.stream.sender()
 
     @property
     def now_s(self) -> float:
@@ -78,8 +79,8 @@ class LedRobot:
 
     @property
     def truth_m(self) -> FloatArray:
-        """Where the platform truly was at the last SYNC, (2,)."""
-        return np.array(self._rig.truth()["position_m"][:2])
+        """Where the platform truly was at the last SYNC, in the pattern's plane, (2,)."""
+        return np.array(self._rig.truth()["position_m"][self._plane])
 
     def advance(self, until_s: float) -> None:
         """Run cycles; raises WorkFailedError where the motion is ended meanwhile."""
@@ -88,43 +89,51 @@ class LedRobot:
             self._stay(cycles * self._rig.period_s)
 
     def send(self, sent_s: float, hand_m: FloatArray, scale: float, buttons: int) -> None:
-        """Hand a packet to the desk; raises WorkFailedError where it is not taken."""
-        packet = self._hand.packet(sent_s, (*hand_m, 0.0), scale, buttons)
+        """Hand a packet to the session manager; raises WorkFailedError where it is not taken."""
+        moved = np.zeros(3)
+        moved[self._plane] = hand_m
+        packet = self._hand.packet(sent_s, moved.tolist(), scale, buttons)
         answer = self._rig.stream.take(packet)
         standing = None if answer is None else self._hand.answer_of(answer).standing
         if standing is not Standing.ACCEPTED:
             raise WorkFailedError(f"the robot did not take a packet of the stream: {standing}")
 
 
-def run_session(asked: Asked, conditions: Sequence[Condition], folder: Path) -> None:
+def run_session(
+    settings: ExperimentSettings, conditions: Sequence[Condition], folder: Path
+) -> None:
     """Start the robot once and run the path under each condition; all is recorded in `folder`.
 
     Raises WorkFailedError and BadInputError.
     """
     with trial_run(
-        asked.robot,
+        settings.robot,
         folder,
-        plant=None if asked.plant is None else Path(asked.plant),
-        seed=asked.seed,
+        plant=None if settings.plant is None else Path(settings.plant),
+        seed=settings.seed,
         advance=lambda _: None,
-        commissioned=None if asked.commissioned is None else Path(asked.commissioned),
-        compensated=asked.compensated,
+        commissioned=None if settings.commissioned is None else Path(settings.commissioned),
+        compensated=settings.compensated,
     ) as run:
-        plant = LedRobot(run)
+        plant = RobotPlant(run)
         for condition in conditions:
-            _run_path(run, plant, asked, condition, folder)
+            _run_path(run, plant, settings, condition, folder)
 
 
 def _run_path(
-    run: TrialRun, plant: LedRobot, asked: Asked, condition: Condition, folder: Path
+    run: TrialRun,
+    plant: RobotPlant,
+    settings: ExperimentSettings,
+    condition: Condition,
+    folder: Path,
 ) -> None:
     centre = centre_m(run.rig.robot, condition.place)
-    run.go(centre)
+    run.go(place_of(run.directions, centre))
     run.stay(1.0)
     run.rig.program("pose", stream=True)
     first = plant.cycle
     trial = run_trial(
-        plant, condition, targets_m(centre), asked.operator, asked.station, asked.seed
+        plant, condition, targets_m(centre), settings.operator, settings.station, settings.seed
     )
     run.stay(_PLAYED_S)
     np.save(folder / f"{condition.name}.npy", trial.ticks)

@@ -9,9 +9,9 @@ from typing import Any, Final
 import numpy as np
 from scipy import stats
 
-from cdpr_rt.exchange import FloatArray
-from tools.experiment import thesis
-from tools.experiment.points import Points
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.experiment import thesis
+from cdpr_tools.experiment.points import Points
 
 RUN = ["place", "scale", "round_trip_s", "repeat"]
 """What names a run along the path."""

@@ -9,15 +9,15 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.exchange import FloatArray
-from cdpr_rt.runtime.stream_buttons import confirmation
-from tools.errors import WorkFailedError
-from tools.experiment.eyes import Eyes
-from tools.experiment.hand import Hand
-from tools.experiment.operator_model import OperatorModel
-from tools.experiment.parameters import OperatorParameters, Station
-from tools.experiment.plants import Plant
-from tools.teleop.steady import SteadyHand
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.motion.stream_buttons import confirmation
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.experiment.model.hand_model import HandModel
+from cdpr_tools.experiment.model.operator_model import OperatorModel
+from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
+from cdpr_tools.experiment.model.plants import Plant
+from cdpr_tools.experiment.model.vision import VisionModel
+from cdpr_tools.teleop.position_filter import PositionFilter
 
 PACKET_S: Final = 0.02
 """Between two packets: 50 a second (Tremblay, section 2.5.1: 30 to 60)."""
@@ -54,7 +54,7 @@ class Condition:
         return asdict(self)
 
     def random(self, seed: int) -> tuple[np.random.Generator, np.random.Generator]:
-        """Return the randomness of hand and eyes, the same for the same condition and seed."""
+        """Return the randomness of hand and vision, the same for the same condition and seed."""
         key = (ord(self.place), round(1e3 * self.scale), round(1e3 * self.round_trip_s))
         return (
             np.random.default_rng([seed, *key, self.repeat, 1]),
@@ -111,12 +111,12 @@ def run_trial(
     """
     for_hand, for_eyes = condition.random(seed)
     there_s = SHARE_THERE * condition.round_trip_s
-    hand = Hand(parameters, PACKET_S, for_hand)
-    eyes = Eyes(parameters, condition.round_trip_s - there_s, for_eyes)
+    hand = HandModel(parameters, PACKET_S, for_hand)
+    vision = VisionModel(parameters, condition.round_trip_s - there_s, for_eyes)
     operator = OperatorModel(
-        parameters, targets_m, condition.scale, condition.round_trip_s, station.clutch, hand, eyes
+        parameters, targets_m, condition.scale, condition.round_trip_s, station.clutch, hand, vision
     )
-    steady = SteadyHand(PACKET_S) if station.steady else None
+    steady = PositionFilter(PACKET_S) if station.steady else None
     link = _Link(plant, there_s, condition.scale)
     begin_s, ticks = plant.now_s, []
     time_s, busy = 0.0, True
@@ -126,7 +126,7 @@ def run_trial(
                 f"{condition.name}: target {operator.target + 1} was not confirmed: the path took "
                 f"more than {_LONGEST_S:g} s"
             )
-        eyes.show(time_s, plant.truth_m)
+        vision.show(time_s, plant.truth_m)
         busy = busy and operator.step(time_s)
         target, buttons = operator.target, operator.buttons
         hand_m = hand.measured_m if steady is None else steady.update(hand.measured_m)

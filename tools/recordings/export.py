@@ -10,9 +10,9 @@ from typing import IO, Any
 import pyarrow as pa  # type: ignore[import-untyped]
 from pyarrow import csv, parquet
 
-from cdpr_rt.service.recording_reader import Columns
-from tools.errors import BadInputError, WorkFailedError
-from tools.recordings.selection import Selection
+from cdpr_rt.service.recordings.recording_reader import Columns
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.recordings.selection import Selection
 
 FORMATS = (".csv", ".parquet")
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from cdpr_rt.service.recording_file import RecordingError
-from cdpr_rt.service.recording_reader import Columns, RecordingReader
-from cdpr_rt.service.recording_schema import MEANING
-from tools.errors import BadInputError
+from cdpr_rt.core.cycle_row import FIELDS
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.service.recordings.recording_file import RecordingError
+from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
+from cdpr_tools.errors import BadInputError
 
 ELAPSED = "elapsed_s"
 """The column that is added: seconds since the first row, over all files."""
@@ -41,8 +41,8 @@ def fields_of(text: str | None) -> list[str] | None:
         return None
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names:
-        if name not in MEANING:
-            raise BadInputError(f"--fields {name}: allowed: {', '.join(MEANING)}")
+        if name not in FIELDS:
+            raise BadInputError(f"--fields {name}: allowed: {', '.join(FIELDS)}")
     if not names:
         raise BadInputError("--fields: names none; allowed: names with commas between them")
     return names

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.service.recording_reader import Columns
-from tools.output import Output
-from tools.recordings.selection import ELAPSED, Selection
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.service.recordings.recording_reader import Columns
+from cdpr_tools.output import Output
+from cdpr_tools.recordings.selection import ELAPSED, Selection
 
 _FIELDS = (
     "cycle",
@@ -24,6 +25,7 @@ _FIELDS = (
     "late_cycles",
     "missed",
 )
+_EVERY = 20
 
 
 @dataclass
@@ -31,7 +33,6 @@ class _Count:
     """Figures of one file, gathered as its rows come."""
 
     rows: int = 0
-    first_stamp_ns: int = 0
     missing_cycles: int = 0
     restarts: int = 0
     first_s: float = 0.0
@@ -40,13 +41,17 @@ class _Count:
     states_s: dict[str, float] = field(default_factory=dict)
     began: dict[str, int] = field(default_factory=dict)
     last: dict[str, int] = field(default_factory=dict)
+    stamps_ns: list[FloatArray] = field(default_factory=list)
+    elapsed_s: list[FloatArray] = field(default_factory=list)
+    """When some of the rows were, by the wall's clock and by the bus'."""
 
     def add(self, rows: Columns) -> None:
         """Take in some rows."""
         elapsed, cycle = rows[ELAPSED], rows["cycle"]
+        for kept, column in ((self.stamps_ns, "stamp_ns"), (self.elapsed_s, ELAPSED)):
+            kept += [rows[column][::_EVERY], rows[column][-1:]]
         if self.rows == 0:
             self.first_s = float(elapsed[0])
-            self.first_stamp_ns = int(rows["stamp_ns"][0])
             self.began = {name: int(rows[name][0]) for name in ("missed", "late_cycles")}
         else:
             elapsed = np.concatenate([[self.last_s], elapsed])
@@ -65,6 +70,14 @@ class _Count:
         self.last = {name: int(rows[name][-1]) for name in ("cycle", "missed", "late_cycles")}
         self.last_s = float(rows[ELAPSED][-1])
         self.rows += rows["cycle"].size
+
+    def when_s(self, stamp_ns: float) -> float:
+        """Return the recording's time, as `cdpr log plot` counts it, at one of the wall's clock."""
+        stamps_ns, elapsed_s = np.concatenate(self.stamps_ns), np.concatenate(self.elapsed_s)
+        at_s = float(np.interp(stamp_ns, stamps_ns, elapsed_s)) - self.first_s
+        # before the first row and after the last one only the wall's clock goes on
+        before_s, after_s = stamps_ns[0] - stamp_ns, stamp_ns - stamps_ns[-1]
+        return at_s + 1e-9 * float(max(after_s, 0.0) - max(before_s, 0.0))
 
     def result(self) -> dict[str, Any]:
         """Return the figures for people and programs."""
@@ -88,9 +101,9 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         for rows in selection.rows():
             count.add(rows)
     (reader,) = selection.readers
-    began_ns = count.first_stamp_ns + reader.offset_ns
     for event in reader.events:
-        event["after_s"] = (event["log_time_ns"] - began_ns) * 1e-9 if count.rows else None
+        stamp_ns = event["log_time_ns"] - reader.offset_ns
+        event["after_s"] = count.when_s(stamp_ns) if count.rows else None
     return {
         "file": str(path),
         "bytes": path.stat().st_size,

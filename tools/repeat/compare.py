@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tools.repeat.contents import NOT_COMPARED, UnreadableError, difference, pieces, usual
-from tools.repeat.run import Run
+from cdpr_tools.repeat.contents import NOT_COMPARED, UnreadableError, difference, normalised, pieces
+from cdpr_tools.repeat.run import Run
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Verdict:
     same: bool | None
     """Whether it is the same in all runs, None where it is not compared."""
     hashes: Sequence[str]
-    """Of what is compared, of each run that has it."""
+    """One for each run that has the file."""
     difference: str = ""
     """The first one, for people."""
 
@@ -34,7 +34,7 @@ class Verdict:
             return f"same     {hashes[0]} {self.name}"
         return f"DIFFERS  {hashes[0]} {self.name}: {self.difference}"
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {
             "file": self.name,
@@ -55,7 +55,7 @@ def _files(run: Run) -> dict[str, Path]:
     """Return the files of a run by what they are usually called."""
     found: dict[str, Path] = {}
     for path in sorted(one for one in run.folder.rglob("*") if one.is_file()):
-        name = base = usual(str(path.relative_to(run.folder)), run)
+        name = base = normalised(str(path.relative_to(run.folder)), run)
         number = 1
         while name in found:
             number += 1
@@ -69,23 +69,23 @@ def _verdict(name: str, runs: Sequence[Run], paths: Sequence[Path | None]) -> Ve
         return Verdict(name, None, ())
     hashes: list[str] = []
     first: tuple[Path, Run] | None = None
-    told = ""
+    found = ""
     for run, path in zip(runs, paths, strict=True):
         if path is None:
-            told = told or f"run {run.number} has not written it"
+            found = found or f"run {run.number} has not written it"
             continue
         try:
             hashes.append(_hash(path, run))
         except UnreadableError as error:
             hashes.append("unreadable  ")
-            told = told or f"in run {run.number}: cannot be read: {error}"
+            found = found or f"in run {run.number}: cannot be read: {error}"
             continue
         if first is None:
             first = path, run
-        elif hashes[-1] != hashes[0] and not told:
+        elif hashes[-1] != hashes[0] and not found:
             where = difference(pieces(*first), pieces(path, run))
-            told = f"runs {first[1].number} and {run.number}: {where}"
-    return Verdict(name, not told, hashes, told)
+            found = f"runs {first[1].number} and {run.number}: {where}"
+    return Verdict(name, not found, hashes, found)
 
 
 def _hash(path: Path, run: Run) -> str:

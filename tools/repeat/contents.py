@@ -1,4 +1,4 @@
-"""What of a file is compared, piece by piece; what is the wall's by its nature is left out."""
+"""The parts of a file that are compared; those that depend on the wall's clock are left out."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import Any, Final
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
-from cdpr_rt.service.recording_schema import TIMING
-from tools.repeat.run import FRAMES, Run
+from cdpr_rt.service.recordings.recording_schema import TIMING
+from cdpr_tools.repeat.run import FRAMES, Run
 
 WALL_KEYS: Final = ("created", "date", "wall_s")
 """Keys of JSON and TOML files whose values are the time of day, or how long it took."""
@@ -32,14 +32,14 @@ class UnreadableError(Exception):
     """A file is not what the end of its name says."""
 
 
-def usual(text: str, run: Run) -> str:
+def normalised(text: str, run: Run) -> str:
     """Return a name without the run's folder, the time of day and ids of the run's processes."""
     text = _DATES.sub("DATE", text.replace(str(run.folder), "."))
     return re.sub(r"(?<=-)\d+(?!\d)", lambda m: "PID" if int(m[0]) in run.processes else m[0], text)
 
 
 def pieces(path: Path, run: Run) -> Iterator[Piece]:
-    """Yield what is compared of a file; raises UnreadableError."""
+    """Yield the parts of a file that are compared; raises UnreadableError."""
     try:
         if path.suffix == ".mcap":
             yield from _messages(path)
@@ -81,18 +81,18 @@ def _leaves(where: str, value: Any, run: Run) -> Iterator[Piece]:
         for number, one in enumerate(value):
             yield from _leaves(f"{where}[{number}]", one, run)
     else:
-        yield where, (usual(value, run) if isinstance(value, str) else repr(value)).encode()
+        yield where, (normalised(value, run) if isinstance(value, str) else repr(value)).encode()
 
 
 def difference(one: Iterator[Piece], other: Iterator[Piece]) -> str:
     """Return the first difference for people, "" where there is none."""
     for a, b in zip_longest(one, other):
         if a != b:
-            return _told(a, b)
+            return _described(a, b)
     return ""
 
 
-def _told(a: Piece | None, b: Piece | None) -> str:
+def _described(a: Piece | None, b: Piece | None) -> str:
     if a is None or b is None:
         ends, there = ("first", b) if a is None else ("second", a)
         assert there is not None  # one of the two goes on
@@ -112,13 +112,13 @@ def _told(a: Piece | None, b: Piece | None) -> str:
 
 def _inner(a: bytes, b: bytes) -> str:
     """Return the first difference of two messages by its name."""
-    nobody = Run(0, Path("/nowhere"), Path("/nowhere"), 0, 0.0, frozenset(), 0, 0.0)
+    no_run = Run(0, Path("/nowhere"), Path("/nowhere"), 0, 0.0, frozenset(), 0, 0.0)
     try:
-        return difference(*(_leaves("", json.loads(text), nobody) for text in (a, b)))
+        return difference(*(_leaves("", json.loads(text), no_run) for text in (a, b)))
     except ValueError:
         return ""
 
 
 def _shown(text: bytes) -> str:
-    told = text.decode(errors="replace").strip()
-    return told if len(told) <= _SHOWN else told[:_SHOWN] + " ..."
+    shown = text.decode(errors="replace").strip()
+    return shown if len(shown) <= _SHOWN else shown[:_SHOWN] + " ..."

@@ -72,7 +72,7 @@ class Stops:
             self._next_s = now_s + duration_s
 
     def release(self) -> None:
-        """Let go on what is stopped."""
+        """Continue what is stopped (SIGCONT)."""
         while self._held:
             descriptor = self._held.pop()
             with suppress(ProcessLookupError):

@@ -12,8 +12,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.errors import BadInputError, WorkFailedError
-from tools.repeat.disturbance import Stops, busy_processes
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.repeat.disturbance import Stops, busy_processes
 
 FRAMES = "frames.log"
 """The log of all frames among the files of a run."""
@@ -41,7 +41,7 @@ class Run:
     """For how long one of them was stopped."""
 
 
-def perform(
+def run_once(
     command: Sequence[str],
     folder: Path,
     number: int,
@@ -66,7 +66,7 @@ def perform(
         stack.enter_context(busy_processes(busy))
         process = stack.enter_context(_running(command, work, out.fileno()))
         if stops is not None:
-            stack.callback(stops.release)  # or nobody could end
+            stack.callback(stops.release)  # a stopped process ends by no signal but SIGKILL
         while process.poll() is None:
             if stop_requested():
                 raise WorkFailedError(f"stopped on request, in run {number}")
@@ -85,7 +85,7 @@ def perform(
 @contextmanager
 def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subprocess.Popen[bytes]]:
     """Run the command meanwhile; end it, and whatever it has left, in order if possible."""
-    words = [sys.executable, "-P", "-m", "tools.cli", *command]
+    words = [sys.executable, "-P", "-m", "cdpr_tools.cli", *command]
     if "/" in command[0]:
         words = [str(Path(command[0]).absolute()), *command[1:]]
     path = f"{Path(sys.executable).parent}:{os.environ.get('PATH', os.defpath)}"

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from profiles import Winch
-from tools.commission_files import Paths
-from tools.procedure import Identified
+from cdpr_profiles import Winch
+from cdpr_rt.procedures.commissioning.commission_files import Paths
+from cdpr_rt.procedures.commissioning.identified import Identified
 
 
 def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified) -> None:
-    """Write the report and its figures; see `tools.report.page.build`.
+    """Write the report and its figures; see `cdpr_tools.report.page.build`.
 
     The drawing library is loaded here and not before: while the motor turns, and while it is
     identified, its memory is better used.
     """
-    from tools.report import page  # noqa: PLC0415
+    from cdpr_tools.report import page  # noqa: PLC0415
 
     page.build(paths, winch, results, found)

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 
-from cdpr_rt.exchange import BoolArray, FloatArray
-from cdpr_rt.identification import BetterResult, ThesisResult
-from cdpr_rt.identification.thesis import GRID, WINDOW_deg, filter_weights
-from cdpr_rt.measurement import Recording, recording
-from cdpr_rt.rawlog import read_raw_log
-from cdpr_rt.validation import low_pass_velocity
-from tools.truth import Truth
+from cdpr_rt.control.validation import low_pass_velocity
+from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.core.rawlog import read_raw_log
+from cdpr_rt.identification import HarmonicResult, ThesisResult
+from cdpr_rt.identification.cogging.thesis import DEGREE, GRID, WINDOW_deg
+from cdpr_rt.procedures.measurement import Recording, recording
+from cdpr_tools.recordings.truth import Truth
 
 _BINS = 720
 _COMPARABLE = 0.5
@@ -43,9 +44,7 @@ def read_ramp(path: Path, truth: Truth | None) -> Ramp:
     log = read_raw_log(path)
     run = recording(log)
     sweep, judged = run.sweep, run.judged
-    angle = sweep.angle_rad
-    if truth is not None:
-        angle = truth.angle_at(run.cycle + log.header["sync_offset"] - 1, angle)
+    angle = sweep.angle_rad if truth is None else truth.angle_of(log, run)
     velocity = low_pass_velocity(angle, run.period_s)[judged]
     wanted = sweep.setpoint_velocity_rad_s[judged]
     effort = run.effort_Nm[judged]
@@ -59,7 +58,7 @@ def read_ramp(path: Path, truth: Truth | None) -> Ramp:
 
 
 @dataclass(frozen=True)
-class LeftOver:
+class ResidualEffort:
     """What the PID still does under compensation, one row a direction that was recorded."""
 
     forward: tuple[bool, ...]
@@ -72,8 +71,8 @@ class LeftOver:
     """The part that comes back in the next turn; None where too little was recorded to tell."""
 
 
-def read_left_over(paths: Sequence[Path], orders: int) -> LeftOver:
-    """Read what is left in recorded passes, up to the given order; raises RawLogError."""
+def read_residual_effort(paths: Sequence[Path], orders: int) -> ResidualEffort:
+    """Read the PID's residual effort in recorded passes up to an order; raises RawLogError."""
     curves, forward, products = [], [], []
     for path in paths:
         run = recording(read_raw_log(path))
@@ -85,7 +84,7 @@ def read_left_over(paths: Sequence[Path], orders: int) -> LeftOver:
         if np.mean(both) > _COMPARABLE:
             products.append(np.mean((last * first)[both]))
     effort = np.array(curves)
-    return LeftOver(
+    return ResidualEffort(
         forward=tuple(forward),
         effort_Nm=effort,
         amplitudes_Nm=np.abs(np.fft.rfft(effort, axis=1))[:, 1 : orders + 1] * 2.0 / _BINS,
@@ -121,7 +120,7 @@ def _over_angle(run: Recording, chosen: BoolArray) -> tuple[FloatArray, BoolArra
     return np.asarray(curve), seen
 
 
-def friction_Nm(better: BetterResult, speed_rad_s: float) -> tuple[float, float]:
+def friction_Nm(better: HarmonicResult, speed_rad_s: float) -> tuple[float, float]:
     """Return the model's friction torque at a steady speed with increasing, decreasing angle."""
     f = better.friction
     fall = math.exp(-((speed_rad_s / f.stribeck_speed_rad_s) ** 2))
@@ -145,11 +144,11 @@ class TableError:
     """By how much motor angle that order comes late, in the sense of the motion."""
 
 
-def table_errors(thesis: ThesisResult, better: BetterResult) -> tuple[TableError, TableError]:
+def table_errors(thesis: ThesisResult, better: HarmonicResult) -> tuple[TableError, TableError]:
     """Compare the thesis' curves with the harmonic model, for each direction."""
     samples = thesis.curve_Nm.shape[1]
     model = better.tables(samples)
-    order = strongest(better)
+    order = strongest_order(better)
     turning = np.exp(-1j * order * np.arange(samples) * (math.tau / samples))
     errors = []
     for side, sign in ((0, 1.0), (1, -1.0)):
@@ -170,7 +169,7 @@ def table_errors(thesis: ThesisResult, better: BetterResult) -> tuple[TableError
     return errors[0], errors[1]
 
 
-def strongest(better: BetterResult) -> int:
+def strongest_order(better: HarmonicResult) -> int:
     """Return the order with the largest amplitude, 1 where none was found."""
     if not better.harmonics:
         return 1
@@ -180,7 +179,7 @@ def strongest(better: BetterResult) -> int:
 def filter_gain(order: int) -> float:
     """Return which share of an order the thesis' filter leaves: degree 2 over 5 deg."""
     half = round(0.5 * WINDOW_deg / 360.0 * GRID)
-    weights = filter_weights(2 * half + 1)
+    weights = scipy.signal.savgol_coeffs(2 * half + 1, DEGREE)
     return float(weights @ np.cos(math.tau * order * np.arange(-half, half + 1) / GRID))
 
 

@@ -11,19 +11,19 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from cdpr_rt.exchange import BoolArray, FloatArray
-from tools.report.curves import LeftOver
-from tools.report.style import (
+from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_tools.report.curves import ResidualEffort
+from cdpr_tools.report.style import (
     BACKWARD,
     COLOURS,
+    DIRECTIONS,
     FORWARD,
     LABELS,
     REPAIRED,
-    WAYS,
     canvas,
-    embedded,
+    data_uri,
+    decimated,
     legend_above,
-    thinned,
 )
 
 _WIDE_SPREAD = 30.0
@@ -50,13 +50,13 @@ def _log_labels(axis: Axis) -> None:
 def raw_curves(raw_Nm: FloatArray) -> str:
     """Draw the averaged torque of both directions, (2, m), over a turn (Tremblay, figure 1.4)."""
     figure, (ax,) = canvas(height=3.2)
-    for curve, colour, name in zip(raw_Nm, (FORWARD, BACKWARD), WAYS, strict=True):
-        ax.plot(*thinned(_turn_deg(curve.size), curve), color=colour, label=name, lw=0.9)
+    for curve, colour, name in zip(raw_Nm, (FORWARD, BACKWARD), DIRECTIONS, strict=True):
+        ax.plot(*decimated(_turn_deg(curve.size), curve), color=colour, label=name, lw=0.9)
     ax.axhline(0.0, color="black", lw=0.5)
     ax.set(xlabel="angle from the index (deg)", ylabel="torque (Nm)")
     _over_turn(ax)
     legend_above(figure, ax)
-    return embedded(figure)
+    return data_uri(figure)
 
 
 def overlay(raw_Nm: FloatArray, order: int) -> str:
@@ -67,13 +67,13 @@ def overlay(raw_Nm: FloatArray, order: int) -> str:
     figure, (ax,) = canvas(height=3.0)
     inside = _turn_deg(raw_Nm.shape[1]) < 360.0 / order
     degrees = _turn_deg(raw_Nm.shape[1])[inside]
-    for curve, colour, name in zip(raw_Nm, (FORWARD, BACKWARD), WAYS, strict=True):
+    for curve, colour, name in zip(raw_Nm, (FORWARD, BACKWARD), DIRECTIONS, strict=True):
         ax.plot(degrees, (curve - curve.mean())[inside], color=colour, label=name)
     ax.axhline(0.0, color="black", lw=0.5)
     ax.set(xlabel="angle from the index (deg)", ylabel="torque about its mean (Nm)")
     ax.set_xlim(0, 360.0 / order)
     legend_above(figure, ax)
-    return embedded(figure)
+    return data_uri(figure)
 
 
 def tables(
@@ -86,7 +86,7 @@ def tables(
     figure, axes = canvas(rows=2, height=2.8, sharex=True)
     degrees = _turn_deg(raw_Nm.shape[1])
     for side, ax in enumerate(axes):
-        measured = thinned(degrees, raw_Nm[side])
+        measured = decimated(degrees, raw_Nm[side])
         ax.plot(*measured, color=COLOURS["none"], lw=2.2, alpha=0.6, label="measured, averaged")
         ax.plot(degrees, thesis_Nm[side], color=COLOURS["thesis"], label="thesis: filtered")
         ax.plot(degrees, better_Nm[side], color=COLOURS["better"], label=LABELS["better"])
@@ -95,11 +95,11 @@ def tables(
             degrees, low, high, where=repaired[side], color=REPAIRED, alpha=0.35, lw=0,
             label="rotor ran away: repaired",
         )  # fmt: skip
-        ax.set(ylabel="torque (Nm)", ylim=(low, high), title=WAYS[side])
+        ax.set(ylabel="torque (Nm)", ylim=(low, high), title=DIRECTIONS[side])
         _over_turn(ax)
     axes[1].set_xlabel("angle from the index (deg)")
     legend_above(figure, axes[0])
-    return embedded(figure)
+    return data_uri(figure)
 
 
 def spectrum(
@@ -137,7 +137,7 @@ def spectrum(
     right.set_yscale("log")
     _log_labels(right.yaxis)
     right.legend()
-    return embedded(figure)
+    return data_uri(figure)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def deviations(time_s: FloatArray, curves: Mapping[str, FloatArray], what: Devia
     """
     figure, (whole, near) = canvas(rows=2, height=2.3, sharex=True)
     for method, curve in curves.items():
-        x, y = thinned(time_s[: curve.size], curve)
+        x, y = decimated(time_s[: curve.size], curve)
         whole.plot(x, y, color=COLOURS[method], label=LABELS[method], lw=0.9)
         faint = 1.0 if method == "better" else 0.6
         near.plot(x, y, color=COLOURS[method], lw=0.7, alpha=faint)
@@ -168,7 +168,7 @@ def deviations(time_s: FloatArray, curves: Mapping[str, FloatArray], what: Devia
     whole.set_xlim(0.0, time_s[-1])
     figure.supylabel(what.label, fontsize=9.5)
     legend_above(figure, whole, near)
-    return embedded(figure)
+    return data_uri(figure)
 
 
 def bandwidths(
@@ -209,10 +209,10 @@ def bandwidths(
     for ax in axes[-2:]:
         ax.set_xlabel("closed-loop bandwidth (Hz)")
     legend_above(figure, axes[0])
-    return embedded(figure)
+    return data_uri(figure)
 
 
-def left_over(left: LeftOver, orders: Sequence[int]) -> str:
+def residual_effort(left: ResidualEffort, orders: Sequence[int]) -> str:
     """Draw what the PID still has to do under the harmonic model over the turn, and its orders.
 
     `orders` are those that the model has.
@@ -221,7 +221,7 @@ def left_over(left: LeftOver, orders: Sequence[int]) -> str:
     degrees = _turn_deg(left.effort_Nm.shape[1])
     count = np.arange(1, left.amplitudes_Nm.shape[1] + 1)
     for row, forward in enumerate(left.forward):
-        colour, name = (FORWARD, WAYS[0]) if forward else (BACKWARD, WAYS[1])
+        colour, name = (FORWARD, DIRECTIONS[0]) if forward else (BACKWARD, DIRECTIONS[1])
         top.plot(degrees, left.effort_Nm[row] * 1e3, color=colour, lw=0.9, label=name)
         bottom.plot(count, left.amplitudes_Nm[row] * 1e3, ".-", color=colour, lw=0.7, ms=3)
     top.set(xlabel="angle from the index (deg)", ylabel="PID effort (mNm)")
@@ -231,4 +231,4 @@ def left_over(left: LeftOver, orders: Sequence[int]) -> str:
     bottom.set(xlabel="order (periods a turn)", ylabel="amplitude (mNm)", xlim=(0, count[-1]))
     bottom.set_ylim(bottom=0.0)
     legend_above(figure, top)
-    return embedded(figure)
+    return data_uri(figure)

@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.rawlog import read_raw_log
-from profiles import Winch
-from tools.commission_files import Paths
-from tools.commissioning import METHODS
-from tools.errors import BadInputError
-from tools.output import to_json
-from tools.procedure import Identified, identify, validation_name
-from tools.report import curves, figures, tables, words
-from tools.report.curves import Ramp
-from tools.report.figures import Deviation
-from tools.report.save import check, save
-from tools.report.text import number, page, paragraph, picture, plain, section
-from tools.truth import Truth
+from cdpr_profiles import Winch
+from cdpr_rt.core.rawlog import read_raw_log
+from cdpr_rt.procedures.commissioning.commission_files import Paths
+from cdpr_rt.procedures.commissioning.evaluation import METHODS
+from cdpr_rt.procedures.commissioning.identified import Identified, identify, validation_name
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import to_json
+from cdpr_tools.recordings.truth import Truth
+from cdpr_tools.report import curves, figures, tables, words
+from cdpr_tools.report.curves import Ramp
+from cdpr_tools.report.figures import Deviation
+from cdpr_tools.report.save import check, save
+from cdpr_tools.report.text import number, page, paragraph, picture, plain, section
 
 _ORDERS_SHOWN = 100
 
@@ -63,7 +63,7 @@ class _Report:
         judged = words.judged_on(self._validation, len(self._passes("better")))
         parts = [
             f"<h1>{escape(title)}</h1>",
-            paragraph(self._whose(), small=True),
+            paragraph(self._motor_and_drive(), small=True),
             self._verdict(),
             tables.summary(self._validation, self._results["bandwidth_Hz"]),
             paragraph(judged, small=True),
@@ -72,7 +72,7 @@ class _Report:
             section("Validation on a ramp of 22 deg/s", *self._ramp(ramps)),
             section("The thesis’ method beside the harmonic model", *self._methods(ramps)),
             section("Softer and stiffer loops", *self._bandwidths()),
-            section("What is left", *self._left()),
+            section("What is left", *self._residual()),
             section("Bus and files", tables.bus(self._results["bus"]), self._files()),
         ]
         return page(title, "\n".join(parts))
@@ -94,7 +94,7 @@ class _Report:
         truth = Truth(self._paths.truth) if self._true else None
         return {method: curves.read_ramp(self._passes(method)[0], truth) for method in METHODS}
 
-    def _whose(self) -> str:
+    def _motor_and_drive(self) -> str:
         motor, drive = self._winch.motor, self._results["drive"]
         if isinstance(drive, Mapping):
             ids = ", ".join(
@@ -112,7 +112,7 @@ class _Report:
         )
 
     def _verdict(self) -> str:
-        good = not words.missed(self._validation, "better")
+        good = not words.missed_targets(self._validation, "better")
         lines = "".join(
             f"<p><b>{who}</b>{escape(words.verdict(self._validation, method))}</p>"
             for method, who in (("better", "The harmonic model"), ("thesis", "The thesis’ method"))
@@ -122,7 +122,7 @@ class _Report:
     def _torque(self) -> list[str]:
         thesis, better = self._found.thesis, self._found.better
         speed = abs(read_raw_log(self._recorded("sweep")[0]).header["speed_rad_s"])
-        order = curves.strongest(better)
+        order = curves.strongest_order(better)
         shift = curves.shift_deg(thesis.raw_Nm, order)
         means = " and ".join(number(1e3 * one) for one in thesis.mean_Nm)
         frictions = " and ".join(number(1e3 * one) for one in curves.friction_Nm(better, speed))
@@ -146,7 +146,7 @@ class _Report:
                 "Both directions over one period of the strongest order",
                 f"Both directions about their means over one period of order {order} (thesis, "
                 f"figure 1.5). In that order the two are {number(abs(shift), 2)} deg apart, each "
-                f"{words.late(shift / 2)} in the sense of its motion.",
+                f"{words.lag_text(shift / 2)} in the sense of its motion.",
             ),
             self._picture(
                 figures.tables(
@@ -223,7 +223,7 @@ class _Report:
         encoder_deg = 360.0 / self._results["encoder_counts_per_turn"]
         return [
             paragraph(words.loop_words(self._results["pid"][0])),
-            paragraph(words.standing_words(ramps)),
+            paragraph(words.standstill_words(ramps)),
             *pictures,
             *map(paragraph, words.floor_words(self._validation, encoder_deg, self._torque_step())),
             *([tables.on_encoder(self._validation["encoder"])] if self._true else []),
@@ -234,12 +234,12 @@ class _Report:
 
     def _methods(self, ramps: dict[str, Ramp]) -> list[str]:
         found = self._found
-        told = words.method_words(self._validation, found.thesis, found.better, ramps)
-        return [paragraph(one) for one in told]
+        sentences = words.method_words(self._validation, found.thesis, found.better, ramps)
+        return [paragraph(one) for one in sentences]
 
     def _bandwidths(self) -> list[str]:
         rows, default = self._validation["bandwidths"], self._results["bandwidth_Hz"]
-        told = paragraph(
+        introduction = paragraph(
             "How much compensation gains depends on the loop it helps: a soft loop leaves much to "
             "win, a stiff one little, and every stiff loop ends at the floor. "
             + (
@@ -251,23 +251,23 @@ class _Report:
         )
         loops = tables.loops(rows, self._results["bandwidths_Hz"], self._results["pid"])
         if len(rows) == 1:
-            return [told, loops]
+            return [introduction, loops]
         drawn = self._picture(
             figures.bandwidths(rows, default, self._validation["targets"]),
             "The three figures and their ratios over the bandwidth of the loop",
             "Left: what each method leaves; right: how many times smaller that is than without. "
             f"The short bars at {plain(default)} Hz are what was asked there.",
         )
-        return [told, drawn, loops]
+        return [introduction, drawn, loops]
 
-    def _left(self) -> list[str]:
-        left = curves.read_left_over(self._passes("better"), _ORDERS_SHOWN)
+    def _residual(self) -> list[str]:
+        left = curves.read_residual_effort(self._passes("better"), _ORDERS_SHOWN)
         facts = self._results["identification"]
-        told = words.left_words(left, facts["residual_rms_Nm"])
+        sentences = words.residual_words(left, facts["residual_rms_Nm"])
         return [
-            *map(paragraph, told),
+            *map(paragraph, sentences),
             self._picture(
-                figures.left_over(left, facts["orders"]),
+                figures.residual_effort(left, facts["orders"]),
                 "PID effort under the harmonic model over the turn, and its orders",
                 "PID effort under the harmonic model over the turn about its mean, and its "
                 "orders; shaded: the orders that the model has.",

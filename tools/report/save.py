@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
 _RATIOS = ("rms_position_error", "peak_pid_effort", "peak_velocity_error")

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_rt.exchange import FloatArray
+from cdpr_rt.core.exchange import FloatArray
 
 COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "better": "#d1581a", "floor": "#3b8f5a"}
 LABELS = {
@@ -21,7 +21,7 @@ LABELS = {
 }
 FORWARD, BACKWARD = "#7a3fa0", "#1f8a8a"
 REPAIRED = "#f3c623"
-WAYS = ("increasing angle", "decreasing angle")
+DIRECTIONS = ("increasing angle", "decreasing angle")
 
 _POINTS = 4000
 
@@ -60,7 +60,7 @@ def legend_above(figure: Figure, *axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper left", ncols=4)
 
 
-def embedded(figure: Figure) -> str:
+def data_uri(figure: Figure) -> str:
     """Return the figure as the text of an image source that needs no file beside the page."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
@@ -68,7 +68,7 @@ def embedded(figure: Figure) -> str:
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
-def thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def decimated(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a curve (k,) with few enough points to draw, both extremes of each stretch kept.
 
     A gap (nan) is kept where it fills a stretch.

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from cdpr_rt.identification import BetterResult, Estimate
-from tools.commissioning import METHODS
-from tools.report.text import data, number, plain, table
-from tools.report.words import NAMES, QUANTITIES, Quantity, missed
+from cdpr_rt.identification import ConfidenceInterval, HarmonicResult
+from cdpr_rt.procedures.commissioning.evaluation import METHODS
+from cdpr_tools.report.text import data, number, plain, table
+from cdpr_tools.report.words import NAMES, QUANTITIES, Quantity, missed_targets
 
 _COMPENSATED = ("thesis", "better")
 
@@ -32,7 +32,9 @@ def summary(validation: Mapping[str, Any], bandwidth_Hz: float) -> str:
 
 def _gain_cell(validation: Mapping[str, Any], method: str, q: Quantity) -> str:
     mine, goal = validation[method], validation["targets"][method][q.ratio]
-    kind, word = ("bad", "missed") if q in missed(validation, method) else ("good", "reached")
+    kind, word = (
+        ("bad", "missed") if q in missed_targets(validation, method) else ("good", "reached")
+    )
     return (
         f'{data(mine[q.key])}<span class="small"><b class="together">'
         f"{data(mine['ratios'][q.ratio])} ×</b> smaller</span>"
@@ -72,11 +74,11 @@ def harmonics(identification: Mapping[str, Any]) -> str:
     return table(head, rows, caption)
 
 
-def estimates(better: BetterResult) -> str:
+def estimates(better: HarmonicResult) -> str:
     """Return what was identified beside the cogging."""
     f = better.friction
 
-    def row(name: str, one: Estimate, factor: float = 1.0) -> list[str]:
+    def row(name: str, one: ConfidenceInterval, factor: float = 1.0) -> list[str]:
         known = number(abs(factor) * one.half_width, 2) if one.half_width > 0.0 else "assumed"
         return [name, data(factor * one.value), known]
 
@@ -140,8 +142,8 @@ def loops(
 
 
 def _gains(ratios: Mapping[str, float]) -> str:
-    told = " · ".join(data(ratios[q.ratio]) for q in QUANTITIES)
-    return f'<span class="together">{told}</span>'
+    shown = " · ".join(data(ratios[q.ratio]) for q in QUANTITIES)
+    return f'<span class="together">{shown}</span>'
 
 
 def bus(facts: Mapping[str, Any]) -> str:

@@ -63,11 +63,11 @@ def plain(value: float) -> str:
     return f"{value:g}"
 
 
-def data(value: float | None, digits: int = 3) -> str:
+def data(value: float | None) -> str:
     """Return a number for people that carries its full value for programs."""
     if value is None:
         return number(value)
-    return f'<data value="{float(value)!r}">{number(value, digits)}</data>'
+    return f'<data value="{float(value)!r}">{number(value)}</data>'
 
 
 def paragraph(text: str, small: bool = False) -> str:

@@ -6,9 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cdpr_rt.identification import BetterResult, ThesisResult
-from tools.report.curves import LeftOver, Ramp, TableError, filter_gain, strongest, table_errors
-from tools.report.text import number, plain
+from cdpr_rt.identification import HarmonicResult, ThesisResult
+from cdpr_tools.report.curves import (
+    Ramp,
+    ResidualEffort,
+    TableError,
+    filter_gain,
+    strongest_order,
+    table_errors,
+)
+from cdpr_tools.report.text import number, plain
 
 _NEAR_FLOOR = 2.0
 _SEEN = 0.005
@@ -39,12 +46,12 @@ def joined(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
-def late(degrees: float) -> str:
+def lag_text(degrees: float) -> str:
     """Say by how much something comes late or early."""
     return f"{number(abs(degrees), 2)} deg {'late' if degrees >= 0.0 else 'early'}"
 
 
-def missed(validation: Mapping[str, Any], method: str) -> list[Quantity]:
+def missed_targets(validation: Mapping[str, Any], method: str) -> list[Quantity]:
     """Return the figures in which a method does not reach its targets."""
     goals, got = validation["targets"][method], validation[method]["ratios"]
     return [q for q in QUANTITIES if got[q.ratio] is not None and got[q.ratio] < goals[q.ratio]]
@@ -55,7 +62,7 @@ def verdict(validation: Mapping[str, Any], method: str) -> str:
     goals, got = validation["targets"][method], validation[method]["ratios"]
     gains = joined([f"the {q.name} {number(got[q.ratio])} times" for q in QUANTITIES])
     asked = joined([plain(goals[q.ratio]) for q in QUANTITIES])
-    short = missed(validation, method)
+    short = missed_targets(validation, method)
     if not short:
         end = "all reached"
     elif len(short) == len(QUANTITIES):
@@ -94,12 +101,12 @@ def floor_words(validation: Mapping[str, Any], encoder_deg: float, torque_Nm: fl
     ]
     without = validation["none"]
     most = {q.name: without[q.key] / floor[q.key] for q in QUANTITIES if floor[q.key] > 0.0}
-    told = joined([f"{number(ratio, 2)} in the {name}" for name, ratio in most.items()])
-    words.append(f"With nothing but the floor left, the gains in this loop would be {told}.")
-    short = missed(validation, "better")
+    gains = joined([f"{number(ratio, 2)} in the {name}" for name, ratio in most.items()])
+    words.append(f"With nothing but the floor left, the gains in this loop would be {gains}.")
+    short = missed_targets(validation, "better")
     if short:
-        told = joined([q.name for q in short])
-        words.append(f"The harmonic model does not reach what was asked in the {told}.")
+        names = joined([q.name for q in short])
+        words.append(f"The harmonic model does not reach what was asked in the {names}.")
     close = [name for name, ratio in above.items() if ratio <= _NEAR_FLOOR]
     if close:
         words.append(
@@ -114,7 +121,7 @@ def floor_words(validation: Mapping[str, Any], encoder_deg: float, torque_Nm: fl
     return words
 
 
-def standing_words(ramps: Mapping[str, Ramp]) -> str:
+def standstill_words(ramps: Mapping[str, Ramp]) -> str:
     """Say how long the rotor stood still in each run."""
     shares = {method: ramp.standing for method, ramp in ramps.items()}
     if max(shares.values()) < _SEEN:
@@ -124,7 +131,7 @@ def standing_words(ramps: Mapping[str, Ramp]) -> str:
         "thesis": "with the thesis’ table",
         "better": "with the harmonic model",
     }
-    told = [f"{_percent(share)} of the time {where[m]}" for m, share in shares.items()]
+    stretches = [f"{_percent(share)} of the time {where[m]}" for m, share in shares.items()]
     end = (
         "What the harmonic model leaves contains stick-slip, which is part of its floor."
         if shares["better"] >= _SEEN
@@ -132,7 +139,7 @@ def standing_words(ramps: Mapping[str, Ramp]) -> str:
     )
     return (
         f"The rotor stuck and slipped: it stood still (slower than a tenth of the ramp) "
-        f"{joined(told)}. {end}"
+        f"{joined(stretches)}. {end}"
     )
 
 
@@ -157,19 +164,19 @@ def loop_words(design: Mapping[str, Any]) -> str:
 def method_words(
     validation: Mapping[str, Any],
     thesis: ThesisResult,
-    better: BetterResult,
+    better: HarmonicResult,
     ramps: Mapping[str, Ramp],
 ) -> list[str]:
     """Say in figures how the thesis' curves differ from the model and what that costs."""
-    short = missed(validation, "thesis")
+    short = missed_targets(validation, "thesis")
     words = []
     if short:
         got, goals = validation["thesis"]["ratios"], validation["targets"]["thesis"]
-        told = [
+        shortfalls = [
             f"{q.name} {number(got[q.ratio])} times smaller instead of {plain(goals[q.ratio])}"
             for q in short
         ]
-        words.append(f"The thesis’ method falls short here: {joined(told)}. The reasons:")
+        words.append(f"The thesis’ method falls short here: {joined(shortfalls)}. The reasons:")
     errors = table_errors(thesis, better)
     words.append(
         f"Its curves differ from the harmonic model {_error(errors[0])} for increasing and "
@@ -180,17 +187,18 @@ def method_words(
         _cost(validation, better, max(one.peak_Nm for one in errors), ramps["thesis"].standing)
     )
     if better.harmonics:
+        order = strongest_order(better)
         words.append(
-            f"In the strongest order, {strongest(better)}, they have {number(errors[0].gain)} and "
+            f"In the strongest order, {order}, they have {number(errors[0].gain)} and "
             f"{number(errors[1].gain)} of the model’s amplitude and come "
-            f"{late(errors[0].behind_deg)} and {late(errors[1].behind_deg)} in the sense of the "
-            "motion."
+            f"{lag_text(errors[0].behind_deg)} and {lag_text(errors[1].behind_deg)} in the "
+            "sense of the motion."
         )
     return words + _method_limits(thesis, better)
 
 
 def _cost(
-    validation: Mapping[str, Any], better: BetterResult, table_error_Nm: float, standing: float
+    validation: Mapping[str, Any], better: HarmonicResult, table_error_Nm: float, standing: float
 ) -> str:
     """Say what the PID has to do for the table's error."""
     effort = validation["thesis"]["peak_pid_effort_Nm"]
@@ -215,7 +223,7 @@ def _cost(
     )
 
 
-def _method_limits(thesis: ThesisResult, better: BetterResult) -> list[str]:
+def _method_limits(thesis: ThesisResult, better: HarmonicResult) -> list[str]:
     """Say what in the thesis' method makes its curves differ."""
     words = []
     if thesis.repaired_fraction > 0.0:
@@ -227,8 +235,10 @@ def _method_limits(thesis: ThesisResult, better: BetterResult) -> list[str]:
     flattened = [(h.order, filter_gain(h.order)) for h in better.harmonics]
     flattened = [(order, gain) for order, gain in flattened if gain < _FLAT]
     if flattened:
-        told = joined([f"{number(100 * gain, 2)} % of order {order}" for order, gain in flattened])
-        words.append(f"Its filter over 5 deg leaves {told}.")
+        shares = joined(
+            [f"{number(100 * gain, 2)} % of order {order}" for order, gain in flattened]
+        )
+        words.append(f"Its filter over 5 deg leaves {shares}.")
     words.append(
         "Its curves also hold what the slow sweep adds to the cogging: the jumps of a rotor that "
         "sticks and slips, and one constant for the friction at that speed. That friction depends "
@@ -244,8 +254,8 @@ def _error(error: TableError) -> str:
     )
 
 
-def left_words(left: LeftOver, residual_rms_Nm: float) -> list[str]:
-    """Say what could not be explained, and what of it repeats."""
+def residual_words(left: ResidualEffort, residual_rms_Nm: float) -> list[str]:
+    """Describe the residual, and which part of it repeats."""
     order = int(left.amplitudes_Nm.max(axis=0).argmax())
     largest = float(left.amplitudes_Nm[:, order].max())
     words = (

@@ -9,21 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from profiles import ProfileError, Robot, load_robot
-from profiles.platform import Platform
-from tools.commissioned import folder_called
-from tools.errors import BadInputError
-from tools.robots.questions import (
-    CABLES,
+from cdpr_drivers.robot.commissioned import folder_called
+from cdpr_profiles import ProfileError, Robot, load_robot
+from cdpr_profiles.platform import Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.platform_model import platform_model
+from cdpr_rt.robots.statics import Box, PlatformStatics
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.robots.kinds import KINDS
+from cdpr_tools.robots.questions import (
     AnswerError,
     Answers,
     Question,
     axis_names,
+    kind_question,
     places,
     questions,
 )
-from tools.robots.statics import Box, PlanarStatics
 
 Ask = Callable[[Question, str, str], str]
 """Takes a question, its default and what was wrong with the last answer; returns the answer."""
@@ -36,15 +38,19 @@ def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
 
     What is in `given` is not asked; raises BadInputError for what is wrong there.
     """
-    told: Answers = {}
-    asked = questions(path.parent, path.stem)
-    known = [q.key for q in (*asked, *places((0.0, 0.0), (1.0, 1.0), proposed_stand))]
+    first = kind_question()
+    told: Answers = {first.key: _answer(first, {}, given, ask)}
+    kind = told["kind"]
+    asked = questions(path.parent, path.stem, kind)
+    nowhere = (0.0,) * kind.size
+    last = [q.key for q in places(kind, nowhere, nowhere, proposed_stand)]
+    known = [first.key, *(q.key for q in asked), *last]
     for key in given:
         if key not in known:
             raise BadInputError(f"--set {key}: no such question; allowed: {', '.join(known)}")
     for question in asked:
         told[question.key] = _answer(question, told, given, ask)
-    for question in places(*proposed_box(told), proposed_stand):
+    for question in places(kind, *proposed_box(told), proposed_stand):
         told[question.key] = _answer(question, told, given, ask)
     return told
 
@@ -63,67 +69,76 @@ def _answer(question: Question, told: Answers, given: Mapping[str, str], ask: As
                 raise BadInputError(f"--set {question.key}: {problem}") from None
 
 
-def proposed_box(told: Answers) -> tuple[tuple[float, float], tuple[float, float]]:
+def proposed_box(told: Answers) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the largest box of targets that the cables can hold, to the cm, or one to begin with.
 
     A tenth of it is left below for the stand.
     """
-    exits = np.array([told[f"exit_{i + 1}_m"] for i in range(CABLES)])
-    middle, size = 0.5 * (exits.min(axis=0) + exits.max(axis=0)), np.ptp(exits, axis=0)
-    around = Box(_pair(middle - 0.5 * size), _pair(middle + 0.5 * size))
+    exits = np.array([told[f"exit_{i + 1}_m"] for i in range(told["kind"].cables)])
+    least, most = exits.min(axis=0), exits.max(axis=0)
+    if least[-1] > 0.5 * most[-1]:
+        least[-1] = 0.0  # all cables come from above: it is held down to the floor
+    middle, size = 0.5 * (least + most), most - least
+    around = Box(_point(least), _point(most))
     found = _statics_of(told, around).largest_box(around)
     if found is not None:
-        height = found.high_m[1] - found.low_m[1]
-        low = (
-            np.ceil(100.0 * (np.array(found.low_m) + _STAND_SHARE * np.array([0.0, height])))
-            / 100.0
-        )
-        high = np.floor(100.0 * np.array(found.high_m)) / 100.0
+        up = np.eye(len(size))[-1]
+        low = np.array(found.low_m) + _STAND_SHARE * up * (found.high_m[-1] - found.low_m[-1])
+        low, high = np.ceil(100.0 * low) / 100.0, np.floor(100.0 * np.array(found.high_m)) / 100.0
         if (low < high).all():
-            return _pair(low), _pair(high)
+            return _point(low), _point(high)
     aside = np.maximum(0.1 * size, 0.05)
-    return _pair(middle - aside), _pair(middle + aside)
+    return _point(middle - aside), _point(middle + aside)
 
 
-def proposed_stand(told: Answers) -> tuple[float, float]:
-    """Return where under the box of targets the cables turn the platform least.
+def proposed_stand(told: Answers) -> tuple[float, ...]:
+    """Return a place under the middle of the box of targets.
 
-    Where they turn it they might tip it on its stand, and lengths learnt there are wrong by that.
+    A platform that is free to turn has it where the cables turn it least: where they turn it they
+    might tip it on its stand, and lengths learnt there are wrong by that.
     """
-    (left, bottom), (right, top) = told["low_m"], told["high_m"]
-    below = bottom - _STAND_SHARE / (1.0 - _STAND_SHARE) * (top - bottom)
-    xs = np.linspace(left, right, 41)
-    xs = xs[np.argsort(np.abs(xs - 0.5 * (left + right)), kind="stable")]
-    places = np.stack([xs, np.full(xs.size, math.ceil(100.0 * below) / 100.0)], axis=-1)
+    low, high = np.array(told["low_m"]), np.array(told["high_m"])
+    below = low[-1] - _STAND_SHARE / (1.0 - _STAND_SHARE) * (high[-1] - low[-1])
     statics = _statics_of(told, Box(told["low_m"], told["high_m"]))
+    middle = np.array([*(0.5 * (low + high))[:-1], math.ceil(100.0 * below) / 100.0])
+    if not statics.turns:
+        return _point(middle)
+    xs = np.linspace(low[0], high[0], 41)
+    xs = xs[np.argsort(np.abs(xs - middle[0]), kind="stable")]
+    places = np.stack([xs, np.full(xs.size, middle[1])], axis=-1)
     turned = np.where(statics.is_target(places), np.abs(statics.angle_rad(places)), math.inf)
     turned = np.where(np.isnan(turned), math.inf, turned)
     # what differs by less than anybody sees is alike, and the first of them is in the middle
-    return _pair(places[int(np.round(turned, 2).argmin())])
+    return _point(places[int(np.round(turned, 2).argmin())])
 
 
-def _statics_of(told: Answers, box: Box) -> PlanarStatics:
-    low_N, high_N = told["tension_min_N"], told["tension_max_N"]
-    return PlanarStatics(_platform_of(told, box), np.full(3, low_N), np.full(3, high_N))
+def _statics_of(told: Answers, box: Box) -> PlatformStatics:
+    low_N, high_N = (
+        np.full(told["kind"].cables, told[f"tension_{end}_N"]) for end in ("min", "max")
+    )
+    return PlatformStatics(platform_model(_platform_of(told, box), low_N, high_N))
 
 
 def _platform_of(told: Answers, box: Box) -> Platform:
-    middle = 0.5 * (np.array(box.low_m) + box.high_m)
+    cables = range(told["kind"].cables)
     return Platform(
         mass_kg=told["mass_kg"],
-        home_m=_pair(middle),
+        home_m=_point(0.5 * (np.array(box.low_m) + box.high_m)),
         home_tolerance_m=0.05,
         workspace_min_m=box.low_m,
         workspace_max_m=box.high_m,
         speed_m_s=told["speed_m_s"],
         acceleration_m_s2=told["acceleration_m_s2"],
-        exit_points_m=tuple(told[f"exit_{i + 1}_m"] for i in range(CABLES)),
-        anchor_points_m=tuple(told[f"anchor_{i + 1}_m"] for i in range(CABLES)),
+        exit_points_m=tuple(told[f"exit_{i + 1}_m"] for i in cables),
+        anchor_points_m=tuple(told[f"anchor_{i + 1}_m"] for i in cables),
+        workspace_angle_rad=told.get("angle_deg", 0.0),
+        angular_speed_rad_s=told.get("angular_speed_deg_s", 0.0),
+        angular_acceleration_rad_s2=told.get("angular_acceleration_deg_s2", 0.0),
     )
 
 
-def _pair(point_m: FloatArray) -> tuple[float, float]:
-    return float(point_m[0]), float(point_m[1])
+def _point(point_m: FloatArray) -> tuple[float, ...]:
+    return tuple(float(x) for x in point_m)
 
 
 def write_robot(told: Answers, path: Path) -> Robot:
@@ -150,21 +165,38 @@ def write_robot(told: Answers, path: Path) -> Robot:
 def text_of(told: Answers) -> str:
     """Return the answers as a robot's file, with comments."""
     winch, _ = told["winch"]
-    names = axis_names(told)
+    kind, names = told["kind"], axis_names(told)
+    on_each = -(-kind.cables // kind.buses)
     axes = [
         _AXIS.format(
             name=_quoted(names[i]),
             winch=_quoted(winch),
+            bus=i // on_each,
             node=told["nodes"][i],
             commissioned=_quoted(f"motors/{folder_called(names[i], told['nodes'][i])}"),
             exit=_array(told[f"exit_{i + 1}_m"]),
             anchor=_array(told[f"anchor_{i + 1}_m"]),
         )
-        for i in range(CABLES)
+        for i in range(kind.cables)
     ]
+    buses = [told["bus"], told.get("bus_2")]
+    turning = ""
+    if told.get("angle_deg", 0.0) > 0.0:
+        turning = _TURNING.format(
+            angle=round(told["angle_deg"], 6),
+            degrees=f"{math.degrees(told['angle_deg']):.3g}",
+            speed=round(told["angular_speed_deg_s"], 6),
+            acceleration=round(told["angular_acceleration_deg_s2"], 6),
+        )
     head = _HEAD.format(
         name=_quoted(told["name"]),
-        bus=_quoted(told["bus"]),
+        what=KINDS[kind.name],
+        axes="x to the right, y upward" if kind.size == 2 else "z upward",
+        buses="".join(
+            _BUS.format(number=i, url=_quoted(url)) for i, url in enumerate(buses[: kind.buses])
+        ),
+        turning=turning,
+        speed_limit=_speed_limit(told),
         home=_array(told["home_m"]),
         low=_array(told["low_m"]),
         high=_array(told["high_m"]),
@@ -183,6 +215,15 @@ def text_of(told: Answers) -> str:
     return "\n".join(_aligned(line) for line in (head + "".join(axes)).splitlines()) + "\n"
 
 
+def _speed_limit(told: Answers) -> str:
+    """Return the shipped robot's limit of the motors' speed as a line, where its winch is taken."""
+    robot = told["kind"].robot
+    most = robot.limits.speed_rad_s
+    if most is None or told["winch"][0] != robot.axes[0].winch.profile:
+        return ""
+    return f"speed_rad_s = {most[0]!r}\n"
+
+
 def _aligned(line: str) -> str:
     """Return a line with what is said of its key where that of the others is."""
     key, mark, said = line.partition("  # ")
@@ -193,21 +234,18 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _array(point_m: tuple[float, float]) -> str:
-    return f"[{float(point_m[0])!r}, {float(point_m[1])!r}]"
+def _array(point_m: tuple[float, ...]) -> str:
+    return f"[{', '.join(repr(float(x)) for x in point_m)}]"
 
 
 _HEAD = """\
-# A planar robot on three cables; x to the right, y upward, in m.
+# A cable robot: {what}.
+# Points are in m, {axes}.
 # `cdpr robot show` draws and checks it, `cdpr run` runs it.
 name = {name}
 sync_period_s = 0.001  # the control cycle
 
-[[buses]]
-name = "can0"
-url = {bus}
-
-[platform]
+{buses}[platform]
 mass_kg = {mass_kg}
 home_m = {home}  # where its middle is while it stands, at start and end
 # home_tolerance_m = 0.05  # how far from there it may really be
@@ -215,18 +253,29 @@ workspace_min_m = {low}  # the box in which targets may lie
 workspace_max_m = {high}
 speed_m_s = {speed_m_s}  # along each direction
 acceleration_m_s2 = {acceleration_m_s2}
-
+{turning}
 [limits]
 torque_Nm = {torque_Nm}  # at the motor
-tension_min_N = {tension_min_N}
+{speed_limit}tension_min_N = {tension_min_N}
 tension_max_N = {tension_max_N}
 # slack_N = 5.0  # a quarter of tension_min_N if left out
+"""
+_BUS = """\
+[[buses]]
+name = "can{number}"
+url = {url}
+
+"""
+_TURNING = """\
+workspace_angle_rad = {angle}  # {degrees} deg: how far targets may be turned
+angular_speed_rad_s = {speed}  # about each axis
+angular_acceleration_rad_s2 = {acceleration}
 """
 _AXIS = """
 [[axes]]
 name = {name}
 winch = {winch}
-bus = "can0"
+bus = "can{bus}"
 node_id = {node}
 exit_point_m = {exit}  # where its cable leaves the frame
 anchor_point_m = {anchor}  # where it ends, from the platform's middle

@@ -1,4 +1,4 @@
-"""The picture of a planar robot: exit points, cables, platform, and where they can hold it."""
+"""The picture of a robot: exit points, cables, platform, and where they can hold it."""
 
 from __future__ import annotations
 
@@ -10,69 +10,91 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-import tools.report.style  # noqa: F401 - how the project's pictures look
-from profiles import Robot
-from profiles.platform import Platform
-from tools.robots.statics import Box, PlanarStatics, can_be_computed, statics_of, view_of
+import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
+from cdpr_profiles import Robot
+from cdpr_profiles.platform import Platform
+from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of, view_of
 
 _CABLE, _PLATFORM, _TARGETS = "#444444", "#d1581a", "#7a3fa0"
 _WIDE_in = 7.4
+_NAMES = "xyz"
+
+_FINE, _COARSE = (121, 95), (41, 31)
+
+_View = tuple[int, int]
+"""Which coordinates are to the right and upward."""
 
 
 def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
-    """Write the picture of a planar robot as PNG; raises OSError.
+    """Write the picture of a robot as PNG; raises OSError.
 
-    Where tensions are known for it (three cables), the workspace that they allow is coloured by
-    how far the tensions can stay from their bounds.
+    A robot in space is seen from the front, from the side and from above, cut through the middle of
+    the box of targets. The workspace that tensions allow is coloured by how far they can stay from
+    their bounds in home's orientation; dotted is where targets are taken at any of theirs.
     """
-    shown = view_of(platform)
-    width, height = np.subtract(shown.high_m, shown.low_m)
-    figure = Figure(figsize=(_WIDE_in, _WIDE_in * height / width * 0.9), layout="constrained")
-    ax = figure.subplots()
-    if can_be_computed(robot):
-        _draw_workspace(figure, ax, statics_of(robot), shown)
-    _draw_machine(ax, robot, platform)
-    (left, right), (bottom, top) = zip(shown.low_m, shown.high_m, strict=True)
-    ax.set(title=robot.name, xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    ax.set(xlim=(left, right), ylim=(bottom, top))
-    ax.grid(visible=False)
-    handles, labels = ax.get_legend_handles_labels()
+    shown, statics = view_of(platform), statics_of(robot)
+    size = np.subtract(shown.high_m, shown.low_m)
+    views = [(0, 1)] if platform.is_planar else [(0, 2), (1, 2), (0, 1)]
+    heights = [float(size[j] / size[:2].max()) for _, j in views]
+    figure = Figure(figsize=(_WIDE_in, _WIDE_in * sum(heights) * 0.9), layout="constrained")
+    all_axes = figure.subplots(len(views), squeeze=False, height_ratios=heights)[:, 0]
+    for ax, view in zip(all_axes, views, strict=True):
+        _draw_workspace(figure, ax, statics, shown, view)
+        _draw_machine(ax, robot, platform, view)
+        i, j = view
+        ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
+        ax.set(xlim=(shown.low_m[i], shown.high_m[i]), ylim=(shown.low_m[j], shown.high_m[j]))
+        ax.grid(visible=False)
+    all_axes[0].set(title=robot.name)
+    handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
     figure.savefig(path, format="png")
 
 
-def _draw_workspace(figure: Figure, ax: Axes, statics: PlanarStatics, shown: Box) -> None:
-    points = shown.grid(181, 141)
-    xs, ys = points[0, :, 0], points[:, 0, 1]
+def _draw_workspace(
+    figure: Figure, ax: Axes, statics: PlatformStatics, shown: Box, view: _View
+) -> None:
+    platform = statics.platform
+    i, j = view
+    counts = _FINE if platform.is_planar else _COARSE
+    plane = Box((shown.low_m[i], shown.low_m[j]), (shown.high_m[i], shown.high_m[j]))
+    cells = plane.grid(*counts)
+    middle = np.add(platform.workspace_min_m, platform.workspace_max_m) / 2.0
+    points = np.empty((*cells.shape[:2], len(middle)))
+    points[:] = middle
+    points[..., view] = cells
+    xs, ys = cells[0, :, 0], cells[:, 0, 1]
     still = np.nan_to_num(statics.reserve_N(points), neginf=-1e3)
-    moving = statics.controlled.reserve_N(points, statics.platform.acceleration_m_s2)
+    wanted, kept_N = platform.acceleration_m_s2, statics.model.reserve_N
+    moving = statics.reserve_N(points, wanted, statics.orientations) - kept_N
     moving = np.nan_to_num(moving, neginf=-1e3)
     if still.max() > 0.0:
         levels = MaxNLocator(9).tick_values(0.0, float(still.max()))
         filled = ax.contourf(xs, ys, still, levels, cmap="YlGnBu", alpha=0.75)
         bar = figure.colorbar(filled, ax=ax, shrink=0.8, format="%.0f")
-        bar.set_label("distance of all tensions from their limits, at rest (N)")
+        bar.set_label("distance of all tensions\nfrom their limits, at rest (N)")
         bar.outline.set_visible(False)
     if moving.max() > 0.0:
         ax.contour(xs, ys, moving, [0.0], colors=_CABLE, linestyles="dotted", linewidths=1.0)
         ax.plot([], [], ":", color=_CABLE, lw=1.0, label="targets can be taken")
 
 
-def _draw_machine(ax: Axes, robot: Robot, platform: Platform) -> None:
-    home = np.array(platform.home_m)
-    exits, anchors = np.array(platform.exit_points_m), home + np.array(platform.anchor_points_m)
+def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> None:
+    all_exits, home = np.array(platform.exit_points_m), np.array(platform.home_m)[list(view)]
+    exits, anchors = all_exits[:, view], home + np.array(platform.anchor_points_m)[:, view]
     middle = exits.mean(axis=0)
     for axis, a, b in zip(robot.axes, exits, anchors, strict=True):
         ax.plot(*zip(a, b, strict=True), color=_CABLE, lw=1.2)
         away = (0, 9) if a[1] >= middle[1] else (0, -17)
-        ax.annotate(axis.name, a, xytext=away, textcoords="offset points", ha="center")
+        if view == (0, 1):  # from the front names would lie on each other
+            ax.annotate(axis.name, a, xytext=away, textcoords="offset points", ha="center")
     ax.plot([], [], color=_CABLE, lw=1.2, label="cables, at rest")
     ax.plot(*exits.T, "s", ms=6, color=_CABLE, label="exit points")
     around = np.argsort(np.arctan2(*(anchors - anchors.mean(axis=0)).T[::-1]))
     ax.add_patch(Polygon(anchors[around], color=_PLATFORM, alpha=0.9, zorder=3))
     ax.plot(*home, "o", ms=3, color=_PLATFORM, label="platform, at rest", zorder=3)
-    low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
-    width, height = high - low
+    low = np.array(platform.workspace_min_m)[list(view)]
+    width, height = np.array(platform.workspace_max_m)[list(view)] - low
     ax.add_patch(
         Rectangle(
             (low[0], low[1]), width, height, fill=False, ec=_TARGETS, lw=1.4, ls="--",

@@ -1,4 +1,4 @@
-"""What must be known of a new planar robot: questions, defaults that follow from the answers."""
+"""What must be known of a new cable robot: questions, defaults that follow from the answers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from profiles import ProfileError, Winch, load_winch
+from cdpr_profiles import ProfileError, Winch, load_winch
+from cdpr_tools.robots.kinds import KINDS, Kind, kind_of
 
 Answers = dict[str, Any]
 """What was answered, by key, of the type that the key's question gives it; SI."""
-CABLES = 3
+_COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+_POINTS = {2: "-2, 3", 3: "-2, 1.5, 3"}
 _TORQUE_RESERVE = 0.85
 """Share of the torque that tensions may take; the rest is for friction and for control."""
 
@@ -37,111 +39,190 @@ class Question:
     default: Callable[[Answers], str]
 
 
-def questions(folder: Path, name: str) -> list[Question]:
-    """Return the questions in their order; files are looked for in `folder` first."""
-    return [
+def kind_question() -> Question:
+    """Return the first question, on which all others depend."""
+
+    def read(text: str, _: Answers) -> Kind:
+        if text not in KINDS:
+            raise AnswerError(f"allowed: {', '.join(KINDS)}")
+        return kind_of(text)
+
+    return Question("kind", "Kind of robot", read, lambda _: next(iter(KINDS)))
+
+
+def questions(folder: Path, name: str, kind: Kind) -> list[Question]:
+    """Return the questions about a kind in their order; files are looked for in `folder` first."""
+    n, platform, limits = kind.cables, kind.platform, kind.robot.limits
+    usual = kind.robot.axes[0].winch.profile
+
+    def template(told: Answers, value: str, otherwise: Callable[[Answers], str]) -> str:
+        """Return the figure of the shipped robot, where its winch is taken and it is not first."""
+        same = told["winch"][0] == usual and kind.name != next(iter(KINDS))
+        return value if same else otherwise(told)
+
+    torque, highest = (
+        value[0] if value else 0.0 for value in (limits.torque_Nm, limits.tension_max_N)
+    )
+    least = limits.tension_min_N[0] if limits.tension_min_N else 1.0
+    asked = [
         Question("name", "Name of the robot", _name, lambda _: name),
         Question(
             "winch",
             "Winches: name (`cdpr profiles list`) or path of a profile",
             lambda text, _: _winch(text, folder),
-            lambda _: "winch-mpp0923d",
+            lambda _: usual,
         ),
         Question("bus", "URL of the CAN bus", _name, lambda _: "socketcan:can0"),
-        Question("nodes", "Node ids of the three drives", _nodes, lambda _: "1, 2, 3"),
-        Question("frame_m", "Frame: width, height (m)", _size, lambda _: "4, 3"),
-        *(_exit(i) for i in range(CABLES)),
-        Question(
-            "side_m",
-            "Side of the triangle on which the cables end (m; 0 if all end in one point)",
-            _number(0.0, 10.0),
-            lambda _: "0.15",
-        ),
-        *(_anchor(i) for i in range(CABLES)),
-        Question("mass_kg", "Mass of the platform (kg)", _number(0.01, 1e4), lambda _: "2"),
-        Question("torque_Nm", "Torque limit at the motors (Nm)", _torque, _rated_torque),
-        Question(
-            "tension_min_N",
-            "Least tension (N)",
-            _number(0.1, 1e5),
-            lambda told: f"{told['winch'][1].cable.min_tension_N:g}",
-        ),
-        Question("tension_max_N", "Greatest tension (N)", _tension_max, _bearable_tension),
-        Question(
-            "speed_m_s", "Speed along each direction (m/s)", _number(1e-3, 20.0), lambda _: "0.5"
-        ),
-        Question(
-            "acceleration_m_s2",
-            "Acceleration along each direction (m/s2)",
-            _number(1e-3, 100.0),
-            lambda _: "2",
-        ),
     ]
+    if kind.buses > 1:
+        asked.append(
+            Question("bus_2", "URL of the second CAN bus", _name, lambda _: "socketcan:can1")
+        )
+    asked += [
+        Question(
+            "nodes", f"Node ids of the {_COUNTS[n]} drives", _nodes(n),
+            lambda _: ", ".join(str(i + 1) for i in range(n)),
+        ),
+        Question("frame_m", f"Frame: {kind.sides} (m)", _size(kind), lambda _: _text(kind.frame_m)),
+        *(_exit(i, kind) for i in range(n)),
+        *([] if kind.is_point else [_side(kind)]),
+        *(_anchor(i, kind) for i in range(n)),
+        Question(
+            "mass_kg", "Mass of the platform (kg)", _number(0.01, 1e4),
+            lambda _: f"{platform.mass_kg:g}",
+        ),
+        Question(
+            "torque_Nm", "Torque limit at the motors (Nm)", _torque,
+            lambda told: template(told, f"{torque:g}", _rated_torque),
+        ),
+        Question(
+            "tension_min_N", "Least tension (N)", _number(0.1, 1e5),
+            lambda told: template(
+                told, f"{least:g}", lambda told: f"{told['winch'][1].cable.min_tension_N:g}"
+            ),
+        ),
+        Question(
+            "tension_max_N", "Greatest tension (N)", _tension_max,
+            lambda told: template(told, f"{highest:g}", _bearable_tension),
+        ),
+        Question(
+            "speed_m_s", "Speed along each direction (m/s)", _number(1e-3, 20.0),
+            lambda _: f"{platform.speed_m_s:g}",
+        ),
+        Question(
+            "acceleration_m_s2", "Acceleration along each direction (m/s2)", _number(1e-3, 100.0),
+            lambda _: f"{platform.acceleration_m_s2:g}",
+        ),
+    ]  # fmt: skip
+    return asked + (_turning(kind) if kind.turns else [])
+
+
+def _turning(kind: Kind) -> list[Question]:
+    """Return the questions on targets that are turned; angles are asked in degrees."""
+    platform = kind.platform
+    return [
+        Question(key, text, _degrees(low, high), _told_in_degrees(usual))
+        for key, text, low, high, usual in (
+            ("angle_deg", "How far targets may be turned from home's orientation (deg; 0: not)",
+             0.0, 179.0, platform.workspace_angle_rad),
+            ("angular_speed_deg_s", "Angular speed about each axis (deg/s)",
+             0.1, 5000.0, platform.angular_speed_rad_s),
+            ("angular_acceleration_deg_s2", "Angular acceleration about each axis (deg/s2)",
+             0.1, 5e5, platform.angular_acceleration_rad_s2),
+        )
+    ]  # fmt: skip
 
 
 def places(
-    low_m: tuple[float, float],
-    high_m: tuple[float, float],
-    stand: Callable[[Answers], tuple[float, float]],
+    kind: Kind,
+    low_m: tuple[float, ...],
+    high_m: tuple[float, ...],
+    stand: Callable[[Answers], tuple[float, ...]],
 ) -> list[Question]:
     """Return the questions on the box of targets and the place of rest.
 
     The box is a proposal, `stand` makes one for the place of rest under the box that was answered.
     """
+    point = _point(kind.size)
+    names = ", ".join("xyz"[: kind.size])
     return [
-        Question(
-            "low_m",
-            "Box of targets, lower left corner: x, y (m)",
-            _point,
-            lambda _: _text(low_m),
-        ),
+        Question("low_m", f"Box of targets, least {names} (m)", point, lambda _: _text(low_m)),
         Question(
             "high_m",
-            "Box of targets, upper right corner: x, y (m)",
-            _upper_corner,
+            f"Box of targets, greatest {names} (m)",
+            _upper_corner(kind.size),
             lambda _: _text(high_m),
         ),
         Question(
             "home_m",
-            "Where the platform stands at rest: x, y (m)",
-            _home,
+            f"Where the platform stands at rest: {names} (m)",
+            _home(kind.size),
             lambda told: _text(stand(told), digits=2),
         ),
     ]
 
 
-def _exit(i: int) -> Question:
+def _exit(i: int, kind: Kind) -> Question:
     def default(told: Answers) -> str:
-        width, height = told["frame_m"]
-        return _text(((-width / 2, height), (width / 2, height), (0.0, 0.0))[i])
+        """Return the shipped robot's exit point, its frame stretched to the size that is wanted."""
+        return _text(kind.exit_m(i, told["frame_m"]))
 
-    return Question(f"exit_{i + 1}_m", f"Cable {i + 1} leaves at: x, y (m)", _point, default)
+    names = ", ".join("xyz"[: kind.size])
+    return Question(
+        f"exit_{i + 1}_m", f"Cable {i + 1} leaves at: {names} (m)", _point(kind.size), default
+    )
 
 
-def _anchor(i: int) -> Question:
-    def default(told: Answers) -> str:
+def _side(kind: Kind) -> Question:
+    if kind.name == "planar-3":
+        text = "Side of the triangle on which the cables end (m; 0 if all end in one point)"
+    else:
+        text = "Greatest distance of two anchor points on the platform (m)"
+    least = 0.0 if kind.name == "planar-3" else 0.01
+    return Question("side_m", text, _number(least, 10.0), lambda _: f"{kind.side_m:.3g}")
+
+
+def _anchor(i: int, kind: Kind) -> Question:
+    def facing(told: Answers) -> str:
         """Return the corner that faces the exit point, the cables in their order around."""
-        exits = np.array([told[f"exit_{j + 1}_m"] for j in range(CABLES)])
+        n = kind.cables
+        exits = np.array([told[f"exit_{j + 1}_m"] for j in range(n)])
         away = exits - exits.mean(axis=0)
         order = np.argsort(np.arctan2(away[:, 1], away[:, 0]))
         # the triangle stands as its first corner has it: below the middle, or above it
         lone = int(np.argmax(np.abs(away[:, 1])))
         first = math.copysign(math.pi / 2, away[lone, 1])
         turn = int(np.where(order == i)[0][0]) - int(np.where(order == lone)[0][0])
-        angle = first + turn * math.tau / CABLES
+        angle = first + turn * math.tau / n
         radius = told["side_m"] / math.sqrt(3.0)
         return _text((radius * math.cos(angle), radius * math.sin(angle)), digits=4)
 
-    text = f"Cable {i + 1} ends on the platform at: x, y from its middle (m)"
-    return Question(f"anchor_{i + 1}_m", text, _point, default)
+    def scaled(told: Answers) -> str:
+        share = 0.0 if kind.is_point else told["side_m"] / kind.side_m
+        return _text(tuple(share * x for x in kind.platform.anchor_points_m[i]), digits=4)
+
+    names = ", ".join("xyz"[: kind.size])
+    return Question(
+        f"anchor_{i + 1}_m",
+        f"Cable {i + 1} ends on the platform at: {names} from its middle (m)",
+        _point(kind.size),
+        facing if kind.name == "planar-3" else scaled,
+    )
 
 
 def axis_names(told: Answers) -> list[str]:
     """Return what to call the axes, after where their cables leave."""
-    (x0, y0), (x1, y1), (_, y2) = (told[f"exit_{i + 1}_m"] for i in range(CABLES))
-    if x0 < x1 and y2 < min(y0, y1):
-        return ["upper left", "upper right", "lower"]
-    return [f"cable {i + 1}" for i in range(CABLES)]
+    kind = told["kind"]
+    exits = [told[f"exit_{i + 1}_m"] for i in range(kind.cables)]
+    if kind.name == "planar-3":
+        (x0, y0), (x1, y1), (_, y2) = exits
+        if x0 < x1 and y2 < min(y0, y1):
+            return [axis.name for axis in kind.robot.axes]
+    elif exits == [kind.exit_m(i, told["frame_m"]) for i in range(kind.cables)]:
+        names = [axis.name for axis in kind.robot.axes]
+        if not names[0].startswith("axis"):
+            return names
+    return [f"cable {i + 1}" for i in range(kind.cables)]
 
 
 def _name(text: str, _: Answers) -> str:
@@ -157,14 +238,17 @@ def _winch(text: str, folder: Path) -> tuple[str, Winch]:
         raise AnswerError(str(error)) from None
 
 
-def _nodes(text: str, _: Answers) -> tuple[int, ...]:
-    try:
-        nodes = tuple(int(part) for part in text.replace(",", " ").split())
-    except ValueError:
-        nodes = ()
-    if len(nodes) != CABLES or len(set(nodes)) != CABLES or not all(0 < n < 127 for n in nodes):
-        raise AnswerError(f"allowed: {CABLES} different numbers from 1 to 126")
-    return nodes
+def _nodes(n: int) -> Callable[[str, Answers], tuple[int, ...]]:
+    def read(text: str, _: Answers) -> tuple[int, ...]:
+        try:
+            nodes = tuple(int(part) for part in text.replace(",", " ").split())
+        except ValueError:
+            nodes = ()
+        if len(nodes) != n or len(set(nodes)) != n or not all(0 < node < 127 for node in nodes):
+            raise AnswerError(f"allowed: {n} different numbers from 1 to 126")
+        return nodes
+
+    return read
 
 
 def _number(low: float, high: float) -> Callable[[str, Answers], float]:
@@ -180,21 +264,36 @@ def _number(low: float, high: float) -> Callable[[str, Answers], float]:
     return read
 
 
-def _point(text: str, _: Answers) -> tuple[float, float]:
-    try:
-        x, y = (float(part) for part in text.replace(",", " ").split())
-    except ValueError:
-        x = y = math.nan
-    if not (abs(x) <= 1000.0 and abs(y) <= 1000.0):
-        raise AnswerError("allowed: two numbers in m, such as `-2, 3`")
-    return x, y
+def _told_in_degrees(angle_rad: float) -> Callable[[Answers], str]:
+    return lambda _: f"{math.degrees(angle_rad):.3g}"
 
 
-def _size(text: str, told: Answers) -> tuple[float, float]:
-    width, height = _point(text, told)
-    if not (width > 0.0 and height > 0.0):
-        raise AnswerError("allowed: two numbers in m above 0, such as `4, 3`")
-    return width, height
+def _degrees(low: float, high: float) -> Callable[[str, Answers], float]:
+    read = _number(low, high)
+    return lambda text, told: math.radians(read(text, told))
+
+
+def _point(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
+    def read(text: str, _: Answers) -> tuple[float, ...]:
+        try:
+            point = tuple(float(part) for part in text.replace(",", " ").split())
+        except ValueError:
+            point = ()
+        if len(point) != size or not all(abs(x) <= 1000.0 for x in point):
+            raise AnswerError(f"allowed: {_COUNTS[size]} numbers in m, such as `{_POINTS[size]}`")
+        return point
+
+    return read
+
+
+def _size(kind: Kind) -> Callable[[str, Answers], tuple[float, ...]]:
+    def read(text: str, told: Answers) -> tuple[float, ...]:
+        size = _point(kind.size)(text, told)
+        if not all(x > 0.0 for x in size):
+            raise AnswerError(f"allowed: {_COUNTS[kind.size]} numbers in m above 0")
+        return size
+
+    return read
 
 
 def _torque(text: str, told: Answers) -> float:
@@ -222,20 +321,28 @@ def _bearable_tension(told: Answers) -> str:
     return f"{max(math.floor(bears_N), 1.1 * told['tension_min_N']):g}"
 
 
-def _upper_corner(text: str, told: Answers) -> tuple[float, float]:
-    (x, y), (left, bottom) = _point(text, told), told["low_m"]
-    if not (x > left and y > bottom):
-        raise AnswerError(f"allowed: right of {left:g} and above {bottom:g}")
-    return x, y
+def _upper_corner(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
+    def read(text: str, told: Answers) -> tuple[float, ...]:
+        point, low = _point(size)(text, told), told["low_m"]
+        if not all(high > x for high, x in zip(point, low, strict=True)):
+            raise AnswerError(f"allowed: above {_text(low)}, each of them")
+        return point
+
+    return read
 
 
-def _home(text: str, told: Answers) -> tuple[float, float]:
-    (x, y), (left, _), (right, top) = _point(text, told), told["low_m"], told["high_m"]
-    if not (left <= x <= right and y <= top):
-        raise AnswerError(f"allowed: x from {left:g} to {right:g}, y up to {top:g}")
-    return x, y
+def _home(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
+    def read(text: str, told: Answers) -> tuple[float, ...]:
+        point, low, high = _point(size)(text, told), told["low_m"], told["high_m"]
+        beside = any(not low[i] <= point[i] <= high[i] for i in range(size - 1))
+        if beside or point[-1] > high[-1]:
+            ways = [f"{'xyz'[i]} from {low[i]:g} to {high[i]:g}" for i in range(size - 1)]
+            raise AnswerError(f"allowed: {', '.join(ways)}, {'xyz'[size - 1]} up to {high[-1]:g}")
+        return point
+
+    return read
 
 
-def _text(point_m: tuple[float, float], digits: int = 3) -> str:
+def _text(point_m: tuple[float, ...], digits: int = 3) -> str:
     # 0.0 is added so that nothing is told as -0
     return ", ".join(f"{round(value, digits) + 0.0:g}" for value in point_m)

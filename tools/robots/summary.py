@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from cdpr_rt.runtime.robot_arrays import limits_of
-from profiles import Robot
-from profiles.platform import Platform
-from tools.robots.statics import can_be_computed, statics_of, view_of
+from cdpr_profiles import Robot
+from cdpr_profiles.platform import Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.cable_loss import worst_swings
+from cdpr_rt.robots.resonance import lowest_resonance_Hz
+from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.robots.statics import statics_of, view_of
 
-_GRID = 25
 _COLUMNS, _ROWS = 65, 23
 
 
@@ -25,6 +26,9 @@ def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
         "mass_kg": platform.mass_kg,
         "home_m": platform.home_m,
         "workspace_m": [platform.workspace_min_m, platform.workspace_max_m],
+        "controlled": platform.controlled,
+        "home_rotation_rad": platform.home_rotation_rad,
+        "workspace_angle_rad": platform.workspace_angle_rad,
         "axes": [
             {"name": axis.name, "exit_point_m": a, "anchor_point_m": b}
             for axis, a, b in zip(
@@ -32,35 +36,46 @@ def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
             )
         ],
     }
-    if can_be_computed(robot):
-        told |= _of_tensions(robot, platform, told["axes"])
-    return told
+    return told | _of_tensions(robot, platform, told["axes"])
 
 
 def _of_tensions(
     robot: Robot, platform: Platform, axes: Sequence[dict[str, Any]]
 ) -> dict[str, Any]:
     statics, limits = statics_of(robot), limits_of(robot)
-    home, points = np.array(platform.home_m), statics.box.grid(_GRID, _GRID)
-    still = statics.reserve_N(points)
-    moving = statics.reserve_N(points, platform.acceleration_m_s2)
-    lengths, angle = statics.geometry.lengths(points), statics.angle_rad(points)
-    at_home_m, least_N = statics.geometry.lengths(home), statics.least_tensions_N(home)
+    home, points, turns = np.array(platform.home_m), statics.points(), statics.orientations
+    still = np.array([statics.reserve_N(points, 0.0, turn) for turn in turns])
+    wanted = platform.acceleration_m_s2
+    moving = np.array([statics.reserve_N(points, wanted, turn) for turn in turns])
+    lengths = np.array([statics.lengths(points, turn) for turn in turns])
+    at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
+    for told, swing in zip(axes, worst_swings(platform), strict=True):
+        told["broken"] = {
+            "at_m": swing.position_m,
+            "to_m": swing.to_m,
+            "swing_m": swing.swing_m,
+            "turn_rad": swing.turn_rad,
+        }
     for i, told in enumerate(axes):
         told["cable_at_home_m"] = float(at_home_m[i])
-        told["least_tension_at_home_N"] = float(least_N[i])
+        told["least_tension_at_home_N"] = _finite(least_N[i])
         told["cable_m"] = [float(lengths[..., i].min()), float(lengths[..., i].max())]
         told["tension_N"] = [float(statics.low_N[i]), float(statics.high_N[i])]
         gain = abs(robot.axes[i].winch.cable_m_per_motor_rad)
         told["torque_at_most_Nm"] = float(statics.high_N[i]) * gain
         told["torque_limit_Nm"] = float(np.broadcast_to(limits.torque_Nm, (len(axes),))[i])
-    return {
+    of_all: dict[str, Any] = {
         "held_share": float(np.mean(still >= 0.0)),
-        "target_share": float(np.mean(statics.is_target(points))),
+        "target_share": float(np.mean(moving >= statics.model.reserve_N)),
+        "kept_for_control_N": statics.model.reserve_N,
+        "reserve_at_home_N": _finite(float(statics.reserve_N(home))),
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
-        "turns_at_most_rad": _finite(np.abs(angle).max()),
+        "lowest_resonance_Hz": float(lowest_resonance_Hz(robot, points).min()),
     }
+    if statics.turns:
+        of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
+    return of_all
 
 
 def _finite(value: float) -> float | None:
@@ -75,41 +90,79 @@ def lines(robot: Robot, platform: Platform, told: dict[str, Any]) -> list[str]:
         f"{platform.acceleration_m_s2:g} m/s2 along each direction",
         f"at rest    {_point(platform.home_m)} m, within {platform.home_tolerance_m:g} m",
         f"targets    {_point(platform.workspace_min_m)} to {_point(platform.workspace_max_m)} m",
+        *_orientation_lines(platform),
+        *_tension_lines(told),
+        "",
+        *_table(told["axes"]),
+        "",
+        *_broken_lines(told["axes"]),
     ]
-    if "held_share" in told:
-        text += _tension_lines(told)
-    text += ["", *_table(told["axes"])]
     if platform.is_planar:
         text += ["", *_sketch(robot, platform)]
     return text
 
 
+def _orientation_lines(platform: Platform) -> list[str]:
+    lines = [f"controlled {', '.join(platform.controlled)}"]
+    if any(platform.home_rotation_rad):
+        turned = math.degrees(math.hypot(*platform.home_rotation_rad))
+        lines.append(f"           at home it is turned by {turned:.1f} deg from the room's axes")
+    if platform.workspace_angle_rad > 0.0:
+        lines.append(
+            f"           targets up to {math.degrees(platform.workspace_angle_rad):.1f} deg from "
+            f"home's orientation, {math.degrees(platform.angular_speed_rad_s):.0f} deg/s and "
+            f"{math.degrees(platform.angular_acceleration_rad_s2):.0f} deg/s2"
+        )
+    elif len(platform.controlled) > len(platform.home_m):
+        lines.append("           targets keep home's orientation")
+    return lines
+
+
+def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
+    """Return a line for each cable on how far the platform swings when it breaks, at the worst."""
+    lines = ["if a cable breaks, the platform comes to rest on the others (the worst corner):"]
+    for axis in axes:
+        broken = axis["broken"]
+        line = (
+            f"{axis['name']:16} at {_point(broken['at_m'])} m it swings {broken['swing_m']:.2f} m"
+        )
+        if broken["turn_rad"] > math.radians(1.0):
+            line += f" and turns by {math.degrees(broken['turn_rad']):.0f} deg"
+        lines.append(line)
+    return lines
+
+
 def _tension_lines(told: dict[str, Any]) -> list[str]:
     held, taken = 100.0 * told["held_share"], 100.0 * told["target_share"]
-    reserve, turns = told["reserve_in_motion_N"], told["turns_at_most_rad"]
+    reserve = told["reserve_in_motion_N"]
     spare = "" if reserve is None or reserve < 0.0 else f", with {reserve:.0f} N to spare in motion"
-    turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
-    return [
+    lines = [
         f"tensions   hold it in {held:.0f} % of the box; targets are taken in {taken:.0f} %{spare}",
-        f"           it {turning} there, which no cable can prevent",
+        f"           of which the control keeps {told['kept_for_control_N']:.0f} N",
     ]
+    lowest = told["lowest_resonance_Hz"]
+    lines.append(
+        f"resonance  rotors against the platform over the cables at {lowest:.1f} Hz or more"
+    )
+    if "turns_at_most_rad" in told:
+        turns = told["turns_at_most_rad"]
+        turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
+        lines.append(f"           it {turning} there, which no cable can prevent")
+    return lines
 
 
 def _table(axes: Sequence[dict[str, Any]]) -> list[str]:
     coordinates = len(axes[0]["exit_point_m"])
     a, b = 9 * coordinates, 10 * coordinates
     rows = [f"{'axis':16}{'exit point, m':>{a}}{'anchor point, m':>{b}}"]
-    if "tension_N" in axes[0]:
-        rows[0] += f"{'cable, m':>16}{'tension, N':>14}{'torque, Nm':>16}"
+    rows[0] += f"{'cable, m':>16}{'tension, N':>14}{'torque, Nm':>16}"
     for axis in axes:
         row = f"{axis['name']:16}{_point(axis['exit_point_m']):>{a}}"
         row += f"{_point(axis['anchor_point_m'], 3):>{b}}"
-        if "tension_N" in axis:
-            cable = "{:.2f} to {:.2f}".format(*axis["cable_m"])
-            tension = "{:g} to {:g}".format(*axis["tension_N"])
-            torque = f"{axis['torque_at_most_Nm']:.1f} of {axis['torque_limit_Nm']:g}"
-            row += f"{cable:>16}{tension:>14}{torque:>16}"
-        rows.append(row)
+        cable = "{:.2f} to {:.2f}".format(*axis["cable_m"])
+        tension = "{:g} to {:g}".format(*axis["tension_N"])
+        torque = f"{axis['torque_at_most_Nm']:.1f} of {axis['torque_limit_Nm']:g}"
+        rows.append(row + f"{cable:>16}{tension:>14}{torque:>16}")
     return rows
 
 
@@ -121,15 +174,11 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     columns = int(min(_COLUMNS, 2 * _ROWS * size[0] / size[1])) | 1
     rows = max(5, round(0.5 * columns * size[1] / size[0]))
     cells, points = np.full((rows, columns), " "), shown.grid(columns, rows)
-    known = can_be_computed(robot)
     box = (points >= np.array(platform.workspace_min_m)).all(axis=-1)
     box &= (points <= np.array(platform.workspace_max_m)).all(axis=-1)
-    if known:
-        statics = statics_of(robot)
-        cells[statics.reserve_N(points) >= 0.0] = "."
-        cells[box] = np.where(statics.is_target(points[box]), "#", "!")
-    else:
-        cells[box] = "#"
+    statics = statics_of(robot)
+    cells[statics.reserve_N(points) >= 0.0] = "."
+    cells[box] = np.where(statics.is_target(points[box], statics.orientations), "#", "!")
 
     def put(position_m: Sequence[float], letter: str) -> None:
         column, row = np.round((np.array(position_m) - low) / size * [columns - 1, rows - 1])
@@ -138,9 +187,8 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     for i, position_m in enumerate(platform.exit_points_m):
         put(position_m, str((i + 1) % 10))
     put(platform.home_m, "o")
-    legend = "1, 2 ... exit points   o at rest   # targets"
-    if known:
-        legend += "   . held as well   ! targets that are not taken"
+    legend = "1, 2 ... exit points   o at rest   # targets   . held as well   "
+    legend += "! targets that are not taken"
     return ["".join(row).rstrip() for row in cells[::-1]] + [legend]
 
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from tools.errors import BadInputError
-from tools.teleop.hand import Hand
-from tools.teleop.stick import AxisRange, Stick, StickMap
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.teleop.input_device import Directions, InputSample
+from cdpr_tools.teleop.stick import AxisRange, SignedAxis, Stick, StickMap
 
 _EV_SYN, _EV_KEY, _EV_ABS = 0, 1, 3
 _SYN_DROPPED = 3
@@ -17,9 +17,13 @@ _REPEATED = 2
 _SEEK_S: Final = 1.0
 _LONGEST_S: Final = 0.1
 _EVERY_DEVICE: Final = Path("/dev/input")
+AXES: Final = {2: "ABS_X,-ABS_Y", 3: "ABS_X,-ABS_Y,-ABS_HAT0Y"}
+"""Left stick, and the directional pad upward: they move the hand along x, y, z."""
+TURN_AXES: Final = {0: "", 1: "-ABS_RX", 2: "ABS_RY,ABS_RX", 3: "ABS_RY,ABS_RX,-ABS_HAT0X"}
+"""Right stick, and the directional pad to the left: they turn it, by how many angles there are."""
 
 
-class InputDevice(Protocol):
+class EvdevDevice(Protocol):
     """What is used of `evdev.InputDevice`."""
 
     path: Any
@@ -41,30 +45,30 @@ class InputDevice(Protocol):
 class Finder(Protocol):
     """Finds the device, at first and after it was unplugged."""
 
-    def find(self) -> InputDevice | None:
+    def find(self) -> EvdevDevice | None:
         """Return it, None where it is not there; raises BadInputError where it is of no use."""
 
-    def nowhere(self) -> str:
+    def missing_text(self) -> str:
         """Say in what way it is not there."""
 
 
 class Gamepad:
-    """A stick and two buttons of a gamepad; unplugged, it holds the robot until it is back."""
+    """Sticks and two buttons of a gamepad; unplugged, it holds the robot until it is back."""
 
-    hint = "hold the dead man's button and push the stick; let go to stop; Ctrl-C ends"
+    hint = "hold the dead man's button and push a stick; let go to stop; Ctrl-C ends"
 
     def __init__(self, finder: Finder, stick_map: StickMap, scale: float) -> None:
         device = finder.find()
         if device is None:
-            raise BadInputError(finder.nowhere())
+            raise BadInputError(finder.missing_text())
         self._finder, self._map = finder, stick_map
         self._stick = Stick(stick_map, scale)
-        self._device: InputDevice | None = None
+        self._device: EvdevDevice | None = None
         self._sought_s = 0.0
         self._first = True
-        self._take_up(device)
+        self._attach(device)
 
-    def read(self, now_s: float) -> Hand:
+    def read(self, now_s: float) -> InputSample:
         """Return where the hand is."""
         stick = self._stick
         if self._device is None:
@@ -73,19 +77,21 @@ class Gamepad:
             self._drain(self._device)
         if self._first:
             self._first = False
-            stick.disregard()  # what was pressed before anybody listened
+            stick.reset()  # what was pressed before anybody listened
         stick.advance(now_s, _LONGEST_S)
         trouble = "" if self._device is not None else "the gamepad is gone: plug it in again"
-        return Hand(stick.position_m, not stick.held, stick.confirmed, trouble)
+        return InputSample(
+            stick.position_m, stick.quaternion, not stick.held, stick.confirmed, trouble
+        )
 
     def close(self) -> None:
         """Close the device."""
         if self._device is not None:
             self._device.close()
 
-    def _take_up(self, device: InputDevice) -> None:
+    def _attach(self, device: EvdevDevice) -> None:
         ranges, values = {}, {}
-        for axis in (self._map.x, self._map.y):
+        for axis in self._map.axes:
             told = device.absinfo(axis)
             ranges[axis], values[axis] = AxisRange(told.min, told.max), told.value
         self._stick.begin(ranges, values)
@@ -98,11 +104,11 @@ class Gamepad:
         try:
             device = self._finder.find()
             if device is not None:
-                self._take_up(device)
+                self._attach(device)
         except (BadInputError, OSError):
             return  # gone again, or not ready yet
 
-    def _drain(self, device: InputDevice) -> None:
+    def _drain(self, device: EvdevDevice) -> None:
         try:
             while True:
                 for event in device.read():
@@ -110,11 +116,11 @@ class Gamepad:
         except BlockingIOError:
             return
         except OSError:
-            self._stick.let_go()
+            self._stick.release()
             self._device = None
             device.close()
 
-    def _take(self, device: InputDevice, kind: int, code: int, value: int) -> None:
+    def _take(self, device: EvdevDevice, kind: int, code: int, value: int) -> None:
         if kind == _EV_ABS:
             self._stick.move_axis(code, value)
         elif kind == _EV_KEY:
@@ -122,26 +128,45 @@ class Gamepad:
                 self._stick.press(code, value != 0)
         elif kind == _EV_SYN and code == _SYN_DROPPED:
             # events were lost, perhaps the one that let go
-            self._stick.let_go()
-            for axis in (self._map.x, self._map.y):
+            self._stick.release()
+            for axis in self._map.axes:
                 self._stick.move_axis(axis, device.absinfo(axis).value)
 
 
 def stick_map(
-    axes: str, dead_man: str, confirm: str, dead_zone: float, speed_m_s: float
+    directions: Directions,
+    axes: str | None,
+    turn_axes: str | None,
+    dead_man: str,
+    confirm: str,
+    dead_zone: float,
+    speed_m_s: float,
 ) -> StickMap:
-    """Return the map that names such as "ABS_X,-ABS_Y" and "BTN_TR" make; raises BadInputError."""
-    names = axes.split(",")
-    if len(names) != 2:
-        raise BadInputError(f"--axes {axes}: allowed: two axes, such as ABS_X,-ABS_Y")
-    x, y = (_code("--axes", name.removeprefix("-"), "ABS_") for name in names)
-    turned = (names[0].startswith("-"), names[1].startswith("-"))
-    if x == y:
-        raise BadInputError(f"--axes {axes}: allowed: two different ones")
+    """Return the map that names such as "ABS_X,-ABS_Y" and "BTN_TR" make; raises BadInputError.
+
+    Axes that are not named are those of `AXES` and `TURN_AXES`.
+    """
+    k, about = directions
+    moves = _axes("--axes", axes or AXES[k], k)
+    turns = _axes("--turn-axes", turn_axes or TURN_AXES[len(about)], len(about))
+    named = [axis for axis, _ in (*moves, *turns)]
+    if len(set(named)) < len(named):
+        told = ",".join(filter(None, (axes or AXES[k], turn_axes or TURN_AXES[len(about)])))
+        raise BadInputError(f"--axes, --turn-axes {told}: allowed: different ones")
     held, pressed = _code("--dead-man", dead_man, "BTN_"), _code("--confirm", confirm, "BTN_")
     if held == pressed:
         raise BadInputError(f"--confirm {confirm}: allowed: another button than --dead-man")
-    return StickMap(x, y, turned, held, pressed, dead_zone, speed_m_s)
+    return StickMap(moves, turns, about, held, pressed, dead_zone, speed_m_s)
+
+
+def _axes(option: str, text: str, count: int) -> tuple[SignedAxis, ...]:
+    names = [name for name in text.split(",") if name]
+    if len(names) != count:
+        raise BadInputError(f"{option} {text}: {len(names)} axes; allowed: {count} for this robot")
+    return tuple(
+        (_code(option, name.removeprefix("-"), "ABS_"), -1 if name.startswith("-") else 1)
+        for name in names
+    )
 
 
 class EvdevFinder:
@@ -154,12 +179,12 @@ class EvdevFinder:
         self._evdev = _evdev()
         self._path, self._used = path, used
 
-    def find(self) -> InputDevice | None:
+    def find(self) -> EvdevDevice | None:
         """Open it; raises BadInputError where it may not be read, or has not what is needed."""
         path, refused = self._path, ""
         for node in [path] if path is not None else sorted(_EVERY_DEVICE.glob("event*")):
             try:
-                device: InputDevice = self._evdev.InputDevice(str(node))
+                device: EvdevDevice = self._evdev.InputDevice(str(node))
             except PermissionError:
                 refused = refused or str(node)
                 continue
@@ -178,20 +203,20 @@ class EvdevFinder:
             )
         return None
 
-    def nowhere(self) -> str:
+    def missing_text(self) -> str:
         """Say in what way it is not there."""
         if self._path is not None:
             return f"--input {self._path}: is no input device; allowed: /dev/input/event0 and so on"
         return (
             "--device gamepad: none is plugged in that has the axes and buttons which --axes, "
-            "--dead-man and --confirm name"
+            "--turn-axes, --dead-man and --confirm name"
         )
 
-    def _missing(self, device: InputDevice) -> str:
+    def _missing(self, device: EvdevDevice) -> str:
         """Return the names of what a device does not have, "" where it has everything."""
         names, used = self._evdev.ecodes, self._used
         has = device.capabilities(absinfo=False)
-        lacks = [names.ABS[axis] for axis in (used.x, used.y) if axis not in has.get(_EV_ABS, ())]
+        lacks = [names.ABS[axis] for axis in used.axes if axis not in has.get(_EV_ABS, ())]
         keys = (used.dead_man, used.confirm)
         lacks += [names.bytype[_EV_KEY][key] for key in keys if key not in has.get(_EV_KEY, ())]
         return ", ".join(name if isinstance(name, str) else name[0] for name in lacks)

@@ -11,18 +11,32 @@ import termios
 import tty
 from typing import Final
 
-from tools.errors import BadInputError
-from tools.teleop.hand import End, Hand, LimitedHand
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.teleop.input_device import (
+    Directions,
+    End,
+    Hand,
+    InputSample,
+    Quaternion,
+    TURN_RAD_PER_m,
+    Vector,
+)
 
 STEPS_mm: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 _FIRST_STEP: Final = STEPS_mm.index(0.5)
 _FASTEST_Hz: Final = 60.0
 _LONGEST_S: Final = 0.1
 _READ_BYTES: Final = 4096
-_DIRECTIONS: Final = {
-    "A": (0, 1), "B": (0, -1), "C": (1, 0), "D": (-1, 0),
-    "w": (0, 1), "s": (0, -1), "d": (1, 0), "a": (-1, 0),
+_MOVES: Final[dict[str, Vector]] = {
+    "A": (0, 1, 0), "B": (0, -1, 0), "C": (1, 0, 0), "D": (-1, 0, 0),
+    "w": (0, 1, 0), "s": (0, -1, 0), "d": (1, 0, 0), "a": (-1, 0, 0),
+    "r": (0, 0, 1), "f": (0, 0, -1),
 }  # fmt: skip
+_TURNS: Final[dict[str, Vector]] = {
+    "k": (1, 0, 0), "i": (-1, 0, 0), "l": (0, 1, 0), "j": (0, -1, 0), "u": (0, 0, 1),
+    "o": (0, 0, -1),
+}  # fmt: skip
+_KEYS_ABOUT: Final = ("k i", "l j", "u o")
 _KEY = re.compile(r"\x1b[\[O]([A-D])|\x1b\[[0-9;]*[~A-Za-z]|\x1bO.|\x1b|([^\x1b])", re.DOTALL)
 _UNFINISHED = re.compile(r"\x1b(\[[0-9;]*|O)?$")
 
@@ -35,7 +49,7 @@ class Keys:
 
     def __init__(self, scale: float) -> None:
         self._scale = scale
-        self._hand = LimitedHand(scale)
+        self._hand = Hand(scale)
         self._step = _FIRST_STEP
         self._left = ""
         self.clutch = False
@@ -48,9 +62,14 @@ class Keys:
         return STEPS_mm[self._step] * 1e-3
 
     @property
-    def position_m(self) -> tuple[float, float]:
+    def position_m(self) -> Vector:
         """Return where the hand is."""
         return self._hand.position_m
+
+    @property
+    def quaternion(self) -> Quaternion:
+        """Return how the hand is turned."""
+        return self._hand.quaternion
 
     def press(self, text: str, passed_s: float) -> None:
         """Take the characters that came within the last `passed_s`.
@@ -65,17 +84,24 @@ class Keys:
         steps = 0
         for key in _KEY.finditer(text[: len(text) - len(self._left)]):
             name = key.group(1) or key.group(2)
-            if name in _DIRECTIONS:
+            if name in _MOVES or name in _TURNS:
                 steps += 1
                 if steps <= most and not self.clutch:
-                    x, y = _DIRECTIONS[name]
-                    self._hand.move(x * self.step_m, y * self.step_m)
+                    self._make_step(name)
             elif name is not None:
                 self._command(name)
 
-    def disregard(self) -> None:
-        """Take back what keys have done so far, but for the wish to end."""
-        self._hand = LimitedHand(self._scale)
+    def _make_step(self, key: str) -> None:
+        if key in _MOVES:
+            x, y, z = (self.step_m * way for way in _MOVES[key])
+            self._hand.move((x, y, z))
+        else:
+            x, y, z = (TURN_RAD_PER_m * self.step_m * way for way in _TURNS[key])
+            self._hand.turn((x, y, z))
+
+    def reset(self) -> None:
+        """Undo what keys have done so far, except a request to end."""
+        self._hand = Hand(self._scale)
         self._step = _FIRST_STEP
         self.clutch = False
         self.confirmed = 0
@@ -99,8 +125,12 @@ class Keyboard:
     Ctrl-C and Ctrl-Z stay what they are. Raises BadInputError where there is no terminal.
     """
 
-    def __init__(self, scale: float, fd: int = 0) -> None:
+    def __init__(self, scale: float, fd: int = 0, directions: Directions = (2, ())) -> None:
         self._fd = fd
+        self._more = "; r f: up, down" if directions[0] > 2 else ""
+        if about := directions[1]:
+            keys = " ".join(_KEYS_ABOUT[axis] for axis in about)
+            self._more += f"; {keys}: turn"
         self._keys = Keys(scale)
         self._gone = ""
         self._read_s = math.nan
@@ -117,11 +147,11 @@ class Keyboard:
     def hint(self) -> str:
         """Say which keys do what."""
         return (
-            f"arrows or wasd: {self._keys.step_m * 1e3:g} mm of the hand, held to go on; + and -: "
-            "longer, shorter; space: hold; Enter: confirm; q: end"
+            f"arrows or wasd: {self._keys.step_m * 1e3:g} mm of the hand, held to go on"
+            f"{self._more}; + and -: longer, shorter; space: hold; Enter: confirm; q: end"
         )
 
-    def read(self, now_s: float) -> Hand:
+    def read(self, now_s: float) -> InputSample:
         """Return where the hand is; it has ended where the terminal is gone.
 
         What was typed before it is first asked has led nobody, and does not afterwards.
@@ -131,11 +161,11 @@ class Keyboard:
         if not self._gone:
             self._take(passed_s)
         if first:
-            keys.disregard()
+            keys.reset()
         end = End("ended by key q") if keys.quit else None
         if self._gone:
             end = End(self._gone, failed=True)
-        return Hand(keys.position_m, keys.clutch, keys.confirmed, end=end)
+        return InputSample(keys.position_m, keys.quaternion, keys.clutch, keys.confirmed, end=end)
 
     def _take(self, passed_s: float) -> None:
         poll = select.poll()

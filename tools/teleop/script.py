@@ -6,15 +6,17 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from cdpr_rt.service.stream_packet import REACH_M
-from profiles.bounded_input import read_text
-from profiles.errors import ProfileError, brief
-from tools.errors import BadInputError
-from tools.teleop.hand import End, Hand
+from cdpr_profiles.errors import ProfileError, brief
+from cdpr_profiles.reading.bounded_input import read_text
+from cdpr_rt.service.streams.stream_packet import REACH_M
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.teleop.input_device import End, InputSample, Vector, from_vector
 
 _WORDS = ("clutch", "confirm")
-_SHAPE = "seconds x_mm y_mm [clutch] [confirm]"
+_SHAPE = "seconds x_mm y_mm [z=MM] [turn=RX,RY,RZ] [clutch] [confirm]"
+_LARGEST_TURN_deg = 180.0
 _LONGEST_m = 20.0
+_LARGEST = {1: 1e3 * _LONGEST_m, 3: _LARGEST_TURN_deg}
 _MOST_BYTES = 1 << 20
 
 
@@ -23,7 +25,9 @@ class ScriptLine:
     """Where the hand is at a time, in s and m, and what it does from then on."""
 
     time_s: float
-    position_m: tuple[float, float]
+    position_m: Vector
+    turn_rad: Vector = (0.0, 0.0, 0.0)
+    """Rotation vector."""
     clutch: bool = False
     """Open until the next line."""
     confirm: bool = False
@@ -70,18 +74,37 @@ def _parsed(where: str, words: list[str]) -> ScriptLine:
         time_s, x_mm, y_mm = (float(word) for word in words[:3])
     except ValueError:
         raise BadInputError(f"{where}: {brief(' '.join(words))!r}; allowed: {_SHAPE}") from None
+    z_mm, turn = 0.0, (0.0, 0.0, 0.0)
     for word in words[3:]:
-        if word not in _WORDS:
-            raise BadInputError(f"{where}: {brief(word)!r}; allowed: {', '.join(_WORDS)}")
+        key, _, value = word.partition("=")
+        if key == "z":
+            (z_mm,) = _numbers(where, word, value, 1)
+        elif key == "turn":
+            x, y, z = (math.radians(angle) for angle in _numbers(where, word, value, 3))
+            turn = (x, y, z)
+        elif word not in _WORDS:
+            allowed = ", ".join((*_WORDS, "z=", "turn="))
+            raise BadInputError(f"{where}: {brief(word)!r}; allowed: {allowed}")
     if not (math.isfinite(time_s) and time_s >= 0.0):
         raise BadInputError(f"{where}: {brief(words[0])} s; allowed: 0 and more")
-    x, y = x_mm * 1e-3, y_mm * 1e-3
-    if not (abs(x) <= _LONGEST_m and abs(y) <= _LONGEST_m):
+    x, y, z = x_mm * 1e-3, y_mm * 1e-3, z_mm * 1e-3
+    if not (abs(x) <= _LONGEST_m and abs(y) <= _LONGEST_m and abs(z) <= _LONGEST_m):
         raise BadInputError(f"{where}: {x_mm:g} {y_mm:g} mm; allowed: up to {_LONGEST_m:g} m")
-    return ScriptLine(time_s, (x, y), "clutch" in words[3:], "confirm" in words[3:])
+    return ScriptLine(time_s, (x, y, z), turn, "clutch" in words[3:], "confirm" in words[3:])
 
 
-class ScriptHand:
+def _numbers(where: str, word: str, text: str, count: int) -> list[float]:
+    try:
+        numbers = [float(number) for number in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(abs(number) <= _LARGEST[count] for number in numbers):
+        allowed = f"{count} of up to {_LARGEST[count]:g}"
+        raise BadInputError(f"{where}: {brief(word)!r}; allowed: numbers, {allowed}")
+    return numbers
+
+
+class ScriptDevice:
     """Plays a script from when it is first read on; positions count from its first line's."""
 
     hint = "a script leads; Ctrl-C ends"
@@ -90,7 +113,7 @@ class ScriptHand:
         self._lines = lines
         self._begin_s = math.nan
 
-    def read(self, now_s: float) -> Hand:
+    def read(self, now_s: float) -> InputSample:
         """Return where the hand is; it has ended after the last line."""
         if math.isnan(self._begin_s):
             self._begin_s = now_s
@@ -101,14 +124,19 @@ class ScriptHand:
         if 0 < done < len(lines):
             towards = lines[done]
             part = (time_s - last.time_s) / (towards.time_s - last.time_s)
-        x, y = (
+        x, y, z = (
             here + part * (there - here) - first
             for here, there, first in zip(
                 last.position_m, towards.position_m, lines[0].position_m, strict=True
             )
         )
-        return Hand(
-            (x, y),
+        rx, ry, rz = (
+            here + part * (there - here)
+            for here, there in zip(last.turn_rad, towards.turn_rad, strict=True)
+        )
+        return InputSample(
+            (x, y, z),
+            from_vector((rx, ry, rz)),
             clutch=done > 0 and last.clutch,
             confirmed=sum(line.confirm for line in lines[:done]),
             end=End("the script is done", arrive=True) if done == len(lines) else None,

@@ -12,11 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.runtime.stream_buttons import stream_buttons
-from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import Standing, StreamAnswer
-from tools.teleop.hand import End, Hand, HandDevice
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.motion.stream_buttons import stream_buttons
+from cdpr_rt.service.streams.stream_client import StreamClient
+from cdpr_rt.service.streams.stream_packet import Standing, StreamAnswer
+from cdpr_tools.teleop.input_device import End, InputDevice, InputSample
 
 RATE_Hz: Final = 60.0
 _GREET_S: Final = 3.0
@@ -38,17 +38,17 @@ _WHY_NOT: Final = {
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What was known when the hand confirmed; poses are (x, y) in m, nan where not known."""
+    """What was known when the hand confirmed; places are (x, y) or (x, y, z) in m, or nan."""
 
     number: int
     time_s: float
-    hand_m: tuple[float, float]
-    pose_m: tuple[float, float]
-    setpoint_m: tuple[float, float]
+    hand_m: tuple[float, ...]
+    pose_m: tuple[float, ...]
+    setpoint_m: tuple[float, ...]
     round_trip_s: float
 
 
-class Session:
+class TeleopSession:
     """Leads through `stream` with `device` at `scale`, while program number `program` runs.
 
     The hand leads from the first set-point on that the robot has taken; its motion before counts
@@ -56,10 +56,16 @@ class Session:
     """
 
     def __init__(
-        self, stream: StreamClient, device: HandDevice, scale: float, program: int
+        self,
+        stream: StreamClient,
+        device: InputDevice,
+        scale: float,
+        program: int,
+        coordinates: int = 2,
     ) -> None:
         self.stream, self.device, self.scale = stream, device, scale
-        self.hand = Hand()
+        self.coordinates = coordinates
+        self.hand = InputSample()
         self.leading = False
         self.confirmations: list[Confirmation] = []
         self.round_trips_s: deque[float] = deque(maxlen=_MOST_KEPT)
@@ -78,23 +84,28 @@ class Session:
         return time.monotonic() - self._heard_s
 
     @property
-    def pose_m(self) -> tuple[float, float]:
+    def pose_m(self) -> tuple[float, ...]:
         """Return where the platform is as the robot knows it."""
-        return _place(None if self.answer is None else self.answer.pose)
+        return self._place(None if self.answer is None else self.answer.pose)
 
     @property
-    def turn_rad(self) -> float:
-        """Return by how much the platform is turned in its plane."""
+    def turn_rad(self) -> tuple[float, ...]:
+        """Return the rotation vector by which the platform is turned, the angle in a plane."""
         pose = () if self.answer is None else self.answer.pose
-        return 2.0 * math.atan2(pose[6], pose[3]) if pose else math.nan
+        vector = [math.nan] * 3
+        if pose:
+            sign, size = math.copysign(1.0, pose[3]), math.hypot(*pose[4:])
+            angle = 2.0 * math.atan2(size, abs(pose[3]))
+            vector = [sign * (angle / size if size else 0.0) * part for part in pose[4:]]
+        return tuple(vector) if self.coordinates > 2 else (vector[2],)
 
     @property
-    def setpoint_m(self) -> tuple[float, float]:
+    def setpoint_m(self) -> tuple[float, ...]:
         """Return where the platform is to be now."""
-        return _place(None if self.answer is None else self.answer.pose_setpoint)
+        return self._place(None if self.answer is None else self.answer.pose_setpoint)
 
-    def lead(self, stop_requested: Callable[[], bool]) -> End:
-        """Lead until the device, the robot or the user ends it; return why."""
+    def teleoperate(self, stop_requested: Callable[[], bool]) -> End:
+        """Teleoperate until the device, the robot or the user ends it; return why."""
         self._begin_s = self._heard_s = self._fine_s = next_s = time.monotonic()
         end: End | None = None
         while end is None:
@@ -129,7 +140,7 @@ class Session:
     def _send(self) -> None:
         hand = self.hand
         buttons = stream_buttons(hand.clutch or bool(hand.trouble), hand.confirmed)
-        self.stream.send((*hand.position_m, 0.0), scale=self.scale, buttons=buttons)
+        self.stream.send(hand.position_m, hand.quaternion, self.scale, buttons)
 
     def _listen(self, until_s: float) -> None:
         """Take answers as they come, so that the delay is that of the network."""
@@ -169,7 +180,7 @@ class Session:
             Confirmation(
                 number,
                 now_s - self._begin_s,
-                self.hand.position_m,
+                self.hand.position_m[: self.coordinates],
                 self.pose_m,
                 self.setpoint_m,
                 self.stream.round_trip_s,
@@ -182,13 +193,13 @@ class Session:
         Returns `end`, or what has ended it before that.
         """
         begin_s = since_s = time.monotonic()
-        place = self.setpoint_m
+        place = self._setpoint
         while not stop_requested():
             self._send()
             now_s = time.monotonic()
             self._listen(now_s + 1.0 / RATE_Hz)
-            if not math.dist(place, self.setpoint_m) < _STILL_m:
-                since_s, place = now_s, self.setpoint_m
+            if not math.dist(place, self._setpoint) < _STILL_m:
+                since_s, place = now_s, self._setpoint
             lost = self._lost(now_s)
             if lost is not None:
                 return lost
@@ -200,6 +211,10 @@ class Session:
                 return End(f"the robot has not come to rest within {_ARRIVE_S:g} s", failed=True)
         return End("ended on request")
 
+    @property
+    def _setpoint(self) -> tuple[float, ...]:
+        """Return the set-point's position in m and quaternion."""
+        return (math.nan,) * 7 if self.answer is None else self.answer.pose_setpoint
 
-def _place(pose: tuple[float, ...] | None) -> tuple[float, float]:
-    return (math.nan, math.nan) if pose is None else (pose[0], pose[1])
+    def _place(self, pose: tuple[float, ...] | None) -> tuple[float, ...]:
+        return ((math.nan,) * 3 if pose is None else pose)[: self.coordinates]

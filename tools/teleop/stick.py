@@ -1,11 +1,14 @@
-"""What a gamepad's events do to a hand: one stick, a button to be held, one to confirm."""
+"""What a gamepad's events do to a hand: sticks, a button to be held, one to confirm."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from tools.teleop.hand import LimitedHand
+from cdpr_tools.teleop.input_device import Hand, Quaternion, TURN_RAD_PER_m, Vector
+
+SignedAxis = tuple[int, int]
+"""An axis, and -1 where it is turned round: sticks count downward."""
 
 
 @dataclass(frozen=True)
@@ -25,20 +28,26 @@ class AxisRange:
 class StickMap:
     """Which axes and buttons mean what, by the numbers of evdev, and how they act."""
 
-    x: int
-    y: int
-    """Positive is upward; sticks count downward, so it is usually turned round."""
-    turned: tuple[bool, bool]
+    moves: tuple[SignedAxis, ...]
+    """Axes that move the hand along x, y, z; z may be left out."""
+    turns: tuple[SignedAxis, ...]
+    """Axes that turn it, about those of the room's axes that `about` says."""
+    about: tuple[int, ...]
     dead_man: int
     confirm: int
     dead_zone: float
-    """Part of the way, in any direction, in which the stick does nothing."""
+    """Part of the way, in any direction, in which a stick does nothing."""
     speed_m_s: float
-    """Of the hand, with the stick at its end."""
+    """Of the hand, with a stick at its end; it turns `TURN_RAD_PER_m` times as fast."""
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Return all axes that are used."""
+        return tuple(axis for axis, _ in (*self.moves, *self.turns))
 
 
 class Stick:
-    """A hand that moves as fast as a stick is pushed, while the dead man's button is held.
+    """A hand that moves as fast as sticks are pushed, while the dead man's button is held.
 
     The speed grows with the square of the way from the dead zone's edge, so that it can be slow.
     Only a press that is seen counts: a button that was held before leads nobody.
@@ -46,18 +55,23 @@ class Stick:
 
     def __init__(self, stick_map: StickMap, scale: float) -> None:
         self._map = stick_map
-        self._hand = LimitedHand(scale)
-        self._ranges = {stick_map.x: AxisRange(-1, 1), stick_map.y: AxisRange(-1, 1)}
-        self._parts = {stick_map.x: 0.0, stick_map.y: 0.0}
+        self._hand = Hand(scale)
+        self._ranges = dict.fromkeys(stick_map.axes, AxisRange(-1, 1))
+        self._parts = dict.fromkeys(stick_map.axes, 0.0)
         self._before_s = math.nan
         self.held = False
         """Whether the dead man's button is held."""
         self.confirmed = 0
 
     @property
-    def position_m(self) -> tuple[float, float]:
+    def position_m(self) -> Vector:
         """Return where the hand is."""
         return self._hand.position_m
+
+    @property
+    def quaternion(self) -> Quaternion:
+        """Return how the hand is turned."""
+        return self._hand.quaternion
 
     def begin(self, ranges: dict[int, AxisRange], values: dict[int, int]) -> None:
         """Go on with a device that has these ranges, its axes at these values; nothing is held."""
@@ -66,11 +80,11 @@ class Stick:
         for axis, value in values.items():
             self.move_axis(axis, value)
 
-    def disregard(self) -> None:
+    def reset(self) -> None:
         """Take back what was confirmed so far."""
         self.confirmed = 0
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Take the hand off: the device is gone, or what it did is not known."""
         self.held = False
         self._parts = dict.fromkeys(self._parts, 0.0)
@@ -93,14 +107,20 @@ class Stick:
         self._before_s = now_s
         if not self.held or not passed_s > 0.0:
             return
-        x, y = self._velocity_m_s()
-        self._hand.move(x * passed_s, y * passed_s)
+        used, way_m = self._map, self._map.speed_m_s * passed_s
+        x, y, *z = self._pushed(used.moves)
+        self._hand.move((way_m * x, way_m * y, way_m * sum(z)))
+        vector = [0.0, 0.0, 0.0]
+        for axis, pushed in zip(used.about, self._pushed(used.turns), strict=True):
+            vector[axis] = TURN_RAD_PER_m * way_m * pushed
+        self._hand.turn((vector[0], vector[1], vector[2]))
 
-    def _velocity_m_s(self) -> tuple[float, float]:
-        x, y = self._parts[self._map.x], self._parts[self._map.y]
-        x, y = (-x if self._map.turned[0] else x), (-y if self._map.turned[1] else y)
-        way, dead = math.hypot(x, y), self._map.dead_zone
-        if way <= dead:
-            return 0.0, 0.0
-        speed = self._map.speed_m_s * min((way - dead) / (1.0 - dead), 1.0) ** 2
-        return speed * x / way, speed * y / way
+    def _pushed(self, axes: tuple[SignedAxis, ...]) -> list[float]:
+        """Return how fast each of the axes is to go, -1 to 1; the first two are one stick."""
+        values = [sign * self._parts[axis] for axis, sign in axes]
+        dead, speeds = self._map.dead_zone, []
+        for stick in (values[:2], values[2:]):
+            way = math.hypot(*stick)
+            share = min(max(way - dead, 0.0) / (1.0 - dead), 1.0) ** 2
+            speeds += [share * value / way if way > 0.0 else 0.0 for value in stick]
+        return speeds

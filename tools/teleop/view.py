@@ -9,9 +9,9 @@ from typing import Any, Final
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.text import Text
 
-from cdpr_rt.runtime.states import LoopState
-from tools.teleop.canvas import Canvas
-from tools.teleop.session import Session
+from cdpr_rt.core.states import LoopState
+from cdpr_tools.teleop.canvas import Canvas
+from cdpr_tools.teleop.session import TeleopSession
 
 _WIDTH, _HEIGHT, _LEAST_HEIGHT = 64, 22, 8
 _WRAPPED = 3
@@ -19,7 +19,7 @@ _WRAPPED = 3
 _MARGIN_m = 0.1
 _SHOWN_TRIPS = 120
 _SILENT_S: Final = 0.5
-"""Longer than a round trip takes that one can lead with; what is shown is old by then."""
+"""Longer than any usable round trip; what is shown is stale by then."""
 _STALE_S: Final = 2.0
 _MARKS: Final = {"target": ("+", "bold cyan"), "platform": ("o", "bold green")}
 
@@ -32,7 +32,9 @@ class View:
     `reason` is why the robot was held or stopped before, which is no news.
     """
 
-    def __init__(self, session: Session, description: dict[str, Any], reason: str = "") -> None:
+    def __init__(
+        self, session: TeleopSession, description: dict[str, Any], reason: str = ""
+    ) -> None:
         self._session = session
         platform = description.get("platform") or {}
         self._platform = platform if len(platform.get("home_m", ())) == 2 else None
@@ -71,7 +73,7 @@ class View:
         canvas.outline([low, (high[0], low[1]), high, (low[0], high[1])])
         x, y = session.pose_m
         if math.isfinite(x):
-            turn = session.turn_rad
+            (turn,) = session.turn_rad
             anchors = [
                 (x + math.cos(turn) * b - math.sin(turn) * c,
                  y + math.sin(turn) * b + math.cos(turn) * c)
@@ -81,7 +83,7 @@ class View:
             for exit_point, anchor in zip(exits, anchors, strict=True):
                 canvas.line(exit_point, anchor)
         canvas.mark((x, y), *_MARKS["platform"])
-        canvas.mark(self._target(), *_MARKS["target"])
+        canvas.mark(_point(self._target()), *_MARKS["target"])
         for exit_point in exits:
             canvas.mark(exit_point, "◉", "")
         rows = [
@@ -90,9 +92,9 @@ class View:
         ]
         return Text("\n", no_wrap=True).join(rows)
 
-    def _target(self) -> Point:
+    def _target(self) -> tuple[float, ...]:
         told = self._status.get("program_progress", {}).get("target_m")
-        return self._session.setpoint_m if told is None else _point(told)
+        return self._session.setpoint_m if told is None else tuple(map(float, told))
 
     def _lines(self) -> list[Text]:
         session, hand = self._session, self._session.hand
@@ -100,11 +102,12 @@ class View:
         if math.isfinite(session.pose_m[0]):
             lines.append(
                 Text(
-                    f"platform {_mm(session.pose_m)}, {math.degrees(session.turn_rad):+.2f} deg; "
+                    f"platform {_mm(session.pose_m)}, {_deg(session.turn_rad)} deg; "
                     f"target {_mm(self._target())}"
                 )
             )
-        lines.append(Text(f"hand {_mm(hand.position_m)} times {session.scale:g}; {self._link()}"))
+        place = _mm(hand.position_m[: session.coordinates])
+        lines.append(Text(f"hand {place} times {session.scale:g}; {self._link()}"))
         tensions = [axis.get("tension_N") for axis in self._status.get("axes", [])]
         if any(value is not None for value in tensions):
             named = zip(self._axes, tensions, strict=False)
@@ -150,5 +153,9 @@ def _point(values: Any) -> Point:
     return float(x), float(y)
 
 
-def _mm(point: Point) -> str:
-    return f"{1e3 * point[0]:+.1f} {1e3 * point[1]:+.1f} mm"
+def _mm(place: tuple[float, ...]) -> str:
+    return " ".join(f"{1e3 * value:+.1f}" for value in place) + " mm"
+
+
+def _deg(angles: tuple[float, ...]) -> str:
+    return " ".join(f"{math.degrees(angle):+.2f}" for angle in angles)

@@ -1,1 +1,1 @@
-"""Work with cable tensions: watch them, calibrate a winch by them."""
+"""Cable tensions at the terminal: watched, and what a calibration by them needs and shows."""

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_rt.tension_gain import TorquePoint
-from profiles.winch_calibration import WinchCalibration
-from tools.report.style import BACKWARD, FORWARD, canvas, legend_above
+from cdpr_profiles.winch_calibration import WinchCalibration
+from cdpr_rt.identification.tension_gain import TorquePoint
+from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above
 
 _SIDES = ((True, FORWARD, "winding in", 1.0), (False, BACKWARD, "paying out", -1.0))
 

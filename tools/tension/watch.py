@@ -11,11 +11,11 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from cdpr_rt.clock import Clock
-from cdpr_rt.exchange import FloatArray
-from cdpr_rt.tension import TensionFault
-from drivers.modbus.tension import TensionSampler
-from tools.output import Output
+from cdpr_drivers.modbus.tension import TensionSampler
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.tension import TensionFault
+from cdpr_tools.output import Output
 
 _LOOK_S = 0.02
 _SHOW_HZ = 8.0
@@ -29,11 +29,11 @@ class _Sums:
         self._seen: FloatArray = np.full(n, -np.inf)
         self.values: list[list[float]] = [[] for _ in range(n)]
 
-    def take(self, sampler: TensionSampler) -> None:
-        told = sampler.exchange.feedback
-        for i in np.flatnonzero(told.valid & (told.time_s > self._seen)):
-            self.values[i].append(float(told.tension_N[i]))
-            self._seen[i] = told.time_s[i]
+    def update(self, sampler: TensionSampler) -> None:
+        feedback = sampler.exchange.feedback
+        for i in np.flatnonzero(feedback.valid & (feedback.time_s > self._seen)):
+            self.values[i].append(float(feedback.tension_N[i]))
+            self._seen[i] = feedback.time_s[i]
 
 
 def watch(
@@ -53,9 +53,9 @@ def watch(
         while clock.now_s < begun_s + seconds and not stop_requested():
             clock.sleep(_LOOK_S)
             exchange.update()
-            sums.take(sampler)
-            told = exchange.feedback
-            highest = float(np.max(told.tension_N, where=told.valid, initial=highest))
+            sums.update(sampler)
+            feedback = exchange.feedback
+            highest = float(np.max(feedback.tension_N, where=feedback.valid, initial=highest))
             if clock.now_s > shown_s + 1.0 / _SHOW_HZ:
                 shown_s = clock.now_s
                 live.update(_table(sampler, highest))
@@ -64,19 +64,21 @@ def watch(
 
 
 def _table(sampler: TensionSampler, highest_N: float) -> Group:
-    exchange, told = sampler.exchange, sampler.exchange.feedback
+    exchange, feedback = sampler.exchange, sampler.exchange.feedback
     table = Table(box=None)
     for title in ("cable", "N", "", "age ms", ""):
         table.add_column(title, justify="right" if title in ("N", "age ms") else "left")
     for i, cable in enumerate(exchange.cables):
-        valid = bool(told.valid[i])
-        bar = ProgressBar(total=highest_N, completed=max(0.0, float(told.tension_N[i])), width=40)
+        valid = bool(feedback.valid[i])
+        bar = ProgressBar(
+            total=highest_N, completed=max(0.0, float(feedback.tension_N[i])), width=40
+        )
         table.add_row(
             cable,
-            f"{told.tension_N[i]:.1f}" if valid else "-",
+            f"{feedback.tension_N[i]:.1f}" if valid else "-",
             bar if valid else "",
-            f"{1e3 * told.age_s[i]:.0f}" if np.isfinite(told.age_s[i]) else "-",
-            "" if valid else TensionFault(int(told.fault[i])).label,
+            f"{1e3 * feedback.age_s[i]:.0f}" if np.isfinite(feedback.age_s[i]) else "-",
+            "" if valid else TensionFault(int(feedback.fault[i])).label,
         )
     errors = dict.fromkeys(error for error in sampler.errors if error)
     return Group(table, *errors)
@@ -85,12 +87,12 @@ def _table(sampler: TensionSampler, highest_N: float) -> Group:
 def _figures(
     sampler: TensionSampler, i: int, values: list[float], elapsed_s: float
 ) -> dict[str, Any]:
-    told = sampler.exchange.feedback
+    feedback = sampler.exchange.feedback
     read = np.array(values) if values else np.full(1, np.nan)
     return {
         "cable": sampler.exchange.cables[i],
-        "valid": bool(told.valid[i]),
-        "fault": TensionFault(int(told.fault[i])).label,
+        "valid": bool(feedback.valid[i]),
+        "fault": TensionFault(int(feedback.fault[i])).label,
         "error": sampler.errors[i],
         "readings": len(values),
         "rate_Hz": len(values) / elapsed_s,
@@ -98,5 +100,5 @@ def _figures(
         "std_N": float(read.std()),
         "lowest_N": float(read.min()),
         "highest_N": float(read.max()),
-        "age_s": float(told.age_s[i]),
+        "age_s": float(feedback.age_s[i]),
     }

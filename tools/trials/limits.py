@@ -7,105 +7,159 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from cdpr_rt.runtime.robot_arrays import limits_of
-from profiles import Robot
-from tools.trials.figures import Figure
-from tools.trials.recorded import Recorded
-from tools.trials.run import TrialRun, platform_of
+from cdpr_profiles import Robot
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.run import TrialRun
 
 OVERSHOOT_mm: Final = 2.0
+SWING_mm: Final = 2.0
+"""A platform whose origin is no farther from its target does not swing any more."""
+SWING_S: Final = 2.0
 SMOOTHED_S: Final = 0.06
 """Over which a controller may average its set-point."""
 _FINISHED_SHARE: Final = 0.7
 _REST_S: Final = (0.0, 1.0)
+_LONG_REST_S: Final = 4.0
+_LONG_EVERY: Final = 5
+"""Of this many moves that are finished, one is followed by a long rest."""
 _CHANGED_AFTER_S: Final = (0.05, 1.2)
-_MOVED_m: Final = 2e-3
+_MOVED: Final = 2e-3
+"""m or rad"""
+_THERE: Final = 1e-5
+"""A set-point as near to its target stands at it, m or rad."""
 _TORQUE_STEP_SHARE: Final = 1e-3
 """Torque crosses the bus in per mille of the rated one."""
 
 
 def drive(run: TrialRun, seconds: float) -> None:
     """Head for one target after the other; nearly a third are given up on the way."""
-    chance = run.chance
+    chance, finished = run.chance, 0
     while run.elapsed_s < seconds:
-        target = run.head_anywhere()
-        run.mark("leg", target_m=target.tolist())
+        target = run.start_random_move()
+        run.mark("leg", **run.directions.marked(target, "target"))
         if chance.random() < _FINISHED_SHARE:
             run.arrive()
-            run.stay(chance.uniform(*_REST_S))
+            rest_s = chance.uniform(*_REST_S)
+            run.stay(rest_s if finished % _LONG_EVERY else _LONG_REST_S)
+            finished += 1
         else:
             run.stay(chance.uniform(*_CHANGED_AFTER_S))
 
 
 @dataclass(frozen=True)
-class Leg:
-    """The rows of one leg, where it began, its target, and where it could be stopped, (2,) each."""
+class TargetLeg:
+    """The rows of one leg, where it began, its target, and where it could be stopped, (d,) each."""
 
     rows: slice
-    from_m: FloatArray
-    target_m: FloatArray
-    stop_m: FloatArray
+    origin: FloatArray
+    target: FloatArray
+    stop: FloatArray
 
-    def overshoot_m(self, true_m: FloatArray) -> FloatArray:
-        """Return how far the platform (k, 2) was beyond its target at most, in each direction.
+    def overshoot(self, true: FloatArray) -> FloatArray:
+        """Return how far the platform (c, d) was beyond its target at most, in each direction.
 
         A direction in which it had hardly to move has none.
         """
-        way = self.target_m - self.from_m
+        way = self.target - self.origin
         sign = np.sign(way)
-        farthest = np.maximum(sign * self.target_m, sign * self.stop_m)
-        beyond = (sign * true_m[self.rows]).max(axis=0) - farthest
-        return np.where(np.abs(way) > _MOVED_m, np.maximum(beyond, 0.0), 0.0)
+        farthest = np.maximum(sign * self.target, sign * self.stop)
+        beyond = (sign * true[self.rows]).max(axis=0) - farthest
+        return np.where(np.abs(way) > _MOVED, np.maximum(beyond, 0.0), 0.0)
 
     def off_m(self, true_m: FloatArray) -> float:
         """Return how far it was, in a direction, out of the box that beginning and target span."""
-        corners = np.array([self.from_m, self.target_m, self.stop_m])
+        k = true_m.shape[1]
+        corners = np.array([self.origin, self.target, self.stop])[:, :k]
         true = true_m[self.rows]
         out = np.maximum(corners.min(axis=0) - true, true - corners.max(axis=0))
         return max(0.0, float(out.max()))
 
 
-def legs(recorded: Recorded, acceleration_m_s2: float) -> list[Leg]:
+def legs(recorded: Recorded) -> list[TargetLeg]:
     """Return all legs of a trial.
 
-    Where a target was changed half-way the set-point still moves: `stop_m` is where it turns, in
+    Where a target was changed half-way the set-point still moves: `stop` is where it turns, in
     each direction, which may lie beyond the new target; but no farther than where the acceleration
     stops a set-point that smoothing lets run on for a moment.
     """
-    marks = recorded.marked("leg")
-    first = [recorded.row(mark["cycle"]) for mark in marks]
-    last = [*first[1:], len(recorded.truth)]
-    found = []
-    for mark, begin, end in zip(marks, first, last, strict=True):
-        setpoint = recorded.setpoint_m[max(begin - 1, 0) : end]
+    acceleration, found = recorded.directions.acceleration, []
+    for mark, rows in _legs(recorded):
+        setpoint = recorded.setpoint_places[max(rows.start - 1, 0) : rows.stop]
         now, speed = setpoint[1], (setpoint[1] - setpoint[0]) / recorded.period_s
-        runs_on = np.abs(speed) * (SMOOTHED_S + np.abs(speed) / (2.0 * acceleration_m_s2))
+        runs_on = np.abs(speed) * (SMOOTHED_S + np.abs(speed) / (2.0 * acceleration))
         turn = np.where(speed > 0.0, setpoint.max(axis=0), setpoint.min(axis=0))
         stop = now + np.clip(turn - now, -runs_on, runs_on)
-        target = np.array(mark["target_m"])
-        found.append(Leg(slice(begin, end), recorded.true_m[begin], target, stop))
+        found.append(TargetLeg(rows, recorded.true_places[rows.start], mark, stop))
     return found
 
 
+def _legs(recorded: Recorded) -> list[tuple[FloatArray, slice]]:
+    """Return target and rows of each leg."""
+    marks = recorded.marked("leg")
+    first = [recorded.row(mark["cycle"]) for mark in marks]
+    ends = zip(first, [*first[1:], len(recorded.truth)], strict=True)
+    targets = [recorded.directions.place(mark, "target") for mark in marks]
+    return [(target, slice(*rows)) for target, rows in zip(targets, ends, strict=True)]
+
+
+def swings_s(recorded: Recorded) -> FloatArray:
+    """Return how long the platform took to stay within `SWING_mm` of each target, (m,).
+
+    From when the set-point stood there, of those legs whose rest was long enough to tell; where it
+    does not stay there at all, all of the rest.
+    """
+    found = []
+    for target, rows in _legs(recorded):
+        k = recorded.directions.k
+        coming = np.abs(recorded.setpoint_places[rows] - target).max(axis=1) > _THERE
+        stood = 0 if not coming.any() else int(np.flatnonzero(coming)[-1]) + 1
+        off = np.linalg.norm(recorded.true_m[rows] - target[:k], axis=1)[stood:]
+        if off.size * recorded.period_s >= SWING_S:
+            swinging = np.flatnonzero(1e3 * off > SWING_mm)
+            found.append(recorded.period_s * (swinging[-1] + 1 if swinging.size else 0))
+    return np.array(found)
+
+
 def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
-    """Return the extremes of tension and torque, and the worst overshoot."""
-    limits, platform = limits_of(robot), platform_of(robot)
+    """Return the extremes of tension and torque, the worst overshoot, and the longest swing."""
+    directions, k = recorded.directions, recorded.directions.k
+    found = legs(recorded)
+    true = recorded.true_places
+    beyond = np.array([leg.overshoot(true) for leg in found]).reshape(-1, directions.d)
+    off = max(leg.off_m(recorded.true_m) for leg in found)
+    speed = np.abs(recorded.truth["velocity_m_s"][:, :k]).max(axis=0)
+    swings = swings_s(recorded)
+    figures = [
+        Figure("legs", "legs, each to a random target", len(found)),
+        Figure("minutes", "bus time", float(recorded.time_s[-1]) / 60.0, "min"),
+        Figure("top_speed_m_s", "fastest along a direction", float(speed.max()), "m/s"),
+        *held_figures(recorded, robot),
+        Figure("overshoot_mm", "overshoot", 1e3 * float(beyond[:, :k].max()), "mm", OVERSHOOT_mm),
+        Figure("off_mm", "farthest from the box of a leg, sideways too", 1e3 * off, "mm"),
+    ]
+    if directions.angle_rad > 0.0:
+        angle = float(np.degrees(beyond[:, k:].max(initial=0.0)))
+        figures.append(Figure("overshoot_deg", "overshoot in angle", angle, "deg"))
+    if swings.size:
+        text = f"longest time until it stays within {SWING_mm:g} mm of its target"
+        figures.append(Figure("swing_s", text, float(swings.max()), "s", SWING_S))
+    return figures
+
+
+def held_figures(recorded: Recorded, robot: Robot) -> list[Figure]:
+    """Return the extremes of the true tensions and of the torques, and what is allowed."""
+    limits = limits_of(robot)
     tension, torque = recorded.truth["tension_N"], recorded.truth["torque_Nm"]
     low, high = np.asarray(limits.tension_min_N), np.asarray(limits.tension_max_N)
     slack, most = np.asarray(limits.slack_N), np.asarray(limits.torque_Nm)
     outside = ((tension < low) | (tension > high)).any(axis=1)
     sent = np.abs(recorded.cycles["torque_sent_Nm"])
     rated = np.array([axis.winch.motor.rated_torque_Nm for axis in robot.axes])
-    found = legs(recorded, platform.acceleration_m_s2)
-    beyond = np.array([leg.overshoot_m(recorded.true_m) for leg in found]).reshape(-1, 2)
-    off = max(leg.off_m(recorded.true_m) for leg in found)
-    speed = np.abs(recorded.truth["velocity_m_s"][:, :2]).max(axis=0)
     bound = "Nm", float(most.max() + _TORQUE_STEP_SHARE * rated.max())
     return [
-        Figure("legs", "legs, each to a random target", len(found)),
-        Figure("minutes", "bus time", float(recorded.time_s[-1]) / 60.0, "min"),
-        Figure("top_speed_m_s", "fastest in x or y", float(speed.max()), "m/s"),
         Figure("tension_min_N", "least tension", float(tension.min()), "N", low.min(), True),
         Figure("tension_max_N", "greatest tension", float(tension.max()), "N", high.max()),
         Figure("outside_cycles", "cycles with a tension out of its bounds", outside.sum(), "", 0),
@@ -114,6 +168,4 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
         ),
         Figure("torque_sent_Nm", "greatest torque asked of a motor", float(sent.max()), *bound),
         Figure("torque_true_Nm", "greatest torque of a motor", float(np.abs(torque).max()), "Nm"),
-        Figure("overshoot_mm", "overshoot", 1e3 * float(beyond.max()), "mm", OVERSHOOT_mm),
-        Figure("off_mm", "farthest from the box of a leg, sideways too", 1e3 * off, "mm"),
     ]

@@ -1,60 +1,102 @@
-"""The trial of lines at 10 mm/s, which is 22 deg/s at the motors of the thesis' winches."""
+"""The trial of lines and turns at a steady speed: 10 mm/s are 22 deg/s at the thesis' motors."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from tools.trials.figures import Figure
-from tools.trials.recorded import Recorded
-from tools.trials.run import TrialRun
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.trials.directions import Directions
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.run import TrialRun
 
 SPEED_m_s: Final = 0.01
 LENGTH_m: Final = 0.6
 """Of each line, or half of what the workspace offers there; motors turn several times in it."""
 RATIO: Final = 3.0
+"""Wanted at `SPEED_m_s`."""
+SETPOINT_mm: Final = 2.0
+"""Wanted at other speeds."""
 WITH, WITHOUT = "with", "without"
+NAMES: Final = {WITH: "with compensation", WITHOUT: "without"}
 
 
-def lines(run: TrialRun) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the ends of a level line and an upright one through the middle of the workspace."""
-    middle, size = 0.5 * (run.low_m + run.high_m), run.high_m - run.low_m
-    found = []
-    for axis in range(2):
-        half = np.zeros(2)
-        half[axis] = 0.5 * min(LENGTH_m, 0.5 * float(size[axis]))
-        found.append((middle - half, middle + half))
-    return found
+def lines(directions: Directions) -> list[tuple[FloatArray, FloatArray]]:
+    """Return the ends (d,) of a line along each direction through the middle of the workspace.
+
+    Along an angle it is a turn, from half of what is allowed on one side to half on the other.
+    """
+    middle, size = directions.middle, directions.high_m - directions.low_m
+    reach = np.minimum(0.5 * LENGTH_m, 0.25 * size)
+    reach = np.append(reach, np.full(len(directions.turns), 0.5 * directions.angle_rad))
+    return [(middle - half, middle + half) for half in np.diag(reach) if half.any()]
 
 
-def drive(run: TrialRun, _seconds: float) -> None:
-    """Move along each line once, there at full speed."""
-    for start, end in lines(run):
+def drive(run: TrialRun, speed_m_s: float) -> None:
+    """Move along each line once; to its beginning at full speed."""
+    directions = run.directions
+    for start, end in lines(directions):
         run.go(start)
         run.stay(2.0)
-        run.mark("line", from_m=start.tolist(), to_m=end.tolist())
-        run.go(end, speed_m_s=SPEED_m_s)
+        run.mark("line", **directions.marked(start, "from"), **directions.marked(end, "to"))
+        run.go(end, speed_m_s)
         run.mark("line end")
 
 
-def path_errors(recorded: Recorded) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return of each line: the way along it in m (k,), and two errors in mm, (k,) and (k, 2).
+@dataclass(frozen=True)
+class LineErrors:
+    """What was recorded along one line, or turn: errors in mm and degrees, one row a cycle."""
 
-    The first error is the true distance from the line, with its sign; the second that from the
-    set-point of the same cycle, in x and y.
-    """
-    found = []
+    direction: int
+    """Which direction it is along."""
+    is_turn: bool
+    way: FloatArray
+    """Along the line, m or rad, (c,)."""
+    across_mm: FloatArray
+    """True distance from the line at right angles to it, (c, k - 1); (c, 0) of a turn."""
+    off_mm: FloatArray
+    """True distance from the set-point of the same cycle, (c, k)."""
+    off_deg: FloatArray
+    """True rotation from it, (c, 3), or (c, 0) where angles are not controlled."""
+
+
+def line_errors(recorded: Recorded) -> list[LineErrors]:
+    """Return the errors of all lines."""
+    directions, found = recorded.directions, []
+    k = directions.k
     for mark, end in zip(recorded.marked("line"), recorded.marked("line end"), strict=True):
         rows = slice(recorded.row(mark["cycle"]), recorded.row(end["cycle"]))
-        start, stop = np.array(mark["from_m"]), np.array(mark["to_m"])
+        start, stop = directions.place(mark, "from"), directions.place(mark, "to")
         along = (stop - start) / np.linalg.norm(stop - start)
-        across = np.array([-along[1], along[0]])
-        true = recorded.true_m[rows]
-        off = true - recorded.setpoint_m[rows]
-        found.append(((true - start) @ along, 1e3 * (true - start) @ across, 1e3 * off))
+        direction = int(np.abs(along).argmax())
+        off = recorded.true_m[rows] - recorded.setpoint_m[rows]
+        true = recorded.true_m[rows] - start[:k]
+        found.append(
+            LineErrors(
+                direction,
+                direction >= k,
+                (recorded.true_places[rows] - start) @ along,
+                1e3 * true @ _at_right_angles(along[:k]),
+                1e3 * off,
+                np.degrees(recorded.turned_off_rad[rows]),
+            )
+        )
     return found
+
+
+def _at_right_angles(along: FloatArray) -> FloatArray:
+    """Return unit vectors (k, k - 1) at right angles to one; (k, 0) where there is none."""
+    if not along.any():
+        return np.zeros((along.size, 0))
+    found: list[FloatArray] = [along / np.linalg.norm(along)]
+    for i in np.argsort(np.abs(along), kind="stable")[:-1]:
+        unit = np.eye(along.size)[i]
+        unit = unit - sum((unit @ other) * other for other in found)
+        found.append(unit / np.linalg.norm(unit))
+    return np.array(found[1:]).T
 
 
 def rms_mm(recorded: Recorded, less_mean: bool = False) -> tuple[float, float]:
@@ -63,32 +105,55 @@ def rms_mm(recorded: Recorded, less_mean: bool = False) -> tuple[float, float]:
     With `less_mean` that of what is left of each line's errors without their mean, which does not
     tell how a motor runs but how well the start is known.
     """
-    found = path_errors(recorded)
-    errors = [(one[1][:, None], one[2]) for one in found]
+    straight = [one for one in line_errors(recorded) if not one.is_turn]
+    return (
+        _rms([one.across_mm for one in straight], less_mean),
+        _rms([one.off_mm for one in straight], less_mean),
+    )
+
+
+def _rms(errors: list[FloatArray], less_mean: bool = False) -> float:
     if less_mean:
-        errors = [(a - a.mean(axis=0), b - b.mean(axis=0)) for a, b in errors]
-    across, off = (np.concatenate([one[k] for one in errors]) for k in range(2))
-    return _rms(across), _rms(off)
+        errors = [one - one.mean(axis=0) for one in errors]
+    return float(np.sqrt(np.mean(np.sum(np.concatenate(errors) ** 2, axis=1))))
 
 
-def _rms(errors: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
-
-
-def judge(parts: dict[str, Recorded]) -> list[Figure]:
+def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:
     """Return the errors of each part, and what compensation has made of them."""
-    names = {WITH: "with compensation", WITHOUT: "without"}
     figures, ratios = [], []
+    slow = speed_m_s == SPEED_m_s
     for less_mean in (False, True):
         key, less = ("_less_mean", ", less its mean") if less_mean else ("", "")
         rms = {part: rms_mm(recorded, less_mean) for part, recorded in parts.items()}
         for i, (what, text) in enumerate((("path", "line"), ("setpoint", "set-point"))):
+            wanted = what == "setpoint" and not less_mean
             for part, values in rms.items():
-                told = f"RMS distance from the {text}{less}, {names[part]}"
-                figures.append(Figure(f"{what}_{part}{key}_mm", told, values[i], "mm"))
-            if len(rms) == len(names):
+                told = f"RMS distance from the {text}{less}, {NAMES[part]}"
+                limit = SETPOINT_mm if wanted and not slow and part == best(parts) else None
+                figures.append(Figure(f"{what}_{part}{key}_mm", told, values[i], "mm", limit))
+            if len(rms) == len(NAMES):
                 ratio = rms[WITHOUT][i] / rms[WITH][i]
                 told = f"distance from the {text}{less}, without over with"
-                limit = RATIO if what == "setpoint" and not less_mean else None
+                limit = RATIO if wanted and slow else None
                 ratios.append(Figure(f"{what}{key}_ratio", told, ratio, "", limit, True))
-    return [*figures, *ratios]
+    return [*figures, *_orientation(parts), *ratios]
+
+
+def best(parts: dict[str, Recorded]) -> str:
+    """Return the part of which most is wanted."""
+    return WITH if WITH in parts else WITHOUT
+
+
+def _orientation(parts: dict[str, Recorded]) -> list[Figure]:
+    """Return the errors in orientation on lines and in turns, where angles are controlled."""
+    figures = []
+    for part, recorded in parts.items():
+        found, name = line_errors(recorded), NAMES[part]
+        if recorded.directions.turns:
+            value = _rms([one.off_deg for one in found])
+            told = f"RMS angle from the set-point, {name}"
+            figures.append(Figure(f"orientation_{part}_deg", told, value, "deg"))
+        if turns := [one.off_mm for one in found if one.is_turn]:
+            told = f"RMS distance from the set-point in turns, {name}"
+            figures.append(Figure(f"turn_{part}_mm", told, _rms(turns), "mm"))
+    return figures

@@ -15,36 +15,36 @@ from contextlib import ExitStack
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, Self
 
-from cdpr_rt.realtime import one_core
-from cdpr_rt.runtime import procedures
-from cdpr_rt.runtime.cycle_row import Row
-from cdpr_rt.runtime.loop import ControlLoop
-from cdpr_rt.runtime.programs.base import Program
-from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.service.recording import Recorder
-from drivers.bus import query_status
-from profiles import load_robot
-from tools.commissioned import with_commissioned, without_commissioned
-from tools.daemon.loop_process import description, loop_parts
-from tools.daemon.machine import RobotMachine
-from tools.errors import WorkFailedError
-from tools.robot_buses import robot_urls
-from tools.simulator import OwnSimulator
-from tools.trials.pose_log import PoseLogTail
-from tools.trials.right import RightInBusTime
-from tools.trials.stream import StreamInBusTime
+from cdpr_drivers.bus import query_status
+from cdpr_drivers.robot.commissioned import with_commissioned, without_commissioned
+from cdpr_drivers.robot.machine import RobotMachine
+from cdpr_drivers.robot.robot_buses import robot_urls
+from cdpr_profiles import load_robot
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.core.cycle_row import Row
+from cdpr_rt.core.shared_block import RowReader, SharedBlock
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.programs.base import Program
+from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.runtime.control_loop.loop import ControlLoop
+from cdpr_rt.runtime.realtime import one_core
+from cdpr_rt.service.recordings.recording import Recorder
+from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.daemon.loop_process import description, loop_parts
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.trials.pose_log import PoseLogTail
+from cdpr_tools.trials.right import RightInBusTime
+from cdpr_tools.trials.streams.stream import StreamInBusTime
 
 RING_S: Final = 30.0
 _LOOK_CYCLES: Final = 512
 _names = count()
 
 
-class OrderRefusedError(WorkFailedError):
-    """An order was not carried out, for the reason that the daemon tells; nothing has changed."""
+class CommandRefusedError(WorkFailedError):
+    """A command was refused or failed, for the reason given."""
 
 
 class LockstepRobot:
@@ -95,13 +95,8 @@ class LockstepRobot:
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Take the power away at once, however the platform stands; `shut_down` lowers it first."""
+    def __exit__(self, *_: object) -> None:
+        """Remove the power at once, wherever the platform is; `shut_down` lowers it first."""
         self._stack.close()
 
     def _start(self, stack: ExitStack) -> None:
@@ -120,9 +115,10 @@ class LockstepRobot:
         self.machine = RobotMachine(robot, [bus])
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
-        parts = loop_parts(robot, block)
+        limits = limits_of(robot)
+        parts = loop_parts(robot, limits, block)
         parts = replace(parts, programs={**parts.programs, **self._more_programs})
-        block.write_description(description(robot, parts))
+        block.write_description(description(robot, limits, parts))
         self.loop = ControlLoop(block, self.machine, parts, lambda: self.now_ns)
         self.right = RightInBusTime(block, lambda: self.now_ns)
         self.stream = StreamInBusTime(block, self.right, lambda: self.now_ns)
@@ -139,7 +135,7 @@ class LockstepRobot:
 
     def _boot(self) -> None:
         loop = self.loop
-        loop.begin(procedures.start_up(loop))
+        loop.runner.begin(loop.transitions.start_up())
         self._turn_until(lambda: not loop.busy, 60.0, "the boot")
         if loop.life.state is not LoopState.READY:
             raise WorkFailedError(loop.life.reason or "the drives are not ready")
@@ -194,10 +190,10 @@ class LockstepRobot:
 
         It fails at once where the drives have lost their power meanwhile.
         """
-        driven = self.loop.driving
+        driven = self.loop.engine.driving
 
         def done_or_lost() -> bool:
-            return done() or (driven and not self.loop.driving)
+            return done() or (driven and not self.loop.engine.driving)
 
         self._turn_until(done_or_lost, within_s, what)
         if not done():
@@ -209,15 +205,15 @@ class LockstepRobot:
         end_s = clock.now_s + within_s
         while not done():
             if clock.now_s > end_s:
-                raise WorkFailedError(f"{what}: not within {within_s:g} s: {self.told()}")
+                raise WorkFailedError(f"{what}: not within {within_s:g} s: {self.state_text()}")
             self.turn()
 
     # -- commands
 
-    def order(self, do: str, within_s: float = 60.0, **what: Any) -> dict[str, Any]:
-        """Give an order as the service does and turn until it is answered, in bus time.
+    def command(self, do: str, within_s: float = 60.0, **what: Any) -> dict[str, Any]:
+        """Send a command as the service does and turn until the reply, in bus time.
 
-        `what` are its keys: program, wanted. Raises OrderRefusedError where it is refused or fails.
+        `what` are its keys: program, wanted. Raises CommandRefusedError where it fails.
         """
         right = self.right.number
         number = self.block.post_command({"do": do, "client": "trial", "right": right, **what})
@@ -231,35 +227,35 @@ class LockstepRobot:
 
         self._turn_until(answered, within_s, do)
         if not answers[0]["ok"]:
-            raise OrderRefusedError(f"{do}: {answers[0]['text']}")
+            raise CommandRefusedError(f"{do}: {answers[0]['text']}")
         return answers[0]
 
-    def enable(self, program: str = "hold", **wanted: Any) -> None:
+    def enable(self, program: str = "hold", **arguments: Any) -> None:
         """Give the drives power and run `program`."""
-        self.order("enable", program=program, wanted=wanted)
+        self.command("enable", program=program, wanted=arguments)
 
-    def program(self, name: str, **wanted: Any) -> None:
-        """Change over to a program that does what is `wanted`; returns at once."""
-        self.order("program", program=name, wanted=wanted)
+    def program(self, name: str, **arguments: Any) -> None:
+        """Change to a program with these arguments; returns at once."""
+        self.command("program", program=name, wanted=arguments)
 
-    def carry_out(self, name: str, within_s: float = 60.0, **wanted: Any) -> None:
+    def carry_out(self, name: str, within_s: float = 60.0, **arguments: Any) -> None:
         """Run a program until nothing is left for it to do; raises WorkFailedError otherwise."""
-        self.program(name, **wanted)
+        self.program(name, **arguments)
         self.finish(within_s)
 
     def finish(self, within_s: float = 60.0) -> None:
         """Run cycles until the present program has nothing left to do."""
-        program = self.loop.program
+        program = self.loop.engine.program
 
         def over() -> bool:
-            return self.loop.program is not program or program.at_rest
+            return self.loop.engine.program is not program or program.at_rest
 
         self.until(over, within_s, program.name)
-        if self.loop.program is not program:
-            raise WorkFailedError(f"{program.name} was ended: {self.told()}")
+        if self.loop.engine.program is not program:
+            raise WorkFailedError(f"{program.name} was ended: {self.state_text()}")
 
-    def misbehave(self, axis: int, sub: int, value: int) -> None:
-        """Have a simulated drive do something on purpose (2F00h), told between two cycles."""
+    def inject_fault(self, axis: int, sub: int, value: int) -> None:
+        """Inject a fault into a simulated drive (object 2F00h), between two cycles."""
         where = self.robot.axes[axis]
         networks = self.machine.networks
         networks[where.bus].write(where.node_id, 0x2F00, sub, value)
@@ -268,6 +264,14 @@ class LockstepRobot:
         """End as `cdpr run` does when it is told to stop: under control, then without power."""
         self.loop.request_stop()
         self._turn_until(lambda: self.loop.ended, 120.0, "the end")
+
+    def die(self, seconds: float) -> None:
+        """Leave the drives without SYNC and heartbeat, as a killed process does, for so long.
+
+        The simulator's log goes on, in records without SYNC.
+        """
+        Clock.close(self.machine.clock)  # nothing is listened to or sent; the lead is kept
+        self.machine.clock.sleep(seconds)
 
     # -- what is known
 
@@ -299,25 +303,25 @@ class LockstepRobot:
 
     @property
     def state(self) -> LoopState:
-        """Where the loop stands."""
+        """The loop's state."""
         return self.loop.life.state
 
     @property
     def progress(self) -> dict[str, Any]:
-        """What the running program tells."""
-        return self.loop.program.progress()
+        """Progress of the running program."""
+        return self.loop.engine.program.progress()
 
     @property
     def status(self) -> dict[str, Any]:
-        """What the daemon would tell now."""
+        """The status that the daemon would publish now."""
         self.loop.status.publish()
         return self.block.status()
 
-    def told(self) -> str:
-        """Return where it stands, for messages."""
+    def state_text(self) -> str:
+        """Return state, program and reason, for messages."""
         life = self.loop.life
         reason = f": {life.reason}" if life.reason else ""
-        return f"{life.state.label}, {self.loop.program.name}{reason}"
+        return f"{life.state.label}, {self.loop.engine.program.name}{reason}"
 
     def recordings(self) -> Sequence[Path]:
         """Return the files recorded so far, in their order."""

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from profiles.bounded_input import open_regular, parse_json
-from profiles.errors import ProfileError
-from tools.errors import BadInputError
-from tools.truth import NO_SYNC
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import open_regular, parse_json
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.recordings.truth import NO_SYNC
 
 _HEADER_BYTES = 1024
 _FORMAT = "cdpr-rt pose log 1"
@@ -71,12 +70,7 @@ class PoseLogTail:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

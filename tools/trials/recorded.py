@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.service.recording_reader import Columns, RecordingReader
-from tools.errors import BadInputError, WorkFailedError
-from tools.trials.pose_log import Truth, read_pose_log
+from cdpr_profiles import load_robot
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.trials.directions import Directions, platform_of, rotations_of
+from cdpr_tools.trials.pose_log import Truth, read_pose_log
 
 TRUTH: Final = "truth.log"
 FIELDS: Final = (
@@ -31,9 +35,9 @@ class Recorded:
     """One part of a trial, from its `begin` to its `end`, cycle by cycle.
 
     `cycles` are the recording's columns, `truth` the records of the same SYNCs. `marks` are what
-    the trial wrote among the recording's events, in their order. Raises RecordingError and
-    BadInputError for files that are missing or no such files, WorkFailedError for files that do not
-    belong together.
+    the trial wrote among the recording's events, in their order. `directions` are those in which
+    the robot's platform is controlled. Raises RecordingError, ProfileError and BadInputError for
+    files that are missing or no such files, WorkFailedError for files that do not belong together.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -43,6 +47,7 @@ class Recorded:
         columns, self.marks = _read(paths)
         self.folder = folder
         begin, end = self._only("begin"), self._only("end")
+        self.directions = Directions.of(platform_of(load_robot(begin["robot"])))
         cycle = columns["cycle"]
         kept = (cycle >= begin["cycle"]) & (cycle <= end["cycle"])
         self.cycles: Columns = {name: column[kept] for name, column in columns.items()}
@@ -64,14 +69,38 @@ class Recorded:
         return float(self.time_s[1])
 
     @property
-    def true_m(self) -> NDArray[np.float64]:
-        """Where the platform truly was, in the plane, (k, 2)."""
-        return np.asarray(self.truth["position_m"][:, :2])
+    def true_m(self) -> FloatArray:
+        """Where the platform's origin truly was, (c, k)."""
+        return np.asarray(self.truth["position_m"][:, : self.directions.k])
 
     @property
-    def setpoint_m(self) -> NDArray[np.float64]:
-        """Where it was to be, as the controller has recorded, (k, 2)."""
-        return np.asarray(self.cycles["pose_setpoint"][:, :2])
+    def setpoint_m(self) -> FloatArray:
+        """Where it was to be, as the controller has recorded, (c, k)."""
+        return np.asarray(self.cycles["pose_setpoint"][:, : self.directions.k])
+
+    @cached_property
+    def true_places(self) -> FloatArray:
+        """Where the platform truly was, angles too where they are controlled, (c, d)."""
+        return self.directions.places(self.truth["position_m"], self.truth["rotation"])
+
+    @cached_property
+    def setpoint_places(self) -> FloatArray:
+        """Where it was to be, angles too where they are controlled, (c, d)."""
+        return self.directions.places(self.setpoint_m, self._wanted_rotations)
+
+    @cached_property
+    def turned_off_rad(self) -> FloatArray:
+        """By which rotation vectors the platform was off its set-point, (c, 3).
+
+        (c, 0) where its angles are not controlled.
+        """
+        if not self.directions.turns:
+            return np.zeros((len(self.truth), 0))
+        return self.directions.turn_between(self._wanted_rotations, self.truth["rotation"])
+
+    @cached_property
+    def _wanted_rotations(self) -> FloatArray:
+        return rotations_of(self.cycles["pose_setpoint"][:, 3:])
 
     def row(self, cycle: int) -> int:
         """Return the row of a cycle."""

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
+from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.runtime.right import PublishedRight
-from cdpr_rt.runtime.shared_block import SharedBlock
 from cdpr_rt.service.lease import Lease, LeaseError
 
 _TTL_S: Final = 2.0
@@ -23,9 +23,9 @@ class RightInBusTime:
     def __init__(self, block: SharedBlock, clock_ns: Callable[[], int]) -> None:
         self._clock_ns = clock_ns
         self.token: str | None = None
-        """That of the right which is held here, None while none is."""
+        """The token of the right held here, None while none is."""
         self.number = 0
-        """That of the newest taking here, which orders carry."""
+        """The number of the newest grant here, which commands carry."""
         self._renewed_ns = 0
         self.lease = Lease(PublishedRight(block), clock_ns)
 
@@ -46,7 +46,7 @@ class RightInBusTime:
         self.token = None
 
     def look(self) -> None:
-        """Renew what is held; called every cycle. Bus time may have begun anew meanwhile."""
+        """Renew the right where that is due; called every cycle."""
         if self.token is not None and abs(self._clock_ns() - self._renewed_ns) >= _RENEWED_NS:
             self._renew(self.token)
 

@@ -1,4 +1,4 @@
-"""What trials do with a robot: start it up, send it places, and mark in the recording when."""
+"""A robot under trial: started up, moved to places, marks written into its recording."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.exchange import FloatArray
-from profiles import Robot, load_robot
-from profiles.platform import Platform
-from tools.errors import BadInputError, WorkFailedError
-from tools.robots.statics import can_be_computed
-from tools.trials.lockstep import LockstepRobot, OrderRefusedError
-from tools.trials.recorded import TRUTH
+from cdpr_profiles import load_robot
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.trials.directions import Directions, platform_of
+from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
+from cdpr_tools.trials.recorded import TRUTH
 
 _TIGHTEN_S, _MOVE_S = 180.0, 60.0
 _SETTLE_S = 2.0
 _TRIES = 100
 _CORNER_SHARE = 0.3
+_BORDER = 1.0 - 1e-9
+"""Share of the largest angle; all of it might be refused for its rounding."""
 
 
 class TrialRun:
@@ -33,9 +34,7 @@ class TrialRun:
         self, rig: LockstepRobot, chance: np.random.Generator, advance: Callable[[float], None]
     ) -> None:
         self.rig = rig
-        self.platform = platform_of(rig.robot)
-        self.low_m = np.array(self.platform.workspace_min_m)
-        self.high_m = np.array(self.platform.workspace_max_m)
+        self.directions = Directions.of(platform_of(rig.robot))
         self.chance = chance
         self.refused = 0
         """Places that the robot has refused, with its reason."""
@@ -52,7 +51,7 @@ class TrialRun:
         rig = self.rig
         rig.enable()
         rig.carry_out("tighten", _TIGHTEN_S)
-        self.go(0.5 * (self.low_m + self.high_m))
+        self.go(self.directions.middle)
         self.stay(_SETTLE_S)
         self._begun_s = rig.now_s
 
@@ -62,62 +61,69 @@ class TrialRun:
         assert recorder is not None  # trials are recorded
         recorder.remark(f"trial: {what}", mark=what, cycle=self.rig.cycle, **values)
 
-    def anywhere(self) -> FloatArray:
-        """Return a place of the workspace, (2,): any, in part on its border or in its corners."""
-        place = self.chance.uniform(self.low_m, self.high_m)
-        edge = self.chance.random(2) < _CORNER_SHARE
-        ends = np.where(self.chance.random(2) < 0.5, self.low_m, self.high_m)
-        return np.asarray(np.where(edge, ends, place))
+    def random_place(self) -> FloatArray:
+        """Return a place of the workspace, (d,): any, in part on its border or in its corners.
 
-    def head_for(self, position_m: FloatArray, **wanted: Any) -> None:
-        """Have the platform go to a place; returns at once. Raises OrderRefusedError."""
-        self.rig.program("pose", position_m=position_m.tolist(), **wanted)
+        Angles are about any axis, and as large as they may be at the border.
+        """
+        low, high = self.directions.low_m, self.directions.high_m
+        chance, k = self.chance, self.directions.k
+        place = chance.uniform(low, high)
+        edge = chance.random(k) < _CORNER_SHARE
+        ends = np.where(chance.random(k) < 0.5, low, high)
+        return np.append(np.where(edge, ends, place), self._random_turn())
+
+    def _random_turn(self) -> FloatArray:
+        turns, chance = len(self.directions.turns), self.chance
+        if not turns or not self.directions.angle_rad:
+            return np.zeros(turns)
+        axis = chance.standard_normal(turns)
+        share = chance.random() ** (1.0 / turns)
+        if chance.random() < _CORNER_SHARE:
+            share = _BORDER
+        return np.asarray(share * self.directions.angle_rad * axis / np.linalg.norm(axis))
+
+    def start_move(self, place: FloatArray, speed_m_s: float | None = None) -> None:
+        """Have the platform go to a place (d,); returns at once. Raises CommandRefusedError."""
+        self.rig.program("pose", **self.directions.arguments(place, speed_m_s))
         self._advance(self.elapsed_s)
 
-    def head_anywhere(self) -> FloatArray:
-        """Have the platform go to some place that the robot does not refuse; return it, (2,)."""
+    def start_random_move(self, speed_m_s: float | None = None) -> FloatArray:
+        """Have the platform go to some place that the robot does not refuse; return it, (d,)."""
         for _ in range(_TRIES):
-            place = self.anywhere()
+            place = self.random_place()
             try:
-                self.head_for(place)
-            except OrderRefusedError as error:
+                self.start_move(place, speed_m_s)
+            except CommandRefusedError as error:
                 self.refused += 1
                 reason = str(error)
-                self.mark("refused", target_m=place.tolist(), reason=reason)
+                self.mark("refused", **self.directions.marked(place, "target"), reason=reason)
                 continue
             return place
         raise WorkFailedError(f"{_TRIES} places in the workspace were refused, the last: {reason}")
 
-    def go(self, position_m: FloatArray, **wanted: Any) -> None:
-        """Take the platform to a place; its set-point stands there then."""
-        self.head_for(position_m, **wanted)
-        self.rig.finish(_MOVE_S + self._time_s(position_m, wanted.get("speed_m_s")))
+    def go(self, place: FloatArray, speed_m_s: float | None = None) -> None:
+        """Take the platform to a place (d,); its set-point stands there then."""
+        self.start_move(place, speed_m_s)
+        self.arrive(self._time_s(place, speed_m_s))
 
-    def arrive(self) -> None:
+    def arrive(self, longer_s: float = 0.0) -> None:
         """Wait until the set-point stands at its target."""
-        self.rig.finish(_MOVE_S)
+        self.rig.finish(_MOVE_S + longer_s)
 
     def stay(self, seconds: float) -> None:
         """Run cycles; raises WorkFailedError where the motion is ended meanwhile."""
         self.rig.turn(round(seconds / self.rig.period_s))
-        if self.rig.loop.program.name != "pose":
-            raise WorkFailedError(f"the motion was ended: {self.rig.told()}")
+        if self.rig.loop.engine.program.name != "pose":
+            raise WorkFailedError(f"the motion was ended: {self.rig.state_text()}")
         self._advance(self.elapsed_s)
 
-    def _time_s(self, position_m: FloatArray, speed_m_s: float | None) -> float:
-        way = float(np.abs(position_m - self.rig.truth()["position_m"][:2]).max())
-        return way / (speed_m_s or self.platform.speed_m_s)
-
-
-def platform_of(robot: Robot) -> Platform:
-    """Return a robot's platform; raises BadInputError for a robot whose platform is not moved."""
-    platform = robot.platform
-    if platform is None or not can_be_computed(robot):
-        raise BadInputError(
-            f"{robot.path}: has no platform in a plane on three cables; allowed: [platform] of two "
-            "coordinates and three axes, such as planar-3 has"
-        )
-    return platform
+    def _time_s(self, place: FloatArray, speed_m_s: float | None) -> float:
+        """Return how long the way to a place takes at least, by its slowest direction."""
+        directions, truth = self.directions, self.rig.truth()
+        here = directions.places(truth["position_m"][None], truth["rotation"][None])[0]
+        share = 1.0 if speed_m_s is None else speed_m_s / directions.speed[0]
+        return float((np.abs(place - here) / (share * directions.speed)).max())
 
 
 @contextmanager
@@ -146,7 +152,7 @@ def trial_run(
         run.mark("end", refused=run.refused)
         rig.turn()  # the last cycle is in the recording as well
     recorder = rig.recorder
-    if recorder is not None and (told := recorder.told())["error"]:
+    if recorder is not None and (told := recorder.status())["error"]:
         raise WorkFailedError(str(told["error"]))
 
 

@@ -9,66 +9,27 @@ from typing import Any, Final
 
 from matplotlib.figure import Figure as Picture
 
-from profiles import Robot, load_robot
-from tools.errors import BadInputError
-from tools.kept import kept
-from tools.output import Output, to_json
-from tools.robots.checks import refuse_impossible
-from tools.trials import limits, line, pictures, streaming, targets
-from tools.trials.figures import Figure, all_reached
-from tools.trials.recorded import Recorded
-from tools.trials.run import TrialRun, platform_of, trial_run
+from cdpr_drivers.robot.commissioned import uncommissioned_text, with_commissioned
+from cdpr_profiles import Robot, load_robot
+from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output, to_json
+from cdpr_tools.stored_settings import load_settings
+from cdpr_tools.trials import limits, line, pictures, tape, targets
+from cdpr_tools.trials.directions import platform_of
+from cdpr_tools.trials.figures import Figure, all_reached
+from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.run import TrialRun, trial_run
+from cdpr_tools.trials.streams import streaming
 
-ASKED, PICTURE, FIGURES = "trial.json", "trial.png", "figures.json"
+SETTINGS, PICTURE, FIGURES, PLANT = "trial.json", "trial.png", "figures.json", "plant.toml"
 _ONE: Final = "run"
 
 Parts = dict[str, Recorded]
 
 
 @dataclass(frozen=True)
-class Kind:
-    """One kind of trial: how the robot is driven, judged and drawn."""
-
-    drive: Callable[[TrialRun, float], None]
-    judge: Callable[[Parts, Robot], list[Figure]]
-    draw: Callable[[Parts, Robot], Picture]
-    minutes: float
-    """How long it lasts, in bus time, where nothing else is wanted."""
-    fixed: bool = False
-    """Whether it lasts as long as it lasts, with compensation and without."""
-
-
-KINDS: Final = {
-    "targets": Kind(
-        targets.drive,
-        lambda parts, _robot: targets.judge(parts[_ONE]),
-        lambda parts, robot: pictures.of_targets(parts[_ONE], robot),
-        2.0,
-    ),
-    "line": Kind(
-        line.drive,
-        lambda parts, _robot: line.judge(parts),
-        lambda parts, _robot: pictures.of_lines(parts),
-        0.0,
-        fixed=True,
-    ),
-    "random": Kind(
-        limits.drive,
-        lambda parts, robot: limits.judge(parts[_ONE], robot),
-        lambda parts, robot: pictures.of_limits(parts[_ONE], robot),
-        10.0,
-    ),
-    "stream": Kind(
-        streaming.drive,
-        lambda parts, robot: streaming.judge(parts[_ONE], robot),
-        lambda parts, robot: pictures.of_stream(parts[_ONE], robot),
-        1.0,
-    ),
-}
-
-
-@dataclass(frozen=True)
-class Asked:
+class TrialSettings:
     """What a trial was asked for; kept beside its recordings."""
 
     kind: str
@@ -78,62 +39,121 @@ class Asked:
     minutes: float
     commissioned: str | None
     compensated: bool
+    speed_m_s: float = line.SPEED_m_s
+    """Of lines."""
 
     @classmethod
-    def load(cls, folder: Path) -> Asked:
+    def load(cls, folder: Path) -> TrialSettings:
         """Return what the trial in `folder` was asked for; raises BadInputError."""
-        return kept(folder / ASKED, cls)
+        return load_settings(folder / SETTINGS, cls)
 
     @property
     def parts(self) -> Sequence[str]:
         """Folders of the recordings, one for each time that the robot was started."""
-        if not KINDS[self.kind].fixed:
+        if not KINDS[self.kind].compares:
             return (_ONE,)
         return (line.WITH, line.WITHOUT) if self.compensated else (line.WITHOUT,)
 
 
-def perform(asked: Asked, folder: Path, out: Output) -> dict[str, Any]:
+@dataclass(frozen=True)
+class TrialKind:
+    """One kind of trial: how the robot is driven, judged and drawn."""
+
+    drive: Callable[[TrialRun, TrialSettings], None]
+    judge: Callable[[Parts, Robot, TrialSettings], list[Figure]]
+    draw: Callable[[Parts, Robot, TrialSettings], Picture]
+    minutes: float
+    """How long it lasts, in bus time, where nothing else is wanted."""
+    compares: bool = False
+    """Whether it is run with compensation and without, each as long as it lasts."""
+
+
+KINDS: Final = {
+    "targets": TrialKind(
+        lambda run, settings: targets.drive(run, 60.0 * settings.minutes),
+        lambda parts, _robot, _settings: targets.judge(parts[_ONE]),
+        lambda parts, _robot, _settings: pictures.of_targets(parts[_ONE]),
+        2.0,
+    ),
+    "line": TrialKind(
+        lambda run, settings: line.drive(run, settings.speed_m_s),
+        lambda parts, _robot, settings: line.judge(parts, settings.speed_m_s),
+        lambda parts, _robot, settings: pictures.of_lines(parts, settings.speed_m_s),
+        0.0,
+        compares=True,
+    ),
+    "random": TrialKind(
+        lambda run, settings: limits.drive(run, 60.0 * settings.minutes),
+        lambda parts, robot, _settings: limits.judge(parts[_ONE], robot),
+        lambda parts, robot, _settings: pictures.of_limits(parts[_ONE], robot),
+        10.0,
+    ),
+    "stream": TrialKind(
+        lambda run, settings: streaming.drive(run, 60.0 * settings.minutes),
+        lambda parts, _robot, _settings: streaming.judge(parts[_ONE]),
+        lambda parts, _robot, _settings: pictures.of_stream(parts[_ONE]),
+        1.0,
+    ),
+    "tape": TrialKind(
+        lambda run, settings: tape.drive(run, 60.0 * settings.minutes),
+        lambda parts, robot, _settings: tape.judge(parts[_ONE], robot),
+        lambda parts, robot, _settings: pictures.of_tape(parts[_ONE], robot),
+        30.0,
+    ),
+}
+
+
+def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any]:
     """Run a trial, recorded in `folder`, and judge it; return what `judge` does."""
-    kind = KINDS[asked.kind]
-    robot = load_robot(asked.robot)
-    platform_of(robot)
+    kind = KINDS[settings.kind]
+    robot = load_robot(settings.robot)
+    platform = platform_of(robot)
     refuse_impossible(robot)
-    knows = asked.commissioned is not None or any(axis.commissioned for axis in robot.axes)
-    if kind.fixed and asked.compensated and not knows:
+    if settings.speed_m_s > platform.speed_m_s:
         raise BadInputError(
-            f"{asked.kind}: compares motion with compensation and without, and nothing is known of "
-            f"the motors; allowed: --commissioned DIR, what `cdpr commission {asked.robot} --all` "
-            "has left, or --without-compensation"
+            f"--speed-mm-s {1e3 * settings.speed_m_s:g}: allowed: up to "
+            f"{1e3 * platform.speed_m_s:g}, speed_m_s of the robot's file"
         )
-    for part in asked.parts:
-        compensated = asked.compensated and part != line.WITHOUT
-        out.note(f"{asked.robot}, {asked.kind}: starting the simulated robot ...")
+    knows = settings.commissioned is not None or any(axis.commissioned for axis in robot.axes)
+    if kind.compares and settings.compensated and not knows:
+        raise BadInputError(
+            f"{settings.kind}: compares motion with compensation and without, and nothing is known "
+            "of the motors; allowed: --commissioned DIR, what `cdpr commission "
+            f"{settings.robot} --all` has left, or --without-compensation"
+        )
+    text = uncommissioned_text(with_commissioned(robot, _path(settings.commissioned)))
+    if settings.compensated and text:
+        out.note(text)
+    plant = _plant(settings, robot, folder)
+    for part in settings.parts:
+        compensated = settings.compensated and part != line.WITHOUT
+        out.note(f"{settings.robot}, {settings.kind}: starting the simulated robot ...")
         with (
-            out.progress(f"{asked.kind}, {part}", 60.0 * asked.minutes) as advance,
+            out.progress(f"{settings.kind}, {part}", 60.0 * settings.minutes) as advance,
             trial_run(
-                asked.robot,
+                settings.robot,
                 folder / part,
-                plant=_path(asked.plant),
-                seed=asked.seed,
+                plant=plant,
+                seed=settings.seed,
                 advance=advance,
-                commissioned=_path(asked.commissioned),
+                commissioned=_path(settings.commissioned),
                 compensated=compensated,
             ) as run,
         ):
-            kind.drive(run, 60.0 * asked.minutes)
-    (folder / ASKED).write_text(to_json(asdict(asked), indent=1), encoding="utf-8")
+            kind.drive(run, settings)
+    (folder / SETTINGS).write_text(to_json(asdict(settings), indent=1), encoding="utf-8")
     return judge(folder)
 
 
 def judge(folder: Path) -> dict[str, Any]:
     """Compute a trial's figures from its recordings and from what was true; draw its picture."""
-    asked = Asked.load(folder)
-    kind, robot = KINDS[asked.kind], load_robot(asked.robot)
-    parts = {part: Recorded(folder / part) for part in asked.parts}
-    figures = kind.judge(parts, robot)
-    kind.draw(parts, robot).savefig(folder / PICTURE)
+    settings = TrialSettings.load(folder)
+    kind, robot = KINDS[settings.kind], load_robot(settings.robot)
+    parts = {part: Recorded(folder / part) for part in settings.parts}
+    figures = kind.judge(parts, robot, settings)
+    kind.draw(parts, robot, settings).savefig(folder / PICTURE)
     result = {
-        **asdict(asked),
+        **asdict(settings),
         "figures": {figure.key: figure.told() for figure in figures},
         "reached": all_reached(figures),
         "refused": {part: one.marked("end")[0]["refused"] for part, one in parts.items()},
@@ -145,6 +165,21 @@ def judge(folder: Path) -> dict[str, Any]:
     told = {key: value for key, value in result.items() if key != "lines"}
     (folder / FIGURES).write_text(to_json(told, indent=1), encoding="utf-8")
     return result
+
+
+def _plant(settings: TrialSettings, robot: Robot, folder: Path) -> Path | None:
+    """Return the plant file of a trial; that of `tape` is written into its folder."""
+    given = _path(settings.plant)
+    if settings.kind != "tape":
+        return given
+    text = tape.plant_text(robot, given, settings.seed)
+    path = folder / PLANT
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be written: {error.strerror}") from error
+    return path
 
 
 def _path(text: str | None) -> Path | None:

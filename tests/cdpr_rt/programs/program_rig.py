@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.compensation import AxisCompensation, FrictionFeedforward
-from cdpr_rt.exchange import AxisFeedback, Setpoint
-from cdpr_rt.runtime.programs.base import Program
-from cdpr_rt.runtime.programs.model import RobotModel, position_gains
-from cdpr_rt.runtime.programs.registry import build_programs
-from cdpr_rt.runtime.shared_block import SAMPLE, SharedBlock
-from cdpr_rt.tuning import sweep_gain
+from cdpr_rt.control.compensation import AxisCompensation, FrictionFeedforward
+from cdpr_rt.control.tuning import sweep_gain
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.core.shared_block import SAMPLE, SharedBlock
+from cdpr_rt.programs.base import Program
+from cdpr_rt.programs.model import RobotModel, position_gains
+from cdpr_rt.programs.registry import build_programs
 
 N = 3
 PERIOD_S = 1e-3

@@ -5,9 +5,9 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from program_rig import PERIOD_S, COULOMB_Nm, N, ProgramRig
 
-from cdpr_rt.runtime.programs.base import ProgramError
+from cdpr_rt.programs.base import ProgramError
+from tests.cdpr_rt.programs.program_rig import PERIOD_S, COULOMB_Nm, N, ProgramRig
 
 
 def test_all_programs_have_their_numbers() -> None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from program_rig import COUNT_RAD, PERIOD_S, COULOMB_Nm, N, ProgramRig
+
+from tests.cdpr_rt.programs.program_rig import COUNT_RAD, PERIOD_S, COULOMB_Nm, N, ProgramRig
 
 CYCLE_S = st.integers(1, 150).map(lambda cycles: cycles * PERIOD_S)
 

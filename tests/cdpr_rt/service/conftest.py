@@ -1,14 +1,15 @@
-"""The service that tests of its doors share, one for each module."""
+"""The service that tests of its policies share, one for each module."""
 
 from collections.abc import Iterator
 
 import pytest
-from service_rig import Rig, running
+
+from tests.cdpr_rt.service.http.service_rig import Rig, running
 
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    with running(tmp_path_factory.mktemp("door")) as rig:
+    with running(tmp_path_factory.mktemp("service")) as rig:
         yield rig
 
 

@@ -11,8 +11,8 @@ import pytest
 
 SIMULATOR = """
 import math, sys
-from sim_bus.frame import pack_frame
-from sim_bus.server import serve
+from cdpr_sim_bus.frame import pack_frame
+from cdpr_sim_bus.bus.server import serve
 
 class Node:
     node_id = 1

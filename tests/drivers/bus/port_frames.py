@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from pathlib import Path
 
-from drivers.bus.packed import FRAME, FramePort
+from cdpr_drivers.bus.frames import FRAME, FramePort
 
 
 def frame(can_id: int, data: bytes = b"") -> bytes:

@@ -8,11 +8,11 @@ from cdpr_here import cdpr_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus.budget import bare_bits, bus_budget, machine_budget, worst_case_bits
-from profiles import load_drive, load_robot, load_winch
-from sim_bus.frame import SFF_BITS
-from tools.bus_fit import require_fit
-from tools.errors import BadInputError
+from cdpr_drivers.bus.budget import bare_bits, bus_budget, machine_budget, worst_case_bits
+from cdpr_drivers.errors import ConfigurationError
+from cdpr_drivers.robot.bus_fit import require_fit
+from cdpr_profiles import load_drive, load_robot, load_winch
+from cdpr_sim_bus.frame import SFF_BITS
 
 DRIVE = load_drive("generic-cia402")
 repeatable = settings(derandomize=True, deadline=None, max_examples=300)
@@ -141,10 +141,12 @@ def test_what_comes_on_a_change_counts_by_its_priority():
 def test_a_machine_that_does_not_fit_is_refused_with_the_figure():
     robot = load_robot("spatial-8")
     require_fit(robot)
-    with pytest.raises(BadInputError, match=r"bus can0: 4 drives need 975 us .* 500 us") as caught:
+    with pytest.raises(
+        ConfigurationError, match=r"bus can0: 4 drives need 975 us .* 500 us"
+    ) as caught:
         require_fit(replace(robot, sync_period_s=0.0005))
     assert "highest rate at 1000000 bit/s: 1022 Hz" in str(caught.value)
-    with pytest.raises(BadInputError, match="1 drives need 5700 us"):
+    with pytest.raises(ConfigurationError, match="1 drives need 5700 us"):
         require_fit(replace(load_winch("winch-mpp0923d"), bitrate_bit_s=50_000))
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus import BusHealth, BusState
-from drivers.bus.health import ERR_FLAG
+from cdpr_drivers.bus import BusHealth, BusState
+from cdpr_drivers.bus.health import ERR_FLAG
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.bus import BusUrl
-from drivers.errors import BusError
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.errors import BusError
 
 
 @pytest.mark.parametrize(

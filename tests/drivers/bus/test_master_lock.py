@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from drivers.bus import BusUrl
-from drivers.bus.master_lock import MasterLock, refuse_second_master
-from drivers.errors import BusError
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.master_lock import MasterLock, refuse_second_master
+from cdpr_drivers.errors import BusError
 
 HOLDER = """
 import sys
-from drivers.bus import BusUrl
-from drivers.bus.master_lock import MasterLock
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.master_lock import MasterLock
 lock = MasterLock(BusUrl.parse(sys.argv[1]))
 print(flush=True)
 sys.stdin.read()

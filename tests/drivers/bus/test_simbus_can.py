@@ -11,8 +11,8 @@ from typing import Any
 import can
 import pytest
 
-from drivers.bus import BusUrl, open_python_can
-from drivers.errors import BusError
+from cdpr_drivers.bus import BusUrl, open_python_can
+from cdpr_drivers.errors import BusError
 
 
 def message(can_id: int, data: bytes = b"") -> can.Message:

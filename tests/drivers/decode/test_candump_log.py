@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.decode import Frame, LogError, format_line, parse_line, read_log
+from cdpr_drivers.decode import Frame, LogError, format_line, parse_line, read_log
 
 seeded = settings(derandomize=True, deadline=None)
 

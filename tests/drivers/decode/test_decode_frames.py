@@ -16,8 +16,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.decode import Decoder, Frame, KnownNode, Record, format_line, parse_line
-from profiles import DriveProfile, Pdo, PdoEntry, load_winch
+from cdpr_drivers.decode import Decoder, Frame, KnownNode, Record, format_line, parse_line
+from cdpr_profiles import DriveProfile, Pdo, PdoEntry, load_winch
 
 WINCH = load_winch("winch-mpp0923d")
 KNOWN = KnownNode.of_winch(WINCH)
@@ -189,7 +189,7 @@ def test_pdos_at_identifiers_of_their_own_and_gaps() -> None:
 
 
 @pytest.fixture
-def stranger() -> Iterator[tuple[canopen.Network, can.BusABC]]:
+def third_party() -> Iterator[tuple[canopen.Network, can.BusABC]]:
     """A network of the library's, and somebody who listens."""
     with can.Bus("decode", "virtual") as bus, can.Bus("decode", "virtual") as ear:
         network = canopen.Network(bus)
@@ -204,8 +204,8 @@ def heard(ear: can.BusABC) -> list[Record]:
     return records
 
 
-def test_network_management(stranger: tuple[canopen.Network, can.BusABC]) -> None:
-    network, ear = stranger
+def test_network_management(third_party: tuple[canopen.Network, can.BusABC]) -> None:
+    network, ear = third_party
     node = network.add_node(5, DICTIONARY)
     node.nmt.state = "OPERATIONAL"
     network.nmt.state = "RESET COMMUNICATION"
@@ -222,8 +222,8 @@ def test_network_management(stranger: tuple[canopen.Network, can.BusABC]) -> Non
     assert time.text.endswith(":02:01.500")
 
 
-def test_heartbeats_and_emergencies(stranger: tuple[canopen.Network, can.BusABC]) -> None:
-    network, ear = stranger
+def test_heartbeats_and_emergencies(third_party: tuple[canopen.Network, can.BusABC]) -> None:
+    network, ear = third_party
     node = canopen.LocalNode(3, DICTIONARY)
     network.add_node(node)
     node.nmt.send_command(0)
@@ -244,8 +244,8 @@ def test_heartbeats_and_emergencies(stranger: tuple[canopen.Network, can.BusABC]
     assert decoded(0x703, "11").problem
 
 
-def test_layer_setting(stranger: tuple[canopen.Network, can.BusABC]) -> None:
-    network, ear = stranger
+def test_layer_setting(third_party: tuple[canopen.Network, can.BusABC]) -> None:
+    network, ear = third_party
     lss = network.lss
     lss.RESPONSE_TIMEOUT = 0.01
     lss.send_switch_state_global(lss.CONFIGURATION_STATE)

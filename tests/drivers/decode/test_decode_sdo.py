@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from drivers.decode import Decoder, Frame, KnownNode, Record
-from drivers.decode.sdo import SdoEvent, SdoWatch, Step
-from profiles import load_winch
+from cdpr_drivers.decode import Decoder, Frame, KnownNode, Record
+from cdpr_drivers.decode.sdo import SdoDecoder, SdoEvent, Step
+from cdpr_profiles import load_winch
 
 WINCH = load_winch("winch-mpp0923d")
 USER_DATA = 0x2F10
@@ -22,7 +22,7 @@ Overhear = Callable[[], list[can.Message]]
 
 @pytest.fixture(scope="module")
 def client(simulated_bus: str) -> Iterator[canopen.RemoteNode]:
-    """A stranger's client of drive 1."""
+    """A third party's client of drive 1."""
     network = canopen.Network()
     network.NOTIFIER_CYCLE = 0.02
     network.connect(interface="simbus", channel=simulated_bus.partition(":")[2])
@@ -52,7 +52,7 @@ def overhear(simulated_bus: str) -> Iterator[Overhear]:
 
 
 def events(messages: list[can.Message]) -> list[SdoEvent]:
-    watch = SdoWatch()
+    watch = SdoDecoder()
     return [
         (watch.request if m.arbitration_id == 0x601 else watch.response)(bytes(m.data))
         for m in messages
@@ -90,7 +90,7 @@ def test_segmented_and_expedited_values_are_put_together(
     assert one(found, Step.WRITTEN).data == value
     read = one(found, Step.VALUE)
     assert (read.index, read.sub, read.data) == (USER_DATA, 0, value)
-    assert not [event for event in found if event.step is Step.ODD]
+    assert not [event for event in found if event.step is Step.UNEXPECTED]
 
 
 @overheard
@@ -106,7 +106,7 @@ def test_block_transfers_are_put_together(
     found = events(overhear())
     assert one(found, Step.WRITTEN).data == value
     assert one(found, Step.VALUE).data == value
-    assert not [event for event in found if event.step is Step.ODD]
+    assert not [event for event in found if event.step is Step.UNEXPECTED]
 
 
 def test_transfers_in_words(client: canopen.RemoteNode, overhear: Overhear) -> None:

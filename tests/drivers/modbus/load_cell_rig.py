@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any, Self
 
-from sim_bus.physics_board import PhysicsBoard
+from cdpr_sim_bus.physics_board import PhysicsBoard
 
 _STEP_S = 1e-3
 
@@ -30,7 +30,7 @@ class LoadCellRig:
         self.pull([0.0] * axes)
         command = ["sim", "tension", str(sensors), "--board", str(self.board.path)]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "tools.cli", *command, "--exit-with-stdin", *options],
+            [sys.executable, "-m", "cdpr_tools.cli", *command, "--exit-with-stdin", *options],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -14,10 +14,11 @@ from typing import Any
 
 from pymodbus.client import ModbusTcpClient
 
-from cdpr_rt.clock import PacedClock
-from profiles.safety_io import SHIPPED, SafetyIoProfile, load_safety_io
-from sim_bus.physics_board import PhysicsBoard
-from sim_bus.safety_twin import Fault
+from cdpr_profiles.devices.safety_io import SafetyIoProfile, load_safety_io
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_rt.core.clock import PacedClock
+from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
+from cdpr_sim_bus.physics_board import PhysicsBoard
 
 CLOCK = PacedClock()
 """Whoever waits by it has the devices asked meanwhile."""
@@ -25,8 +26,8 @@ PANEL = 247
 DEADLINE_S = 10.0
 
 
-class Twin:
-    """The running twin; the stranger's client here is pymodbus alone."""
+class SafetyIoProcess:
+    """A running `cdpr sim safety-io`; the client here is pymodbus alone."""
 
     def __init__(self, profile: Path, *options: str | Path) -> None:
         self.file = profile
@@ -42,13 +43,13 @@ class Twin:
     def press(self, pressed: bool = True) -> None:
         assert not self._client.write_register(0, int(pressed), device_id=PANEL).isError()
 
-    def break_(self, fault: Fault) -> None:
+    def break_(self, fault: SafetyIoFault) -> None:
         assert not self._client.write_register(1, int(fault), device_id=PANEL).isError()
 
     def mend(self) -> None:
         """Have everything as it was at the start."""
         self.press(False)
-        self.break_(Fault(0))
+        self.break_(SafetyIoFault(0))
         for coil in (0, 1, 2, 8, 9, 10):
             self.set(coil, False)
         wait_until(lambda: not self.coil(0) and self.input(1))
@@ -68,7 +69,7 @@ class Twin:
 
 
 def start(*arguments: str | Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "tools.cli", "sim", *map(str, arguments)]
+    command = [sys.executable, "-m", "cdpr_tools.cli", "sim", *map(str, arguments)]
     return subprocess.Popen(
         [*command, "--exit-with-stdin"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
@@ -91,7 +92,7 @@ def wait_until(done: Callable[[], object], timeout_s: float = DEADLINE_S) -> flo
 
 def patient_profile(folder: Path, watchdog_s: float = 1.0) -> Path:
     """Return the shipped profile with times that suit a busy machine."""
-    text = (SHIPPED / "modbus-remote-io.toml").read_text()
+    text = (SHIPPED / "safety_io" / "modbus-remote-io.toml").read_text()
     for key, value in (("answer_timeout_s", 0.2), ("trip_timeout_s", 0.4)):
         line = next(line for line in text.splitlines() if line.startswith(key))
         text = text.replace(line, f"{key} = {value}")
@@ -111,14 +112,16 @@ def board_file() -> Iterator[Path]:
 
 
 @contextmanager
-def twin_on_board(folder: Path, axes: int = 2) -> Iterator[tuple[Twin, PhysicsBoard]]:
-    """A twin whose board is the test's own, with limit switches at -90 and 90 deg."""
+def io_device_on_board(
+    folder: Path, axes: int = 2
+) -> Iterator[tuple[SafetyIoProcess, PhysicsBoard]]:
+    """A simulated I/O whose board is the test's own, with limit switches at -90 and 90 deg."""
     plant = folder / "safety-plant.toml"
     switches = "[[axes]]\nlimit_negative_deg = -90.0\nlimit_positive_deg = 90.0\n"
     plant.write_text(switches)
     with board_file() as path, PhysicsBoard.create(path, axes) as board:
-        twin = Twin(patient_profile(folder), "--board", path, "--plant", plant)
+        io_device = SafetyIoProcess(patient_profile(folder), "--board", path, "--plant", plant)
         try:
-            yield twin, board
+            yield io_device, board
         finally:
-            twin.close()
+            io_device.close()

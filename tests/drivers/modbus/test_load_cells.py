@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import serial
-from load_cell_rig import LoadCellRig
 
-from cdpr_rt.clock import PacedClock
-from cdpr_rt.tension import TensionFault
-from drivers.modbus.line import LineError
-from drivers.modbus.tcp import ModbusError
-from drivers.modbus.tension import LoadCells, TensionSampler, raw_value
-from profiles.tension_sensor import TensionSensors, ValueMap, load_tension_sensors
+from cdpr_drivers.modbus.line import LineError
+from cdpr_drivers.modbus.tcp import ModbusError
+from cdpr_drivers.modbus.tension import LoadCells, TensionSampler, raw_value
+from cdpr_profiles.devices.tension_sensor import TensionSensors, ValueMap, load_tension_sensors
+from cdpr_rt.core.clock import PacedClock
+from cdpr_rt.core.tension import TensionFault
+from tests.drivers.modbus.load_cell_rig import LoadCellRig
 
 CLOCK = PacedClock()
 N = 3
@@ -163,7 +163,7 @@ def test_a_register_that_is_not_there_is_refused_in_words(cells: LoadCells) -> N
 
 
 def test_the_bytes_on_the_line_are_those_of_the_standard(rig: LoadCellRig) -> None:
-    """A stranger who knows the Modbus specification alone asks and checks."""
+    """A third party who knows the Modbus specification alone asks and checks."""
 
     def crc(data: bytes) -> bytes:
         value = 0xFFFF

@@ -19,18 +19,25 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from load_cell_rig import LoadCellRig
-from safety_rig import Twin, board_file, patient_profile, ready, start
 
-from cdpr_rt.clock import LockstepClock
-from drivers.modbus.rail import ModbusRailAxis
-from drivers.modbus.safety_io import SafetyIo, SafetyIoError
-from drivers.modbus.tension import TensionSampler
-from drivers.rail import Conditions, move
-from profiles.rail import SHIPPED, load_rail
-from profiles.tension_sensor import load_tension_sensors
-from sim_bus.physics_board import BoardAxis, PhysicsBoard
-from sim_bus.safety_twin import Fault
+from cdpr_drivers.modbus.safety_io import SafetyIo, SafetyIoError
+from cdpr_drivers.modbus.tension import TensionSampler
+from cdpr_drivers.rails.rail import MoveConditions, move
+from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
+from cdpr_profiles.devices.rail import load_rail
+from cdpr_profiles.devices.tension_sensor import load_tension_sensors
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_rt.core.clock import LockstepClock
+from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from tests.drivers.modbus.load_cell_rig import LoadCellRig
+from tests.drivers.modbus.safety_rig import (
+    SafetyIoProcess,
+    board_file,
+    patient_profile,
+    ready,
+    start,
+)
 
 STEP_S = 1e-3
 HELD_UP_S = 0.6  # much longer than any of the lines' time-outs
@@ -98,7 +105,7 @@ def readings(folder: Path, *, disturbed: bool) -> list[tuple[float, ...]]:
                         clock.sleep(2 * profile.period_s)
                 elif cycle in (50, 333):
                     clock.sleep(2 * profile.period_s)
-                clock.stand_until(bus.now_s + 2 * STEP_S)
+                clock.sleep_until(bus.now_s + 2 * STEP_S)
                 sampler.exchange.update()
                 feedback = sampler.exchange.feedback
                 told.append((*feedback.tension_N, *feedback.time_s, *feedback.age_s))
@@ -138,31 +145,31 @@ def test_a_cell_that_says_nothing_is_found_silent_in_bus_time(tmp_path: Path) ->
 
 
 @contextmanager
-def safety_lab(folder: Path) -> Iterator[tuple[Twin, BoardBus, LockstepClock]]:
+def safety_lab(folder: Path) -> Iterator[tuple[SafetyIoProcess, BoardBus, LockstepClock]]:
     folder.mkdir()
     with board_file() as path, PhysicsBoard.create(path, 2, lockstep=True) as board:
         bus = BoardBus(board, lambda _: 0.0)
-        twin = Twin(patient_profile(folder), "--board", path)
+        io_device = SafetyIoProcess(patient_profile(folder), "--board", path)
         bus.seen.clear()
         try:
-            yield twin, bus, LockstepClock([bus])
+            yield io_device, bus, LockstepClock([bus])
         finally:
-            twin.close()
+            io_device.close()
 
 
 def session(folder: Path, *, disturbed: bool) -> list[tuple[int, bool, bool]]:
     """Return when power and brake came and went in a session with a safety I/O."""
-    with safety_lab(folder) as (twin, bus, clock), SafetyIo(twin.profile(), clock) as io:
+    with safety_lab(folder) as (io_device, bus, clock), SafetyIo(io_device.profile(), clock) as io:
         io.energise()
         if disturbed:
-            with held_up(twin.process):
+            with held_up(io_device.process):
                 io.release_brakes("winch 1")
                 io.await_brakes(True, "winch 1")
         else:
             io.release_brakes("winch 1")
             io.await_brakes(True, "winch 1")
         for _ in range(100):
-            clock.stand_until(clock.now_s + 2 * STEP_S)
+            clock.sleep_until(clock.now_s + 2 * STEP_S)
             assert (io.alarm(), io.stop_reason()) == ("", "")
         io.close()
         return bus.seen
@@ -183,8 +190,8 @@ def test_contactor_and_brake_follow_in_bus_time_however_long_the_device_is_held_
 
 
 def test_the_devices_own_watchdog_counts_bus_time(tmp_path: Path) -> None:
-    with safety_lab(tmp_path / "lab") as (twin, bus, clock):
-        io = SafetyIo(twin.profile(), clock).open()
+    with safety_lab(tmp_path / "lab") as (io_device, bus, clock):
+        io = SafetyIo(io_device.profile(), clock).open()
         io.energise()
         fed_s = io.state.at_s
         time.sleep(1.5)  # by the wall: the device has 1 s
@@ -199,27 +206,29 @@ def test_the_devices_own_watchdog_counts_bus_time(tmp_path: Path) -> None:
         io.close()
 
 
-def answer_to_a_stranger(twin: Twin) -> bytes:
+def answer_to_third_party(io_device: SafetyIoProcess) -> bytes:
     """Return what comes where the discrete inputs 0 to 7 are asked for."""
-    with socket.create_connection(("127.0.0.1", twin.port), 10.0) as stranger:
-        stranger.sendall(bytes.fromhex("0001 0000 0006 01 02 0000 0008"))
-        return stranger.recv(100)
+    with socket.create_connection(("127.0.0.1", io_device.port), 10.0) as third_party:
+        third_party.sendall(bytes.fromhex("0001 0000 0006 01 02 0000 0008"))
+        return third_party.recv(100)
 
 
-@pytest.mark.parametrize("fault", [Fault.SILENT, Fault.TRUNCATED])
-def test_a_safety_io_that_falls_silent_trips_in_bus_time(tmp_path: Path, fault: Fault) -> None:
-    with safety_lab(tmp_path / "lab") as (twin, _, clock):
-        io = SafetyIo(twin.profile(), clock).open()
+@pytest.mark.parametrize("fault", [SafetyIoFault.SILENT, SafetyIoFault.TRUNCATED])
+def test_a_safety_io_that_falls_silent_trips_in_bus_time(
+    tmp_path: Path, fault: SafetyIoFault
+) -> None:
+    with safety_lab(tmp_path / "lab") as (io_device, _, clock):
+        io = SafetyIo(io_device.profile(), clock).open()
         io.energise()
-        twin.break_(fault)
-        assert answer_to_a_stranger(twin).endswith(bytes.fromhex("0000 ffff 0002 0000"))
+        io_device.break_(fault)
+        assert answer_to_third_party(io_device).endswith(bytes.fromhex("0000 ffff 0002 0000"))
         began_s = clock.now_s
         while not io.stop_reason():
-            clock.stand_until(clock.now_s + STEP_S)
+            clock.sleep_until(clock.now_s + STEP_S)
             assert clock.now_s < began_s + 1.0
         assert 0.4 - 0.05 < clock.now_s - began_s < 0.4 + 0.2
         assert "no good poll" in io.stop_reason()
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
         io.close()
         with pytest.raises(SafetyIoError, match="no good poll"):
             io.release_brakes()
@@ -233,7 +242,7 @@ def travel(folder: Path, *, disturbed: bool) -> list[tuple[float, float]]:
     with board_file() as path, PhysicsBoard.create(path, 1, lockstep=True) as board:
         bus = BoardBus(board, lambda _: 0.0)
         process = start("rail", "rail-modbus", "--port", "0", "--board", path)
-        text = (SHIPPED / "rail-modbus.toml").read_text()
+        text = (SHIPPED / "rails" / "rail-modbus.toml").read_text()
         profile.write_text(text.replace("port = 502", f"port = {ready(process)['port']}"))
         rail, clock = load_rail(profile), LockstepClock([bus])
         axis = ModbusRailAxis(rail, clock)
@@ -245,7 +254,7 @@ def travel(folder: Path, *, disturbed: bool) -> list[tuple[float, float]]:
                 os.kill(process.pid, signal.SIGSTOP)
                 threading.Timer(HELD_UP_S, os.kill, (process.pid, signal.SIGCONT)).start()
 
-        conditions = Conditions(lambda: "", lambda: "", lambda: False, progress)
+        conditions = MoveConditions(lambda: "", lambda: "", lambda: False, progress)
         done = move(rail, axis, clock, 0.02, conditions)
         told.append((done.from_m, done.to_m))
         axis.close()

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from cdpr_rt.clock import PacedClock
-from drivers.modbus.tcp import ModbusError, ModbusTcp
+from cdpr_drivers.modbus.tcp import ModbusError, ModbusTcp
+from cdpr_rt.core.clock import PacedClock
 
 Answer = Callable[[bytes], bytes]
 

@@ -5,49 +5,50 @@ from __future__ import annotations
 import ctypes
 import math
 import socket
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from safety_rig import CLOCK, Twin, twin_on_board, wait_until
-
-from drivers.modbus.io_link import IoLink
-from drivers.modbus.safety_io import SafetyIo, SafetyIoError
-from drivers.modbus.tcp import ModbusError
-from sim_bus.physics_board import BoardAxis, PhysicsBoard
-from sim_bus.safety_twin import Fault
-from tools.safety import trip_file
+from cdpr_drivers.modbus.io_link import IoLink
+from cdpr_drivers.modbus.safety_io import SafetyIo, SafetyIoError
+from cdpr_drivers.modbus.tcp import ModbusError
+from cdpr_drivers.robot.safety import trip_file
+from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from tests.drivers.modbus.safety_rig import CLOCK, SafetyIoProcess, io_device_on_board, wait_until
 
 TRIP_S = 0.4
 SLACK_S = 1.0  # of a busy machine
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Twin, PhysicsBoard]]:
-    with twin_on_board(tmp_path_factory.mktemp("safety")) as both:
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SafetyIoProcess, PhysicsBoard]]:
+    with io_device_on_board(tmp_path_factory.mktemp("safety")) as both:
         yield both
 
 
 @pytest.fixture
-def winch(lab: tuple[Twin, PhysicsBoard]) -> BoardAxis:
+def winch(lab: tuple[SafetyIoProcess, PhysicsBoard]) -> BoardAxis:
     return lab[1].axis(0)
 
 
 @pytest.fixture
-def twin(lab: tuple[Twin, PhysicsBoard], winch: BoardAxis) -> Iterator[Twin]:
-    """The twin, whole and at rest, its winch in the middle."""
+def io_device(
+    lab: tuple[SafetyIoProcess, PhysicsBoard], winch: BoardAxis
+) -> Iterator[SafetyIoProcess]:
+    """The device, whole and at rest, its winch in the middle."""
     winch.publish(0.0, 0.0, 0.0, 0.0, False)
     lab[0].mend()
     yield lab[0]
     lab[0].mend()
 
 
-def test_the_contactor_closes_when_asked_and_opens_at_the_end(twin: Twin, winch: BoardAxis) -> None:
-    with SafetyIo(twin.profile(), CLOCK) as io:
+def test_the_contactor_closes_when_asked_and_opens_at_the_end(
+    io_device: SafetyIoProcess, winch: BoardAxis
+) -> None:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         assert not winch.power_allowed
         assert not io.state.contactor_closed
         io.energise()
@@ -61,36 +62,39 @@ def test_the_contactor_closes_when_asked_and_opens_at_the_end(twin: Twin, winch:
         wait_until(lambda: io.state.lights == {"red": False, "yellow": True, "green": False})
     assert not winch.power_allowed
     assert not winch.brake_released
-    assert not twin.coil(0)
+    assert not io_device.coil(0)
 
 
-def test_an_open_chain_refuses_power(twin: Twin, winch: BoardAxis) -> None:
-    twin.press()
-    with SafetyIo(twin.profile(), CLOCK) as io, pytest.raises(SafetyIoError, match="chain is open"):
+def test_an_open_chain_refuses_power(io_device: SafetyIoProcess, winch: BoardAxis) -> None:
+    io_device.press()
+    with (
+        SafetyIo(io_device.profile(), CLOCK) as io,
+        pytest.raises(SafetyIoError, match="chain is open"),
+    ):
         io.energise()
-    assert not twin.coil(0)
+    assert not io_device.coil(0)
 
 
 def test_the_emergency_stop_trips_until_it_is_acknowledged(
-    twin: Twin, winch: BoardAxis, tmp_path: Path
+    io_device: SafetyIoProcess, winch: BoardAxis, tmp_path: Path
 ) -> None:
     latch = tmp_path / "trip.json"
-    with SafetyIo(twin.profile(), CLOCK, latch) as io:
+    with SafetyIo(io_device.profile(), CLOCK, latch) as io:
         io.energise()
         io.release_brakes()
         io.await_brakes(True)
-        twin.press()
+        io_device.press()
         assert wait_until(io.alarm) < SLACK_S
         assert "emergency-stop chain is open (input 0 reads 0)" in io.alarm()
-        wait_until(lambda: not twin.coil(0) and not twin.coil(1))
+        wait_until(lambda: not io_device.coil(0) and not io_device.coil(1))
         wait_until(lambda: not winch.brake_released)
         with pytest.raises(SafetyIoError, match="chain is open"):
             io.acknowledge()
-        twin.press(False)
+        io_device.press(False)
         CLOCK.sleep(0.1)
         assert io.alarm()  # stays
     with SafetyIo(
-        twin.profile(), CLOCK, latch
+        io_device.profile(), CLOCK, latch
     ) as later:  # another command, after the buttons were pulled
         with pytest.raises(SafetyIoError, match=r"tripped on .*chain is open.*io ack"):
             later.energise()
@@ -102,44 +106,51 @@ def test_the_emergency_stop_trips_until_it_is_acknowledged(
 @pytest.mark.parametrize(
     ("fault", "text"),
     [
-        (Fault.SILENT, r"no good poll for 0\.\d+ s, 0\.4 s allowed .*no answer within 0\.2 s"),
-        (Fault.TRUNCATED, r"no good poll .*the answer was cut off after \d+ bytes"),
-        (Fault.WRONG_UNIT, r"no good poll .*unit 2 answered, unit 1 was asked"),
-        (Fault.EXCEPTIONS, r"no good poll .*refused with exception 4 \(device failure\)"),
+        (
+            SafetyIoFault.SILENT,
+            r"no good poll for 0\.\d+ s, 0\.4 s allowed .*no answer within 0\.2 s",
+        ),
+        (SafetyIoFault.TRUNCATED, r"no good poll .*the answer was cut off after \d+ bytes"),
+        (SafetyIoFault.WRONG_UNIT, r"no good poll .*unit 2 answered, unit 1 was asked"),
+        (SafetyIoFault.EXCEPTIONS, r"no good poll .*refused with exception 4 \(device failure\)"),
     ],
 )
-def test_answers_that_are_no_answers_stop_the_motion(twin: Twin, fault: Fault, text: str) -> None:
-    io = SafetyIo(twin.profile(), CLOCK).open()
+def test_answers_that_are_no_answers_stop_the_motion(
+    io_device: SafetyIoProcess, fault: SafetyIoFault, text: str
+) -> None:
+    io = SafetyIo(io_device.profile(), CLOCK).open()
     try:
         io.energise()
-        twin.break_(fault)
+        io_device.break_(fault)
         assert TRIP_S / 2 < wait_until(io.stop_reason) < TRIP_S + SLACK_S
         assert not io.alarm()  # braked under control: nothing says that the power is gone
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
         CLOCK.sleep(0.1)
         with pytest.raises(SafetyIoError, match=text):
             io.energise()
     finally:
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
         io.close()
 
 
-def test_a_poll_that_waits_for_its_answer_trips_as_well(twin: Twin) -> None:
+def test_a_poll_that_waits_for_its_answer_trips_as_well(io_device: SafetyIoProcess) -> None:
     """The task waits for an answer much longer than the trip time-out allows."""
-    io = SafetyIo(twin.profile(answer_timeout_s=1.5), CLOCK).open()
+    io = SafetyIo(io_device.profile(answer_timeout_s=1.5), CLOCK).open()
     try:
         io.energise()
-        twin.break_(Fault.SILENT)
+        io_device.break_(SafetyIoFault.SILENT)
         assert wait_until(io.stop_reason) < TRIP_S + SLACK_S
         assert "no answer has come" in io.stop_reason()
     finally:
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
         assert "no good poll" in io.close()
 
 
-def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(twin: Twin) -> None:
+def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(
+    io_device: SafetyIoProcess,
+) -> None:
     hold_interpreter = ctypes.PyDLL(None).usleep  # unlike time.sleep it lets no thread run
-    with SafetyIo(twin.profile(), CLOCK) as io:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
         assert io.stop_reason() == ""
         hold_interpreter(int(1.5e6 * TRIP_S))
@@ -148,85 +159,87 @@ def test_a_pause_of_the_whole_process_is_no_silence_but_silence_after_it_is(twin
         while CLOCK.now_s < asking_s:
             assert io.stop_reason() == ""
             CLOCK.sleep(0.01)
-        twin.break_(Fault.SILENT)
+        io_device.break_(SafetyIoFault.SILENT)
         hold_interpreter(int(1.5e6 * TRIP_S))
         assert wait_until(io.stop_reason) < TRIP_S + SLACK_S
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
 
 
-def test_rare_questions_are_answered_as_well(twin: Twin) -> None:
+def test_rare_questions_are_answered_as_well(io_device: SafetyIoProcess) -> None:
     """Cycles that are longer than the trip time-out get the benefit of the doubt only once."""
-    with SafetyIo(twin.profile(), CLOCK) as io:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
-        twin.break_(Fault.SILENT)
+        io_device.break_(SafetyIoFault.SILENT)
         for _ in range(2):
             CLOCK.sleep(1.5 * TRIP_S)
             io.stop_reason()
         assert "no good poll" in io.stop_reason()
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
 
 
-def test_a_welded_contactor_is_noticed(twin: Twin) -> None:
-    io = SafetyIo(twin.profile(), CLOCK).open()
+def test_a_welded_contactor_is_noticed(io_device: SafetyIoProcess) -> None:
+    io = SafetyIo(io_device.profile(), CLOCK).open()
     io.energise()
-    twin.break_(Fault.CONTACTOR_WELDED)
+    io_device.break_(SafetyIoFault.CONTACTOR_WELDED)
     assert "the contactor is closed (input 1) though output 0 is 0; is it welded?" in io.close()
-    with SafetyIo(twin.profile(), CLOCK) as io:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         with pytest.raises(SafetyIoError, match="welded"):
             io.energise()
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
         wait_until(lambda: not io.state.contactor_closed)
 
 
-def test_a_contactor_without_feedback_is_noticed(twin: Twin, winch: BoardAxis) -> None:
-    twin.break_(Fault.FEEDBACK_STUCK)
-    with SafetyIo(twin.profile(), CLOCK) as io:
+def test_a_contactor_without_feedback_is_noticed(
+    io_device: SafetyIoProcess, winch: BoardAxis
+) -> None:
+    io_device.break_(SafetyIoFault.FEEDBACK_STUCK)
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         with pytest.raises(SafetyIoError, match=r"contactor is not closed 0\.\d+ s after output 0"):
             io.energise()
-        wait_until(lambda: not twin.coil(0))
+        wait_until(lambda: not io_device.coil(0))
 
 
-def test_a_brake_that_does_not_follow_is_noticed(twin: Twin) -> None:
-    with SafetyIo(twin.profile(), CLOCK) as io:
+def test_a_brake_that_does_not_follow_is_noticed(io_device: SafetyIoProcess) -> None:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
-        twin.break_(Fault.BRAKES_STUCK)
+        io_device.break_(SafetyIoFault.BRAKES_STUCK)
         io.release_brakes("winch 1")
         with pytest.raises(SafetyIoError, match=r"brake of winch 1 is not released .* output 1"):
             io.await_brakes(True, "winch 1")
         assert "brake of winch 1" in io.alarm()
 
 
-def test_an_output_that_somebody_else_changes_is_noticed(twin: Twin) -> None:
-    with SafetyIo(twin.profile(), CLOCK) as io:
+def test_an_output_that_somebody_else_changes_is_noticed(io_device: SafetyIoProcess) -> None:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
-        twin.break_(Fault.FEEDBACK_STUCK)  # which would tell otherwise
-        twin.set(0, False)
+        io_device.break_(SafetyIoFault.FEEDBACK_STUCK)  # which would tell otherwise
+        io_device.set(0, False)
         wait_until(io.alarm)
         assert "output 0 was set to 1 and reads 0" in io.alarm()
-        twin.break_(Fault(0))
+        io_device.break_(SafetyIoFault(0))
 
 
 def test_a_second_command_does_not_take_the_power_from_the_first(
-    twin: Twin, winch: BoardAxis
+    io_device: SafetyIoProcess, winch: BoardAxis
 ) -> None:
-    with SafetyIo(twin.profile(), CLOCK) as io:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
         with pytest.raises(SafetyIoError, match="another command uses it"):
-            SafetyIo(twin.profile(), CLOCK).open()
+            SafetyIo(io_device.profile(), CLOCK).open()
         CLOCK.sleep(0.1)
         assert winch.power_allowed
         assert not io.alarm()
 
 
 def test_a_poll_that_fails_in_an_unforeseen_way_is_silence_and_power_still_goes(
-    twin: Twin, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
+    io_device: SafetyIoProcess, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise KeyError("an input that is nowhere")
 
-    with SafetyIo(twin.profile(), CLOCK) as io:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
-        monkeypatch.setattr("drivers.modbus.safety_io.interpret", fail)
+        monkeypatch.setattr("cdpr_drivers.modbus.safety_io.interpret", fail)
         wait_until(io.stop_reason)
         assert "an input that is nowhere" in io.stop_reason()
         monkeypatch.undo()
@@ -234,24 +247,24 @@ def test_a_poll_that_fails_in_an_unforeseen_way_is_silence_and_power_still_goes(
 
 
 def test_an_interrupt_that_ends_the_polling_still_ends_in_an_open_contactor(
-    twin: Twin, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
+    io_device: SafetyIoProcess, winch: BoardAxis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), SafetyIo(twin.profile(), CLOCK) as io:
+    with pytest.raises(KeyboardInterrupt), SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
         with monkeypatch.context() as patch:
-            patch.setattr("drivers.modbus.safety_io.interpret", interrupt)
+            patch.setattr("cdpr_drivers.modbus.safety_io.interpret", interrupt)
             CLOCK.sleep(1.0)
     assert not winch.power_allowed
-    assert not twin.coil(0)
+    assert not io_device.coil(0)
 
 
 def test_a_loop_that_is_busy_for_long_finds_that_the_device_has_opened_the_contactor(
-    twin: Twin, winch: BoardAxis
+    io_device: SafetyIoProcess, winch: BoardAxis
 ) -> None:
-    with SafetyIo(twin.profile(), CLOCK) as io:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
         time.sleep(1.3)  # nobody polls; the device waits for 1 s
         assert not winch.power_allowed
@@ -265,18 +278,20 @@ def test_each_place_has_trips_of_its_own() -> None:
     assert trip_file("modbus-remote-io@127.0.0.1:502") == trip_file("modbus-remote-io")
 
 
-def test_a_damaged_trip_file_refuses_until_it_is_acknowledged(twin: Twin, tmp_path: Path) -> None:
+def test_a_damaged_trip_file_refuses_until_it_is_acknowledged(
+    io_device: SafetyIoProcess, tmp_path: Path
+) -> None:
     latch = tmp_path / "trip.json"
     latch.write_text("{")
-    with SafetyIo(twin.profile(), CLOCK, latch) as io:
+    with SafetyIo(io_device.profile(), CLOCK, latch) as io:
         with pytest.raises(SafetyIoError, match="is damaged"):
             io.energise()
         io.acknowledge()
         io.energise()
 
 
-def test_a_limit_switch_stops_the_motion(twin: Twin, winch: BoardAxis) -> None:
-    with SafetyIo(twin.profile(), CLOCK) as io:
+def test_a_limit_switch_stops_the_motion(io_device: SafetyIoProcess, winch: BoardAxis) -> None:
+    with SafetyIo(io_device.profile(), CLOCK) as io:
         io.energise()
         winch.publish(0.0, 0.0, math.radians(91.0), 0.0, True)
         wait_until(io.stop_reason)
@@ -284,14 +299,17 @@ def test_a_limit_switch_stops_the_motion(twin: Twin, winch: BoardAxis) -> None:
         assert not io.alarm()
         assert winch.power_allowed  # for the controlled stop
         wait_until(lambda: not winch.power_allowed)  # which may not take for ever
-    with SafetyIo(twin.profile(), CLOCK) as io, pytest.raises(SafetyIoError, match="limit switch"):
+    with (
+        SafetyIo(io_device.profile(), CLOCK) as io,
+        pytest.raises(SafetyIoError, match="limit switch"),
+    ):
         io.energise()
 
 
 def test_the_device_drops_its_outputs_when_the_master_falls_silent(
-    twin: Twin, winch: BoardAxis
+    io_device: SafetyIoProcess, winch: BoardAxis
 ) -> None:
-    link = IoLink(twin.profile(), CLOCK)
+    link = IoLink(io_device.profile(), CLOCK)
     link.set_watchdog()
     link.feed_watchdog()
     link.write(0, True)
@@ -301,18 +319,20 @@ def test_the_device_drops_its_outputs_when_the_master_falls_silent(
     link.close()
 
 
-def test_a_device_that_is_not_there_or_another_one_is_said_in_words(twin: Twin) -> None:
+def test_a_device_that_is_not_there_or_another_one_is_said_in_words(
+    io_device: SafetyIoProcess,
+) -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
         with pytest.raises(ModbusError, match=rf"127.0.0.1:{port}: cannot connect: Connection ref"):
-            SafetyIo(twin.profile(port=port), CLOCK).open()
+            SafetyIo(io_device.profile(port=port), CLOCK).open()
         # takes the connection and says nothing
         free.listen()
         with pytest.raises(ModbusError, match=r"no answer within 0\.2 s from unit 1"):
-            SafetyIo(twin.profile(port=port), CLOCK).open()
+            SafetyIo(io_device.profile(port=port), CLOCK).open()
     with pytest.raises(ModbusError, match=r"no-such-host\.invalid:\d+: cannot connect"):
-        SafetyIo(twin.profile(host="no-such-host.invalid"), CLOCK).open()
+        SafetyIo(io_device.profile(host="no-such-host.invalid"), CLOCK).open()
     with pytest.raises(ModbusError, match=r"exception 11 \(gateway target .* is the unit id right"):
-        SafetyIo(twin.profile(unit=9), CLOCK).open()
-    assert not twin.coil(0)
+        SafetyIo(io_device.profile(unit=9), CLOCK).open()
+    assert not io_device.coil(0)

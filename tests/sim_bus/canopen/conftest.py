@@ -3,7 +3,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from slave_bench import Bench, odd_eds
+
+from tests.sim_bus.canopen.slave_bench import Bench, odd_eds
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import struct
 
 import canopen
 import pytest
-from slave_bench import MASTER, NODE, RTR, Bench
 
-from sim_bus.canopen import NmtState, SlaveApplication
+from cdpr_sim_bus.canopen import NmtState, SlaveApplication
+from tests.sim_bus.canopen.slave_bench import MASTER, NODE, RTR, Bench
 
 HEARTBEAT = 0x700 + NODE
 EMCY = 0x80 + NODE

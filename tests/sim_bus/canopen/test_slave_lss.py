@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 from canopen.lss import LssError, LssMaster
-from slave_bench import NODE, Bench
 
-from sim_bus.canopen import ParameterStore
-from sim_bus.canopen.lss import UNCONFIGURED
+from cdpr_sim_bus.canopen import ParameterStore
+from cdpr_sim_bus.canopen.lss import UNCONFIGURED
+from tests.sim_bus.canopen.slave_bench import NODE, Bench
 
 VENDOR, PRODUCT, REVISION = 0x00CD9A01, 0x00000402, 0x00010000
 SERIAL = 0x89ABCDEF

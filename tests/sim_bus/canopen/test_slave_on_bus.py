@@ -1,4 +1,4 @@
-"""The slave on the real hub, with the `canopen` package as a stranger on the bus."""
+"""The slave on the real hub, with the `canopen` package as a third party on the bus."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 import canopen
 import pytest
-from slave_bench import GENERIC_EDS, MASTER, NODE, Recorder
 
-from sim_bus.canopen import CanopenSlave, ObjectDictionary
-from sim_bus.hub import Hub
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.canopen import CanopenSlave, ObjectDictionary
+from tests.sim_bus.canopen.slave_bench import GENERIC_EDS, MASTER, NODE, Recorder
 
 
 @dataclass
 class Site:
-    """A slave on a bus of its own and a stranger's network on the same bus."""
+    """A slave on a bus of its own and a third party's network on the same bus."""
 
     slave: CanopenSlave
     app: Recorder
@@ -61,7 +61,7 @@ def site(request: pytest.FixtureRequest) -> Iterator[Site]:
         hub.close()
 
 
-def test_stranger_resets_starts_and_stops_the_node(site: Site) -> None:
+def test_third_party_resets_starts_and_stops_the_node(site: Site) -> None:
     nmt = site.remote.nmt
     seen: list[bytes] = []
     site.network.subscribe(0x700 + NODE, lambda _id, data, _time: seen.append(bytes(data)))
@@ -75,14 +75,14 @@ def test_stranger_resets_starts_and_stops_the_node(site: Site) -> None:
         assert nmt.state == state
 
 
-def test_stranger_scans_and_reads_identity(site: Site) -> None:
+def test_third_party_scans_and_reads_identity(site: Site) -> None:
     site.network.scanner.search()
     assert wait_for(lambda: site.network.scanner.nodes == [NODE])
     identity = site.remote.sdo[0x1018]
     assert [identity[k].raw for k in range(1, 5)] == [0x00CD9A01, 0x402, 0x10000, 1]
 
 
-def test_stranger_moves_a_large_block_both_ways(site: Site) -> None:
+def test_third_party_moves_a_large_block_both_ways(site: Site) -> None:
     content = bytes(range(256)) * 16
     with site.remote.sdo.open(0x2F10, 0, "wb", size=len(content), block_transfer=True) as stream:
         stream.write(content)
@@ -91,7 +91,7 @@ def test_stranger_moves_a_large_block_both_ways(site: Site) -> None:
     assert site.remote.sdo.upload(0x2F10, 0) == content
 
 
-def test_stranger_runs_pdos_by_sync(site: Site) -> None:
+def test_third_party_runs_pdos_by_sync(site: Site) -> None:
     remote = site.remote
     remote.tpdo.read()
     remote.rpdo.read()
@@ -115,7 +115,7 @@ def test_stranger_runs_pdos_by_sync(site: Site) -> None:
     assert (site.od.get(0x6040), site.od.get(0x6071)) == (6, -55)
 
 
-def test_stranger_hears_of_a_lost_heartbeat(site: Site) -> None:
+def test_third_party_hears_of_a_lost_heartbeat(site: Site) -> None:
     site.remote.sdo[0x1016][1].raw = MASTER << 16 | 100
     site.remote.nmt.state = "OPERATIONAL"
     site.network.send_message(0x700 + MASTER, b"\x05")
@@ -126,7 +126,7 @@ def test_stranger_hears_of_a_lost_heartbeat(site: Site) -> None:
     assert ("heartbeat_lost", MASTER) in site.app.events
 
 
-def test_stranger_asks_by_remote_frames(site: Site) -> None:
+def test_third_party_asks_by_remote_frames(site: Site) -> None:
     """Node guarding, and a TPDO that is sent on request only."""
     seen: list[tuple[int, bytes]] = []
     for identifier in (0x700 + NODE, 0x180 + NODE):

@@ -8,9 +8,9 @@ from time import perf_counter
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from slave_bench import NODE, Bench
 
-from sim_bus.canopen import ObjectDictionary, SlaveApplication
+from cdpr_sim_bus.canopen import ObjectDictionary, SlaveApplication
+from tests.sim_bus.canopen.slave_bench import NODE, Bench
 
 IDENTIFIERS = [
     0x000, 0x080, 0x085, 0x100, 0x180 + NODE, 0x200 + NODE, 0x300 + NODE, 0x580 + NODE,

@@ -10,10 +10,10 @@ import canopen
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from slave_bench import NODE, Bench
 
-from sim_bus.canopen import Abort, SdoAbort
-from sim_bus.canopen.sdo_server import TIMEOUT_S
+from cdpr_sim_bus.canopen import Abort, SdoAbort
+from cdpr_sim_bus.canopen.sdo.sdo_server import TIMEOUT_S
+from tests.sim_bus.canopen.slave_bench import NODE, Bench
 
 DOMAIN = 0x2F10
 contents = st.one_of(st.binary(max_size=40), st.binary(min_size=850, max_size=2000))
@@ -242,7 +242,7 @@ def test_server_is_closed_in_stopped(bench: Bench) -> None:
     assert abort_of(bench.sdo(b"\x60"))[2] == 0x05040001
 
 
-def test_every_readable_object_can_be_read_by_the_stranger(bench: Bench) -> None:
+def test_every_readable_object_can_be_read_by_a_third_party(bench: Bench) -> None:
     for index in bench.remote.object_dictionary:
         record = bench.remote.object_dictionary[index]
         variables = (

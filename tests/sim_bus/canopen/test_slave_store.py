@@ -6,9 +6,9 @@ from pathlib import Path
 
 import canopen
 import pytest
-from slave_bench import NODE, Bench
 
-from sim_bus.canopen import ParameterStore, StoreError
+from cdpr_sim_bus.canopen import ParameterStore, StoreError
+from tests.sim_bus.canopen.slave_bench import NODE, Bench
 
 
 def power_cycle(path: Path, node_id: int = NODE) -> Bench:

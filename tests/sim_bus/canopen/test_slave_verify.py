@@ -6,7 +6,8 @@ import struct
 
 import canopen
 import pytest
-from slave_bench import Bench
+
+from tests.sim_bus.canopen.slave_bench import Bench
 
 SAVE = b"save"
 LOAD = b"load"

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim_bus import servo
-from sim_bus.cable_robot import CableRobot, RobotShape
-from sim_bus.motor_state import MotorRatings, Transmission, build_motor
-from sim_bus.plant import Plant
-from sim_bus.robot_plant import RobotPlant
+from cdpr_sim_bus.robot import servo
+from cdpr_sim_bus.robot.cable_robot import CableRobot
+from cdpr_sim_bus.robot.motor_state import MotorRatings, Transmission, build_motor
+from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.platform_record import RobotShape
+from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
 SIDE_m = 0.15
 HEIGHT_m = SIDE_m * math.sqrt(3.0) / 2.0
@@ -40,23 +41,37 @@ def body(
     pretension_N: float = 30.0,
     mass_kg: float = 4.0,
     weight_N_m: float = 0.0,
+    shape: dict[str, Any] | None = None,
     **plant: Any,
 ) -> CableRobot:
-    """Return a robot whose cables are taut at power-up; `plant` are sections of its plant file."""
+    """Return a robot whose cables are taut at power-up.
+
+    `shape` are further fields of its RobotShape, `plant` sections of its plant file.
+    """
     sections = {
-        "cables": {"damping_s": 0.0, "sag": weight_N_m > 0.0, "friction_share": 0.0},
+        "cables": {
+            "damping_s": 0.0,
+            "sag": weight_N_m > 0.0,
+            "friction_share": 0.0,
+            "creep_shares": (0.0, 0.0),
+        },
         "floor": {"present": False},
         "platform": {"air_Ns_m": 0.0},
         "start": {"slack_m": 0.0},
-        "winding": {"run_out_m": 0.0, "carriage_error": 0.0, "carriage_offset_m": 0.0},
+        "winding": {
+            "run_out_m": 0.0,
+            "carriage_error": 0.0,
+            "carriage_offset_m": 0.0,
+            "gear_stiffness_Nm_rad": 1e9,
+        },
     }
     for name, table in plant.items():
         sections[name] = {**sections.get(name, {}), **table}
     motor = SMOOTH if smooth else {}
     whole = RobotPlant.model_validate({**sections, "motor": motor})
     n = len(np.asarray(exits))
-    shape = RobotShape(exits, anchors, mass_kg, home, [weight_N_m] * n)
-    robot = CableRobot(shape, whole, [Transmission()] * n)
+    form = RobotShape(exits, anchors, mass_kg, home, [weight_N_m] * n, **(shape or {}))
+    robot = CableRobot(form, whole, [Transmission()] * n)
     for i, own in enumerate(whole.motor_plants(n) if not smooth else [whole.motor] * n):
         robot.adopt(
             i, build_motor(Plant.model_validate(own), MotorRatings()), lambda: (servo.OFF, 0.0)

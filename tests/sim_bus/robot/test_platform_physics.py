@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from body_lab import ANCHORS_m, EXITS_m, body, energy_J, free_length_m, run
 from scipy.optimize import brentq
 
-from sim_bus import servo
-from sim_bus.rotor import cable_force
+from cdpr_sim_bus.robot import servo
+from cdpr_sim_bus.robot.rotor import cable_force
+from tests.sim_bus.robot.body_lab import ANCHORS_m, EXITS_m, body, energy_J, free_length_m, run
 
 ROOM_EXITS_m = [(x, y, z) for z in (0.0, 3.0) for x in (-2.5, 2.5) for y in (-2.0, 2.0)]
 ROOM_ANCHORS_m = [(x, y, z) for z in (-0.3, 0.3) for x in (-0.1, 0.1) for y in (-0.1, 0.1)]

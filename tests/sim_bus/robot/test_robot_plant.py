@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from profiles import load_winch
-from profiles.errors import ProfileError
-from sim_bus.plant import Plant
-from sim_bus.robot_plant import RobotPlant
+from cdpr_profiles import load_winch
+from cdpr_profiles.errors import ProfileError
+from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
 
 def test_each_motor_is_its_own() -> None:
@@ -59,7 +59,16 @@ def test_the_page_shows_the_defaults_and_a_plant_that_works(tmp_path: Path) -> N
     path.write_text(shown)
     default = RobotPlant()
     assert RobotPlant.load_file(path) == default
-    for section in ("platform", "geometry", "cables", "winding", "start", "floor", "variation"):
+    for section in (
+        "platform",
+        "geometry",
+        "cables",
+        "winding",
+        "start",
+        "floor",
+        "variation",
+        "scanner",
+    ):
         for key in type(getattr(default, section)).model_fields:
             assert f"\n{key} = " in shown or f"\n# {key} = " in shown, f"{section}.{key}"
     path.write_text(other)

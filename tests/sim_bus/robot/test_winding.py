@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from body_lab import body, run
 
-from sim_bus.rotor import paid_out
+from cdpr_sim_bus.robot.rotor import paid_out
+from tests.sim_bus.robot.body_lab import body, run
 
 LAGGING = {
     "run_out_m": 0.01,

@@ -15,13 +15,13 @@ import sys
 import time
 from pathlib import Path
 
-from cdpr_rt.runtime.shared_block import SharedBlock
-from cdpr_rt.runtime.stop_requests import CUT_SHORT
-from tools.daemon import launcher
-from tools.daemon.child import end_with
-from tools.daemon.loop_file import POWER_OFF_SIGNAL
-from tools.daemon.notify import ServiceManager
-from tools.daemon.settings import RunSettings
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.runtime.control_loop.stop_requests import CUT_SHORT
+from cdpr_tools.daemon import launcher
+from cdpr_tools.daemon.child import end_with_launcher
+from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
+from cdpr_tools.daemon.notify import ServiceManager
+from cdpr_tools.daemon.settings import RunSettings
 
 NAME = "stand-in"
 
@@ -77,14 +77,16 @@ def loop() -> None:
     _tell_pid(folder, "loop")
     time.sleep(plan.get("loading_s", 0.0))
     end, power_off = _asked(signal.SIGTERM), _asked(POWER_OFF_SIGNAL)
-    end_with(settings.launcher_pid)
+    end_with_launcher(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)
     block.write_description({"lowering_s": plan.get("lowering_s", 0.0), "master_heartbeat_s": 0.1})
     block.counters["loop_pid"] = os.getpid()
     if "refuse" in plan:
         sys.exit(plan["refuse"])
     block.counters["loop_alive_ns"] = time.monotonic_ns()  # a test may stop it from here on
-    block.write_status({"state": "ready", "reason": "", "driving": "stopping_s" in plan})
+    block.write_status(
+        {"state": "ready", "reason": "", "driving": "stopping_s" in plan, **plan.get("status", {})}
+    )
     while not select.select([end], [], [], 0.02)[0] and not (folder / "shutdown").exists():
         block.counters["loop_alive_ns"] = time.monotonic_ns()
         if (folder / "fault").exists():
@@ -109,7 +111,7 @@ def service() -> None:
         os.kill(os.getpid(), signal.SIGSTOP)
     _tell_pid(folder, "service")
     end = _asked(signal.SIGTERM)
-    end_with(settings.launcher_pid)
+    end_with_launcher(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)
     settings.socket.unlink(missing_ok=True)
     with socket.socket(socket.AF_UNIX) as listening:

@@ -10,17 +10,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cdpr_rt.runtime import procedures
-from cdpr_rt.runtime.cycle_row import Row
-from cdpr_rt.runtime.loop import ControlLoop
-from cdpr_rt.runtime.programs.base import Program
+from cdpr_drivers.robot.machine import RobotMachine
+from cdpr_profiles import load_robot
+from cdpr_rt.core.cycle_row import Row
+from cdpr_rt.core.shared_block import RowReader, SharedBlock
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.programs.base import Program
+from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.right import LONGEST_S, PublishedRight
-from cdpr_rt.runtime.shared_block import RowReader, SharedBlock
-from cdpr_rt.runtime.states import LoopState
 from cdpr_rt.service.lease import Lease, LeaseError
-from profiles import load_robot
-from tools.daemon.loop_process import loop_parts
-from tools.daemon.machine import RobotMachine
+from cdpr_tools.daemon.loop_process import loop_parts
 
 
 class LoopRig:
@@ -40,14 +40,14 @@ class LoopRig:
         self.lease = Lease(PublishedRight(self.block), lambda: self.now_ns)
         self.take_right()
         self.machine = RobotMachine(self.robot, url.split(), **more)
-        parts = loop_parts(self.robot, self.block)
+        parts = loop_parts(self.robot, limits_of(self.robot), self.block)
         parts = replace(parts, programs={**parts.programs, **(programs or {})})
         self.loop = ControlLoop(self.block, self.machine, parts, lambda: self.now_ns)
         self._rows = RowReader(self.block)
 
     def boot(self) -> None:
         """Do what the loop does by itself at its start."""
-        self.loop.begin(procedures.start_up(self.loop))
+        self.loop.runner.begin(self.loop.transitions.start_up())
         self.turn_until(lambda: not self.loop.busy)
 
     def take_right(self) -> None:
@@ -79,7 +79,7 @@ class LoopRig:
         """Return the rows since the last call."""
         return self._rows.read()
 
-    def order(self, do: Any, **what: Any) -> dict[str, Any]:
+    def command(self, do: Any, **what: Any) -> dict[str, Any]:
         """Post a command and turn until it is answered."""
         command = {"do": do, "client": "test", "right": self.right, **what}
         number = self.block.post_command(command)
@@ -96,10 +96,10 @@ class LoopRig:
 
     def obeyed(self, do: str, **what: Any) -> None:
         """Post a command that is to be done."""
-        answer = self.order(do, **what)
+        answer = self.command(do, **what)
         assert answer["ok"], answer
 
-    def misbehave(self, axis: int, sub: int, value: int) -> None:
+    def inject_fault(self, axis: int, sub: int, value: int) -> None:
         """Have a drive do something on purpose (2F00h), told between two cycles."""
         where = self.robot.axes[axis]
         self.machine.networks[where.bus].write(where.node_id, 0x2F00, sub, value)

@@ -8,7 +8,7 @@ import pwd
 import httpx
 import pytest
 
-from tools.daemon.client import Daemon
+from cdpr_tools.client.client import Daemon
 
 
 def test_a_user_without_a_name_can_command_too(monkeypatch: pytest.MonkeyPatch) -> None:

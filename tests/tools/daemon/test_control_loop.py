@@ -16,13 +16,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.runtime.cycle_row import Row
-from cdpr_rt.runtime.programs.idle import IdleProgram
-from cdpr_rt.runtime.programs.model import model_of
-from cdpr_rt.runtime.robot_arrays import limits_of
-from cdpr_rt.runtime.states import LoopState
-from drivers.cia402 import STATE_TABLE, State
-from profiles import load_robot
+from cdpr_drivers.cia402 import STATE_TABLE, State
+from cdpr_profiles import load_robot
+from cdpr_rt.core.cycle_row import Row
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.programs.idle import IdleProgram
+from cdpr_rt.programs.model import model_of
+from cdpr_rt.robots.robot_arrays import limits_of
 from tests.drivers.bus_log import BusLog, logged
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import Simulator, robot_file, simulated, unique
@@ -63,7 +63,7 @@ def jogging(ready: LoopRig) -> LoopRig:
     ready.obeyed("enable")
     ready.obeyed("program", program="jog", wanted=JOG)
     ready.run(0.4)
-    assert ready.loop.setpoint.velocity_rad_s == pytest.approx([2.0, 2.0])
+    assert ready.loop.engine.setpoint.velocity_rad_s == pytest.approx([2.0, 2.0])
     return ready
 
 
@@ -117,7 +117,7 @@ def test_who_does_not_hold_the_right_to_move_moves_nothing(ready: LoopRig) -> No
     ready.drop_right()
     try:
         for order in ({"do": "enable"}, {"do": "enable", "program": "jog"}):
-            answer = ready.order(**order)
+            answer = ready.command(**order)
             assert not answer["ok"]
             assert "right to move" in answer["text"]
         assert ready.state is LoopState.READY
@@ -135,7 +135,7 @@ def test_a_lease_that_runs_out_in_motion_ends_in_a_hold(jogging: LoopRig) -> Non
         assert "right to move" in status["reason"]
         assert rows["setpoint_velocity_rad_s"][-1] == pytest.approx([0.0, 0.0])
         jogging.obeyed("hold")  # anybody may
-        assert not jogging.order("set", wanted={})["ok"]
+        assert not jogging.command("set", wanted={})["ok"]
     finally:
         jogging.take_right()
 
@@ -173,7 +173,7 @@ def test_no_cycle_has_two_commands_whatever_happens(ready: LoopRig) -> None:
         ready.obeyed("disable")
         ready.obeyed("enable", program="jog", wanted=JOG)
         ready.run(0.2)
-        ready.misbehave(0, FAULT_CODE, 0x7305)
+        ready.inject_fault(0, FAULT_CODE, 0x7305)
         ready.turn_until(lambda: ready.state is LoopState.FAULT)
         ready.run(0.1)
     for node in (1, 2):
@@ -186,12 +186,12 @@ def test_an_emergency_stop_takes_the_power_in_the_next_cycle_and_latches(jogging
     with log_of(jogging) as log:
         jogging.loop.request_power_off()
         jogging.turn(2)
-        assert not jogging.loop.driving
+        assert not jogging.loop.engine.driving
     words = [word for _, word in controlwords(log, 1)]
     assert words[-1] & 0x0F == 0  # disable voltage, no quick stop and no braking before
     jogging.turn_until(lambda: jogging.state is LoopState.FAULT and not jogging.loop.busy)
     assert jogging.status["reason"] == "emergency stop by cdpr estop"
-    assert not jogging.order("enable")["ok"]
+    assert not jogging.command("enable")["ok"]
     jogging.obeyed("acknowledge")
 
 
@@ -212,7 +212,7 @@ def test_an_emergency_stop_without_power_latches_once_and_for_all_states(ready: 
 
 def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -> None:
     with log_of(jogging) as log:
-        jogging.misbehave(0, FAULT_CODE, 0x7305)
+        jogging.inject_fault(0, FAULT_CODE, 0x7305)
         jogging.rows()
         jogging.turn_until(lambda: jogging.state is LoopState.FAULT)
     words = controlwords(log, 2)
@@ -229,7 +229,7 @@ def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -
     assert "7305h" in status["reason"]
     assert status["reason_limit"]["limit"] == "drive"
     assert status["reason_limit"]["reaction"] == "quick stop"
-    assert not jogging.order("enable")["ok"]
+    assert not jogging.command("enable")["ok"]
     jogging.run(1.0)
     assert jogging.state is LoopState.FAULT
     jogging.obeyed("acknowledge")
@@ -241,25 +241,25 @@ def test_a_drive_in_fault_quick_stops_the_others_and_latches(jogging: LoopRig) -
 
 
 def test_a_drive_that_falls_silent_is_booted_anew(jogging: LoopRig) -> None:
-    jogging.misbehave(1, SILENT_MS, 100)
+    jogging.inject_fault(1, SILENT_MS, 100)
     jogging.turn_until(lambda: jogging.state is LoopState.FAULT)
     assert "node 2" in jogging.status["reason"]
     jogging.run(0.1)  # until it is heard again
     jogging.turn_until(lambda: not jogging.loop.busy)
-    cycle = jogging.loop.cycle
+    cycle = jogging.loop.engine.cycle
     jogging.obeyed("acknowledge")
     assert jogging.state is LoopState.READY
-    assert jogging.loop.cycle is not cycle or jogging.machine.intact()
+    assert jogging.loop.engine.cycle is not cycle or jogging.machine.intact()
     jogging.obeyed("enable")
     assert drive_states(jogging.run(0.1)) == {State.OPERATION_ENABLED}
 
 
 def test_a_drive_that_stays_deaf_keeps_the_fault(lab: tuple[Path, str]) -> None:
     with simulated(lab[0]) as url, opened(lab[0], url) as rig:
-        rig.misbehave(1, SILENT_MS, 65535)
+        rig.inject_fault(1, SILENT_MS, 65535)
         rig.turn_until(lambda: rig.state is LoopState.FAULT)
         rig.turn_until(lambda: not rig.loop.busy)
-        answer = rig.order("acknowledge")
+        answer = rig.command("acknowledge")
         assert not answer["ok"]
         assert "node 2" in answer["text"]
         assert rig.state is LoopState.FAULT
@@ -276,7 +276,7 @@ def test_a_bus_that_is_gone_and_comes_back(lab: tuple[Path, str]) -> None:
         rig.turn_until(lambda: rig.state is LoopState.FAULT)
         rig.turn_until(lambda: not rig.loop.busy)
         assert "gone" in rig.status["reason"]
-        answer = rig.order("acknowledge")
+        answer = rig.command("acknowledge")
         assert not answer["ok"]
         assert rig.state is LoopState.FAULT
         with simulated(lab[0], name=name):
@@ -297,7 +297,7 @@ def test_a_program_that_fails_stops_the_drives_and_not_the_loop(lab: tuple[Path,
     model = model_of(load_robot(lab[0]).axes, PERIOD_S, [3e-3] * 2, limits_of(load_robot(lab[0])))
     with simulated(lab[0]) as url, opened(lab[0], url, {"failing": Failing(model)}) as rig:
         rig.obeyed("enable")
-        rig.order("program", program="failing")
+        rig.command("program", program="failing")
         rig.turn_until(lambda: rig.state is LoopState.FAULT)
         reason = rig.status["reason"]
         assert "failing: ZeroDivisionError: by nought" in reason
@@ -318,7 +318,7 @@ def test_a_request_to_end_brakes_within_the_acceleration_limit(lab: tuple[Path, 
         velocity = rig.rows()["setpoint_velocity_rad_s"][:, 0]
         assert velocity[0] == pytest.approx(2.0)
         braking = np.abs(np.diff(velocity[: np.flatnonzero(velocity == 0.0)[0] + 1]))
-        slope = rig.loop.programs[1]._model.acceleration_rad_s2[0]  # type: ignore[attr-defined]
+        slope = rig.loop.engine.programs[1]._model.acceleration_rad_s2[0]  # type: ignore[attr-defined]
         assert np.max(braking) <= 1.001 * slope * PERIOD_S
         assert rig.status["state"] == "unconfigured"
         assert [word for _, word in controlwords(log, 1)][-1] & 0x0F == 0
@@ -337,11 +337,11 @@ def test_nothing_that_is_posted_crashes_the_loop_or_gives_power(ready: LoopRig) 
             ready.obeyed("acknowledge")
         for order in orders:
             what = {key: value for key, value in order.items() if key != "do"}
-            answer = ready.order(order.get("do"), **what)
+            answer = ready.command(order.get("do"), **what)
             assert set(answer) == {"to", "ok", "text", "state", "number"}
             if order.get("do") == "enable" and answer["ok"]:
                 ready.obeyed("disable")
-            assert not ready.loop.driving
+            assert not ready.loop.engine.driving
         assert State.OPERATION_ENABLED not in drive_states(ready.run(0.02))
 
     post()
@@ -357,7 +357,7 @@ def test_a_command_that_is_no_command_is_left_aside(ready: LoopRig) -> None:
         block.counters["commands"][0] = number + 1
         ready.turn(2)
         assert block.counters["commands_taken"][0] == number + 1
-    assert ready.order("set", wanted={})["ok"] is False
+    assert ready.command("set", wanted={})["ok"] is False
 
 
 def test_status_is_plain_json_that_a_service_can_read(ready: LoopRig) -> None:

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "drivers" / "modbus"))
-from safety_rig import Twin, board_file, patient_profile, ready, start
-
-from cdpr_rt.runtime.states import LoopState
-from sim_bus.physics_board import BoardAxis, PhysicsBoard
-from sim_bus.safety_twin import Fault
+from cdpr_rt.core.states import LoopState
+from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
+from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
+from tests.drivers.modbus.safety_rig import (
+    SafetyIoProcess,
+    board_file,
+    patient_profile,
+    ready,
+    start,
+)
 from tests.tools.daemon.loop_rig import LoopRig, opened
 
 WINCH = "winch-mpp0923d"
 
 
 @pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[LoopRig, Twin, BoardAxis]]:
+def lab(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[tuple[LoopRig, SafetyIoProcess, BoardAxis]]:
     bus = f"simbus:loop-safety-{os.getpid()}-{uuid.uuid4().hex[:6]}"
     folder = tmp_path_factory.mktemp("io")
     before = os.environ.get("XDG_STATE_HOME")
@@ -32,13 +36,13 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[LoopRig, Twi
         with board_file() as path:
             simulator = start("up", WINCH, "--bus", bus, "--lockstep", "--board", path)
             ready(simulator)
-            twin = Twin(patient_profile(folder), "--board", path)
+            io_device = SafetyIoProcess(patient_profile(folder), "--board", path)
             with (
                 PhysicsBoard.attach(path) as board,
-                opened(WINCH, bus, safety_io=twin.reference) as rig,
+                opened(WINCH, bus, safety_io=io_device.reference) as rig,
             ):
-                yield rig, twin, board.axis(0)
-            twin.close()
+                yield rig, io_device, board.axis(0)
+            io_device.close()
             simulator.communicate(b"", timeout=10)
     finally:
         if before is None:
@@ -64,7 +68,7 @@ def jog(rig: LoopRig) -> None:
 
 
 def test_brakes_open_behind_power_and_close_before_it_goes(
-    lab: tuple[LoopRig, Twin, BoardAxis],
+    lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
     rig, _, winch = lab
     assert rig.state is LoopState.READY, rig.status
@@ -72,7 +76,7 @@ def test_brakes_open_behind_power_and_close_before_it_goes(
     assert not winch.brake_released
     number = rig.block.post_command({"do": "enable", "right": rig.right})
     wait(rig, lambda: winch.brake_released)
-    assert rig.loop.driving  # it was held before the brake let go
+    assert rig.loop.engine.driving  # it was held before the brake let go
     wait(rig, lambda: not rig.loop.busy)
     answer = rig.block.take_reply()
     assert answer is not None
@@ -85,15 +89,15 @@ def test_brakes_open_behind_power_and_close_before_it_goes(
 
 
 def test_an_emergency_stop_takes_the_torque_at_once(
-    lab: tuple[LoopRig, Twin, BoardAxis],
+    lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
-    rig, twin, winch = lab
+    rig, io_device, winch = lab
     rig.block.post_command({"do": "enable", "right": rig.right})
-    wait(rig, lambda: rig.loop.driving and not rig.loop.busy)
+    wait(rig, lambda: rig.loop.engine.driving and not rig.loop.busy)
     rig.block.take_reply()
     jog(rig)
     rig.rows()
-    twin.press()
+    io_device.press()
     wait(rig, lambda: rig.state is LoopState.FAULT)
     wait(rig, lambda: not winch.brake_released)
     wait(rig, lambda: not rig.loop.busy)
@@ -103,11 +107,11 @@ def test_an_emergency_stop_takes_the_torque_at_once(
     (changes,) = (rows["state"] == LoopState.FAULT).nonzero()
     assert not rows["torque_sent_Nm"][changes].any()
     # it stays while the button is pressed
-    answer = rig.order("acknowledge")
+    answer = rig.command("acknowledge")
     assert not answer["ok"]
     assert "chain" in answer["text"]
     assert rig.state is LoopState.FAULT
-    twin.press(False)
+    io_device.press(False)
     rig.obeyed("acknowledge")
     assert rig.state is LoopState.READY
     assert not winch.brake_released
@@ -115,16 +119,16 @@ def test_an_emergency_stop_takes_the_torque_at_once(
 
 
 def test_a_brake_that_does_not_open_ends_in_a_fault(
-    lab: tuple[LoopRig, Twin, BoardAxis],
+    lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
-    rig, twin, winch = lab
-    twin.break_(Fault.BRAKES_STUCK)
+    rig, io_device, winch = lab
+    io_device.break_(SafetyIoFault.BRAKES_STUCK)
     rig.block.post_command({"do": "enable", "right": rig.right})
     wait(rig, lambda: rig.state is LoopState.FAULT)
     wait(rig, lambda: not rig.loop.busy)
     assert "brake" in rig.status["reason"]
     assert not winch.state().power_on
-    twin.break_(Fault(0))
+    io_device.break_(SafetyIoFault(0))
     answer = rig.block.take_reply()
     assert answer is not None
     assert not answer["ok"]
@@ -132,27 +136,27 @@ def test_a_brake_that_does_not_open_ends_in_a_fault(
 
 
 def test_power_that_is_taken_at_once_while_it_ends_has_the_brakes_applied(
-    lab: tuple[LoopRig, Twin, BoardAxis],
+    lab: tuple[LoopRig, SafetyIoProcess, BoardAxis],
 ) -> None:
     rig, _, winch = lab
     rig.block.post_command({"do": "enable", "right": rig.right})
-    wait(rig, lambda: rig.loop.driving and not rig.loop.busy)
+    wait(rig, lambda: rig.loop.engine.driving and not rig.loop.busy)
     jog(rig)
     rig.loop.request_stop()
     rig.turn(10)
-    assert rig.loop.driving  # it brakes under its controller
+    assert rig.loop.engine.driving  # it brakes under its controller
     rig.loop.request_stop()
     rig.turn(2)
-    assert rig.loop.driving  # who asks for the same again changes nothing
+    assert rig.loop.engine.driving  # who asks for the same again changes nothing
     rig.loop.request_power_off()
     rig.turn(2)
-    assert not rig.loop.driving
+    assert not rig.loop.engine.driving
     assert rig.machine._safety is not None
-    assert not any(rig.machine._safety.io._wanted[brake] for brake in brake_coils(rig))
+    assert not any(rig.machine._safety.io._outputs[brake] for brake in brake_coils(rig))
     wait(rig, lambda: not winch.brake_released)
     wait(rig, lambda: rig.loop.ended)
     assert not winch.state().power_on
-    assert rig.loop.doubt == ""
+    assert rig.loop.transitions.power_off_unconfirmed == ""
 
 
 def brake_coils(rig: LoopRig) -> list[int]:

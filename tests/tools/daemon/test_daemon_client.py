@@ -11,8 +11,14 @@ from typing import Any
 
 import pytest
 
-from tools.daemon.client import CutOffError, NoDaemonError, axis_values, key_values, open_daemon
-from tools.errors import BadInputError
+from cdpr_tools.client.client import (
+    ConnectionLostError,
+    NoDaemonError,
+    axis_values,
+    key_values,
+    open_daemon,
+)
+from cdpr_tools.errors import BadInputError
 
 
 @pytest.fixture
@@ -80,7 +86,7 @@ def test_a_stop_that_is_cut_off_is_asked_for_again(
         if tries > 1:
             assert daemon.post(path)["state"] == "active"
         else:
-            with pytest.raises(CutOffError):
+            with pytest.raises(ConnectionLostError):
                 daemon.post(path)
         thread.join()
     assert asked == [f"POST {path} HTTP/1.1".encode()] * tries

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_rt.runtime.states import LoopState
-from drivers.cia402 import POWER_OFF
+from cdpr_drivers.cia402 import POWER_OFF
+from cdpr_rt.core.states import LoopState
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 
@@ -29,7 +29,7 @@ def unpowered(rig: LoopRig) -> bool:
 
 def test_a_loop_that_begins_with_a_drive_in_fault(lab: tuple[Path, str]) -> None:
     with opened(*lab) as rig:
-        rig.misbehave(0, FAULT_CODE, 0x7305)
+        rig.inject_fault(0, FAULT_CODE, 0x7305)
         rig.turn_until(lambda: rig.state is LoopState.FAULT)
     with opened(*lab) as rig:
         # a start resets nothing by itself; somebody who asks for a check does
@@ -43,12 +43,12 @@ def test_a_loop_that_begins_with_a_drive_in_fault(lab: tuple[Path, str]) -> None
 
 def test_a_fault_while_one_is_acknowledged(lab: tuple[Path, str]) -> None:
     with opened(*lab) as rig:
-        rig.misbehave(0, FAULT_CODE, 0x7305)
+        rig.inject_fault(0, FAULT_CODE, 0x7305)
         rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
         rig.block.post_command({"do": "acknowledge"})
-        rig.turn_until(lambda: rig.state is LoopState.INACTIVE and rig.loop.cycling)
+        rig.turn_until(lambda: rig.state is LoopState.INACTIVE and rig.loop.engine.cycling)
         rig.turn(40)
-        rig.misbehave(1, FAULT_CODE, 0x7305)
+        rig.inject_fault(1, FAULT_CODE, 0x7305)
         rig.turn_until(lambda: not rig.loop.busy)
         assert rig.state is LoopState.FAULT
         assert "node 2" in rig.status["reason"]
@@ -67,7 +67,7 @@ def test_a_drive_that_restarted_needs_a_new_boot(lab: tuple[Path, str]) -> None:
         rig.machine.networks["can0"].reset(2)
         rig.turn_until(lambda: not rig.loop.busy)
         for _ in range(2):
-            answer = rig.order("check")
+            answer = rig.command("check")
             assert not answer["ok"]
             assert "restarted" in answer["text"]
         rig.obeyed("configure")

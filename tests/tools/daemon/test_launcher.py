@@ -17,7 +17,7 @@ from typing import Any
 import launcher_rig
 import pytest
 
-from tools.daemon.loop_file import LoopFile
+from cdpr_tools.daemon.loop_file import LoopFile
 
 TIMEOUT_S = 60.0
 
@@ -229,6 +229,19 @@ def test_the_watchdog_is_fed_while_the_loop_turns_and_no_longer(start: Start) ->
     os.kill(loop, signal.SIGCONT)
     assert "turns again" in daemon.line("told")["told"]
     assert daemon.fed(0.8) >= 2
+
+
+def test_in_lockstep_a_loop_that_stands_still_is_nothing_to_tell(start: Start) -> None:
+    daemon = start({"status": {"lockstep": True}}, watchdog_s=0.4)
+    daemon.line("ready")
+    loop = daemon.pid("loop")
+    os.kill(loop, signal.SIGSTOP)
+    assert daemon.fed(1.4) > 0
+    assert daemon.fed(0.6) == 0  # it has been seen to stand still
+    os.kill(loop, signal.SIGCONT)
+    assert daemon.fed(0.8) >= 2
+    (daemon.folder / "fault").touch()
+    assert daemon.line("told")["told"] == "fault: left: too fast", "and nothing before it"
 
 
 def test_a_loop_that_hangs_does_not_keep_the_daemon_from_ending(start: Start) -> None:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdpr_rt.controllers.base import Idle
-from cdpr_rt.exchange import AxisFeedback, FloatArray, Setpoint
-from cdpr_rt.runtime.cycle_row import Row
-from cdpr_rt.runtime.states import LoopState, Reaction
-from cdpr_rt.supervisor import Limit
-from drivers.cia402 import STATE_TABLE, State
-from profiles.catalogue import SHIPPED
+from cdpr_drivers.cia402 import STATE_TABLE, State
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_rt.control.base import Idle
+from cdpr_rt.core.cycle_row import Row
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.core.supervisor import Limit
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
@@ -198,16 +198,16 @@ def test_the_robots_own_reaction_is_what_happens(ready: WildRig, what: float) ->
     ],
 )
 def test_lengths_that_are_none_are_refused(ready: WildRig, wanted: dict[str, Any]) -> None:
-    answer = ready.order("lengths", wanted=wanted)
+    answer = ready.command("lengths", wanted=wanted)
     assert not answer["ok"]
     assert "allowed: " in answer["text"]
-    assert not ready.loop.parts.estimator.estimate.length_known.any()
+    assert not ready.loop.engine.parts.estimator.estimate.length_known.any()
 
 
 def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> None:
-    estimator = ready.loop.parts.estimator
+    estimator = ready.loop.engine.parts.estimator
     ready.drop_right()
-    assert not ready.order("lengths", wanted={"cable_length_m": [None, 1.0]})["ok"]
+    assert not ready.command("lengths", wanted={"cable_length_m": [None, 1.0]})["ok"]
     ready.take_right()
     ready.obeyed("lengths", wanted={"cable_length_m": [None, 1.0]})
     ready.turn(1)
@@ -217,7 +217,7 @@ def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> 
     try:
         moving = {"velocity_rad_s": [0.0, 4.0], "timeout_s": 2.0}
         ready.obeyed("enable", program="jog", wanted=moving)
-        ready.turn_until(lambda: ready.loop.program.name == "hold")
+        ready.turn_until(lambda: ready.loop.engine.program.name == "hold")
         told = ready.status
         assert (told["state"], told["program"]) == ("active", "hold")
         assert told["reason"].startswith("axis 1: cable length 1.02")
@@ -228,7 +228,7 @@ def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> 
         back = {"velocity_rad_s": [0.0, -4.0], "timeout_s": 2.0}
         ready.obeyed("program", program="jog", wanted=back)
         ready.turn_until(lambda: estimator.estimate.cable_length_m[1] < length_m - 5e-3)
-        assert ready.loop.program.name == "jog"
+        assert ready.loop.engine.program.name == "jog"
     finally:
         estimator.forget_lengths()
         ready.obeyed("disable")
@@ -284,7 +284,7 @@ def loaded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[WildRig, 
 
 def until_read(rig: WildRig, tension_N: float) -> None:
     """Turn until the right load cell is read as `tension_N`, but for its own error."""
-    told = rig.loop.parts.estimator.estimate
+    told = rig.loop.engine.parts.estimator.estimate
     rig.turn_until(lambda: abs(told.tension_N[1] - tension_N) < 2.0)
 
 
@@ -313,7 +313,7 @@ def test_measured_tensions_end_a_motion(
     told = rig.status["reason_limit"]
     cells.pull([30.0, 30.0])
     until_read(rig, 30.0)
-    rig.turn_until(lambda: bool(rig.order("acknowledge")["ok"]))
+    rig.turn_until(lambda: bool(rig.command("acknowledge")["ok"]))
     assert told["limit"] in limits
     assert told["axis"] == 1
     assert least_N < told["value"] < most_N
@@ -332,12 +332,12 @@ def test_a_silent_load_cell_ends_the_motion_and_is_named(
         told = rig.status
         assert told["reason_limit"]["limit"] == "tension_sensor"
         assert told["reason_limit"]["axis"] == 1
-        answer = rig.order("acknowledge")
+        answer = rig.command("acknowledge")
         assert "right: tension sensor: stale" in answer["text"]
         assert rig.state is LoopState.FAULT
     finally:
         cells.tell("mend 2")
-    rig.turn_until(lambda: bool(rig.order("acknowledge")["ok"]))
+    rig.turn_until(lambda: bool(rig.command("acknowledge")["ok"]))
 
 
 # -- a winch alone

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from tools.daemon.estop import EmergencyStop, Outcome
-from tools.daemon.loop_file import LoopFile, started
-from tools.daemon.paths import find_loop_files, find_sockets, is_trusted, left_out
-from tools.errors import WorkFailedError
+from cdpr_tools.daemon.estop import EmergencyStop, Outcome
+from cdpr_tools.daemon.loop_file import LoopFile, started
+from cdpr_tools.daemon.paths import find_loop_files, find_sockets, is_trusted, unsearched_folders
+from cdpr_tools.errors import WorkFailedError
 
 NOBODY = 65534
 OBEYS = "import signal, sys; signal.signal(signal.SIGUSR1, print); print(1, flush=True); input()"
@@ -24,7 +24,7 @@ DOES_NOT = "print(1, flush=True); input()"
 
 
 def cdpr(*arguments: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-P", "-m", "tools.cli", *map(str, arguments)]
+    command = [sys.executable, "-P", "-m", "cdpr_tools.cli", *map(str, arguments)]
     return subprocess.run(
         command,
         capture_output=True,
@@ -146,7 +146,7 @@ def test_a_folder_that_another_has_made_is_not_looked_into(
     folder.mkdir(mode=0o700)
     (folder / "r.loop").write_text(json.dumps(named(process.pid)))
     assert find_loop_files("r") == [folder / "r.loop"]
-    assert left_out() == ""
+    assert unsearched_folders() == ""
     give_away(folder)
     assert find_loop_files("r") == find_sockets("r") == []
     for command in (("estop",), ("estop", "r"), ("status",), ("disable",)):

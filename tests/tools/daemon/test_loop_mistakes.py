@@ -8,18 +8,18 @@ from typing import Any
 
 import pytest
 
-from cdpr_rt.runtime.programs.hold import HoldProgram
-from cdpr_rt.runtime.programs.idle import IdleProgram
-from cdpr_rt.runtime.programs.model import model_of
-from cdpr_rt.runtime.programs.registry import build_programs
-from cdpr_rt.runtime.robot_arrays import limits_of
-from cdpr_rt.runtime.shared_block import SharedBlock
-from cdpr_rt.runtime.states import LoopState, Reaction
-from drivers.cia402 import POWER_OFF
-from profiles import load_robot
+from cdpr_drivers.cia402 import POWER_OFF
+from cdpr_drivers.robot.machine import RobotMachine
+from cdpr_profiles import load_robot
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.programs.axes.hold import HoldProgram
+from cdpr_rt.programs.idle import IdleProgram
+from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.registry import build_programs
+from cdpr_rt.robots.robot_arrays import limits_of
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
-from tools.daemon.machine import RobotMachine
 
 PERIOD_S = 2e-3
 
@@ -50,7 +50,7 @@ def rig(tmp_path: Path) -> Iterator[LoopRig]:
 
 
 def test_a_program_that_cannot_stop_loses_the_power(rig: LoopRig) -> None:
-    answer = rig.order("disable")
+    answer = rig.command("disable")
     assert not answer["ok"]
     rig.turn_until(lambda: rig.state is LoopState.FAULT and not rig.loop.busy)
     assert "ZeroDivisionError: by nought" in rig.status["reason"]
@@ -59,9 +59,9 @@ def test_a_program_that_cannot_stop_loses_the_power(rig: LoopRig) -> None:
 
 
 def test_where_a_limit_ends_it_the_drives_brake_by_themselves(rig: LoopRig) -> None:
-    rig.loop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
-    assert rig.loop.reacting is Reaction.QUICK_STOP
-    assert not rig.loop.driving
+    rig.loop.safe_stop.stop(Reaction.CONTROLLED_STOP, LoopState.FAULT)
+    assert rig.loop.engine.reacting is Reaction.QUICK_STOP
+    assert not rig.loop.engine.driving
     rig.turn_until(lambda: rig.state is LoopState.FAULT)
     assert all(state in POWER_OFF for state in rig.machine._booted.states())
 
@@ -79,12 +79,12 @@ def test_a_status_that_cannot_be_written_ends_no_loop(
 ) -> None:
     before = rig.status["state"]
     if what == "reason":
-        rig.loop.life.blame("\u00e9" * 20000)
+        rig.loop.life.set_fault_reason("\u00e9" * 20000)
     elif what == "safety":
         monkeypatch.setattr(RobotMachine, "safety", "x" * 20000)
     else:
-        monkeypatch.setattr(rig.loop.block, "_status", rig.loop.block._status[:16])
-    rig.loop.status.touch()
+        monkeypatch.setattr(rig.loop.engine.block, "_status", rig.loop.engine.block._status[:16])
+    rig.loop.life.changed = True
     rig.turn(3)
     if what != "everything":
         assert rig.block.status()["state"] == before
@@ -92,7 +92,7 @@ def test_a_status_that_cannot_be_written_ends_no_loop(
 
 
 def test_long_words_are_answered(rig: LoopRig) -> None:
-    answer = rig.order("\u00e9" * 665)
+    answer = rig.command("\u00e9" * 665)
     assert not answer["ok"]
     rig.obeyed("hold")
 
@@ -111,5 +111,5 @@ def test_a_machine_that_cannot_be_left_in_order_is_told_of(
     assert isinstance(rig.machine, RobotMachine)
     rig.loop.request_stop()
     rig.turn_until(lambda: rig.loop.ended)
-    assert "contactor" in rig.loop.doubt
+    assert "contactor" in rig.loop.transitions.power_off_unconfirmed
     assert "contactor" in rig.status["reason"]

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from cdpr_rt.runtime.cycle_row import Row
-from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.core.cycle_row import Row
+from cdpr_rt.core.states import LoopState
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 
@@ -37,7 +37,7 @@ def test_motors_arrive_and_stand_in_spite_of_cogging_and_friction(rig: LoopRig) 
     for distance in ([3.0, -1.0], [-3.4, 2.0], [0.3, 0.4]):
         rig.obeyed("program", program="pid", wanted={"distance_rad": distance})
         rows = rig.run(3.0)
-        assert rig.loop.program.at_rest
+        assert rig.loop.engine.program.at_rest
         # friction of 0.1 Nm and cogging over the gain, less what the integral has made up for
         assert np.max(np.abs(error_deg(rows, 0.5))) < 4.0
         assert np.max(np.ptp(error_deg(rows, 0.5), axis=0)) < 2.0

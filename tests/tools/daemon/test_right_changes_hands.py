@@ -1,8 +1,8 @@
 """A thousand takings of the right to move: no cycle moves under a right that is another's by then.
 
 Two clients move axis 0, one forwards and one backwards, so that each set-point tells whose it is.
-An attacker wants axis 1 to move. All goes through the lease, the desk of the set-point stream and
-the shared memory to the loop and its simulated drives; only time is the test's.
+An attacker wants axis 1 to move. All goes through the lease, the session manager of the set-point
+stream and the shared memory to the loop and its simulated drives; only time is the test's.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.lease import LeaseError
-from cdpr_rt.service.stream_desk import StreamDesk
-from cdpr_rt.service.stream_packet import Bye, StreamSession, StreamSetpoint, seal
+from cdpr_rt.service.streams.stream_packet import Bye, StreamSession, StreamSetpoint, seal
+from cdpr_rt.service.streams.stream_sessions import StreamSessionManager
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
 
@@ -63,7 +63,7 @@ def test_motion_ends_when_the_right_changes_hands_between_two_looks(rig: LoopRig
     assert (rig.status["state"], rig.status["program"]) == ("active", "hold")
     assert rig.status["reason"] == "jog: the right to move has changed hands; held"
     for do in ("program", "set"):
-        answer = rig.order(do, program="jog", wanted=JOG, right=before)
+        answer = rig.command(do, program="jog", wanted=JOG, right=before)
         assert answer["text"] == f"{do}: the right to move is somebody else's by now"
     rig.obeyed("program", program="jog", wanted=JOG)
     rig.obeyed("disable")
@@ -73,7 +73,7 @@ def test_enabling_for_somebody_who_has_lost_the_right_ends_in_a_hold(rig: LoopRi
     what = {"do": "enable", "program": "jog", "wanted": JOG, "right": rig.right}
     number = rig.block.post_command(what)
     rig.turn_until(lambda: rig.state is LoopState.ACTIVE)
-    assert not rig.loop.driving
+    assert not rig.loop.engine.driving
     change_hands(rig)
     rig.turn_until(lambda: not rig.loop.busy)
     answer = rig.block.take_reply()
@@ -124,8 +124,8 @@ class Scene:
     """Cycles that moved on the holder's behalf; takings that have stopped somebody's motion."""
 
     def __post_init__(self) -> None:
-        self.desk = StreamDesk(self.rig.block, self.rig.lease)
-        self.rig.loop.right._clock_ns = self.clock_ns
+        self.sessions = StreamSessionManager(self.rig.block, self.rig.lease)
+        self.rig.loop.engine.right._clock_ns = self.clock_ns
 
     def clock_ns(self) -> int:
         in_between, self.in_between = self.in_between, None
@@ -174,7 +174,7 @@ class Scene:
         data = seal(packet, session.key)
         self.packets = [*self.packets[-KEPT:], (data, client.port)]
         posted = int(self.rig.block.counters["samples"][0])
-        self.desk.take(data, ("127.0.0.1", client.port), self.rig.now_ns)
+        self.sessions.receive(data, ("127.0.0.1", client.port), self.rig.now_ns)
         if int(self.rig.block.counters["samples"][0]) > posted:
             self.until_ns = self.rig.now_ns + round(TTL_S * 1e9)
 
@@ -189,9 +189,9 @@ class Scene:
             self.clock_ns()
         while self.rig.block.take_reply() is not None:
             pass
-        assert (loop.life.state, loop.driving) == (LoopState.ACTIVE, True), loop.life.reason
-        before, self.speed = self.speed, float(loop.setpoint.velocity_rad_s[0])
-        assert loop.setpoint.velocity_rad_s[1] == 0.0, "the attacker's axis"
+        assert (loop.life.state, loop.engine.driving) == (LoopState.ACTIVE, True), loop.life.reason
+        before, self.speed = self.speed, float(loop.engine.setpoint.velocity_rad_s[0])
+        assert loop.engine.setpoint.velocity_rad_s[1] == 0.0, "the attacker's axis"
         if abs(self.speed) <= STEP_rad_s:
             return
         brakes = before * self.speed > 0.0 and abs(self.speed) < abs(before)
@@ -200,7 +200,7 @@ class Scene:
             assert holds and self.ordered, f"{self.speed} rad/s are nobody's"
             assert self.holder is not None
             assert self.speed * self.holder.sign > 0.0, f"{self.speed} rad/s, {self.holder.name}"
-            assert loop.right.mover == self.number
+            assert loop.engine.right.mover == self.number
             self.driven += 1
 
 
@@ -211,7 +211,7 @@ def moves(scene: Scene, client: Client) -> None:
     jog = {"velocity_rad_s": [speed, 0.0], "timeout_s": 2.0}
     (way,) = chance.choices(("jog", "stream", "set", "enable"), (4, 4, 2, 1))
     if way == "stream" and client is scene.holder:
-        client.session = scene.desk.give(client.token)
+        client.session = scene.sessions.issue(client.token)
         client.sequence, client.place_m = 0, 0.0
         command = scene.asked(client, "program", program="follow")
     elif way == "set":
@@ -238,7 +238,7 @@ def attacks(scene: Scene) -> None:
 def guesses(scene: Scene) -> None:
     held = None if scene.holder is None else scene.holder.token
     for token in (scene.chance.randbytes(18).hex(), "", scene.chance.choice(scene.tokens)):
-        for use in (scene.rig.lease.renew, scene.rig.lease.release, scene.desk.give):
+        for use in (scene.rig.lease.renew, scene.rig.lease.release, scene.sessions.issue):
             if token != held:
                 with pytest.raises(LeaseError):
                     use(token)
@@ -261,7 +261,7 @@ def makes_orders(scene: Scene) -> None:
 def replays_packets(scene: Scene) -> None:
     for data, port in scene.chance.sample(scene.packets, min(8, len(scene.packets))):
         address = "127.0.0.1", scene.chance.choice((port, ATTACKER.port))
-        scene.desk.take(data, address, scene.rig.now_ns)
+        scene.sessions.receive(data, address, scene.rig.now_ns)
 
 
 def forges(scene: Scene) -> None:
@@ -269,9 +269,11 @@ def forges(scene: Scene) -> None:
     session = scene.chance.choice([scene.chance.randrange(1, 1 << 32), *sessions])
     packet = StreamSetpoint(session, scene.chance.randrange(1 << 20), 1, (0.0, 0.1, 0.0))
     for forged in (packet.pack(), *(seal(packet, key) for key in (bytes(32), b""))):
-        assert scene.desk.take(forged, ("127.0.0.1", ATTACKER.port), scene.rig.now_ns) is None
+        assert (
+            scene.sessions.receive(forged, ("127.0.0.1", ATTACKER.port), scene.rig.now_ns) is None
+        )
     goodbye = seal(Bye(session, 1 << 30), bytes(32))
-    scene.desk.take(goodbye, ("127.0.0.1", ATTACKER.port), scene.rig.now_ns)
+    scene.sessions.receive(goodbye, ("127.0.0.1", ATTACKER.port), scene.rig.now_ns)
 
 
 CLIENTS = Client("forwards", 1, 4001), Client("backwards", -1, 4002)
@@ -302,9 +304,9 @@ def test_no_motion_goes_on_under_somebody_elses_right(rig: LoopRig) -> None:
                     moves(scene, one)
             if chance.random() < 0.15:
                 attacks(scene)
-    counts = rig.loop.parts.programs["follow"].progress()
+    counts = rig.loop.engine.parts.programs["follow"].progress()
     print(f"{scene.number} takings, {scene.stopped} in motion, {scene.driven} cycles moved")
-    print(f"packets {dict(scene.desk.counts)}, samples {counts}")
+    print(f"packets {dict(scene.sessions.counts)}, samples {counts}")
     assert scene.driven > TAKINGS
     assert scene.stopped > TAKINGS // 8
     assert np.ptp(rig.rows()["setpoint_rad"][:, 1]) < 0.02

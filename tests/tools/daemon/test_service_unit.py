@@ -14,16 +14,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from profiles import load_robot
-from tools.daemon.notify import ServiceManager
-from tools.daemon.paths import default_socket, find_sockets
-from tools.daemon.settings import Address, RunSettings, is_loopback, read_key
-from tools.daemon.unit import service_unit
-from tools.errors import BadInputError
+from cdpr_profiles import load_robot
+from cdpr_tools.daemon.notify import ServiceManager
+from cdpr_tools.daemon.paths import default_socket, find_sockets
+from cdpr_tools.daemon.settings import Address, RunSettings, is_loopback, read_key
+from cdpr_tools.daemon.unit import service_unit
+from cdpr_tools.errors import BadInputError
 
 
 def cdpr(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tools.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "cdpr_tools.cli", *map(str, arguments)]
     return subprocess.run(
         command, capture_output=True, text=True, timeout=120, check=False, cwd=cwd
     )
@@ -182,4 +182,4 @@ def test_nobody_is_told_where_nobody_asks(monkeypatch: pytest.MonkeyPatch) -> No
     assert manager.asks
     assert manager.watchdog_s == 0.0
     assert "NOTIFY_SOCKET" not in os.environ
-    manager.tell(READY=1)  # who has gone is not missed
+    manager.notify(READY=1)  # who has gone is not missed

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.runtime.shared_block import MESSAGES, URGENT_MESSAGES
-from cdpr_rt.runtime.states import LoopState
+from cdpr_rt.core.shared_block import MESSAGES, URGENT_MESSAGES
+from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.link import LoopLink, Reply
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
@@ -110,7 +110,7 @@ def test_whatever_was_asked_for_before_a_stop_does_not_move_after_it(
         stops = [task.result() for do, task in clients.asked if do != "program"]
         assert all(reply.ok for reply in stops)
         if asked:
-            assert active.loop.program.name == ("jog" if asked[-1] == "program" else "hold")
+            assert active.loop.engine.program.name == ("jog" if asked[-1] == "program" else "hold")
 
     asyncio.run(play())
 
@@ -123,12 +123,12 @@ def test_a_stop_is_taken_before_a_full_queue(active: LoopRig) -> None:
     block.void_commands()
     number = block.post_urgent({"do": "hold", "client": "another"})
     active.turn(1)
-    assert active.loop.program.name == "hold"
+    assert active.loop.engine.program.name == "hold"
     answers = [block.take_reply(), block.take_reply()]
     assert answers[0] is not None
     assert (answers[0]["to"], answers[0]["ok"]) == (number, True)
     active.turn(MESSAGES)
-    assert active.loop.program.name == "hold"
+    assert active.loop.engine.program.name == "hold"
     while (reply := block.take_reply()) is not None:
         assert "a stop was asked for after it" in reply["text"]
     active.obeyed("program", **JOG)  # what comes later counts again
@@ -164,7 +164,7 @@ def test_what_is_no_stop_is_left_aside(active: LoopRig) -> None:
         block.counters["urgent"][0] = number + 1
         active.turn(2)
         assert block.counters["urgent_taken"][0] == number + 1
-    assert active.loop.program.name == "hold"
+    assert active.loop.engine.program.name == "hold"
 
 
 def test_a_hold_over_and_over_does_not_begin_anew(active: LoopRig) -> None:
@@ -172,7 +172,7 @@ def test_a_hold_over_and_over_does_not_begin_anew(active: LoopRig) -> None:
     active.run(0.2)
     active.obeyed("hold")
     active.run(0.5)
-    setpoint = active.loop.setpoint.position_rad.copy()
+    setpoint = active.loop.engine.setpoint.position_rad.copy()
     for _ in range(50):
         active.obeyed("hold")
-    assert active.loop.setpoint.position_rad == pytest.approx(setpoint, abs=1e-12)
+    assert active.loop.engine.setpoint.position_rad == pytest.approx(setpoint, abs=1e-12)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_rt.runtime.states import LoopState
-from drivers.cia402 import POWER_OFF, State, state_of
+from cdpr_drivers.cia402 import POWER_OFF, State, state_of
+from cdpr_rt.core.states import LoopState
 from tests.drivers.bus_log import BusLog, logged
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import Simulator, robot_file, simulated, unique
@@ -21,7 +21,7 @@ JOG = {"velocity_rad_s": [20.0, 20.0], "timeout_s": 2.0}
 def jog(rig: LoopRig) -> None:
     rig.obeyed("enable", program="jog", wanted=JOG)
     rig.run(0.8)
-    assert np.all(rig.loop.parts.estimator.estimate.velocity_rad_s > 15.0)
+    assert np.all(rig.loop.engine.parts.estimator.estimate.velocity_rad_s > 15.0)
     rig.rows()
 
 
@@ -71,7 +71,7 @@ def test_answers_are_missing_while_the_drives_brake(tmp_path: Path) -> None:
         with logged(str(bus)) as log:
             rig.turn(10)
             for axis in (0, 1):
-                rig.misbehave(axis, DROP_TPDOS, 20)
+                rig.inject_fault(axis, DROP_TPDOS, 20)
                 rig.turn(1)
             rig.turn_until(lambda: rig.state is LoopState.FAULT)
         for node in (1, 2):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tools.experiment import figures, thesis
-from tools.experiment.points import POINT
-from tools.experiment.report import lines
-from tools.experiment.statistics import rows, run_times_s, variance_analysis
+from cdpr_tools.experiment import figures, thesis
+from cdpr_tools.experiment.points import POINT
+from cdpr_tools.experiment.report import lines
+from cdpr_tools.experiment.statistics import rows, run_times_s, variance_analysis
 
 
 def made_up(sigma_mm: dict[float, float], runs: int = 30) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The operator model: a hand that trembles, eyes that see late, and a stopping rule."""
+"""The operator model: a hand that trembles, a delayed view, and a stopping rule."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from profiles import load_robot
-from tools.errors import BadInputError, WorkFailedError
-from tools.experiment import trial
-from tools.experiment.eyes import Eyes
-from tools.experiment.hand import Hand
-from tools.experiment.parameters import OperatorParameters, Station
-from tools.experiment.path import PLACES, centre_m, targets_m
-from tools.experiment.plants import PerfectRobot
-from tools.experiment.points import points_of_perfect_robot
-from tools.experiment.statistics import spread_mm
-from tools.experiment.trial import PACKET_S, SHARE_THERE, Condition, run_trial
-from tools.teleop.steady import SteadyHand
-from tools.trials.run import platform_of
+from cdpr_profiles import load_robot
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.experiment import trial
+from cdpr_tools.experiment.model.hand_model import HandModel
+from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
+from cdpr_tools.experiment.model.plants import PerfectRobot
+from cdpr_tools.experiment.model.vision import VisionModel
+from cdpr_tools.experiment.path import PLACES, centre_m, place_of, plane_of, targets_m
+from cdpr_tools.experiment.points import points_of_perfect_robot
+from cdpr_tools.experiment.statistics import spread_mm
+from cdpr_tools.experiment.trial import PACKET_S, SHARE_THERE, Condition, run_trial
+from cdpr_tools.teleop.position_filter import PositionFilter
+from cdpr_tools.trials.directions import Directions, platform_of
 
 ROBOT = load_robot("planar-3")
 PLATFORM = platform_of(ROBOT)
@@ -31,7 +31,7 @@ CENTRE = centre_m(ROBOT, "A")
 
 
 def hand_at_rest(seconds: float, **changes: float) -> np.ndarray:
-    hand = Hand(replace(OPERATOR, **changes), PACKET_S, np.random.default_rng(5))
+    hand = HandModel(replace(OPERATOR, **changes), PACKET_S, np.random.default_rng(5))
     samples = []
     for _ in range(round(seconds / PACKET_S)):
         hand.step()
@@ -71,11 +71,11 @@ def test_the_master_knows_only_its_steps() -> None:
 
 def test_a_steadied_hand_trembles_less_and_ends_where_the_hand_ends() -> None:
     raw = hand_at_rest(60.0, drift_m=1e-9)
-    steady = SteadyHand(PACKET_S)
+    steady = PositionFilter(PACKET_S)
     smooth = np.array([steady.update(x) for x in raw])
     assert smooth[100:].std() < 0.3 * raw[100:].std()
     way = np.linspace(0.0, 0.1, 25)[:, None] * [1.0, -0.5]
-    steady = SteadyHand(PACKET_S)
+    steady = PositionFilter(PACKET_S)
     for place in (*way, *[way[-1]] * 100):
         last = steady.update(place)
     assert last == pytest.approx(way[-1], abs=1e-6)
@@ -83,15 +83,15 @@ def test_a_steadied_hand_trembles_less_and_ends_where_the_hand_ends() -> None:
 
 def test_pictures_come_late_and_in_pixels() -> None:
     exact = replace(OPERATOR, sight_pixel_m=1e-9)
-    eyes = Eyes(exact, 0.3, np.random.default_rng(1))
+    vision = VisionModel(exact, 0.3, np.random.default_rng(1))
     for k in range(40):
-        eyes.show(k * PACKET_S, np.array([k * 1e-3, 0.0]))
-    newest = eyes.seen[-1]
+        vision.show(k * PACKET_S, np.array([k * 1e-3, 0.0]))
+    newest = vision.seen[-1]
     assert 39 * PACKET_S - newest.taken_s >= 0.3 - 1e-9
     assert 39 * PACKET_S - newest.taken_s < 0.3 + OPERATOR.frame_s
     target = np.array([0.03, 0.0])
-    assert eyes.judge([newest], target) == pytest.approx(target - newest.platform_m, abs=1e-7)
-    coarse = Eyes(OPERATOR, 0.3, np.random.default_rng(1))
+    assert vision.judge([newest], target) == pytest.approx(target - newest.platform_m, abs=1e-7)
+    coarse = VisionModel(OPERATOR, 0.3, np.random.default_rng(1))
     judged = [coarse.judge([newest], target) for _ in range(4000)]
     assert np.std(judged, axis=0) == pytest.approx(OPERATOR.sight_pixel_m, rel=0.05)
 
@@ -183,3 +183,17 @@ def test_no_room_for_the_pattern_is_told() -> None:
         centre_m(replace(ROBOT, platform=narrow), "B")
     with pytest.raises(BadInputError, match="allowed: A, B, C"):
         centre_m(ROBOT, "D")
+
+
+def test_in_space_the_pattern_stands_upright_in_the_middle_of_the_depth():
+    robot = load_robot("suspended-8")
+    directions = Directions.of(platform_of(robot))
+    centre = centre_m(robot, "B")
+    place = place_of(directions, centre)
+    low, high = directions.low_m, directions.high_m
+    assert place[:3] == pytest.approx(
+        [0.5 * (low[0] + high[0]) - 0.2 * (high[0] - low[0]), 0.5 * (low[1] + high[1]),
+         0.75 * low[2] + 0.25 * high[2]]
+    )  # fmt: skip
+    assert place[3:].tolist() == [0.0, 0.0, 0.0]
+    assert place[list(plane_of(3))] == pytest.approx(centre)

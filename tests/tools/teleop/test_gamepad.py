@@ -17,23 +17,26 @@ from typing import Any
 
 import pytest
 from evdev import AbsInfo, InputEvent, ecodes
+from scipy.spatial.transform import Rotation
 
-from tools.errors import BadInputError
-from tools.teleop.gamepad import EvdevFinder, Gamepad, InputDevice, stick_map
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.teleop.gamepad import EvdevDevice, EvdevFinder, Gamepad, stick_map
+from cdpr_tools.teleop.stick import StickMap
 
-MAP = stick_map("ABS_X,-ABS_Y", "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
+PLANE, ROOM = (2, ()), (3, (0, 1, 2))
+MAP = stick_map(PLANE, None, None, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
 SCALE = 8.0
 
 
 class StandIn:
-    """Gives what was put into it as an InputDevice does, until it is unplugged."""
+    """Gives what was put into it as an EvdevDevice does, until it is unplugged."""
 
     path = "/dev/input/event7"
     name = "a pad that is not there"
 
     def __init__(self, least: int = 0, most: int = 255) -> None:
         self.events: deque[InputEvent] = deque()
-        self.values = {ecodes.ABS_X: (least + most + 1) // 2, ecodes.ABS_Y: (least + most + 1) // 2}
+        self.values = dict.fromkeys(range(ecodes.ABS_MAX), (least + most + 1) // 2)
         self.range = least, most
         self.plugged = True
         self.closed = False
@@ -67,20 +70,20 @@ class Pads:
 
     there: list[StandIn] = field(default_factory=list)
 
-    def find(self) -> InputDevice | None:
+    def find(self) -> EvdevDevice | None:
         return self.there.pop(0) if self.there else None
 
-    def nowhere(self) -> str:
+    def missing_text(self) -> str:
         return "nothing is plugged in"
 
 
 class Rig:
     """A gamepad whose time the test tells."""
 
-    def __init__(self, *pads: StandIn) -> None:
+    def __init__(self, *pads: StandIn, used: StickMap = MAP) -> None:
         self.pad = pads[0]
         self.pads = Pads(list(pads[:1]))
-        self.device = Gamepad(self.pads, MAP, SCALE)
+        self.device = Gamepad(self.pads, used, SCALE)
         self.now_s = 10.0
         self.hand = self.device.read(self.now_s)
 
@@ -194,7 +197,7 @@ def test_nothing_that_fits_is_refused(tmp_path: Path) -> None:
     missing = tmp_path / "event0"
     finder = EvdevFinder(missing, MAP)
     assert finder.find() is None
-    assert f"--input {missing}: is no input device" in finder.nowhere()
+    assert f"--input {missing}: is no input device" in finder.missing_text()
     missing.write_text("no device either")
     assert EvdevFinder(missing, MAP).find() is None
 
@@ -202,8 +205,8 @@ def test_nothing_that_fits_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("axes", "dead_man", "confirm", "told"),
     [
-        ("ABS_X", "BTN_TR", "BTN_SOUTH", "--axes ABS_X: allowed: two axes"),
-        ("ABS_X,ABS_X", "BTN_TR", "BTN_SOUTH", "two different ones"),
+        ("ABS_X", "BTN_TR", "BTN_SOUTH", "--axes ABS_X: 1 axes; allowed: 2 for this robot"),
+        ("ABS_X,ABS_X", "BTN_TR", "BTN_SOUTH", "ABS_X,ABS_X: allowed: different ones"),
         ("ABS_X,ABS_Q", "BTN_TR", "BTN_SOUTH", "--axes: 'ABS_Q'; allowed: a name of the kernel's"),
         ("ABS_X,ABS_Y", "KEY_A", "BTN_SOUTH", "--dead-man: 'KEY_A'"),
         ("ABS_X,ABS_Y", "BTN_TR", "BTN_TR", "--confirm BTN_TR: allowed: another button"),
@@ -213,4 +216,44 @@ def test_names_that_mean_nothing_are_refused(
     axes: str, dead_man: str, confirm: str, told: str
 ) -> None:
     with pytest.raises(BadInputError, match=told):
-        stick_map(axes, dead_man, confirm, 0.1, 0.05)
+        stick_map(PLANE, axes, None, dead_man, confirm, 0.1, 0.05)
+
+
+def test_a_second_stick_and_the_directional_pad_lift_and_turn() -> None:
+    used = stick_map(ROOM, None, None, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
+    most = 0.05 * math.radians(100.0)  # a tenth of a degree for a millimetre
+    for code, value, way, about in (
+        (ecodes.ABS_HAT0Y, -1000, (0.0, 0.0, 0.05), (0.0, 0.0, 0.0)),
+        (ecodes.ABS_RX, 1000, (0.0, 0.0, 0.0), (0.0, most, 0.0)),
+        (ecodes.ABS_RY, 1000, (0.0, 0.0, 0.0), (most, 0.0, 0.0)),
+        (ecodes.ABS_HAT0X, -1000, (0.0, 0.0, 0.0), (0.0, 0.0, most)),
+    ):
+        rig = Rig(StandIn(-1000, 1000), used=used)
+        rig.key(ecodes.BTN_TR, True)
+        rig.pad.put(ecodes.EV_ABS, code, value)
+        rig.run(1.0)
+        assert rig.hand.position_m == pytest.approx(way, abs=1e-3)
+        w, *vector = rig.hand.quaternion
+        turned = Rotation.from_quat([*vector, w]).as_rotvec()
+        assert turned == pytest.approx(about, abs=2e-3)
+
+
+def test_in_a_plane_the_second_stick_turns_to_its_side() -> None:
+    used = stick_map((2, (2,)), None, None, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
+    rig = Rig(StandIn(-1000, 1000), used=used)
+    rig.key(ecodes.BTN_TR, True)
+    rig.pad.put(ecodes.EV_ABS, ecodes.ABS_RX, -1000)
+    rig.run(1.0)
+    assert 2.0 * math.atan2(rig.hand.quaternion[3], rig.hand.quaternion[0]) == pytest.approx(
+        0.05 * math.radians(100.0), rel=0.03
+    )
+
+
+def test_axes_that_do_not_fit_the_robot_are_refused() -> None:
+    for axes, turns, told in (
+        ("ABS_X,ABS_Y", None, "--axes ABS_X,ABS_Y: 2 axes; allowed: 3"),
+        (None, "ABS_RX", "--turn-axes ABS_RX: 1 axes; allowed: 3"),
+        (None, "ABS_X,ABS_RX,ABS_RY", "allowed: different ones"),
+    ):
+        with pytest.raises(BadInputError, match=told):
+            stick_map(ROOM, axes, turns, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)

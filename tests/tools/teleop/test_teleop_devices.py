@@ -10,12 +10,13 @@ import time
 from pathlib import Path
 
 import pytest
+from scipy.spatial.transform import Rotation
 
-from cdpr_rt.service.stream_packet import REACH_M
-from tools.errors import BadInputError
-from tools.teleop.hand import Hand, HandDevice, parse_scale
-from tools.teleop.keyboard import Keyboard, Keys, STEPS_mm
-from tools.teleop.script import ScriptHand, read_script
+from cdpr_rt.service.streams.stream_packet import REACH_M
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.teleop.input_device import InputDevice, InputSample, parse_scale
+from cdpr_tools.teleop.keyboard import Keyboard, Keys, STEPS_mm
+from cdpr_tools.teleop.script import ScriptDevice, read_script
 
 UP, DOWN, RIGHT, LEFT = "\x1b[A", "\x1b[B", "\x1b[C", "\x1bOD"
 TICK_S = 1.0 / 60.0
@@ -41,7 +42,7 @@ def script(folder: Path, text: str) -> Path:
 
 
 def test_a_script_is_played_straight_between_its_lines(tmp_path: Path) -> None:
-    hand = ScriptHand(
+    hand = ScriptDevice(
         read_script(
             script(
                 tmp_path,
@@ -56,7 +57,7 @@ def test_a_script_is_played_straight_between_its_lines(tmp_path: Path) -> None:
     for t, (x_mm, y_mm) in {
         0.0: (0, 0), 0.5: (5, 0), 1.4: (10, 0), 2.5: (5, 10), 3.0: (0, 0), 9.0: (0, 0)
     }.items():  # fmt: skip
-        assert seen[t].position_m == pytest.approx((1e-3 * x_mm, 1e-3 * y_mm), abs=1e-12)
+        assert seen[t].position_m == pytest.approx((1e-3 * x_mm, 1e-3 * y_mm, 0.0), abs=1e-12)
     assert [seen[t].confirmed for t in (1.4, 1.5, 2.5, 3.0)] == [0, 1, 1, 2]
     assert [seen[t].clutch for t in (1.5, 1.99, 2.5, 3.0)] == [False, False, True, False]
     assert seen[2.5].end is None
@@ -64,13 +65,46 @@ def test_a_script_is_played_straight_between_its_lines(tmp_path: Path) -> None:
     assert end is not None and end.arrive and not end.failed
 
 
+def test_a_script_lifts_and_turns_the_hand_steadily(tmp_path: Path) -> None:
+    hand = ScriptDevice(read_script(script(tmp_path, "0 5 5\n2 5 5 z=40 turn=0,-90,0\n3 5 5")))
+    hand.read(0.0)
+    seen = hand.read(1.0)
+    assert seen.position_m == pytest.approx((0.0, 0.0, 0.02))
+    half = math.radians(22.5)
+    assert seen.quaternion == pytest.approx((math.cos(half), 0.0, -math.sin(half), 0.0))
+
+
+def test_keys_lift_and_turn_about_the_room_s_axes() -> None:
+    keys = Keys(scale=1.0)
+    for key in "+" * 4 + "rrf" + "uuukkl":
+        keys.press(key, TICK_S)
+    assert keys.position_m == pytest.approx((0.0, 0.0, keys.step_m))
+    step = math.radians(0.1) * 1e3 * keys.step_m
+    turned = Rotation.identity()
+    for vector in (
+        [0, 0, step],
+        [0, 0, step],
+        [0, 0, step],
+        [step, 0, 0],
+        [step, 0, 0],
+        [0, step, 0],
+    ):
+        turned = Rotation.from_rotvec(vector) * turned
+    x, y, z, w = turned.as_quat(canonical=True)
+    assert keys.quaternion == pytest.approx((w, x, y, z))
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
         ("", "no lines; allowed: seconds x_mm y_mm"),
-        ("0 0", r"line 1: '0 0'; allowed: seconds x_mm y_mm \[clutch\]"),
+        ("0 0", r"line 1: '0 0'; allowed: seconds x_mm y_mm \[z=MM\]"),
         ("0 0 0\n\n1 0 zero", "line 3: '1 0 zero'"),
-        ("0 0 0 clutsh", "line 1: 'clutsh'; allowed: clutch, confirm"),
+        ("0 0 0 clutsh", "line 1: 'clutsh'; allowed: clutch, confirm, z=, turn="),
+        ("0 0 0 z=up", "line 1: 'z=up'; allowed: numbers, 1 of up to 20000"),
+        ("0 0 0 z=1,2", "line 1: 'z=1,2'; allowed: numbers, 1"),
+        ("0 0 0 turn=5", "line 1: 'turn=5'; allowed: numbers, 3 of up to 180"),
+        ("0 0 0 turn=0,0,nan", "line 1: 'turn=0,0,nan'; allowed: numbers, 3"),
         ("1 0 0\n1 0 0", "line 2: 1 s; allowed: more than 1 s"),
         ("-1 0 0", "line 1: -1 s; allowed: 0 and more"),
         ("nan 0 0", "line 1: nan s"),
@@ -108,7 +142,7 @@ def test_each_press_is_a_step_and_nothing_moves_without() -> None:
     step = keys.step_m
     for key in (RIGHT, RIGHT, UP, "d", LEFT, DOWN, "w"):
         keys.press(key, TICK_S)
-    assert keys.position_m == pytest.approx((2 * step, step))
+    assert keys.position_m == pytest.approx((2 * step, step, 0.0))
     keys.press("+", TICK_S)
     assert keys.step_m > step
     for _ in range(20):
@@ -121,7 +155,7 @@ def test_keys_that_come_in_pieces_are_understood() -> None:
     step = keys.step_m
     for piece in ("\x1b", "[", "C", "\x1b[", "C", "\x1b", "\x1b[C", "\x1b[1;5C\x1b[3~", "x\x1bOC"):
         keys.press(piece, TICK_S)
-    assert keys.position_m == pytest.approx((4 * step, 0.0))  # not for Ctrl-right and Delete
+    assert keys.position_m == pytest.approx((4 * step, 0.0, 0.0))  # not for Ctrl-right and Delete
 
 
 def test_space_holds_enter_confirms_q_ends() -> None:
@@ -129,7 +163,7 @@ def test_space_holds_enter_confirms_q_ends() -> None:
     keys.press(" ", TICK_S)
     assert keys.clutch
     keys.press(RIGHT, TICK_S)
-    assert keys.position_m == (0.0, 0.0)
+    assert keys.position_m == (0.0, 0.0, 0.0)
     keys.press(" \r" + "\n", TICK_S)
     assert not keys.clutch
     assert keys.confirmed == 2
@@ -157,7 +191,7 @@ def test_no_hand_goes_where_packets_are_refused() -> None:
     assert 100.0 * math.hypot(*keys.position_m) < REACH_M
 
 
-def read_soon(device: HandDevice, what: str) -> Hand:
+def read_soon(device: InputDevice, what: str) -> InputSample:
     """Read until something is true of the hand: terminals pass bytes on in their own time."""
     end = time.monotonic() + 5.0
     while not getattr(hand := device.read(time.monotonic()), what):
@@ -175,7 +209,7 @@ def test_a_terminal_leads_and_is_given_back_as_it_was() -> None:
     assert during[3] & termios.ISIG  # Ctrl-C stays what it is
     os.write(ours, RIGHT.encode() + b" \n")  # before anybody listens
     time.sleep(0.05)
-    assert device.read(time.monotonic()) == Hand(clutch=False)
+    assert device.read(time.monotonic()) == InputSample(clutch=False)
     os.write(ours, RIGHT.encode())
     time.sleep(0.05)
     os.write(ours, b"\n")

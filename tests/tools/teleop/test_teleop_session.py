@@ -9,17 +9,17 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from cdpr_rt.core.shared_block import SAMPLES, SharedBlock
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.motion.stream_buttons import CLUTCH, confirmation
 from cdpr_rt.runtime.right import PublishedRight
-from cdpr_rt.runtime.shared_block import SAMPLES, SharedBlock
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.runtime.stream_buttons import CLUTCH, confirmation
 from cdpr_rt.service.lease import Lease
-from cdpr_rt.service.setpoint_stream import SetpointStream, listen_udp
-from cdpr_rt.service.stream_client import StreamClient
-from tools.teleop import session as session_module
-from tools.teleop.hand import End, Hand, HandDevice
-from tools.teleop.script import ScriptHand, ScriptLine
-from tools.teleop.session import Session
+from cdpr_rt.service.streams.setpoint_stream import SetpointStream, listen_udp
+from cdpr_rt.service.streams.stream_client import StreamClient
+from cdpr_tools.teleop import session as session_module
+from cdpr_tools.teleop.input_device import End, InputDevice, InputSample
+from cdpr_tools.teleop.script import ScriptDevice, ScriptLine
+from cdpr_tools.teleop.session import TeleopSession
 
 POSE, IDLE = 3, 0
 SCALE = 4.0
@@ -58,19 +58,19 @@ def robot() -> Iterator[Robot]:
         one.stream.stop()
 
 
-def lead(
-    robot: Robot, device: HandDevice, after: tuple[float, Callable[[], None]] | None = None
-) -> tuple[Session, End]:
+def teleoperate(
+    robot: Robot, device: InputDevice, after: tuple[float, Callable[[], None]] | None = None
+) -> tuple[TeleopSession, End]:
     """Lead to the end; have something happen after some seconds."""
     timer = threading.Timer(*after) if after else None
-    given = robot.stream.desk.give(robot.token)
+    given = robot.stream.sessions.issue(robot.token)
     with StreamClient(*robot.stream.address, given) as stream:
-        session = Session(stream, device, SCALE, POSE)
+        session = TeleopSession(stream, device, SCALE, POSE)
         if timer:
             timer.start()
         try:
             deadline_s = time.monotonic() + 20.0
-            return session, session.lead(lambda: time.monotonic() > deadline_s)
+            return session, session.teleoperate(lambda: time.monotonic() > deadline_s)
         finally:
             if timer:
                 timer.join()
@@ -84,8 +84,8 @@ class Still:
     def __init__(self, trouble: str = "") -> None:
         self.trouble = trouble
 
-    def read(self, now_s: float) -> Hand:
-        return Hand((0.01, 0.02), clutch=False, trouble=self.trouble)
+    def read(self, now_s: float) -> InputSample:
+        return InputSample((0.01, 0.02, 0.0), clutch=False, trouble=self.trouble)
 
     def close(self) -> None:
         pass
@@ -93,18 +93,21 @@ class Still:
 
 def test_what_the_hand_does_reaches_the_loop_and_its_answer_the_hand(robot: Robot) -> None:
     lines = (
-        ScriptLine(0.0, (0.0, 0.0)),
-        ScriptLine(0.2, (0.01, -0.02), confirm=True),
-        ScriptLine(0.3, (0.01, -0.02), clutch=True),
-        ScriptLine(0.4, (0.0, 0.0), confirm=True),
+        ScriptLine(0.0, (0.0, 0.0, 0.0)),
+        ScriptLine(0.2, (0.01, -0.02, 0.0), confirm=True),
+        ScriptLine(0.3, (0.01, -0.02, 0.0), (0.0, 0.4, 0.0), clutch=True),
+        ScriptLine(0.4, (0.0, 0.0, 0.0), confirm=True),
     )
-    session, end = lead(robot, ScriptHand(lines))
+    session, end = teleoperate(robot, ScriptDevice(lines))
     assert (end.failed, end.text) == (False, "the script is done")
     samples = robot.samples()
     assert np.all(samples["scale"] == SCALE)
     numbers = confirmation(samples["buttons"].astype(np.int64))
     assert sorted(set(numbers.tolist())) == [0, 1, 2]
     np.testing.assert_allclose(samples["position_m"][numbers == 1][0], [0.01, -0.02, 0], atol=2e-3)
+    turned = 2.0 * np.arctan2(samples["quaternion"][:, 2], samples["quaternion"][:, 0])
+    assert turned.max() == pytest.approx(0.4, abs=0.1)
+    assert np.abs(np.diff(turned)).max() < 0.3, "steadily"
     clutch = (samples["buttons"] & CLUTCH) != 0
     assert clutch[0]  # until the robot has answered nothing leads
     assert clutch[numbers == 1][-1] and not clutch[numbers == 1][0] and not clutch[-1]
@@ -116,37 +119,37 @@ def test_what_the_hand_does_reaches_the_loop_and_its_answer_the_hand(robot: Robo
 
 
 def test_a_hand_in_trouble_does_not_lead(robot: Robot) -> None:
-    session, _ = lead(robot, Still("its cable is loose"), (0.4, lambda: robot.run(IDLE)))
+    session, _ = teleoperate(robot, Still("its cable is loose"), (0.4, lambda: robot.run(IDLE)))
     assert session.leading
     assert np.all(robot.samples()["buttons"] & CLUTCH)
 
 
 def test_a_program_that_has_ended_ends_it(robot: Robot) -> None:
-    session, end = lead(robot, Still(), (0.3, lambda: robot.run(IDLE)))
+    session, end = teleoperate(robot, Still(), (0.3, lambda: robot.run(IDLE)))
     assert end.failed and end.text == "the robot does not follow the stream any more"
     assert session.leading
 
 
 def test_a_fault_ends_it(robot: Robot) -> None:
-    _, end = lead(robot, Still(), (0.3, lambda: robot.run(POSE, LoopState.FAULT)))
+    _, end = teleoperate(robot, Still(), (0.3, lambda: robot.run(POSE, LoopState.FAULT)))
     assert end.failed
 
 
 def test_a_right_that_is_gone_ends_it(robot: Robot) -> None:
-    _, end = lead(robot, Still(), (0.3, lambda: robot.lease.release(robot.token)))
+    _, end = teleoperate(robot, Still(), (0.3, lambda: robot.lease.release(robot.token)))
     assert end.failed and end.text.startswith("the right to move has ended")
 
 
 def test_a_robot_lost_on_its_way_to_the_end_of_a_script_is_told(robot: Robot) -> None:
-    done = ScriptHand((ScriptLine(0.0, (0.0, 0.0)),))
-    _, end = lead(robot, done, (0.3, lambda: robot.run(IDLE)))
+    done = ScriptDevice((ScriptLine(0.0, (0.0, 0.0, 0.0)),))
+    _, end = teleoperate(robot, done, (0.3, lambda: robot.run(IDLE)))
     assert end.failed and end.text == "the robot does not follow the stream any more"
 
 
 def test_silence_ends_it(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_module, "_SILENCE_S", 0.3)
-    _, end = lead(robot, Still(), (0.3, robot.stream.stop))
+    _, end = teleoperate(robot, Still(), (0.3, robot.stream.stop))
     assert end.failed and end.text == "the robot has not answered for 0.3 s"
     monkeypatch.setattr(session_module, "_GREET_S", 0.2)
-    session, end = lead(robot, Still())
+    session, end = teleoperate(robot, Still())
     assert end.failed and not session.leading

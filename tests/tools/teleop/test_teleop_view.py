@@ -8,15 +8,20 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.service.stream_client import StreamClient
-from cdpr_rt.service.stream_packet import UNKNOWN_POSE, Standing, StreamAnswer, StreamSession
-from tools.teleop import view as view_module
-from tools.teleop.canvas import Canvas
-from tools.teleop.hand import Hand
-from tools.teleop.script import ScriptHand, ScriptLine
-from tools.teleop.session import Session
-from tools.teleop.view import View
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.service.streams.stream_client import StreamClient
+from cdpr_rt.service.streams.stream_packet import (
+    UNKNOWN_POSE,
+    Standing,
+    StreamAnswer,
+    StreamSession,
+)
+from cdpr_tools.teleop import view as view_module
+from cdpr_tools.teleop.canvas import Canvas
+from cdpr_tools.teleop.input_device import InputSample
+from cdpr_tools.teleop.script import ScriptDevice, ScriptLine
+from cdpr_tools.teleop.session import TeleopSession
+from cdpr_tools.teleop.view import View
 
 PLATFORM = {
     "home_m": [0.0, 0.0],
@@ -35,15 +40,17 @@ def seen(
     height: int = 40,
     before: str = "",
     silent_s: float = 0.0,
+    coordinates: int = 2,
 ) -> list[str]:
     """Return the lines shown of a robot that has answered once."""
     with StreamClient("127.0.0.1", 9, StreamSession(1, bytes(32))) as stream:
         stream.state = StreamAnswer(
             1, Standing.ACCEPTED, 1, 0, 0, LoopState.ACTIVE, 3, pose=pose, pose_setpoint=pose
         )
-        session = Session(stream, ScriptHand((ScriptLine(0.0, (0.0, 0.0)),)), 8.0, 3)
+        hand = ScriptDevice((ScriptLine(0.0, (0.0, 0.0, 0.0)),))
+        session = TeleopSession(stream, hand, 8.0, 3, coordinates)
         session.leading = True
-        session.hand = Hand((0.01, 0.0), clutch=False, confirmed=2)
+        session.hand = InputSample((0.01, 0.0, 0.0), clutch=False, confirmed=2)
         session.round_trips_s.extend((0.35, 0.73))
         session._heard_s -= silent_s
         view = View(session, {"axes": AXES, "platform": platform}, before)
@@ -117,3 +124,17 @@ def test_lines_are_drawn_where_they_are() -> None:
     canvas.mark((70.0, 0.0), "y", "red")
     rows = ["".join(letters for letters, _ in row) for row in canvas.rows()]
     assert rows == ["⡏⠉⠉⠉", "⡇  x"]
+
+
+def test_in_space_all_coordinates_and_the_rotation_are_told() -> None:
+    half = math.radians(5.0)
+    pose = (0.5, 0.25, 1.5, math.cos(half), 0.0, -math.sin(half), 0.0)
+    room = {"home_m": [0.0, 0.0, 1.0]}
+    progress = {"target_m": [0.5, 0.25, 1.6]}
+    lines = seen(pose, {"axes": [], "program_progress": progress}, room, coordinates=3)
+    assert any(
+        "platform +500.0 +250.0 +1500.0 mm, +0.00 -10.00 +0.00 deg; target +500.0 +250.0 +1600.0"
+        in line
+        for line in lines
+    )
+    assert any("hand +10.0 +0.0 +0.0 mm times 8" in line for line in lines)

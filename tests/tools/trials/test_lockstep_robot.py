@@ -5,12 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from cdpr_rt.runtime.states import LoopState
-from cdpr_rt.service.stream_packet import Standing, StreamSession
-from tools.errors import WorkFailedError
-from tools.trials.lockstep import LockstepRobot, OrderRefusedError
-from tools.trials.pose_log import read_pose_log
-from tools.trials.stream import Hand
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.service.streams.stream_packet import Standing, StreamSession
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
+from cdpr_tools.trials.pose_log import read_pose_log
+from cdpr_tools.trials.streams.stream import StreamSender
 
 HEIGHT = 1.5
 
@@ -59,8 +59,25 @@ def test_truth_is_that_of_the_last_sync(robot):
     robot.finish()
 
 
+def test_a_fall_after_the_controller_s_death_is_in_the_log():
+    with LockstepRobot("planar-3") as dying:
+        dying.enable()
+        dying.carry_out("tighten", 60.0)
+        dying.carry_out("pose", position_m=[0.0, HEIGHT])
+        syncs, now_s = read_pose_log(dying.truth_log).size, dying.truth()["time_s"]
+        dying.die(2.0)
+        assert read_pose_log(dying.truth_log).size == syncs
+        after = read_pose_log(dying.truth_log, without_sync=True)[-80:]
+    after = after[after["time_s"] > now_s]
+    assert after["time_s"][-1] == pytest.approx(now_s + 2.0, abs=0.1)
+    height, fastest = after["position_m"][:, 1], after["velocity_m_s"][:, 1].min()
+    assert height[0] == pytest.approx(HEIGHT, abs=0.01)
+    assert height[-1] == pytest.approx(1.3, abs=1e-3)  # on its stand
+    assert fastest < -0.3
+
+
 def test_what_is_refused_is_told_and_changes_nothing(robot):
-    with pytest.raises(OrderRefusedError, match="workspace"):
+    with pytest.raises(CommandRefusedError, match="workspace"):
         robot.program("pose", position_m=[9.0, HEIGHT])
     assert robot.state is LoopState.ACTIVE
     with pytest.raises(WorkFailedError, match=r"the impossible: not within 0\.1 s: active"):
@@ -71,8 +88,8 @@ def test_a_right_that_is_given_back_holds_the_motion(robot):
     robot.program("pose", position_m=[0.3, HEIGHT])
     robot.right.drop()
     robot.run(0.01)
-    assert robot.loop.program.name == "hold"
-    with pytest.raises(OrderRefusedError, match="nobody holds the right"):
+    assert robot.loop.engine.program.name == "hold"
+    with pytest.raises(CommandRefusedError, match="nobody holds the right"):
         robot.program("pose", position_m=[0.0, HEIGHT])
 
 
@@ -80,16 +97,16 @@ def test_a_right_runs_out_by_the_time_of_the_bus(robot):
     robot.program("pose", position_m=[0.0, HEIGHT + 0.2], speed_m_s=0.001)
     robot.right.fall_silent()
     robot.run(1.0)
-    assert robot.loop.program.name == "pose"
+    assert robot.loop.engine.program.name == "pose"
     robot.run(1.5)
-    assert robot.loop.program.name == "hold"
+    assert robot.loop.engine.program.name == "hold"
 
 
 def test_a_stream_s_packets_are_taken_as_the_daemon_takes_them(robot):
     robot.carry_out("pose", position_m=[0.0, HEIGHT])
     robot.program("pose", stream=True)
-    hand = robot.stream.hand()
-    stranger = Hand(StreamSession(7, bytes(32)))
+    hand = robot.stream.sender()
+    stranger = StreamSender(StreamSession(7, bytes(32)))
     answers = []
     for step in range(50):
         place = (0.0, 0.002 * step, 0.0)

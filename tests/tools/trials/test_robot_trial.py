@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from profiles.errors import ProfileError
-from tools.commands import robot_trial
-from tools.commands.robot_trial import KindOfTrial as Kind
-from tools.errors import BadInputError, WorkFailedError
-from tools.trials.recorded import Recorded
+from cdpr_drivers.errors import ConfigurationError
+from cdpr_profiles.errors import ProfileError
+from cdpr_tools.commands import robot_trial
+from cdpr_tools.commands.robot_trial import KindOfTrial
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.trials.recorded import Recorded
 
 ROOT = Path(__file__).parents[3]
 BEHIND = 1024  # the header of a log of true poses
@@ -25,10 +26,21 @@ BEHIND = 1024  # the header of a log of true poses
 def trial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("trial") / "targets"
     what = ["planar-3", "targets", "--minutes", "0.12", "--out", str(folder), "--json"]
-    command = [sys.executable, "-m", "tools.cli", "robot", "trial", *what]
+    command = [sys.executable, "-m", "cdpr_tools.cli", "robot", "trial", *what]
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout.splitlines()[-1])
+
+
+def test_a_trial_that_is_told_to_end_says_so(tmp_path):
+    what = ["robot", "trial", "planar-3", "targets", "--out", str(tmp_path / "trial")]
+    command = [sys.executable, "-m", "cdpr_tools.cli", *what]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stderr is not None
+        assert "starting the simulated robot" in process.stderr.readline()
+        process.terminate()
+        *_, last = process.stderr.read().splitlines()
+    assert (process.returncode, last) == (1, "cdpr: interrupted")
 
 
 def test_figures_are_those_of_the_files(trial):
@@ -62,11 +74,11 @@ def test_figures_are_those_of_the_files(trial):
 
 def test_it_can_be_judged_again(trial, capsys):
     folder, told = trial
-    robot_trial.trial("planar-3", Kind.TARGETS, out_dir=folder, again=True, as_json=True)
+    robot_trial.trial("planar-3", KindOfTrial.TARGETS, out_dir=folder, again=True, as_json=True)
     again = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert again["figures"] == told["figures"]
     with pytest.raises(BadInputError, match="holds a trial of targets, not line"):
-        robot_trial.trial("planar-3", Kind.LINE, out_dir=folder, again=True)
+        robot_trial.trial("planar-3", KindOfTrial.LINE, out_dir=folder, again=True)
 
 
 @pytest.mark.parametrize("by", [1, -30])
@@ -89,20 +101,23 @@ def test_a_log_of_other_syncs_is_noticed(trial, tmp_path, by):
 @pytest.mark.parametrize(
     ("robot", "kind", "options", "told"),
     [
-        ("planar-3", Kind.LINE, {"minutes": 1.0}, "lasts as long as it lasts"),
-        ("planar-3", Kind.LINE, {}, "--commissioned DIR"),
-        ("bench-2", Kind.TARGETS, {}, "has no platform in a plane"),
-        ("nothing", Kind.TARGETS, {}, "nothing"),
-        ("planar-3", Kind.TARGETS, {"again": True, "out_dir": None}, "needs --out"),
-        ("planar-3", Kind.TARGETS, {"commissioned": Path("/nowhere")}, "/nowhere"),
+        ("planar-3", KindOfTrial.LINE, {"minutes": 1.0}, "lasts as long as it lasts"),
+        ("planar-3", KindOfTrial.LINE, {}, "--commissioned DIR"),
+        ("planar-3", KindOfTrial.TARGETS, {"speed_mm_s": 20.0}, "20: allowed: with line"),
+        ("planar-3", KindOfTrial.LINE, {"speed_mm_s": 900.0}, "900: allowed: up to 500"),
+        ("planar-3", KindOfTrial.TAPE, {"plant": Path("/nowhere.toml")}, "/nowhere.toml"),
+        ("bench-2", KindOfTrial.TARGETS, {}, "has no platform; allowed"),
+        ("nothing", KindOfTrial.TARGETS, {}, "nothing"),
+        ("planar-3", KindOfTrial.TARGETS, {"again": True, "out_dir": None}, "needs --out"),
+        ("planar-3", KindOfTrial.TARGETS, {"commissioned": Path("/nowhere")}, "/nowhere"),
     ],
 )
 def test_what_cannot_be_tried_is_told(tmp_path, robot, kind, options, told):
-    with pytest.raises((BadInputError, ProfileError), match=told):
+    with pytest.raises((BadInputError, ConfigurationError, ProfileError), match=told):
         robot_trial.trial(robot, kind, **{"out_dir": tmp_path / "out", **options})
 
 
 def test_an_earlier_trial_is_not_written_over(trial):
     folder, _ = trial
     with pytest.raises(BadInputError, match="not empty"):
-        robot_trial.trial("planar-3", Kind.TARGETS, minutes=0.1, out_dir=folder)
+        robot_trial.trial("planar-3", KindOfTrial.TARGETS, minutes=0.1, out_dir=folder)

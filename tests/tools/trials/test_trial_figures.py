@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from made_up_trial import PERIOD_S, recorded
 
-from profiles import load_robot
-from tools.trials import limits, line, streaming, targets
-from tools.trials.figures import Figure, all_reached
+from cdpr_profiles import load_robot
+from cdpr_tools.trials import limits, line, targets
+from cdpr_tools.trials.figures import Figure, all_reached
+from cdpr_tools.trials.streams import streaming
+from tests.tools.trials.made_up_trial import PERIOD_S, recorded
 
 ROBOT = load_robot("planar-3")
 REACH = np.array([0.3, 2.0])
@@ -55,7 +56,7 @@ def slanted(ripple_m: float) -> object:
 
 def test_a_line_s_error_is_the_distance_from_it():
     parts = {line.WITH: slanted(1e-3), line.WITHOUT: slanted(4e-3)}
-    found = figures_of(line.judge(parts))
+    found = figures_of(line.judge(parts, line.SPEED_m_s))
     assert found["path_with_mm"].value == pytest.approx(1.0 / np.sqrt(2.0), rel=0.01)
     assert found["path_without_mm"].value == pytest.approx(4.0 / np.sqrt(2.0), rel=0.01)
     assert found["path_ratio"].value == pytest.approx(4.0, rel=0.01)
@@ -64,7 +65,9 @@ def test_a_line_s_error_is_the_distance_from_it():
     assert not found["setpoint_ratio"].reached
     expected = np.sqrt(8.0 / 0.5)
     assert found["setpoint_less_mean_ratio"].value == pytest.approx(expected, rel=0.01)
-    assert "path_ratio" not in figures_of(line.judge({line.WITHOUT: parts[line.WITHOUT]}))
+    assert "path_ratio" not in figures_of(
+        line.judge({line.WITHOUT: parts[line.WITHOUT]}, line.SPEED_m_s)
+    )
 
 
 def leg_of(over_m: float, **truth: np.ndarray) -> object:
@@ -124,7 +127,7 @@ def test_a_step_of_the_commanded_velocity_is_found(times, reached):
     setpoint = np.round(REACH + np.cumsum(velocity * PERIOD_S, axis=0), 9)  # as recorded
     counts = {"sent": 50, "lost": 10, "doubled": 5, "overtaken": 7}
     found = figures_of(
-        streaming.judge(recorded(setpoint, setpoint, [{"mark": "network", **counts}]), ROBOT)
+        streaming.judge(recorded(setpoint, setpoint, [{"mark": "network", **counts}]))
     )
     assert found["step_mm_s"].value == pytest.approx(1e3 * times * allowed, abs=2e-3)
     assert found["step_mm_s"].reached is reached

@@ -1,0 +1,1 @@
+"""Controllers of an axis: position loop, compensation, their tuning and validation."""

@@ -1,0 +1,37 @@
+"""The interface that every controller has."""
+
+from typing import Protocol
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+
+
+class Controller(Protocol):
+    """Turns feedback and set-point into torques, once per cycle."""
+
+    effort_Nm: FloatArray
+    """What the feedback loop asked for in this cycle, (n,)."""
+    compensation_Nm: FloatArray
+    """What was added from knowledge of the motor, (n,)."""
+
+    def reset(self) -> None:
+        """Forget the past, before a motion starts."""
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write the torque to ask of each axis, (n,), Nm."""
+
+
+class Idle:
+    """Asks for no torque; used while drives are enabled or disabled."""
+
+    def __init__(self, n: int) -> None:
+        self.effort_Nm = np.zeros(n)
+        self.compensation_Nm = np.zeros(n)
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def update(self, _feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write zeros."""
+        torque_Nm[:] = 0.0

@@ -1,0 +1,209 @@
+"""Torque known beforehand from the motor's profile: cogging by table, and friction."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
+from cdpr_rt.jit import jit
+
+TWO_PI = 2.0 * math.pi
+
+# columns of the parameter array of one axis
+_LOOK_AHEAD, _OBSERVER_POLE, _BLEND = 0, 1, 2
+_COULOMB_FORWARD, _COULOMB_BACKWARD, _STRIBECK_FORWARD, _STRIBECK_BACKWARD = 3, 4, 5, 6
+_STRIBECK_SPEED, _VISCOUS, _AVAILABLE, _MOST = 7, 8, 9, 10
+_COLUMNS = 11
+# columns of the state of one axis
+_FADE, _STARTED, _DEVIATION, _DRIFT = 0, 1, 2, 3
+_STATES = 4
+
+
+@dataclass(frozen=True)
+class FrictionFeedforward:
+    """Friction to compensate: (Coulomb + Stribeck·exp(-(v/v_s)²))·sign(v) + viscous·v."""
+
+    coulomb_forward_Nm: float = 0.0
+    coulomb_backward_Nm: float = 0.0
+    """Magnitude while the angle decreases."""
+    stribeck_forward_Nm: float = 0.0
+    stribeck_backward_Nm: float = 0.0
+    stribeck_speed_rad_s: float = 1.0
+    viscous_Nms_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class AxisCompensation:
+    """What one axis needs: tables (2, m) in Nm over the turn from the index, and timing.
+
+    `table_Nm[0]` is for increasing angles, `table_Nm[1]` for decreasing ones; sample j lies at
+    2π·j/m from the index. `look_ahead_s` is the time from the instant an angle was true to the
+    mean instant at which the torque computed from it acts. Angle and velocity are the set-point's
+    plus the deviation from it and the deviation's rate, both from a tracking observer with a double
+    pole of time constant `observer_s` (0: the encoder's reading and the set-point's velocity).
+    Friction is evaluated at that velocity, for the set-point's direction: where it falls with
+    speed, this takes away the negative damping that makes a rotor stick and slip.
+    """
+
+    table_Nm: FloatArray
+    most_Nm: float = field(kw_only=True)
+    """What is added is never more than this, whatever table and friction say."""
+    friction: FrictionFeedforward = FrictionFeedforward()
+    look_ahead_s: float = 0.0
+    observer_s: float = 0.0
+    blend_speed_rad_s: float = 0.02
+    """Set-point speed above which one direction's table counts alone."""
+
+
+@jit
+def _torque(
+    tables: FloatArray,
+    parameters: FloatArray,
+    state: FloatArray,
+    period: float,
+    fade_step: float,
+    position: FloatArray,
+    index: FloatArray,
+    index_known: BoolArray,
+    reference: FloatArray,
+    speed: FloatArray,
+    out: FloatArray,
+) -> None:
+    size = tables.shape[2]
+    for i in range(out.size):
+        if parameters[i, _AVAILABLE] == 0.0 or not index_known[i]:
+            state[i, _FADE] = 0.0
+            state[i, _STARTED] = 0.0
+            out[i] = 0.0
+            continue
+        state[i, _FADE] = min(1.0, state[i, _FADE] + fade_step)
+        velocity = speed[i]
+        deviation = position[i] - reference[i]
+        pole = parameters[i, _OBSERVER_POLE]
+        if state[i, _STARTED] == 0.0:
+            state[i, _STARTED] = 1.0
+            state[i, _DEVIATION] = deviation
+            state[i, _DRIFT] = 0.0
+        moving = velocity
+        if pole > 0.0:
+            state[i, _DEVIATION] += period * state[i, _DRIFT]
+            surprise = deviation - state[i, _DEVIATION]
+            state[i, _DEVIATION] += (1.0 - pole * pole) * surprise
+            state[i, _DRIFT] += (1.0 - pole) * (1.0 - pole) / period * surprise
+            deviation = state[i, _DEVIATION]
+            moving += state[i, _DRIFT]
+        angle = reference[i] + deviation + moving * parameters[i, _LOOK_AHEAD] - index[i]
+        moving = max(moving, 0.0) if velocity >= 0.0 else min(moving, 0.0)
+        turns = angle / TWO_PI
+        place = (turns - math.floor(turns)) * size
+        low = int(place)
+        part = place - low
+        low %= size
+        high = (low + 1) % size
+        forward = (1.0 - part) * tables[i, 0, low] + part * tables[i, 0, high]
+        backward = (1.0 - part) * tables[i, 1, low] + part * tables[i, 1, high]
+        side = min(max(velocity / parameters[i, _BLEND], -1.0), 1.0)
+        fall = moving / parameters[i, _STRIBECK_SPEED]
+        stribeck = math.exp(-fall * fall)
+        forward += parameters[i, _COULOMB_FORWARD] + parameters[i, _STRIBECK_FORWARD] * stribeck
+        backward -= parameters[i, _COULOMB_BACKWARD] + parameters[i, _STRIBECK_BACKWARD] * stribeck
+        total = 0.5 * (1.0 + side) * forward + 0.5 * (1.0 - side) * backward
+        total += parameters[i, _VISCOUS] * moving
+        most = parameters[i, _MOST]
+        # written so that what is not a number stays none: the supervisor looks for it
+        if total > most:
+            total = most
+        elif total < -most:
+            total = -most
+        out[i] = state[i, _FADE] * total
+
+
+def _row(axis: AxisCompensation, period_s: float) -> list[float]:
+    f = axis.friction
+    return [
+        axis.look_ahead_s,
+        math.exp(-period_s / axis.observer_s) if axis.observer_s > 0.0 else 0.0,
+        axis.blend_speed_rad_s,
+        f.coulomb_forward_Nm,
+        f.coulomb_backward_Nm,
+        f.stribeck_forward_Nm,
+        f.stribeck_backward_Nm,
+        f.stribeck_speed_rad_s,
+        f.viscous_Nms_rad,
+        1.0,
+        axis.most_Nm,
+    ]
+
+
+class Compensation:
+    """Cogging and friction torque of n axes from their profiles (Tremblay, figure 1.8).
+
+    Linear interpolation in the tables; the direction comes from the set-point's velocity, with a
+    linear hand-over around standstill; the torque fades in over `fade_in_s` once the axis' index
+    is known and is zero while it is not, or where the axis has no profile (None).
+    All tables must have the same length. Raises ValueError for tables of another shape.
+    """
+
+    def __init__(
+        self, axes: list[AxisCompensation | None], period_s: float, fade_in_s: float = 0.2
+    ) -> None:
+        sizes = {axis.table_Nm.shape for axis in axes if axis is not None}
+        if len(sizes) > 1 or any(len(s) != 2 or s[0] != 2 or s[1] < 2 for s in sizes):
+            raise ValueError(f"tables must all have one shape (2, m), got {sorted(sizes)}")
+        shape = sizes.pop() if sizes else (2, 2)
+        n = len(axes)
+        self._tables = np.zeros((n, *shape))
+        self._parameters = np.zeros((n, _COLUMNS))
+        for i, axis in enumerate(axes):
+            if axis is not None:
+                self._tables[i] = axis.table_Nm
+                self._parameters[i] = _row(axis, period_s)
+        self._state = np.zeros((n, _STATES))
+        self.available: BoolArray = self._parameters[:, _AVAILABLE] != 0.0
+        """Which axes have a profile, (n,); until its index is known nothing comes of it."""
+        self._period_s = period_s
+        self._fade_step = min(1.0, period_s / fade_in_s) if fade_in_s > 0.0 else 1.0
+
+    def reset(self) -> None:
+        """Fade in anew and forget the deviation from the set-point."""
+        self._state[:] = 0.0
+
+    def standing_Nm(self, position_rad: FloatArray, feedback: AxisFeedback) -> FloatArray:
+        """Return what motors at these angles take up of a torque, (n,), mean of both directions.
+
+        That is cogging, and half of what friction differs by. 0 where there is no profile or no
+        index is known.
+        """
+        angle = np.where(feedback.index_known, position_rad - feedback.index_rad, 0.0)
+        size = self._tables.shape[2]
+        place = angle / TWO_PI % 1.0 * size
+        low = place.astype(int) % size
+        axes = np.arange(low.size)
+        mean = self._tables.mean(axis=1)
+        here, there = mean[axes, low], mean[axes, (low + 1) % size]
+        cogging = here + (place - np.floor(place)) * (there - here)
+        p = self._parameters
+        forward = p[:, _COULOMB_FORWARD] + p[:, _STRIBECK_FORWARD]
+        backward = p[:, _COULOMB_BACKWARD] + p[:, _STRIBECK_BACKWARD]
+        known = self.available & feedback.index_known
+        most = p[:, _MOST]
+        return np.where(known, np.clip(cogging + 0.5 * (forward - backward), -most, most), 0.0)
+
+    def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
+        """Write the torque to add, (n,), Nm."""
+        _torque(
+            self._tables,
+            self._parameters,
+            self._state,
+            self._period_s,
+            self._fade_step,
+            feedback.position_rad,
+            feedback.index_rad,
+            feedback.index_known,
+            setpoint.position_rad,
+            setpoint.velocity_rad_s,
+            out,
+        )

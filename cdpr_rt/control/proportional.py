@@ -1,0 +1,53 @@
+"""The high-gain proportional controller of the cogging sweep."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.jit import jit
+
+
+@jit
+def _update(
+    gain: FloatArray,
+    limit: FloatArray,
+    position: FloatArray,
+    reference: FloatArray,
+    effort: FloatArray,
+    torque: FloatArray,
+) -> None:
+    for i in range(gain.size):
+        u = gain[i] * (reference[i] - position[i])
+        u = min(max(u, -limit[i]), limit[i])
+        effort[i] = u
+        torque[i] = u
+
+
+class Proportional:
+    """Torque in proportion to the position error, limited (Tremblay, section 1.3, figure 1.2).
+
+    Without integral action the torque keeps the sign of the ramp's slope as long as friction
+    prevails, so that what is recorded belongs to one direction of motion.
+    Parameters, shapes (n,): `gain_Nm_rad`, `limit_Nm`.
+    """
+
+    def __init__(self, gain_Nm_rad: FloatArray, limit_Nm: FloatArray) -> None:
+        self._gain = np.array(gain_Nm_rad, float)
+        self._limit = np.array(limit_Nm, float)
+        self.effort_Nm = np.zeros_like(self._gain)
+        self.compensation_Nm = np.zeros_like(self._gain)
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write the limited proportional torque."""
+        _update(
+            self._gain,
+            self._limit,
+            feedback.position_rad,
+            setpoint.position_rad,
+            self.effort_Nm,
+            torque_Nm,
+        )

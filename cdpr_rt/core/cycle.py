@@ -1,0 +1,118 @@
+"""One cycle of a device, whoever runs it: its deadline, the exchange, alarms, the last command."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from cdpr_rt.core.exchange import AxisDevice
+
+_LATE_SHARE = 0.1
+_TOO_LATE_SHARE = 0.25
+
+
+class Watch(Protocol):
+    """Something beside the axes that may end their motion, such as safety I/O.
+
+    Both are asked every cycle and cost next to nothing while all is well.
+    """
+
+    def alarm(self) -> str:
+        """Return why the torque must go at once, or an empty text."""
+
+    def stop_reason(self) -> str:
+        """Return why the motion must be braked to its end, or an empty text."""
+
+
+@dataclass
+class Lateness:
+    """How the paced loop kept its deadlines."""
+
+    cycles: int = 0
+    late: int = 0
+    """Cycles that started more than a tenth of a period after their deadline."""
+    worst_s: float = 0.0
+
+
+class Cycle:
+    """Exchanges a device once a cycle and sends one command in each.
+
+    On a lockstep device the next SYNC goes out as soon as `exchange` is called; otherwise each has
+    an absolute deadline.
+    """
+
+    def __init__(self, device: AxisDevice, watches: Sequence[Watch] = ()) -> None:
+        self.device = device
+        self.watches = tuple(watches)
+        self.lateness = Lateness()
+        self.late_s = 0.0
+        """How far this cycle began behind its deadline, 0 in lockstep."""
+        self.began_ns = 0
+        """CLOCK_MONOTONIC when this cycle's SYNC went out."""
+        self.elapsed_s = device.period_s
+        """From the last SYNC to this one; one period where cycles begin, or run in lockstep."""
+        self._first = True
+        self._deadline_s = 0.0
+        self._fresh = True
+
+    def begin(self) -> None:
+        """Tell that no cycles have run for a while: the next one is not late by it."""
+        self._fresh = self._first = True
+
+    def exchange(self) -> int:
+        """Wait for the deadline, send SYNC, take in the answers; return how many axes answered."""
+        if not self.device.lockstep:
+            self._await_deadline()
+        self._take_time()
+        self.device.sync()
+        return self.device.receive()
+
+    def transmit(self) -> None:
+        """Send the command as it stands, and close the cycle."""
+        self.device.transmit()
+
+    def device_alarm(self) -> str:
+        """Return why the drives must not go on being driven, or an empty text."""
+        return self.device.alarm()
+
+    def watch_alarm(self) -> str:
+        """Return for what cause beside the axes the torque must go at once, or an empty text."""
+        for watch in self.watches:
+            reason = watch.alarm()
+            if reason:
+                return reason
+        return ""
+
+    def stop_reason(self) -> str:
+        """Return why the motion must be braked to its end, or an empty text."""
+        for watch in self.watches:
+            reason = watch.stop_reason()
+            if reason:
+                return reason
+        return ""
+
+    def _take_time(self) -> None:
+        device, now_ns = self.device, time.monotonic_ns()
+        steady = self._first or device.lockstep
+        self.elapsed_s = device.period_s if steady else (now_ns - self.began_ns) * 1e-9
+        self.began_ns, self._first = now_ns, False
+
+    def _await_deadline(self) -> None:
+        period, clock = self.device.period_s, self.device.clock
+        self._deadline_s += period
+        now = clock.now_s
+        if now < self._deadline_s:
+            clock.sleep_until(self._deadline_s)
+            now = clock.now_s
+        elif self._fresh:
+            self._deadline_s = now
+        self._fresh = False
+        self.late_s = now - self._deadline_s
+        if self.late_s > _TOO_LATE_SHARE * period:
+            self._deadline_s = now  # a new time base: the next cycles are not run in a hurry
+        lateness = self.lateness
+        lateness.cycles += 1
+        lateness.late += self.late_s > _LATE_SHARE * period
+        lateness.worst_s = max(lateness.worst_s, self.late_s)

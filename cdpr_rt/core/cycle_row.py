@@ -1,0 +1,273 @@
+"""One cycle as a row of fixed size: everything that is recorded, shown or streamed of it.
+
+A quantity is declared here and nowhere else: the row's type, what is written into it, recordings,
+their schemas, the status, the live view and the metrics follow from these tables.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_profiles.limits.limit_kinds import Limit
+from cdpr_rt.core.states import LoopState, Reaction
+
+Row = NDArray[np.void]
+"""A structured array of the type that `cycle_dtype` returns."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One quantity of a cycle; its unit is the end of its name."""
+
+    name: str
+    kind: str
+    """Type of one value, as numpy writes it."""
+    source: str
+    """Where the loop has it: a path of attributes that begins at the engine."""
+    meaning: str
+    wall: bool = False
+    """Whether it tells of the machine that ran the loop; all else follows from the bus."""
+    status: bool = False
+    """Whether the status shows it of each axis; it shows all that there is once a cycle."""
+    live: bool = False
+    """Whether the live view shows it: angles in degrees, times in ms, the longest of each."""
+    metric: str = ""
+    """What Prometheus calls it, without prefix; "" where it is no metric."""
+    labels: type[LoopState] | type[Reaction] | None = None
+    """What its numbers stand for."""
+
+
+def _listed(members: type[IntEnum], word: str) -> str:
+    return ", ".join(f"{member.value} {getattr(member, word)}" for member in members)
+
+
+SCALAR_FIELDS: Final = (
+    Field(
+        "cycle", "<u8", "cycle.device.feedback.cycle", "SYNCs since cycles began", metric="cycles"
+    ),
+    Field("time_s", "<f8", "cycle.device.feedback.time_s", "bus time of the SYNC"),
+    Field(
+        "stamp_ns", "<i8", "cycle.began_ns", "CLOCK_MONOTONIC when the loop woke for it", wall=True
+    ),
+    Field(
+        "lateness_s",
+        "<f8",
+        "cycle.late_s",
+        "wake-up behind its deadline; 0 in lockstep",
+        wall=True,
+        live=True,
+        metric="lateness",
+    ),
+    Field(
+        "exchange_s",
+        "<f8",
+        "exchange_s",
+        "from SYNC until the last answer, or until it was given up",
+        wall=True,
+        live=True,
+        metric="exchange",
+    ),
+    Field(
+        "compute_s",
+        "<f8",
+        "compute_s",
+        "from the last answer until the last command had been sent",
+        wall=True,
+        live=True,
+        metric="compute",
+    ),
+    Field(
+        "missed",
+        "<u8",
+        "missed",
+        "answers that did not come in time, over all axes, since the beginning",
+        live=True,
+        metric="missed_answers",
+    ),
+    Field(
+        "late_cycles",
+        "<u8",
+        "cycle.lateness.late",
+        "cycles that began more than a tenth of a period late, since the beginning",
+        wall=True,
+        live=True,
+        metric="late_cycles",
+    ),
+    Field(
+        "stream_age_s",
+        "<f8",
+        "last_program.stream_age_s",
+        "age of the newest sample of the set-point stream; null without",
+    ),
+    Field(
+        "stream_buttons",
+        "<u8",
+        "last_program.stream_buttons",
+        "buttons of the sample that is played: bit 0 the clutch, "
+        "bits 8 to 15 the number of the confirmation",
+    ),
+    Field(
+        "state",
+        "<u1",
+        "life.state",
+        f"state of the loop: {_listed(LoopState, 'label')}",
+        labels=LoopState,
+    ),
+    Field("program", "<u1", "program_number", "number of the program in the description's list"),
+    Field(
+        "reaction",
+        "<u1",
+        "reaction",
+        f"reaction of the supervisor in this cycle: {_listed(Reaction, 'label')}",
+        labels=Reaction,
+    ),
+    Field("limit", "<u1", "limit", f"the limit that caused it: {_listed(Limit, 'key')}"),
+    Field("limit_axis", "<i2", "limit_axis", "the axis concerned, -1 without"),
+    Field("answered", "<u2", "answered", "axes that answered this SYNC", live=True),
+)
+"""One value a cycle."""
+
+AXIS_FIELDS: Final = (
+    Field(
+        "setpoint_rad",
+        "<f8",
+        "setpoint.position_rad",
+        "where the motor should be",
+        status=True,
+        live=True,
+    ),
+    Field(
+        "setpoint_velocity_rad_s", "<f8", "setpoint.velocity_rad_s", "how fast the set-point moves"
+    ),
+    Field(
+        "position_rad",
+        "<f8",
+        "cycle.device.feedback.position_rad",
+        "motor angle as the encoder gives it",
+        status=True,
+        live=True,
+        metric="position_radians",
+    ),
+    Field(
+        "velocity_rad_s",
+        "<f8",
+        "parts.estimator.estimate.velocity_rad_s",
+        "motor speed, estimated",
+        status=True,
+        live=True,
+        metric="velocity_radians_per_second",
+    ),
+    Field(
+        "torque_actual_Nm",
+        "<f8",
+        "cycle.device.feedback.torque_Nm",
+        "torque that the drive reports",
+        status=True,
+        live=True,
+        metric="torque_newton_metres",
+    ),
+    Field("torque_asked_Nm", "<f8", "asked_Nm", "torque that the controller wanted, before limits"),
+    Field(
+        "torque_sent_Nm",
+        "<f8",
+        "cycle.device.command.sent_torque_Nm",
+        "torque that was sent",
+        status=True,
+        live=True,
+    ),
+    Field("effort_Nm", "<f8", "program.controller.effort_Nm", "the controller's part of it"),
+    Field(
+        "compensation_Nm",
+        "<f8",
+        "program.controller.compensation_Nm",
+        "the compensation's part of it",
+        live=True,
+    ),
+    Field(
+        "tension_N",
+        "<f8",
+        "parts.estimator.estimate.tension_N",
+        "cable tension, measured or estimated; null where neither",
+        status=True,
+        metric="tension_newtons",
+    ),
+    Field(
+        "cable_length_m",
+        "<f8",
+        "parts.estimator.estimate.cable_length_m",
+        "length of the cable; null where it is not known",
+        status=True,
+        live=True,
+        metric="cable_length_metres",
+    ),
+    Field(
+        "index_rad",
+        "<f8",
+        "cycle.device.feedback.index_rad",
+        "motor angle of the encoder's index, where it is known",
+    ),
+    Field(
+        "statusword",
+        "<u2",
+        "cycle.device.feedback.statusword",
+        "CiA 402 statusword (6041h)",
+        status=True,
+    ),
+    Field(
+        "valid",
+        "?",
+        "cycle.device.feedback.valid",
+        "whether the drive answered this SYNC",
+        status=True,
+    ),
+    Field("alive", "?", "cycle.device.feedback.alive", "whether its heartbeats come", status=True),
+    Field(
+        "rate_ok", "?", "cycle.device.feedback.rate_ok", "whether its answers come at their rate"
+    ),
+    Field(
+        "index_known",
+        "?",
+        "cycle.device.feedback.index_known",
+        "whether the encoder's index has been found",
+        status=True,
+    ),
+    Field(
+        "tension_measured",
+        "?",
+        "parts.estimator.estimate.tension_measured",
+        "whether the tension is a sensor's",
+        status=True,
+    ),
+)
+"""One value for each axis."""
+
+_SEVEN = "x, y, z in m and quaternion w, x, y, z; null where it is not known"
+POSE_FIELDS: Final = (
+    Field("pose", "<f8", "last_program.pose", f"the platform's pose: {_SEVEN}"),
+    Field(
+        "pose_setpoint", "<f8", "program.pose_setpoint", f"where the platform should be: {_SEVEN}"
+    ),
+)
+"""Seven values, nan in a row where they are not known."""
+
+FIELDS: Final = {field.name: field for field in (*SCALAR_FIELDS, *AXIS_FIELDS, *POSE_FIELDS)}
+"""All of a row by their names, in its order."""
+SCALARS: Final = tuple(field.name for field in SCALAR_FIELDS)
+AXES: Final = tuple(field.name for field in AXIS_FIELDS)
+WALL_TIMES: Final = tuple(field.name for field in FIELDS.values() if field.wall)
+
+
+def cycle_dtype(n: int) -> np.dtype[np.void]:
+    """Return the type of a row for n axes, aligned to 8 bytes."""
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    fields += [(field.name, field.kind) for field in SCALAR_FIELDS]
+    fields += [(field.name, field.kind, (n,)) for field in AXIS_FIELDS]
+    fields += [(field.name, field.kind, (7,)) for field in POSE_FIELDS]
+    packed = np.dtype(fields)
+    spare = -packed.itemsize % 8
+    return np.dtype([*fields, ("spare", "u1", (spare,))]) if spare else packed

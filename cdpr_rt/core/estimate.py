@@ -1,0 +1,245 @@
+"""What a cycle knows of each axis beyond its feedback: velocity, cable length, tension."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray
+from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.jit import bound, jit
+
+FILTER_S = 0.01
+"""Speed and torque are judged over this: one encoder step a cycle is hundreds a second."""
+_FRICTION_FULL_rad_s = 0.1
+
+_PAST = np.dtype(
+    [
+        ("position", "<f8"),
+        ("torque", "<f8"),  # low-passed, less what is known to turn the motor alone
+        ("elapsed", "<f8"),  # since the position was last heard
+        ("started", "<f8"),
+        ("length_at_zero", "<f8"),  # cable length at motor angle 0; nan where it is not known
+    ]
+)
+
+
+@dataclass(frozen=True)
+class WinchArrays:
+    """What the estimate needs of n winches; shapes are (n,).
+
+    Winding torque = gain·tension + bias ± (friction + friction_per_N·tension), plus while the
+    cable is wound in, as a winch's calibration has it.
+    """
+
+    cable_m_per_rad: FloatArray
+    """Cable paid out per radian of the motor, with its sign; 0 where there is no cable."""
+    gain_m: FloatArray
+    """Nm at the motor per N of tension (K_t of Tremblay, section 3.6.2)."""
+    bias_Nm: FloatArray
+    friction_Nm: FloatArray
+    friction_per_N_m: FloatArray
+    inertia_kg_m2: FloatArray
+    """What the motor accelerates besides the cable."""
+
+    @classmethod
+    def bare(cls, n: int) -> WinchArrays:
+        """Return n motors without a cable."""
+        return cls(*(np.zeros(n) for _ in range(6)))
+
+    def table(self) -> FloatArray:
+        """Return all of it as (6, n)."""
+        return np.array(
+            [
+                self.cable_m_per_rad,
+                self.gain_m,
+                self.bias_Nm,
+                self.friction_Nm,
+                self.friction_per_N_m,
+                self.inertia_kg_m2,
+            ],
+            float,
+        )
+
+
+class AxisEstimate:
+    """Estimates of n axes; shapes are (n,); overwritten in place every cycle."""
+
+    def __init__(self, n: int) -> None:
+        self.elapsed_s = 0.0
+        """From the last SYNC to this one."""
+        self.velocity_rad_s: FloatArray = np.zeros(n)
+        self.cable_m_per_rad: FloatArray = np.zeros(n)
+        self.cable_length_m: FloatArray = np.full(n, np.nan)
+        """Beyond the drum, as wound off; nan where it is not known."""
+        self.length_known: BoolArray = np.zeros(n, np.bool_)
+        self.tension_N: FloatArray = np.full(n, np.nan)
+        """Measured, or estimated from the torque; nan where neither can be."""
+        self.may_be_slack = False
+        """Whether cables are being tightened or let go, so that none is missed."""
+        self.tension_measured: BoolArray = np.zeros(n, np.bool_)
+        self.sensor_ok: BoolArray = np.ones(n, np.bool_)
+        """False where there is a tension sensor whose reading is not valid."""
+
+
+@jit
+def _update(
+    winch: FloatArray,
+    past: Any,
+    velocity: FloatArray,
+    length: FloatArray,
+    tension: FloatArray,
+    position: FloatArray,
+    torque: FloatArray,
+    valid: BoolArray,
+    inner: FloatArray,
+    elapsed: float,
+) -> None:
+    for i in range(position.size):
+        own = past[i]
+        own["elapsed"] += elapsed
+        if not valid[i]:
+            continue
+        # a measured friction of the winch has the motor's in it
+        outer = torque[i] - (inner[i] if winch[3, i] == 0.0 else 0.0)
+        if own["started"] == 0.0:
+            own["position"], own["torque"] = position[i], outer
+            own["started"], velocity[i] = 1.0, 0.0
+        since = own["elapsed"]
+        weight = since / (since + FILTER_S)
+        gain = weight * ((position[i] - own["position"]) / since - velocity[i])
+        velocity[i] += gain
+        own["torque"] += weight * (outer - own["torque"])
+        own["position"], own["elapsed"] = position[i], 0.0
+        length[i] = own["length_at_zero"] + winch[0, i] * position[i]
+        tension[i] = np.nan
+        if winch[1, i] > 0.0:
+            # what the torque does not spend on accelerating the motor is on the cable
+            loaded = own["torque"] - winch[5, i] * gain / since
+            tension[i] = _tension(winch[:, i], loaded, velocity[i])
+
+
+@jit
+def _tension(winch: FloatArray, torque: float, velocity: float) -> float:
+    sign = 1.0 if winch[0] >= 0.0 else -1.0
+    winding = -sign * velocity / _FRICTION_FULL_rad_s
+    way = min(max(winding, -1.0), 1.0)
+    balanced = -sign * torque - winch[2] - way * winch[3]
+    return max(0.0, float(balanced / (winch[1] + way * winch[4])))
+
+
+@jit
+def _take_sensors(
+    sensor_of: Any,
+    read_N: FloatArray,
+    read_valid: BoolArray,
+    tension: FloatArray,
+    measured: BoolArray,
+    sensor_ok: BoolArray,
+) -> None:
+    for i in range(tension.size):
+        sensor = sensor_of[i]
+        if sensor < 0 or sensor >= read_N.size:
+            continue
+        sensor_ok[i] = measured[i] = read_valid[sensor]
+        if read_valid[sensor]:
+            tension[i] = read_N[sensor]
+
+
+class Estimator:
+    """Brings an `AxisEstimate` up to date once a cycle; allocates nothing.
+
+    `sensor_of_axis` (n,) says which reading belongs to an axis, -1 for none; without it the
+    readings are those of the first axes.
+    """
+
+    def __init__(
+        self,
+        n: int,
+        period_s: float,
+        winches: WinchArrays | None = None,
+        sensor_of_axis: Any = None,
+    ) -> None:
+        self.estimate = AxisEstimate(n)
+        self._period_s = period_s
+        self._winch = (winches or WinchArrays.bare(n)).table()
+        self.estimate.cable_m_per_rad[:] = self._winch[0]
+        self._past = np.zeros(n, _PAST)
+        self._past["length_at_zero"] = np.nan
+        sensors = range(n) if sensor_of_axis is None else sensor_of_axis
+        self._sensor_of = np.array(sensors, np.int64)
+        self._nothing = np.zeros(n)
+        self._taken: tuple[Any, Any] = (None, None)
+        """Whose arrays the kernel is bound to."""
+        self._update: Callable[..., None] = _update
+
+    def reset(self) -> None:
+        """Forget speeds, torques and tensions, after cycles did not run; lengths stay known."""
+        for field in ("position", "torque", "elapsed", "started"):
+            self._past[field] = 0.0
+        self.estimate.velocity_rad_s[:] = 0.0
+        self.estimate.tension_N[:] = np.nan
+        self.estimate.tension_measured[:] = False
+        self.estimate.sensor_ok[:] = True
+
+    def set_lengths(self, position_rad: FloatArray, length_m: FloatArray) -> None:
+        """Take the cables to have `length_m` (n,) at the motor angles; nan leaves one as it is."""
+        for i, length in enumerate(length_m):
+            if math.isfinite(length) and self._winch[0, i] != 0.0:
+                self._past["length_at_zero"][i] = length - self._winch[0, i] * position_rad[i]
+                self.estimate.cable_length_m[i] = length
+        np.isfinite(self._past["length_at_zero"], out=self.estimate.length_known)
+
+    def forget_lengths(self) -> None:
+        """Take no length for known any more, such as after the drives have lost their origins."""
+        self._past["length_at_zero"] = np.nan
+        self.estimate.length_known[:] = False
+
+    def update(
+        self,
+        feedback: AxisFeedback,
+        tension: TensionFeedback | None = None,
+        elapsed_s: float = 0.0,
+        inner_Nm: FloatArray | None = None,
+    ) -> None:
+        """Take in this cycle's feedback and the tensions as last read.
+
+        `elapsed_s` is from the last SYNC to this one, where it was not one period; `inner_Nm` (n,)
+        is the part of the torque that the motors' own cogging and friction take up.
+        """
+        told = self.estimate
+        told.elapsed_s = elapsed_s or self._period_s
+        inner_Nm = self._nothing if inner_Nm is None else inner_Nm
+        taken = self._taken
+        if feedback is not taken[0] or inner_Nm is not taken[1]:
+            self._bind(feedback, inner_Nm)
+        self._update(told.elapsed_s)
+        if tension is not None:
+            _take_sensors(
+                self._sensor_of,
+                tension.tension_N,
+                tension.valid,
+                told.tension_N,
+                told.tension_measured,
+                told.sensor_ok,
+            )
+
+    def _bind(self, feedback: AxisFeedback, inner_Nm: FloatArray) -> None:
+        self._taken = feedback, inner_Nm
+        self._update = bound(
+            _update,
+            self._winch,
+            self._past,
+            self.estimate.velocity_rad_s,
+            self.estimate.cable_length_m,
+            self.estimate.tension_N,
+            feedback.position_rad,
+            feedback.torque_Nm,
+            feedback.valid,
+            inner_Nm,
+            then=(0.0,),
+        )

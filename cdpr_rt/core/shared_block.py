@@ -1,0 +1,333 @@
+"""The memory that the loop's process shares with the others: rows out, commands in, no lock.
+
+Each part has one writer. A counter next to it tells readers what is complete; who reads twice the
+same counter around its copy has copied something whole. Neither side ever waits for the other.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import mmap
+import os
+import platform
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.core.cycle_row import Row, cycle_dtype
+from cdpr_rt.errors import ControlError
+
+MAGIC: Final = 0x63647072_72743032
+MOST_AXES: Final = 16
+# other processors let a reader see a counter before what it counts
+_IN_ORDER: Final = ("x86_64", "i686", "i386")
+DESCRIPTION_BYTES: Final = 1 << 17
+STATUS_BYTES: Final = 1 << 14
+MESSAGE_BYTES: Final = 1 << 12
+MESSAGES: Final = 64
+URGENT_MESSAGES: Final = 16
+SAMPLES: Final = 64
+# who shortened the file would kill everybody who reads behind its end (SIGBUS)
+_SEALS: Final = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
+
+_COUNTERS: Final = np.dtype(
+    [
+        ("magic", "<u8"),
+        ("axes", "<u8"),
+        ("capacity", "<u8"),
+        ("loop_pid", "<i8"),
+        ("service_pid", "<i8"),
+        ("start_monotonic_ns", "<i8"),  # the same instant on both clocks, taken once
+        ("start_realtime_ns", "<i8"),
+        ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not
+        ("service_alive_ns", "<i8"),  # of the service's last turn, 0 before the first
+        ("right_number", "<u8"),  # grows with every taking of the right to move
+        ("right_until_ns", "<i8"),  # until when the newest taking holds, 0 where it has ended
+        ("mover", "<u8"),  # number of the taking on whose behalf the loop moves, 0 for nobody's
+        ("rows", "<u8"),  # rows written since the beginning
+        ("recorded", "<u8"),  # of them, those that are safe in the recording
+        ("description", "<u8"),  # versions of the texts; odd while one is being written
+        ("status", "<u8"),
+        ("commands", "<u8"),  # messages written since the beginning, and those taken
+        ("commands_taken", "<u8"),
+        ("commands_void", "<u8"),  # commands up to this number may not start motion any more
+        ("urgent", "<u8"),  # stops: looked at before commands
+        ("urgent_taken", "<u8"),
+        ("replies", "<u8"),
+        ("replies_taken", "<u8"),
+        ("samples", "<u8"),
+    ]
+)
+SAMPLE: Final = np.dtype(
+    [
+        ("sequence", "<u8"),
+        ("sent_ns", "<i8"),  # the sender's clock
+        ("arrived_ns", "<i8"),  # CLOCK_MONOTONIC
+        ("position_m", "<f8", (3,)),
+        ("quaternion", "<f8", (4,)),  # w x y z, of length 1
+        ("scale", "<f8"),
+        ("buttons", "<u4"),
+        ("session", "<u4"),
+        ("right", "<u8"),  # number of the taking of the right to move under which it came
+    ]
+)
+"""One sample of the set-point stream; `sequence` only grows within a session."""
+
+
+class SharedBlockError(ControlError):
+    """The shared memory is not what it should be, or a text does not fit into it."""
+
+
+class SharedBlock:
+    """All parts as arrays over one file descriptor; `create` makes it, `attach` joins it.
+
+    The descriptor is inherited by child processes; when the last has ended, nothing is left. Over
+    one that was opened for reading only, nothing can be written.
+    """
+
+    def __init__(self, fd: int, n: int, capacity: int) -> None:
+        self.fd = fd
+        self.n = n
+        self.capacity = capacity
+        """Rows that are kept; a reader further behind has lost some."""
+        sizes = _sizes(n, capacity)
+        reads_only = fcntl.fcntl(fd, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+        access = mmap.ACCESS_READ if reads_only else mmap.ACCESS_WRITE
+        self._map = mmap.mmap(fd, sum(sizes), access=access)
+        views, first = [], 0
+        for size in sizes:
+            views.append(np.frombuffer(self._map, np.uint8, size, first))
+            first += size
+        self.counters: Row = views[0][: _COUNTERS.itemsize].view(_COUNTERS)
+        """One row; `counters["rows"][0]` and so on. Who writes which is said at its type."""
+        self._description, self._status = views[1], views[2]
+        self._commands = views[3].reshape(MESSAGES, MESSAGE_BYTES)
+        self._urgent = views[4].reshape(URGENT_MESSAGES, MESSAGE_BYTES)
+        self._replies = views[5].reshape(MESSAGES, MESSAGE_BYTES)
+        self.samples: Row = views[6].view(SAMPLE)
+        self.rows: Row = views[7].view(cycle_dtype(n))
+
+    @classmethod
+    def create(cls, n: int, seconds: float, rate_Hz: float) -> SharedBlock:
+        """Make a block for n axes whose ring holds `seconds` of cycles at `rate_Hz`.
+
+        Raises SharedBlockError for more axes than a loop runs.
+        """
+        if not 1 <= n <= MOST_AXES:
+            raise SharedBlockError(f"{n} axes; allowed: 1 to {MOST_AXES}")
+        capacity = max(256, round(seconds * rate_Hz))
+        fd = os.memfd_create("cdpr-rt", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        os.set_inheritable(fd, True)
+        os.ftruncate(fd, sum(_sizes(n, capacity)))
+        fcntl.fcntl(fd, fcntl.F_ADD_SEALS, _SEALS)
+        block = cls(fd, n, capacity)
+        block.counters["axes"], block.counters["capacity"] = n, capacity
+        block.counters["magic"] = MAGIC
+        return block
+
+    @classmethod
+    def attach(cls, fd: int) -> SharedBlock:
+        """Join the block behind an inherited descriptor; raises SharedBlockError.
+
+        Also on a processor that may show another process stores out of order.
+        """
+        if (machine := platform.machine()) not in _IN_ORDER:
+            raise SharedBlockError(
+                f"this machine's processor is {machine}: processes that share memory without a "
+                f"lock need one that shows stores in order; allowed: {', '.join(_IN_ORDER)}"
+            )
+        size = os.fstat(fd).st_size
+        if size < _COUNTERS.itemsize:
+            raise SharedBlockError("the shared memory is empty")
+        try:
+            sealed = fcntl.fcntl(fd, fcntl.F_GET_SEALS) & _SEALS == _SEALS
+        except OSError:  # not of a kind that can be sealed
+            sealed = False
+        if not sealed:
+            raise SharedBlockError("the shared memory can be resized by others")
+        with mmap.mmap(fd, _COUNTERS.itemsize, prot=mmap.PROT_READ) as head:
+            row = np.frombuffer(bytes(head), _COUNTERS)[0]
+        if row["magic"] != MAGIC:
+            raise SharedBlockError("the shared memory was made by another version")
+        n, capacity = int(row["axes"]), int(row["capacity"])
+        if not 1 <= n <= MOST_AXES or sum(_sizes(n, capacity)) != size:
+            raise SharedBlockError(f"the shared memory has {size} bytes, not those of its axes")
+        return cls(fd, n, capacity)
+
+    # -- texts: the loop writes, others read
+
+    def write_description(self, value: Mapping[str, Any]) -> None:
+        """Publish what stays while drives are booted: the robot, its axes, limits, programs."""
+        self._write_text("description", self._description, value)
+
+    def write_status(self, value: Mapping[str, Any]) -> None:
+        """Publish what changes now and then: state, program, reasons, notices."""
+        self._write_text("status", self._status, value)
+
+    def description(self) -> dict[str, Any]:
+        """Return what was published last, an empty table before that."""
+        return self._read_text("description", self._description)
+
+    def status(self) -> dict[str, Any]:
+        """Return what was published last, an empty table before that."""
+        return self._read_text("status", self._status)
+
+    def _write_text(self, name: str, area: NDArray[np.uint8], value: Mapping[str, Any]) -> None:
+        data = json.dumps(value).encode()
+        if len(data) + 8 > area.size:
+            raise SharedBlockError(f"{name}: {len(data)} bytes, {area.size - 8} allowed")
+        counter = self.counters[name]
+        version = int(counter[0]) // 2 * 2
+        counter[0] = version + 1
+        area[:8].view("<u8")[0] = len(data)
+        area[8 : 8 + len(data)] = np.frombuffer(data, np.uint8)
+        counter[0] = version + 2
+
+    def _read_text(self, name: str, area: NDArray[np.uint8]) -> dict[str, Any]:
+        counter = self.counters[name]
+        for _ in range(1000):
+            before = int(counter[0])
+            if before == 0:
+                return {}
+            size = min(int(area[:8].view("<u8")[0]), area.size - 8)
+            data = area[8 : 8 + size].tobytes()
+            if before % 2 == 0 and int(counter[0]) == before:
+                value: dict[str, Any] = json.loads(data)
+                return value
+        raise SharedBlockError(f"{name}: its writer ended in the middle of it")
+
+    # -- messages: commands to the loop, replies from it
+
+    def post_command(self, value: Mapping[str, Any]) -> int:
+        """Queue a command; return its number, which its reply repeats. Raises SharedBlockError."""
+        return self._post("commands", self._commands, value)
+
+    def take_command(self) -> dict[str, Any] | None:
+        """Return the next command, None where there is none."""
+        return self._take("commands", self._commands)
+
+    def void_commands(self) -> None:
+        """Have no command that has been queued so far start motion: somebody asks for a stop."""
+        self.counters["commands_void"][0] = self.counters["commands"][0]
+
+    def post_urgent(self, value: Mapping[str, Any]) -> int:
+        """Queue a stop beside the commands; return its number, which is negative.
+
+        Raises SharedBlockError.
+        """
+        return self._post("urgent", self._urgent, value, sign=-1)
+
+    def take_urgent(self) -> dict[str, Any] | None:
+        """Return the next stop, None where there is none; its number is negative."""
+        return self._take("urgent", self._urgent)
+
+    def post_reply(self, value: Mapping[str, Any]) -> int:
+        """Queue a reply. Raises SharedBlockError where nobody takes them."""
+        return self._post("replies", self._replies, value)
+
+    def take_reply(self) -> dict[str, Any] | None:
+        """Return the next reply, None where there is none."""
+        return self._take("replies", self._replies)
+
+    def _post(
+        self, name: str, slots: NDArray[np.uint8], value: Mapping[str, Any], sign: int = 1
+    ) -> int:
+        written, taken = int(self.counters[name][0]), int(self.counters[f"{name}_taken"][0])
+        if written - taken >= len(slots):
+            raise SharedBlockError(f"{name}: {len(slots)} wait to be taken already")
+        number = sign * (written + 1)
+        data = json.dumps({**value, "number": number}).encode()
+        slot = slots[written % len(slots)]
+        if len(data) + 8 > slot.size:
+            raise SharedBlockError(f"{name}: {len(data)} bytes, {slot.size - 8} allowed")
+        slot[:8].view("<u8")[0] = len(data)
+        slot[8 : 8 + len(data)] = np.frombuffer(data, np.uint8)
+        self.counters[name][0] = written + 1
+        return number
+
+    def _take(self, name: str, slots: NDArray[np.uint8]) -> dict[str, Any] | None:
+        written, taken = int(self.counters[name][0]), int(self.counters[f"{name}_taken"][0])
+        if taken >= written:
+            return None
+        slot = slots[taken % len(slots)]
+        size = min(int(slot[:8].view("<u8")[0]), slot.size - 8)
+        value: dict[str, Any] = json.loads(slot[8 : 8 + size].tobytes())
+        self.counters[f"{name}_taken"][0] = taken + 1
+        return value
+
+    # -- samples of the set-point stream: the service writes, the loop reads
+
+    def post_sample(self, sample: Row) -> None:
+        """Append one sample, a scalar of type `SAMPLE`; the oldest is overwritten."""
+        written = int(self.counters["samples"][0])
+        self.samples[written % SAMPLES] = sample
+        self.counters["samples"][0] = written + 1
+
+
+class RowReader:
+    """Follows the ring of rows from now on; any number of readers, at their own pace."""
+
+    def __init__(self, block: SharedBlock) -> None:
+        self._block = block
+        self.next = int(block.counters["rows"][0])
+        """Number of the row to be read next."""
+        self.lost = 0
+        """Rows that were overwritten before they were read."""
+
+    def read(self, most: int = 1 << 30) -> Row:
+        """Return a copy of the rows written since, oldest first, at most `most`; perhaps none."""
+        block = self._block
+        capacity = block.capacity
+        head = int(block.counters["rows"][0])
+        self._skip(head - capacity)
+        last = min(head, self.next + most)
+        numbers = np.arange(self.next, last, dtype=np.int64) % capacity
+        rows = block.rows[numbers]
+        # the writer may have come round while they were copied; it may be inside one row
+        overwritten = int(block.counters["rows"][0]) - capacity + 1
+        stale = min(max(0, overwritten - self.next), rows.size)
+        self.lost += stale
+        self.next = last
+        return rows[stale:]
+
+    def _skip(self, oldest: int) -> None:
+        if oldest > self.next:
+            self.lost += oldest - self.next
+            self.next = oldest
+
+
+class RowWriter:
+    """Writes rows into the ring; never waits for a reader, overwrites the oldest."""
+
+    def __init__(self, block: SharedBlock) -> None:
+        self._rows = block.rows
+        self._counter = block.counters["rows"].data
+        self._capacity = block.capacity
+        self._written = int(self._counter[0])
+
+    def slot(self) -> Row:
+        """Return the row to fill for this cycle, of shape (1,), a view."""
+        k = self._written % self._capacity
+        return self._rows[k : k + 1]
+
+    def commit(self) -> None:
+        """Make the filled row visible."""
+        self._written += 1
+        self._counter[0] = self._written
+
+
+def _sizes(n: int, capacity: int) -> tuple[int, ...]:
+    sizes = (
+        _COUNTERS.itemsize,
+        DESCRIPTION_BYTES,
+        STATUS_BYTES,
+        MESSAGES * MESSAGE_BYTES,
+        URGENT_MESSAGES * MESSAGE_BYTES,
+        MESSAGES * MESSAGE_BYTES,
+        SAMPLES * SAMPLE.itemsize,
+        capacity * cycle_dtype(n).itemsize,
+    )
+    return tuple(size + -size % 64 for size in sizes[:-1]) + sizes[-1:]

@@ -1,0 +1,1 @@
+"""Identification of cogging and friction from sweeps."""

@@ -1,0 +1,1 @@
+"""Set-points over time: trajectories, approaches, streams of poses."""

@@ -1,0 +1,1 @@
+"""Commissioning of one winch's motor: recorded passes, identification, validation."""

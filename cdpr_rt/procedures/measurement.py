@@ -1,0 +1,145 @@
+"""Runs that measure a motor: what is commanded, and where in the recording to look."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.control.base import Controller
+from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.core.rawlog import RawLog, RawLogWriter, column_names
+from cdpr_rt.errors import RawLogError
+from cdpr_rt.identification import SweepData
+from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.runtime.operating import Operator
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass at constant speed: motor angle to cover after a lead-in, in one direction."""
+
+    speed_rad_s: float
+    """Signed."""
+    lead_in_rad: float
+    """Covered first and left out, so that friction and controller have settled."""
+    distance_rad: float
+    ramp_s: float = 0.5
+    """Time to reach the speed, and to stop."""
+    with_ramps: bool = False
+    """Whether speeding up and slowing down count too, as they must to tell the inertia."""
+
+    def leg(self, start_rad: FloatArray) -> Leg:
+        """Return the set-point of n axes that start at `start_rad` (n,)."""
+        cruise = (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s)
+        speed = np.full(np.shape(start_rad), self.speed_rad_s)
+        return Leg(start_rad, speed, cruise, self.ramp_s)
+
+    def duration_s(self) -> float:
+        """Return how long the pass takes."""
+        return (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s) + 2.0 * self.ramp_s
+
+    def measured(self) -> tuple[float, float]:
+        """Return from when to when, in seconds from the start, the pass counts."""
+        if self.with_ramps:
+            return 0.0, self.duration_s()
+        begin = self.ramp_s + self.lead_in_rad / abs(self.speed_rad_s)
+        return begin, begin + self.distance_rad / abs(self.speed_rad_s)
+
+
+def both_ways(speed_rad_s: float, lead_in_rad: float, turns: float) -> tuple[Pass, Pass]:
+    """Return a pass forward and one backward over whole turns."""
+    there = Pass(speed_rad_s, lead_in_rad, turns * math.tau)
+    return there, replace(there, speed_rad_s=-speed_rad_s)
+
+
+def run_pass(
+    operator: Operator,
+    controller: Controller,
+    what: Pass,
+    path: Path,
+    meta: dict[str, Any],
+    on_progress: Callable[[float], None] | None = None,
+) -> Path:
+    """Run `controller` along one pass from where the axes stand, recording into `path`.
+
+    Raises what `Operator.follow` raises; the file is closed and kept in every case.
+    """
+    device = operator.device
+    begin, end = what.measured()
+    meta = {
+        **meta,
+        "axes": device.n,
+        "period_s": device.period_s,
+        "speed_rad_s": what.speed_rad_s,
+        "measured_from_s": begin,
+        "measured_until_s": end,
+        "first_cycle": device.feedback.cycle + 1,
+    }
+    log = RawLogWriter(path, column_names(device.n), meta)
+    try:
+        leg = what.leg(device.feedback.position_rad)
+        operator.follow(controller, leg, log, on_progress)
+    finally:
+        log.close()
+    return path
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recorded pass of one axis, angles from the index; arrays are (samples,)."""
+
+    sweep: SweepData
+    effort_Nm: FloatArray
+    cycle: FloatArray
+    judged: BoolArray
+    """The samples that count: at full speed after the lead-in."""
+    period_s: float
+    complete: bool
+    """False when the recording ends before the pass does."""
+
+
+def recording(log: RawLog, axis: int = 0) -> Recording:
+    """Take a raw log as the recording of a pass and refer it to the encoder index.
+
+    Raises RawLogError when the log is of something else, ends before the part that counts, or
+    the index was not known in it.
+    """
+    try:
+        period = float(log.header["period_s"])
+        begin, end = float(log.header["measured_from_s"]), float(log.header["measured_until_s"])
+        first_cycle = int(log.header["first_cycle"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise RawLogError(f"{log.path}: not the recording of a pass ({error})") from error
+    answered = log.column("valid", axis) != 0.0
+    since_start = (log.column("cycle") - first_cycle) * period
+    judged = ((since_start >= begin) & (since_start < end))[answered]
+    if not judged.any():
+        raise RawLogError(
+            f"{log.path}: ends after {since_start[-1]:.1f} s; the part to be measured begins at "
+            f"{begin:.1f} s"
+        )
+    if not log.column("index_known", axis)[answered].all():
+        raise RawLogError(f"{log.path}: axis {axis}: the encoder index was not known in this run")
+    index = log.column("index_rad", axis)[answered]
+    sweep = SweepData(
+        time_s=log.column("time_s")[answered],
+        angle_rad=log.column("position_rad", axis)[answered] - index,
+        torque_Nm=log.column("torque_sent_Nm", axis)[answered],
+        setpoint_rad=log.column("setpoint_rad", axis)[answered] - index,
+        setpoint_velocity_rad_s=log.column("setpoint_velocity_rad_s", axis)[answered],
+    )
+    if not all(np.isfinite(getattr(sweep, field.name)).all() for field in fields(sweep)):
+        raise RawLogError(f"{log.path}: holds numbers that are not finite")
+    return Recording(
+        sweep=sweep,
+        effort_Nm=log.column("effort_Nm", axis)[answered],
+        cycle=log.column("cycle")[answered],
+        judged=judged,
+        period_s=period,
+        complete=bool(since_start[-1] >= end - 2 * period),
+    )

@@ -1,0 +1,1 @@
+"""What a running robot can be told to do."""

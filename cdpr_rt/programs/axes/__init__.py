@@ -1,0 +1,1 @@
+"""Programs that move each axis by itself."""

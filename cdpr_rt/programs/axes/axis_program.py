@@ -1,0 +1,72 @@
+"""Base class of the programs that move the set-points of single axes."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from cdpr_rt.control.base import Controller
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.motion.approach import ramp_velocity
+from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.program_base import CommandedProgram
+
+
+class BumplessController(Protocol):
+    """Controls the axes, without a torque step at start: `PositionLoop`, `BumplessTransfer`."""
+
+    @property
+    def controller(self) -> Controller:
+        """The controller whose effort and compensation are recorded."""
+
+    def take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
+        """Begin with the torques (n,) of the last cycle."""
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write the torques of this cycle, (n,)."""
+
+
+class AxisProgram(CommandedProgram):
+    """Moves the axes' set-points within the model's bounds; the base class brakes and holds.
+
+    Subclasses override `_move`, and `_parsed` and `_take` for their commands.
+    """
+
+    name = "hold"
+    needs_lease = False
+
+    def __init__(self, model: RobotModel, loop: BumplessController) -> None:
+        self._model = model
+        self._loop = loop
+        self.controller = loop.controller
+        self._setpoint = Setpoint(model.n)
+        self._zero_velocity = np.zeros(model.n)
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+        self._setpoint = setpoint
+        self._stopping = self._at_rest = False
+        self._loop.take_over(feedback, torque_Nm)
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        if self._stopping:
+            self._at_rest = self._brake(setpoint)
+        else:
+            self._at_rest = self._move(setpoint)
+        self._loop.update(feedback, setpoint, torque_Nm)
+
+    def _move(self, setpoint: Setpoint) -> bool:
+        """Write the next set-point; return whether nothing is left to do."""
+        return self._brake(setpoint)
+
+    def _brake(self, setpoint: Setpoint) -> bool:
+        return ramp_velocity(
+            self._zero_velocity,
+            self._model.acceleration_rad_s2,
+            self._model.period_s,
+            setpoint.position_rad,
+            setpoint.velocity_rad_s,
+            setpoint.acceleration_rad_s2,
+        )

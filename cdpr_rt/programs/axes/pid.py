@@ -1,0 +1,74 @@
+"""Program `pid`: go to positions under the position loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.programs.arguments import CommandArguments
+from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
+from cdpr_rt.programs.axes.point_to_point import PointToPoint
+from cdpr_rt.programs.model import RobotModel
+
+FURTHEST_RAD = 1e4
+"""How far one command may send an axis."""
+_SLOWEST_RAD_S = 1e-4
+
+_Target = tuple[str, FloatArray, FloatArray]
+
+
+class PidProgram(AxisProgram):
+    """Moves the axes to positions on a trapezoidal profile that is planned anew every cycle."""
+
+    name = "pid"
+    needs_lease = True
+
+    def __init__(self, model: RobotModel, loop: BumplessController) -> None:
+        super().__init__(model, loop)
+        self._motion = PointToPoint(model)
+        self._has_target = False
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque; brakes until a position is commanded."""
+        super().start(feedback, setpoint, torque_Nm)
+        self._motion.stay(setpoint)
+        self._has_target = False
+
+    def progress(self) -> dict[str, Any]:
+        """Return the target and the share of the distance that has been covered."""
+        done = self._motion.part_done(self._setpoint)
+        return {"target_rad": self._motion.target_rad.tolist(), "done": done}
+
+    def _parsed(self, arguments: Mapping[str, Any]) -> _Target:
+        keys = CommandArguments(
+            self.name, arguments, ("position_rad", "distance_rad", "cable_m", "speed_rad_s")
+        )
+        key = keys.one_of("position_rad", "distance_rad", "cable_m")
+        limit = np.full(self._model.n, FURTHEST_RAD)
+        cable = self._model.cable_m_per_rad
+        if key == "cable_m":
+            distance = keys.axes(key, limit * np.abs(cable), optional=True) / cable
+        else:
+            distance = keys.axes(key, limit, optional=True)
+        speed = self._model.speed_rad_s
+        most = keys.number("speed_rad_s", _SLOWEST_RAD_S, float(speed.max()), float(speed.max()))
+        return key, distance, np.minimum(speed, most)
+
+    def _take(self, parsed: _Target) -> None:
+        key, distance, speed = parsed
+        setpoint = self._setpoint
+        here, pace = setpoint.position_rad, setpoint.velocity_rad_s
+        there = distance if key == "position_rad" else here + distance
+        stop = here + 0.5 * pace * np.abs(pace) / self._model.acceleration_rad_s2
+        self._motion.set_out(np.where(np.isnan(distance), stop, there), setpoint, speed)
+        self._has_target = True
+
+    def _move(self, setpoint: Setpoint) -> bool:
+        if not self._has_target:
+            at_rest = self._brake(setpoint)
+            self._motion.stay(setpoint)
+            return at_rest
+        return self._motion.move(setpoint)

@@ -1,0 +1,73 @@
+"""Program `idle`: no torque."""
+
+from __future__ import annotations
+
+from cdpr_rt.control.base import Idle
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.jit import jit
+from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
+from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.program_base import ProgramDefaults
+
+_FILTER_S = 0.01
+
+
+@jit
+def _track_axes(
+    weight: float,
+    period: float,
+    first: bool,
+    angle: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    slope: FloatArray,
+) -> None:
+    for i in range(angle.size):
+        if not first:
+            velocity[i] += weight * ((angle[i] - position[i]) / period - velocity[i])
+        position[i] = angle[i]
+        slope[i] = 0.0
+
+
+class IdleProgram(ProgramDefaults):
+    """Fades the torque out; the set-point tracks the axes' angles and filtered speeds.
+
+    The program that comes next thus begins at the speed at which an axis turns.
+    """
+
+    name = "idle"
+    needs_lease = False
+
+    def __init__(self, model: RobotModel) -> None:
+        self._loop = BumplessTransfer(Idle(model.n), model.torque_Nm, model.period_s)
+        self.controller = self._loop.controller
+        self._period_s = model.period_s
+        self._weight = model.period_s / (model.period_s + _FILTER_S)
+        self._first = True
+
+    def start(self, feedback: AxisFeedback, _setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+        self._first = True
+        self._loop.take_over(feedback, torque_Nm)
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        _track_axes(
+            self._weight,
+            self._period_s,
+            self._first,
+            feedback.position_rad,
+            setpoint.position_rad,
+            setpoint.velocity_rad_s,
+            setpoint.acceleration_rad_s2,
+        )
+        self._first = False
+        self._loop.update(feedback, setpoint, torque_Nm)
+
+    def stop(self) -> None:
+        """Nothing is to be braked."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether no torque is left."""
+        return self._loop.done

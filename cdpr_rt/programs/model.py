@@ -1,0 +1,85 @@
+"""The axes of a robot as programs need them: bounds, gains, compensation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_profiles import RobotAxis
+from cdpr_rt.control.compensation import AxisCompensation
+from cdpr_rt.control.pid import PidGains
+from cdpr_rt.control.tuning import stand_firm, stiffest_pid, sweep_gain
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.limits import Limits
+
+BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
+"""Bandwidths of the position loops that are tried, the stiffest first."""
+CABLE_ACCELERATION_M_S2 = 1.0
+"""Acceleration of cable set-points."""
+SETPOINT_SPEED_SHARE = 0.8
+"""Fastest set-point over the supervisor's speed limit: axes overshoot their set-points."""
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """The axes of a robot as arrays (n,) and what holds for all of them, motor side."""
+
+    period_s: float
+    torque_Nm: FloatArray
+    """The most that the controllers may command."""
+    speed_rad_s: FloatArray
+    """The fastest that a set-point moves."""
+    acceleration_rad_s2: FloatArray
+    """The most by which its speed changes."""
+    cable_m_per_rad: FloatArray
+    """Cable paid out per radian, with its sign."""
+    gains: tuple[PidGains, ...]
+    """Of the position loops, one an axis."""
+    sweep_gain_Nm_rad: FloatArray
+    """Of the cogging sweep's proportional controller."""
+    compensation: tuple[AxisCompensation | None, ...] = ()
+    """Cogging and friction of each motor where they are known; empty where none is."""
+
+    @property
+    def n(self) -> int:
+        """How many axes there are."""
+        return len(self.gains)
+
+
+def position_gains(inertia_kg_m2: float, latency_s: float, period_s: float) -> PidGains:
+    """Return the position gains of a bare rotor; raises TuningError."""
+    design = stiffest_pid(inertia_kg_m2, latency_s, BANDWIDTHS_Hz, period_s)
+    return stand_firm(design, period_s).gains
+
+
+def model_of(
+    axes: Sequence[RobotAxis],
+    period_s: float,
+    latency_s: Sequence[float],
+    limits: Limits,
+    compensation: Sequence[AxisCompensation | None] = (),
+) -> RobotModel:
+    """Return the model of axes whose loops are as stiff as the latency of each allows.
+
+    `latency_s` (n,) is from the instant an angle was true to the middle of the cycle in which its
+    torque acts; `compensation` (n,) or empty what is known of each motor. The loops are those of
+    the bare rotors. Raises TuningError where a latency is too long for any loop.
+    """
+    cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
+    inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
+    pairs = list(zip(inertia, latency_s, strict=True))
+    designs = {
+        (J, latency): position_gains(J, latency, period_s) for J, latency in dict.fromkeys(pairs)
+    }
+    return RobotModel(
+        period_s=period_s,
+        torque_Nm=np.broadcast_to(limits.torque_Nm, cable.shape).astype(float),
+        speed_rad_s=SETPOINT_SPEED_SHARE * np.broadcast_to(limits.speed_rad_s, cable.shape),
+        acceleration_rad_s2=CABLE_ACCELERATION_M_S2 / np.abs(cable),
+        cable_m_per_rad=cable,
+        gains=tuple(designs[pair] for pair in pairs),
+        sweep_gain_Nm_rad=np.array([sweep_gain(J, latency) for J, latency in pairs]),
+        compensation=tuple(compensation),
+    )

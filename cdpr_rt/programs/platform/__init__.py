@@ -1,0 +1,1 @@
+"""Programs that move the platform by all its cables."""

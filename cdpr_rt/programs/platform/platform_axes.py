@@ -1,0 +1,113 @@
+"""Programs `hold`, `idle` and `jog` of axes whose cables carry one platform."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
+from cdpr_rt.programs.axes.jog import JogProgram
+from cdpr_rt.programs.base import Program, ProgramError
+from cdpr_rt.programs.idle import IdleProgram
+from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
+from cdpr_rt.programs.program_base import ProgramDefaults
+from cdpr_rt.robots.workspace import G_m_s2
+
+_CARRIED_SHARE = 0.8
+"""Sum of the tensions over the weight, below which the cables do not carry the platform."""
+
+
+class PlatformHold(ProgramDefaults):
+    """Brakes and holds the platform, or each axis by itself where the cables are slack."""
+
+    name = "hold"
+    needs_lease = False
+
+    def __init__(self, parts: PlatformParts, model: RobotModel, loop: BumplessController) -> None:
+        self._parts = parts
+        self._axes = AxisProgram(model, loop)
+        self._platform = PlatformProgram(parts, model.torque_Nm)
+        self._active: Program = self._axes
+        self.controller = self._active.controller
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
+        self._active = self._platform if self._parts.tight else self._axes
+        self.controller = self._active.controller
+        self._active.start(feedback, setpoint, torque_Nm)
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        self._active.update(feedback, setpoint, torque_Nm)
+
+    def stop(self) -> None:
+        """Begin to brake to a standstill."""
+        self._active.stop()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the set-point stands still."""
+        return self._active.at_rest
+
+    @property
+    def pose(self) -> FloatArray | None:
+        """Return where the platform is, (7,), None where that is not known."""
+        return self._active.pose
+
+    @property
+    def pose_setpoint(self) -> FloatArray | None:
+        """Return where the platform is to be, (7,), None where that is not known."""
+        return self._active.pose_setpoint
+
+    def progress(self) -> dict[str, Any]:
+        """Return whether the platform or the axes are held, and where."""
+        return {"tight": self._parts.tight, **self._active.progress()}
+
+
+class PlatformIdle(IdleProgram):
+    """Fades the torque out; refused while the platform hangs on its cables."""
+
+    def __init__(self, parts: PlatformParts, model: RobotModel) -> None:
+        super().__init__(model)
+        self._parts = parts
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque; the cables count as slack."""
+        self._parts.slacken()
+        super().start(feedback, setpoint, torque_Nm)
+
+    def check(self, arguments: Mapping[str, Any]) -> None:
+        """Raise ProgramError where `command` would, or where the platform would fall."""
+        super().check(arguments)
+        if self._parts.tight:
+            raise ProgramError("idle: the platform hangs on its cables; lower it first")
+        carried_N = float(np.nansum(self._parts.estimator.estimate.tension_N))
+        if carried_N > _CARRIED_SHARE * self._parts.platform.mass_kg * G_m_s2:
+            raise ProgramError(
+                f"idle: its cables pull with {carried_N:.0f} N, the platform may hang on them; "
+                "lower it first"
+            )
+
+
+class PlatformJog(JogProgram):
+    """Turns single winches; the cables count as slack from then on."""
+
+    def __init__(self, parts: PlatformParts, model: RobotModel, loop: BumplessController) -> None:
+        super().__init__(model, loop)
+        self._parts = parts
+
+    def check(self, arguments: Mapping[str, Any]) -> None:
+        """Raise ProgramError where `command` would, or where the platform hangs on its cables."""
+        super().check(arguments)
+        if self._parts.tight:
+            raise ProgramError("jog: the platform hangs on its cables; lower it first")
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque; brakes until speeds are commanded."""
+        self._parts.slacken()
+        self._parts.last.take()
+        super().start(feedback, setpoint, torque_Nm)

@@ -1,0 +1,314 @@
+"""Program `pose`: move a platform to poses, or along the set-point stream."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.motion import hand_target
+from cdpr_rt.motion.approach import soft_deadband, stopping_position
+from cdpr_rt.motion.pose_stream import PoseStream, StreamState
+from cdpr_rt.motion.stream_buttons import CLUTCH
+from cdpr_rt.programs.arguments import CommandArguments
+from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.platform.platform_program import (
+    PlatformParts,
+    PlatformProgram,
+    distance_m,
+    synchronise,
+)
+
+_SLOWEST_m_s = 1e-4
+_DEADBAND_m = 5e-5
+_ANYWHERE_m = 1e3
+_HALF_TURN_rad = math.pi
+_BLOCKED_m = 1e-3
+"""A way on which the set-point comes no further than this is blocked."""
+_HELD_BACK = {
+    hand_target.FREE: "",
+    hand_target.AT_EDGE: "at the edge of the workspace",
+    hand_target.ON_STAND: "below the workspace, as on its stand: up first",
+}
+_KEYS = ("position_m", "rotation_rad", "stream", "resume", "speed_m_s")
+
+
+class PoseProgram(PlatformProgram):
+    """Takes the platform to a position and rotation, or along with the set-point stream.
+
+    The trapezoidal profile of Tremblay (thesis), eq. (2.10) to (2.12), in each direction, planned
+    anew every cycle; from rest to a target all directions take the same time, on a straight line.
+    The stream moves the target by its displacement times its scale and turns it as it turns, except
+    while the clutch is pressed: then the platform comes to rest and holds. No target leaves the
+    workspace, and the set-point only moves where it can still stop within it.
+    """
+
+    name = "pose"
+    needs_lease = True
+
+    def __init__(self, parts: PlatformParts, torque_Nm: FloatArray, stream: PoseStream) -> None:
+        super().__init__(parts, torque_Nm)
+        platform, d = parts.platform, parts.model.size
+        self._low = np.array(platform.workspace_min_m)
+        self._high = np.array(platform.workspace_max_m)
+        self.stream = stream
+        self._following = False
+        self._epoch = -1
+        self._last_sample, self._hand = np.zeros(7), np.zeros((4, 4))
+        self._last_sample[3] = 1.0
+        self._goal, self._seen_goal, self._kept = np.zeros((3, d))
+        self._deadband_weight = 0.0
+        self._hindrance = hand_target.FREE
+        self._clutched = False
+        self._aim: FloatArray | None = None
+        self._has_aim = False
+        self._inside = False
+        self._asked = np.array(parts.speed)
+        self._braking = False
+        self._blocked_at, self._blocked = np.full(d, np.nan), False
+        self._before = np.zeros((3, d))
+        k = self._k
+        self._steps = [*(slice(i, i + 1) for i in range(k)), *[slice(k, d)] * (d > k)]
+        # compiled here, not when a motion or the stream begins
+        self._follow_sample()
+        self._calm()
+        synchronise(self._target, self._target, self._asked)
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the present set-point and torque; brakes until a position is commanded."""
+        super().start(feedback, setpoint, torque_Nm)
+        self._following = self._has_aim = self._inside = False
+        self._braking = self._blocked = False
+        self._hindrance = hand_target.FREE
+
+    @property
+    def stream_age_s(self) -> float:
+        """Age of the newest sample, nan where no stream is followed."""
+        return self.stream.age_s if self._following else math.nan
+
+    @property
+    def stream_buttons(self) -> int:
+        """The buttons of the sample that is played, 0 where no stream is followed."""
+        return self.stream.buttons if self._following else 0
+
+    def progress(self) -> dict[str, Any]:
+        """Return the platform's state, the target, and the state of the stream."""
+        state, aim, k = super().progress(), self._aim, self._k
+        state["left_m"] = None if aim is None else aim[:k].tolist()
+        if self._about.size:
+            state["left_rotation_rad"] = None if aim is None else aim[k:].tolist()
+        if self._blocked:
+            state["trouble"] = f"no way on, {self._missing_at(self._seen_goal)}"
+        if self._following:
+            state |= {"stream": self.stream.state.name.lower(), **self.stream.counts()}
+        return state
+
+    def _held_back(self) -> str:
+        """Return why set-point or target are held back, an empty text where they are not."""
+        lags = super()._held_back()
+        if lags or not self._following:
+            return lags
+        return self._missing_at(self._seen_goal) or _HELD_BACK[self._hindrance]
+
+    def _missing_at(self, position: FloatArray) -> str:
+        """Return where and why a position is not feasible, an empty text where it is."""
+        missing = self._control.feasible(position)
+        if not missing:
+            return ""
+        k = self._k
+        turned = f" turned by {_listed(position[k:])} rad" if position[k:].any() else ""
+        return f"at {_listed(position[:k])} m{turned}: {missing}"
+
+    # -- commands
+
+    def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, FloatArray | None, float]:
+        allowed = [key for key in _KEYS if key != "rotation_rad" or self._about.size]
+        keys = CommandArguments(self.name, arguments, allowed)
+        most = float(self._parts.speed[0])
+        speed = keys.number("speed_m_s", _SLOWEST_m_s, most, most)
+        if not self._parts.tight:
+            raise ProgramError("pose: the cables are not tight; run tighten first")
+        if not arguments:
+            return "stay", None, speed
+        if "rotation_rad" in keys and "position_m" not in keys:
+            what = keys.one_of("rotation_rad", "stream", "resume")
+        else:
+            what = keys.one_of("position_m", "stream", "resume")
+        if what not in ("stream", "resume"):
+            return "go", self._position(keys), speed
+        if arguments[what] is not True:
+            raise ProgramError(f"pose: {what}: value {arguments[what]!r}; allowed: true")
+        if what == "resume" and self._aim is None:
+            raise ProgramError("pose: resume: no target has been left; allowed: position_m")
+        return what, self._aim, speed
+
+    def _position(self, keys: CommandArguments) -> FloatArray:
+        """Return the position (d,) that is wanted; what is left out stays as it is."""
+        k, control, wanted = self._k, self._control, np.zeros(self._target.size)
+        acceleration = self._parts.acceleration
+        stopping_position(control.position, control.velocity, acceleration, wanted)
+        told = []
+        if "position_m" in keys:
+            wanted[:k] = self._checked_position(keys)
+            told.append(f"position_m: value {wanted[:k].tolist()}")
+        if "rotation_rad" in keys:
+            wanted[k:] = self._checked_rotation(keys)
+            told.append(f"rotation_rad: value {wanted[k:].tolist()}")
+        else:
+            turned, most = float(np.linalg.norm(wanted[k:])), self._parts.model.angle_rad
+            wanted[k:] *= 1.0 if turned <= most else most / turned
+        missing = control.feasible(wanted)
+        if missing:
+            raise ProgramError(f"pose: {', '.join(told)}: {missing}")
+        missing = control.feasible_path(wanted)
+        if missing:
+            raise ProgramError(f"pose: {', '.join(told)}: on the way, {missing}")
+        return wanted
+
+    def _checked_position(self, keys: CommandArguments) -> FloatArray:
+        position = keys.axes("position_m", np.full(self._k, _ANYWHERE_m), each="a coordinate")
+        for i, (low, high) in enumerate(zip(self._low, self._high, strict=True)):
+            if not low <= position[i] <= high:
+                raise ProgramError(
+                    f"pose: position_m[{i}]: value {position[i]:g} m; allowed: {low:g} to "
+                    f"{high:g} m, the workspace"
+                )
+        return position
+
+    def _checked_rotation(self, keys: CommandArguments) -> FloatArray:
+        limit = np.full(self._about.size, _HALF_TURN_rad)
+        rotation = keys.axes("rotation_rad", limit, each="an angle that is controlled")
+        angle, most = float(np.linalg.norm(rotation)), self._parts.model.angle_rad
+        if not angle <= most:
+            raise ProgramError(
+                f"pose: rotation_rad: value {rotation.tolist()}, {angle:g} rad from the "
+                f"orientation at home; allowed: up to {most:g} rad"
+            )
+        return rotation
+
+    def _take(self, parsed: tuple[str, FloatArray | None, float]) -> None:
+        what, position, speed = parsed
+        self._asked[:] = self._parts.speeds(speed)
+        self._following = what == "stream"
+        self._has_aim = what in ("go", "resume")
+        self._braking = self._blocked = False
+        self._blocked_at[:] = np.nan
+        if self._following:
+            self.stream.reset()
+            self._aim = None
+            self._deadband_weight = 0.0
+        if self._has_aim and position is not None:
+            self._aim = np.array(position)
+            self._set_out(self._aim)
+            return
+        self._brake()
+        if self._following:
+            self._speed[:] = self._asked
+            self._acceleration[:] = self._parts.acceleration
+            self._target[:] = self._stopping_position()
+
+    def _set_out(self, aim: FloatArray) -> None:
+        """Set out for a target, from rest so that all directions take the same time."""
+        control = self._control
+        self._target[:] = aim
+        self._speed[:] = self._asked
+        self._acceleration[:] = self._parts.acceleration
+        if not control.velocity.any():
+            synchronise(control.position, aim, self._speed)
+            synchronise(control.position, aim, self._acceleration)
+
+    # -- cycle by cycle
+
+    def _move(self) -> bool:
+        if self._following:
+            self._follow()
+            return False
+        if self._braking:
+            if self._approach():
+                self._go_on()
+            return False
+        at_rest = self._advance(self._target)
+        if at_rest and self._has_aim:
+            self._aim = None
+        return at_rest
+
+    def _go_on(self) -> None:
+        """Set out anew, straight on, after a way that no tensions hold; or give it up."""
+        here, aim, scale_m = self._control.position, self._aim, self._parts.scale_m
+        if self._blocked or aim is None:
+            return
+        if distance_m(here, self._blocked_at, scale_m) < _BLOCKED_m:
+            self._blocked = True
+            return
+        self._braking = False
+        self._blocked_at[:] = here
+        self._set_out(aim)
+
+    def _follow(self) -> None:
+        stream = self.stream
+        state = stream.update()
+        if state is StreamState.STOPPED:
+            self._target[:] = self._stopping_position()
+        elif stream.epoch != self._epoch or stream.buttons & CLUTCH or self._clutched:
+            # in the cycle in which the clutch closes, part of the motion was made with it open
+            if stream.epoch != self._epoch or not self._clutched:
+                self._target[:] = self._stopping_position()
+            self._epoch = stream.epoch
+            self._last_sample[:] = stream.pose
+        else:
+            self._follow_sample()
+        self._clutched = bool(stream.buttons & CLUTCH)
+        self._calm()
+        self._advance(self._goal)
+
+    def _calm(self) -> None:
+        """Have trembling around the target not move the platform."""
+        self._deadband_weight = soft_deadband(
+            self._target, self._control.position, self._parts.scale_m, self._deadband_weight,
+            _DEADBAND_m, self._goal,
+        )  # fmt: skip
+
+    def _follow_sample(self) -> None:
+        """Move the target by the stream's motion, or as far as it is feasible."""
+        control, goal, target = self._control, self._goal, self._target
+        self._hindrance = hand_target.lead(
+            self.stream.scale, self.stream.pose, self._last_sample, self._about,
+            self._low, self._high, self._parts.model.angle_rad, self._speed, self._acceleration,
+            control.position, target, self._hand, goal,
+        )  # fmt: skip
+        self._seen_goal[:] = goal
+        if control.stands(goal) or not control.stands(target):
+            target[:] = goal
+            return
+        # along the edge in one direction, where not in all; turning is one of them
+        for part in self._steps:
+            self._kept[part], target[part] = target[part], goal[part]
+            if control.stands(target):
+                return
+            target[part] = self._kept[part]
+
+    def _advance(self, goal: FloatArray) -> bool:
+        """Go one cycle towards a goal, or brake where the stopping position would be infeasible."""
+        control, before = self._control, self._before
+        before[0], before[1] = control.position, control.velocity
+        before[2] = control.acceleration
+        arrived = self._go_towards(goal)
+        stops = control.stands(self._stopping_position())
+        if self._inside and not stops:
+            control.position[:], control.velocity[:] = before[0], before[1]
+            control.acceleration[:] = before[2]
+            if not self._following:
+                self._braking = True
+                self._seen_goal[:] = self._rest
+                self._target[:] = self._stopping_position()
+            self._go_towards(self._stopping_position())
+            return False
+        self._inside = stops
+        return arrived
+
+
+def _listed(values: FloatArray) -> str:
+    return ", ".join(f"{value:.3f}" for value in values)

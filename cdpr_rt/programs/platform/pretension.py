@@ -1,0 +1,329 @@
+"""Program `tighten`: take up slack, pretension the cables, find the platform's pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.programs.arguments import CommandArguments
+from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.platform.arrival import Arrival
+from cdpr_rt.programs.platform.index_path import index_path
+from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
+from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
+from cdpr_rt.robots.last_lengths import StoppedLengths, off_index_m
+from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
+
+TAKE_UP_m_s = 0.05
+"""Speed at which slack is taken up."""
+TAKE_UP_SHARE = 0.4
+"""Tension while some cables are slack, as a share of the pretension."""
+OVERSHOOT = 1.5
+"""Tension over pretension, for a moment: on the way back friction acts in the other direction, so
+that its effect on the angles cancels out."""
+INDEX_m_s = 0.1
+"""Speed of the platform during the search for indices."""
+_STANDING = 0.85
+_HIGHEST = 0.9
+_SETTLING_S = 0.5
+_HANGING = 0.5
+_RISE_1_s = 1.0
+_FALL_S = 0.2
+_STILL_m = 0.0003
+_STILL_S = 0.3
+_PULLED = 0.95
+_MOST_m, _ONCE_TIGHT_m = 1.0, 0.05
+_MOST_S = 60.0
+
+_STAGES = (("slack", TAKE_UP_SHARE), ("pull", 1.0), ("beyond", OVERSHOOT), ("lengths", 1.0))
+_SOURCES = ("home", "lengths", "last")
+
+
+class PretensionProgram(PlatformProgram):
+    """Takes up slack until all cables are tight and still, pretensions them, then holds.
+
+    The platform stays on its stand meanwhile: tensions grow in a fixed ratio whose wrench presses
+    it down where the cables can, and has no horizontal component. The cables' lengths follow from
+    home, where it has to stand then, from the estimate, or from the last stop. Where a motor's
+    cogging is known but not its index, the platform is lifted until all have passed theirs. A cable
+    that does not become tight, and lengths that disagree, end it: the cables are slackened again.
+    """
+
+    name = "tighten"
+    needs_lease = True
+
+    def __init__(self, parts: PlatformParts, torque_Nm: FloatArray, cable_m: FloatArray) -> None:
+        super().__init__(parts, torque_Nm)
+        self._arrival = Arrival(parts.period_s, near_s=_SETTLING_S)
+        self._cable = np.array(cable_m)
+        self._pretension_N = np.minimum(
+            home_pretension_N(parts), torque_Nm / np.abs(cable_m) / OVERSHOOT
+        )
+        inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
+        self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
+        self._winches.paying_out_m_s[:] = -TAKE_UP_m_s
+        tight_m = parts.control.lengths_at_home(OVERSHOOT * self._pretension_N)
+        stretch_m = parts.control.lengths_at_home(np.zeros(cable_m.size)) - tight_m
+        self._once_tight_m = _ONCE_TIGHT_m + float(stretch_m.max())
+        self._start_rad, self._still_rad, self._rising_rad = np.zeros((3, cable_m.size))
+        self._home_rad = np.full(cable_m.size, np.nan)
+        """Angles at which lengths were taken at home, nan once they have been corrected."""
+        self._stage = 0
+        self._share = 0.0
+        self._still = self._cycles = 0
+        self._source = "home"
+        self._last: StoppedLengths | None = None
+        self._feedback = AxisFeedback(cable_m.size)
+        self._path: list[FloatArray] = []
+        self._failure = ""
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the torque of the last cycle."""
+        parts = self._parts
+        self._feedback = feedback
+        self._failure = ""
+        self._stopping = self._at_rest = False
+        self._source = self._default_source()
+        self._last = None
+        self._stage = self._still = self._cycles = 0
+        if parts.tight:
+            super().start(feedback, setpoint, torque_Nm)
+            self._look_for_indices()
+            return
+        self._start_rad[:] = self._still_rad[:] = feedback.position_rad
+        self._winches.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
+        self._control.compensation_Nm[:] = 0.0
+        self._share = min(
+            max(float(np.max(-torque_Nm / self._cable / self._pretension_N)), 0.0), 1.0
+        )
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        if self._parts.tight:
+            super().update(feedback, setpoint, torque_Nm)
+            self._at_rest = self._at_rest and (self._stopping or self._arrival.over)
+            return
+        goal = 0.0 if self._stopping else _STAGES[self._stage][1]
+        step = self._parts.period_s * (1.0 / _FALL_S if self._stopping else _RISE_1_s)
+        self._share += min(max(goal - self._share, -step), step)
+        np.multiply(self._pretension_N, self._share, out=self._winches.high_N)
+        self._winches.update(feedback, torque_Nm)
+        setpoint.position_rad[:] = feedback.position_rad
+        setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
+        self._cycles += 1
+        if self._stopping:
+            self._at_rest = self._share == 0.0
+        elif self._stands_still(feedback, self._share == goal):
+            self._next_stage(feedback, setpoint, torque_Nm)
+        else:
+            self._fail_if(self._trouble(feedback))
+
+    def progress(self) -> dict[str, Any]:
+        """Return the stage, the cables' tensions, and what went wrong."""
+        tight = self._parts.tight
+        stage = _STAGES[self._stage][0] if not tight else "index" if self._path else "held"
+        done = tight and self._at_rest
+        state = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._failure}
+        if tight:
+            told = super().progress()
+            return {**told, **state, "trouble": self._failure or told["trouble"]}
+        return {"tension_N": self._winches.tension_N.tolist(), **state}
+
+    # -- commands
+
+    def _default_source(self) -> str:
+        return "lengths" if self._parts.known else "home"
+
+    def _parsed(self, arguments: Mapping[str, Any]) -> str:
+        CommandArguments(self.name, arguments, ("from",))
+        if arguments and self._parts.tight:
+            raise ProgramError("tighten: from: the cables are tight already; lower it first")
+        source, last = arguments.get("from", self._default_source()), self._parts.last
+        if source not in _SOURCES:
+            allowed = ", ".join(_SOURCES)
+            raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
+        if source == "home" and last.displaced and not arguments:
+            raise ProgramError(
+                "tighten: from: the platform was let go elsewhere, and where it stands is not "
+                "known; stand it at home, then say from: home"
+            )
+        if source == "lengths" and not self._parts.known:
+            raise ProgramError("tighten: from: the cables' lengths are not known; allowed: home")
+        if source == "last" and last.lengths is None:
+            raise ProgramError(f"tighten: from: no lengths of the last stop: {last.why}")
+        return str(source)
+
+    def _take(self, source: str) -> None:
+        self._source = source
+        hanging = self._parts.estimator.estimate.tension_N >= _HANGING * self._control.least_N
+        if source != "home" and bool(hanging.all()) and not self._parts.tight:
+            self._stage = len(_STAGES) - 1  # brakes have kept it where it was
+            self._share = 1.0
+
+    # -- taking up slack
+
+    def _stands_still(self, feedback: AxisFeedback, pulling: bool) -> bool:
+        winches = self._winches
+        pulling = pulling and bool((winches.tension_N > _PULLED * winches.high_N).all())
+        moved_m = np.abs((feedback.position_rad - self._still_rad) * self._cable).max()
+        if not pulling or moved_m > _STILL_m:
+            self._still_rad[:] = feedback.position_rad
+            self._still = 0
+        self._still += 1
+        return self._still * self._parts.period_s > _STILL_S
+
+    def _next_stage(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> None:
+        self._still = 0
+        if self._stage == 0:
+            self._start_rad[:] = feedback.position_rad
+        if _STAGES[self._stage][0] == "pull":
+            self._rising_rad[:] = feedback.position_rad
+        if self._stage + 1 < len(_STAGES):
+            self._stage += 1
+            return
+        last = self._parts.last.take()
+        self._last = last if self._source == "last" else None
+        self._control.take_lengths(self._lengths(feedback), feedback)
+        self._control.begin(feedback)
+        allowed_m = self._parts.lengths_allowed_m
+        if self._control.residual_m > allowed_m:
+            self._fail_if(
+                f"the cables' lengths disagree by {1e3 * self._control.residual_m:.0f} mm, "
+                f"{1e3 * allowed_m:.0f} mm allowed; stand the platform at home and tighten from it"
+            )
+            return
+        self._finish(feedback, setpoint, torque_Nm)
+
+    def _lengths(self, feedback: AxisFeedback) -> FloatArray:
+        """Return the cables' lengths, (n,), as they are now."""
+        self._home_rad[:] = np.nan
+        if self._source == "last" and self._last is not None:
+            return self._last.at(feedback.position_rad, self._cable)
+        if self._source == "lengths":
+            return self._parts.estimator.estimate.cable_length_m
+        self._home_rad[:] = 0.5 * (feedback.position_rad + self._rising_rad)
+        hysteresis = 0.5 * self._cable * (feedback.position_rad - self._rising_rad)
+        return self._control.lengths_at_home(self._pretension_N) + hysteresis
+
+    def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        parts, control = self._parts, self._control
+        parts.estimator.set_lengths(feedback.position_rad, control.free_lengths_m)
+        control.stand_still()
+        parts.loop.take_over(feedback, torque_Nm)
+        parts.cycle = feedback.cycle
+        parts.tight, parts.last.displaced = True, False
+        super().start(feedback, setpoint, torque_Nm)
+        self._look_for_indices()
+
+    def _trouble(self, feedback: AxisFeedback) -> str:
+        moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
+        most = int(moved_m.argmax())
+        # what stands at home does not move once its cables are tight
+        fixed = self._stage > 0 and self._source == "home"
+        allowed_m = self._once_tight_m if fixed else _MOST_m
+        if moved_m[most] > allowed_m:
+            return (
+                f"cable {most}: {moved_m[most]:.2f} m reeled in and not tight, "
+                f"{allowed_m:.2g} m allowed"
+            )
+        if self._cycles * self._parts.period_s > _MOST_S:
+            return f"not tight within {_MOST_S:g} s"
+        return ""
+
+    def _fail_if(self, trouble: str) -> None:
+        self._failure = trouble
+        self._stopping = bool(trouble)
+
+    # -- the search for indices
+
+    def _look_for_indices(self) -> None:
+        """Start along a path on which all motors turn, where an index is needed."""
+        parts, control = self._parts, self._control
+        self._path = []
+        if self._needs_index():
+            self._path = index_path(
+                parts.model, self._cable, lambda there: not control.feasible(there)
+            )
+        if self._path:
+            self._target[:] = self._path[0]
+            self._acceleration[:] = parts.acceleration
+            self._speed[:] = parts.speeds(INDEX_m_s)
+        else:
+            self._correct_motor_torque()
+
+    def _needs_index(self) -> bool:
+        """Whether an index is missing that compensation needs, or that checks the last lengths."""
+        last, known = self._last, self._feedback.index_known
+        if last is not None and bool((np.isfinite(last.cable_at_index_m) & ~known).any()):
+            return True
+        return self._parts.index_missing(self._feedback)
+
+    def _move(self) -> bool:
+        arrived = self._approach()
+        if not self._path:
+            return arrived
+        found = not self._needs_index()
+        if found or arrived:
+            self._path = [] if found else self._path[1:]
+            self._target[:] = self._path[0] if self._path else self._stopping_position()
+            if not found and not self._path:
+                self._failure = "a motor has not passed its index"
+            if found:
+                self._correct_motor_torque()
+                self._failure = self._compare_indices()
+        return False
+
+    def _correct_motor_torque(self) -> None:
+        """Correct lengths taken at home for cogging and friction, once the index is known.
+
+        These torques were part of the tensions by which the cables stretched.
+        """
+        parts, control, known = self._parts, self._control, self._parts.compensation
+        if known is None or np.isnan(self._home_rad).any():
+            return
+        torque_error_N = known.standing_Nm(self._home_rad, self._feedback) / self._cable
+        stretch_error_m = control.lengths_at_home(self._pretension_N + torque_error_N)
+        stretch_error_m -= control.lengths_at_home(self._pretension_N)
+        self._home_rad[:] = np.nan
+        length_m = parts.estimator.estimate.cable_length_m + stretch_error_m
+        parts.estimator.set_lengths(self._feedback.position_rad, length_m)
+        control.take_lengths(length_m, self._feedback)
+
+    def _compare_indices(self) -> str:
+        """Return which index contradicts the lengths of the last stop, or an empty text."""
+        last = self._last
+        if last is None:
+            return ""
+        length_m = self._parts.estimator.estimate.cable_length_m
+        off = np.abs(off_index_m(last, length_m, self._feedback, self._cable))
+        off[np.isnan(off)] = 0.0
+        worst, allowed_m = int(off.argmax()), self._parts.lengths_allowed_m
+        if off[worst] <= allowed_m:
+            return ""
+        return (
+            f"cable {worst}: its motor's index is {1e3 * off[worst]:.0f} mm from where the last "
+            f"stop has it, {1e3 * allowed_m:.0f} mm allowed: lower, and tighten from home"
+        )
+
+
+def home_pretension_N(parts: PlatformParts) -> FloatArray:
+    """Return tensions (n,) under which a platform at home stays on its stand.
+
+    None is below the least tension. Their wrench presses the platform down with its own weight,
+    where some cable pulls downward; else it carries part of the weight, too little to lift the
+    platform even at the overshoot.
+    """
+    model, control, t = parts.model, parts.control, np.zeros(parts.model.kinematics.n)
+    home, weight = model.pose(model.home), model.weight()
+    W = model.kinematics.wrench_matrix(home)
+    most = np.maximum(_HIGHEST * model.high_N / OVERSHOOT, 1.1 * control.least_N)
+    for least in (np.minimum(control.low_N, 0.9 * most), control.least_N):
+        if model.least_tensions(least, most).solve(W, -weight, t) is TensionOutcome.FEASIBLE:
+            return t
+    model.least_tensions(control.least_N, most).solve(W, weight, t)
+    return np.maximum(_STANDING / OVERSHOOT * t, 0.0)

@@ -1,0 +1,113 @@
+"""Velocity loops of the winches, saturated in cable tension."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.jit import jit
+
+_BANDWIDTH_rad_s = 100.0
+_FILTER_S = 0.005
+_FASTEST_m_s = 5.0
+FIXED_END_1_s = 60.0
+"""Integral rate where the cables' ends are fixed."""
+HANGING_LOAD_1_s = 4.0
+"""Integral rate under a load ten times the rotor's mass at the cable, without oscillation."""
+
+
+@jit
+def _control_speed(
+    period: float,
+    weight: float,
+    low: FloatArray,
+    high: FloatArray,
+    paying_out: FloatArray,
+    fastest_in: float,
+    cable: FloatArray,
+    gain: FloatArray,
+    integral_rate: float,
+    position: FloatArray,
+    last: FloatArray,
+    speed: FloatArray,
+    integral: FloatArray,
+    tension: FloatArray,
+    torque: FloatArray,
+) -> None:
+    for i in range(position.size):
+        raw = (position[i] - last[i]) / period
+        last[i] = position[i]
+        # a jump of the encoder is no speed
+        if abs(cable[i] * raw) < _FASTEST_m_s:
+            speed[i] += weight * (raw - speed[i])
+        out = cable[i] * speed[i]
+        # a loose cable must not be wound up ever faster
+        least = low[i] * min(max(1.0 + out / fastest_in, 0.0), 1.0)
+        error = paying_out[i] / cable[i] - speed[i]
+        integral[i] += gain[i] * integral_rate * period * error
+        demand = gain[i] * error + integral[i]
+        tension[i] = min(max(-demand / cable[i], least), max(high[i], least))
+        torque[i] = -cable[i] * tension[i]
+        integral[i] += torque[i] - demand
+
+
+class WinchSpeedLoop:
+    """A PI velocity loop for each winch, its tension limited to [low_N, high_N]; arrays are (n,).
+
+    A slack cable is reeled in at the commanded speed, a tight one pulled with `high_N`; a loaded
+    cable is paid out at the commanded speed, held with at most `high_N`. Anti-windup by
+    back-calculation.
+    """
+
+    def __init__(
+        self,
+        inertia_kg_m2: FloatArray,
+        cable_m: FloatArray,
+        period_s: float,
+    ) -> None:
+        n = len(cable_m)
+        self._period_s = period_s
+        self._weight = period_s / (period_s + _FILTER_S)
+        self._cable = np.array(cable_m, float)
+        self._gain = np.broadcast_to(inertia_kg_m2, (n,)) * _BANDWIDTH_rad_s
+        self.low_N = np.zeros(n)
+        """Lowest tension."""
+        self.high_N = np.zeros(n)
+        """Highest tension."""
+        self.paying_out_m_s = np.zeros(n)
+        """Commanded cable speed; negative reels in."""
+        self.fastest_in_m_s = 0.1
+        """Reeling-in speed at which `low_N` has faded to zero."""
+        self.integral_rate_1_s = FIXED_END_1_s
+        self.tension_N = np.zeros(n)
+        """Commanded tension of the last cycle."""
+        self.speed_rad_s = np.zeros(n)
+        """Filtered motor speed."""
+        self._last = np.zeros(n)
+        self._integral = np.zeros(n)
+
+    def begin(self, feedback: AxisFeedback, speed_rad_s: FloatArray, torque_Nm: FloatArray) -> None:
+        """Begin with the last cycle's torques at the motors' present speeds, (n,) each."""
+        self._last[:] = feedback.position_rad
+        self.speed_rad_s[:] = speed_rad_s
+        self._integral[:] = torque_Nm
+
+    def update(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
+        """Write the torques of this cycle."""
+        _control_speed(
+            self._period_s,
+            self._weight,
+            self.low_N,
+            self.high_N,
+            self.paying_out_m_s,
+            self.fastest_in_m_s,
+            self._cable,
+            self._gain,
+            self.integral_rate_1_s,
+            feedback.position_rad,
+            self._last,
+            self.speed_rad_s,
+            self._integral,
+            self.tension_N,
+            torque_Nm,
+        )

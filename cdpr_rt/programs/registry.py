@@ -1,0 +1,123 @@
+"""All programs of a robot, by name."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_profiles import Robot
+from cdpr_rt.control.compensation import Compensation
+from cdpr_rt.core.estimate import Estimator
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.motion.pose_stream import PoseStream
+from cdpr_rt.programs.axes.follow import FollowProgram
+from cdpr_rt.programs.axes.hold import HoldProgram
+from cdpr_rt.programs.axes.jog import JogProgram
+from cdpr_rt.programs.axes.pid import PidProgram
+from cdpr_rt.programs.axes.position_loop import PositionLoop
+from cdpr_rt.programs.axes.sweep import SweepProgram
+from cdpr_rt.programs.base import Program
+from cdpr_rt.programs.idle import IdleProgram
+from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.platform.lower import LowerProgram
+from cdpr_rt.programs.platform.platform_axes import PlatformHold, PlatformIdle, PlatformJog
+from cdpr_rt.programs.platform.platform_program import PlatformParts
+from cdpr_rt.programs.platform.pose import PoseProgram
+from cdpr_rt.programs.platform.pretension import PretensionProgram
+from cdpr_rt.robots.platform_control import platform_control
+from cdpr_rt.robots.platform_model import platform_model
+
+_WARM_UP_CYCLES = 5
+
+
+def platform_parts(
+    robot: Robot, limits: Limits, model: RobotModel, estimator: Estimator
+) -> PlatformParts | None:
+    """Return what the programs of a platform share; None where there is none.
+
+    Raises GeometryError where its tensions have no bounds to hold it by.
+    """
+    platform = robot.platform
+    if platform is None:
+        return None
+    low, high = (
+        np.broadcast_to(bound, (model.n,)).astype(float)
+        for bound in (limits.tension_min_N, limits.tension_max_N)
+    )
+    known = None
+    if any(axis is not None for axis in model.compensation):
+        known = Compensation(list(model.compensation), model.period_s)
+    of_platform = platform_model(platform, low, high)
+    control = platform_control(of_platform, robot.axes, model.torque_Nm, model.period_s, known)
+    return PlatformParts(
+        of_platform, control, estimator, model.period_s, known, limits.lengths_disagree_m
+    )
+
+
+def build_programs(
+    model: RobotModel, block: SharedBlock, parts: PlatformParts | None = None
+) -> dict[str, Program]:
+    """Return a robot's programs by name, in the order of their numbers in its description.
+
+    `block` is where the set-point stream comes from, `parts` is of a robot whose platform is moved.
+    """
+    loop = PositionLoop(model)
+    stream = PoseStream(block, model.period_s)
+    if parts is not None:
+        return {program.name: program for program in _of_platform(model, loop, stream, parts)}
+    programs: tuple[Program, ...] = (
+        IdleProgram(model),
+        HoldProgram(model, loop),
+        JogProgram(model, loop),
+        SweepProgram(model),
+        PidProgram(model, loop),
+        FollowProgram(model, loop, stream),
+    )
+    return {program.name: program for program in programs}
+
+
+def _of_platform(
+    model: RobotModel, loop: PositionLoop, stream: PoseStream, parts: PlatformParts
+) -> tuple[Program, ...]:
+    torque_Nm, cable_m = model.torque_Nm, model.cable_m_per_rad
+    return (
+        PlatformIdle(parts, model),
+        PlatformHold(parts, model, loop),
+        PlatformJog(parts, model, loop),
+        PretensionProgram(parts, torque_Nm, cable_m),
+        PoseProgram(parts, torque_Nm, stream),
+        LowerProgram(parts, torque_Nm, cable_m),
+    )
+
+
+def warm_up_programs(
+    programs: dict[str, Program], n: int, parts: PlatformParts | None = None
+) -> None:
+    """Run each program for some cycles on n imaginary axes, so that its kernels are compiled.
+
+    A kernel is compiled when it is first called, which may take seconds.
+    """
+    feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
+    _run_each(programs, feedback, setpoint, torque)
+    if parts is not None:
+        parts.assume_at_home(feedback)
+        for program in programs.values():
+            parts.tight = True  # idle and jog slacken
+            _run_each({program.name: program}, feedback, setpoint, torque)
+        parts.forget()
+
+
+def _run_each(
+    programs: dict[str, Program],
+    feedback: AxisFeedback,
+    setpoint: Setpoint,
+    torque: FloatArray,
+) -> None:
+    for program in programs.values():
+        program.start(feedback, setpoint, torque)
+        for _ in range(_WARM_UP_CYCLES):
+            feedback.cycle += 1
+            program.update(feedback, setpoint, torque)
+        program.stop()
+        program.update(feedback, setpoint, torque)

@@ -1,0 +1,84 @@
+"""Where a platform comes to rest when one of its cables breaks: a static estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.optimize import NonlinearConstraint, minimize
+
+from cdpr_profiles.platform import Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.rigid_body import free_directions, home_rotation, in_space, rotation
+
+_FURTHEST_RAD = 0.9 * np.pi
+"""A platform may turn over; half a turn has no single rotation vector."""
+_STEPS, _DONE_m = 200, 1e-9
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How far a platform swings that was at rest at a position when a cable broke."""
+
+    cable: int
+    position_m: tuple[float, ...]
+    swing_m: float
+    """Distance of the origin's new position from there."""
+    turn_rad: float
+    to_m: tuple[float, ...]
+
+
+def worst_swings(platform: Platform) -> list[Swing]:
+    """Return for each cable the largest swing from any corner of the box of targets."""
+    corners = list(product(*zip(platform.workspace_min_m, platform.workspace_max_m, strict=True)))
+    cables = range(len(platform.exit_points_m))
+    return [
+        max((swing_of(platform, i, corner) for corner in corners), key=lambda swing: swing.swing_m)
+        for i in cables
+    ]
+
+
+def swing_of(platform: Platform, cable: int, position_m: tuple[float, ...]) -> Swing:
+    """Return where the platform comes to rest on the other cables.
+
+    That is the least height of its centre of mass at which no other cable is longer than it was:
+    |a - p - Q b| <= rho, tension being what the constraint costs. Cables do not stretch, winches do
+    not turn, and what it passes on the way is not looked at; it swings through to about as far on
+    the other side before it comes to rest.
+    """
+    size = len(platform.home_m)
+    start, Q0 = in_space(position_m), home_rotation(platform)
+    kept = [i for i in range(len(platform.exit_points_m)) if i != cable]
+    exits = np.array([in_space(platform.exit_points_m[i]) for i in kept])
+    anchors = np.array([in_space(platform.anchor_points_m[i]) for i in kept]) @ Q0.T
+    mass_m = Q0 @ in_space(platform.centre_of_mass_m)
+    chosen = list(free_directions(platform))
+    limits = [(-np.inf, np.inf) if i < 3 else (-_FURTHEST_RAD, _FURTHEST_RAD) for i in chosen]
+
+    def pose(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        moved = np.zeros(6)
+        moved[chosen] = x
+        return start + moved[:3], rotation(moved[3:])
+
+    def height(x: FloatArray) -> float:
+        p, Q = pose(x)
+        return float((p + Q @ mass_m)[size - 1])
+
+    def spare(x: FloatArray) -> FloatArray:
+        p, Q = pose(x)
+        return np.asarray(rho - np.linalg.norm(p + anchors @ Q.T - exits, axis=1))
+
+    rho = np.linalg.norm(start + anchors - exits, axis=1)
+    found = minimize(
+        height,
+        np.zeros(len(chosen)),
+        method="SLSQP",
+        bounds=limits,
+        constraints=NonlinearConstraint(spare, 0.0, np.inf),
+        options={"maxiter": _STEPS, "ftol": _DONE_m},
+    )
+    p, _ = pose(found.x)
+    turn = float(np.linalg.norm([x for i, x in zip(chosen, found.x, strict=True) if i >= 3]))
+    swing_m = float(np.linalg.norm(p - start))
+    return Swing(cable, tuple(position_m), swing_m, turn, tuple(p[:size].tolist()))

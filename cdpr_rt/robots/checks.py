@@ -1,0 +1,298 @@
+"""Whether a cable robot can work as its file describes it, and what to change where it cannot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr_profiles import ProfileError, Robot
+from cdpr_profiles.platform import DIRECTIONS, Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.platform_model import platform_model
+from cdpr_rt.robots.rigid_body import is_point
+from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
+
+_GRID = 25
+_FLAT = 1e-3
+"""Share of their span by which points may be off a line or a plane and still count as in it."""
+_SHARES = np.concatenate([np.linspace(0.99, 0.03, 97), np.geomspace(0.0295, 1e-5, 120)])
+_TIMES = np.geomspace(1.02, 20.0, 150)
+_LONGEST_PERIOD_s = 0.005
+"""Of a cycle, with which the platform's control is still stiff enough to overcome friction."""
+_NEAREST_m = 0.1
+"""An anchor point closer than this to an exit point is about to be pulled into it."""
+_FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
+_WIDE_ARMS = 0.5
+"""Anchor points further apart than this share of the exit points are probably not in metres."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a key of a robot's file: what is wrong, and what to change."""
+
+    key: str
+    text: str
+    impossible: bool
+    """Whether the robot cannot work like this; else it can, less well than it seems."""
+
+
+def findings(robot: Robot) -> list[Finding]:
+    """Return what is impossible or doubtful about a robot's platform, the worst first."""
+    if robot.platform is None:
+        return []
+    statics = statics_of(robot)
+    found = [*_cycle(robot), *_shape(robot, statics)]
+    if not any(finding.impossible for finding in found):
+        # with points that cannot be meant, tensions and torques only repeat it
+        found += [*_tensions(statics), *_motors(robot, statics), *_lengths(robot, statics)]
+        if statics.turns:
+            found += _turning(statics)
+        found += _swinging(robot.platform)
+    return sorted(found, key=lambda finding: not finding.impossible)
+
+
+def refuse_impossible(robot: Robot) -> list[str]:
+    """Return what is doubtful about a robot, a line each.
+
+    Raises ProfileError where it is impossible: a line for each key, with what to change.
+    """
+    found = findings(robot)
+    wrong = [finding for finding in found if finding.impossible]
+    if wrong:
+        further = "".join(f"\n{robot.path}: {f.key}: {f.text}" for f in wrong[1:])
+        raise ProfileError(robot.path, wrong[0].key, wrong[0].text + further)
+    return [f"{robot.path}: {finding.key}: {finding.text}" for finding in found]
+
+
+def _cycle(robot: Robot) -> Iterator[Finding]:
+    if robot.sync_period_s > _LONGEST_PERIOD_s:
+        text = (
+            f"value {robot.sync_period_s:g}; allowed: up to {_LONGEST_PERIOD_s:g} for a platform, "
+            "whose control would be too soft to overcome its winches' friction"
+        )
+        yield Finding("sync_period_s", text, impossible=True)
+
+
+def _shape(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    a, b, n = statics.exits_m, statics.anchors_m, len(robot.axes)
+    apart = [(i, j, float(np.linalg.norm(a[i] - a[j]))) for i in range(n) for j in range(i)]
+    for i, j, distance in apart:
+        if distance < _NEAREST_m:
+            text = f"{distance:.3g} m from that of axes[{j}]; allowed: {_NEAREST_m:g} m and more"
+            yield Finding(f"axes[{i}].exit_point_m", text, impossible=True)
+    span = max(distance for _, _, distance in apart)
+    wide = max(float(np.linalg.norm(b[i] - b[j])) for i in range(n) for j in range(i))
+    if wide > _WIDE_ARMS * span:
+        text = (
+            f"anchor points are up to {wide:.3g} m apart, exit points {span:.3g} m; allowed: half "
+            "of that (is one of them in millimetres?)"
+        )
+        yield Finding("axes[0].anchor_point_m", text, impossible=True)
+        return
+    lengths = statics.lengths(statics.points()).reshape(-1, len(robot.axes))
+    for i, nearest in enumerate(lengths.min(axis=0)):
+        if nearest < _NEAREST_m:
+            text = (
+                f"the box of targets goes up to {nearest:.2g} m from the exit point of "
+                f"axes[{i}] ({robot.axes[i].name}); allowed: {_NEAREST_m:g} m and more"
+            )
+            yield Finding("platform.workspace_min_m", text, impossible=True)
+
+
+def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
+    platform = statics.platform
+    home = np.array(platform.home_m)
+    way = np.linspace(home, np.clip(home, statics.box.low_m, statics.box.high_m), _GRID)
+    for place, where in ((home[None], ""), (way, "on the way to the box of targets, ")):
+        missing = ~statics.is_target(place)
+        if missing.any():
+            text = where + _not_held(statics, place[missing.argmax()], NONE_rad)
+            yield Finding("platform.home_m", text, impossible=True)
+            break
+    points, turns = statics.points(), statics.orientations
+    moving_N = np.array([statics.reserve_N(points, platform.acceleration_m_s2, t) for t in turns])
+    taken = float(np.mean(moving_N >= statics.model.reserve_N))
+    if taken < 1.0:
+        text = f"in {100 * taken:.0f} % of the box targets are taken; "
+        smaller = statics.largest_box(statics.box) if platform.is_planar else None
+        if smaller is not None:
+            text += f"in all of {_point(smaller.low_m)} to {_point(smaller.high_m)} m they would be"
+        else:
+            worst = np.unravel_index(moving_N.argmin(), moving_N.shape)
+            text += _not_held(statics, points[worst[1:]], turns[worst[0]])
+        yield Finding("platform.workspace_min_m", text, impossible=taken == 0.0)
+
+
+def _not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
+    """Say why the platform is not moved there, and what would help."""
+    where, reserve = f"at {_point(position_m)} m", float(statics.reserve_N(position_m, 0, turn_rad))
+    if turn_rad.any():
+        where += f", turned {_turn(turn_rad)}"
+    if not math.isfinite(reserve):
+        return f"{where} {_singular(statics)}"
+    needed = ", ".join(f"{value:.0f}" for value in statics.tensions_N(position_m, turn_rad))
+    allowed = f"{statics.low_N.min():g} to {statics.high_N.max():g} N are allowed"
+    if reserve < 0.0:
+        text = f"{where} the cables would need {needed} N; {allowed}"
+    else:
+        text = f"{where} the cables have {needed} N; {allowed}, which leaves too little for motion"
+    return f"{text}; {_what_helps(statics, position_m, turn_rad)}"
+
+
+def _singular(statics: PlatformStatics) -> str:
+    """Say that a direction is not held, and which points in a line or a plane are to blame."""
+    text = "the cables cannot hold one direction, whatever their tensions"
+    for name, points in (("exit points", statics.exits_m), ("anchor points", statics.anchors_m)):
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        flat = int(np.sum(spread > _FLAT * max(float(spread[0]), _FLAT)))
+        if flat == 1:
+            return f"{text}: all {name} lie in one line"
+        if flat == 2 and len(spread) == 3 and _is_upright(points) and points is statics.exits_m:
+            return f"{text}: all {name} lie in one upright plane"
+    return f"{text}: anchor points elsewhere on the platform help"
+
+
+def _is_upright(points: FloatArray) -> bool:
+    normal = np.linalg.svd(points - points.mean(axis=0))[2][2]
+    return abs(float(normal[2])) < _FLAT
+
+
+def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
+    """Say by how much one figure would have to change for a target there."""
+    platform, low_N = statics.platform, statics.low_N
+    most, mass_kg = platform.acceleration_m_s2, platform.mass_kg
+
+    def helps(platform: Platform, low_N: FloatArray) -> bool:
+        changed = PlatformStatics(platform_model(platform, low_N, statics.high_N))
+        return bool(changed.is_target(position_m, turn_rad))
+
+    for share in _SHARES if turn_rad.any() else ():
+        if bool(statics.is_target(position_m, share * turn_rad)):
+            angle = share * platform.workspace_angle_rad
+            return f"workspace_angle_rad up to {angle:.3g} is possible there"
+    for share in _SHARES:
+        if helps(replace(platform, acceleration_m_s2=share * most), low_N):
+            return f"acceleration_m_s2 up to {share * most:.3g} is possible there"
+    for share in _SHARES:
+        if helps(replace(platform, mass_kg=share * mass_kg), low_N):
+            return f"a platform of up to {share * mass_kg:.3g} kg is possible there"
+    for share in _SHARES:
+        if helps(platform, share * low_N):
+            return f"tension_min_N up to {share * low_N.min():.3g} is possible there"
+    for times in _TIMES:
+        if helps(replace(platform, mass_kg=times * mass_kg), low_N):
+            return f"a platform of {times * mass_kg:.3g} kg and more is possible there"
+    return "only a place further inside the exit points helps"
+
+
+def _motors(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    limits, platform = limits_of(robot), statics.platform
+    arm_m = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
+    allowed_Nm = np.broadcast_to(limits.torque_Nm, arm_m.shape)
+    needed_Nm = statics.high_N * arm_m
+    i = int((needed_Nm / allowed_Nm).argmax())
+    if needed_Nm[i] > allowed_Nm[i]:
+        text = (
+            f"{statics.high_N[i]:g} N are {needed_Nm[i]:.3g} Nm at the motor of axes[{i}], whose "
+            f"torque_Nm is {allowed_Nm[i]:g}; allowed: up to {allowed_Nm[i] / arm_m[i]:.0f} N, "
+            "less friction"
+        )
+        yield Finding("limits.tension_max_N", text, impossible=True)
+    rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in robot.axes])
+    points = statics.points()
+    taken = points[statics.is_target(points)]
+    held_N = statics.least_tensions_N(taken, reserve_N=statics.model.reserve_N).max(
+        axis=0, initial=0.0
+    )
+    i = int((held_N * arm_m / rated_Nm).argmax())
+    if held_N[i] * arm_m[i] > rated_Nm[i]:
+        text = (
+            f"to stand somewhere in the box axes[{i}] needs {held_N[i] * arm_m[i]:.3g} Nm, its "
+            f"motor is rated for {rated_Nm[i]:g} Nm; the drive will not bear it for long: a "
+            "smaller box or a larger gear helps"
+        )
+        yield Finding("platform.workspace_max_m", text, impossible=False)
+    # each direction has the speed of its own, so that all together are faster along a diagonal
+    together = math.sqrt(len(platform.home_m))
+    turning_m_s = 0.0
+    if platform.workspace_angle_rad > 0.0:
+        arm = float(np.linalg.norm(statics.anchors_m, axis=1).max())
+        angles = len(platform.controlled) - len(platform.home_m)
+        turning_m_s = math.sqrt(angles) * platform.angular_speed_rad_s * arm
+    cable_m_s = together * platform.speed_m_s + turning_m_s
+    most_m_s = arm_m * np.broadcast_to(limits.speed_rad_s, arm_m.shape)
+    i = int(most_m_s.argmin())
+    if cable_m_s > most_m_s[i]:
+        text = (
+            f"value {platform.speed_m_s:g}; allowed: up to "
+            f"{max(most_m_s[i] - turning_m_s, 0.0) / together:.3g}, where axes[{i}] reaches the "
+            "limit of its speed"
+        )
+        yield Finding("platform.speed_m_s", text, impossible=True)
+
+
+def _turning(statics: PlatformStatics) -> Iterator[Finding]:
+    home = np.array(statics.platform.home_m)
+    places = np.concatenate([home[None], statics.points().reshape(-1, 2)])
+    angle = np.where(statics.is_target(places), statics.angle_rad(places), 0.0)
+    if np.isnan(angle).any():
+        where = _point(places[int(np.isnan(angle).argmax())])
+        text = (
+            f"at {where} m the cables would turn the platform over; each cable should be made fast "
+            "on the side of the platform that faces its exit point"
+        )
+        yield Finding("axes[0].anchor_point_m", text, impossible=True)
+        return
+    degrees = np.abs(np.degrees(angle))
+    if degrees[0] > _TIPPED_deg:
+        text = (
+            f"there the cables would turn the platform by {degrees[0]:.0f} deg, and may tip it on "
+            "its stand; where it turns less, lengths learnt from there are better"
+        )
+        yield Finding("platform.home_m", text, impossible=False)
+    if degrees.max() > _FAR_TURNED_deg:
+        where = _point(places[int(degrees.argmax())])
+        text = (
+            f"at {where} m the platform turns by {degrees.max():.0f} deg, which no cable can "
+            "prevent; anchor points that lie towards their exit points let it turn less"
+        )
+        yield Finding("axes[0].anchor_point_m", text, impossible=False)
+
+
+def _swinging(platform: Platform) -> Iterator[Finding]:
+    angles = DIRECTIONS[3][3:]
+    left = [name for name in angles if name not in platform.controlled]
+    if not platform.is_planar and left and not is_point(platform):
+        text = (
+            f"{', '.join(left)} left out: the platform swings about these axes, and is reckoned "
+            "with as it is at home"
+        )
+        yield Finding("platform.controlled", text, impossible=False)
+
+
+def _lengths(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    limits = limits_of(robot)
+    lengths = statics.lengths(statics.points()).reshape(-1, len(robot.axes))
+    for key, needed, allowed, sign in (
+        ("cable_length_min_m", lengths.min(axis=0), limits.cable_length_min_m, 1.0),
+        ("cable_length_max_m", lengths.max(axis=0), limits.cable_length_max_m, -1.0),
+    ):
+        bound = np.broadcast_to(allowed, (len(robot.axes),))
+        i = int((sign * (bound - needed)).argmax())
+        if sign * (bound[i] - needed[i]) > 0.0:
+            text = f"{bound[i]:g} m; in the box of targets axes[{i}] has {needed[i]:.3g} m of cable"
+            yield Finding(f"limits.{key}", text, impossible=True)
+
+
+def _turn(turn_rad: FloatArray) -> str:
+    angle = float(np.linalg.norm(turn_rad))
+    axis = ", ".join(f"{value:.2g}" for value in turn_rad / angle)
+    return f"by {math.degrees(angle):.0f} deg about ({axis})"
+
+
+def _point(position_m: FloatArray | tuple[float, ...]) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in position_m) + ")"

@@ -1,0 +1,127 @@
+"""What the controller asks of a robot, whatever its cables and directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from cdpr_rt.control.base import Controller
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.robots.kinematics.pose import Pose
+
+
+@dataclass
+class PoseSolution:
+    """A pose from cable lengths; it belongs to the kinematics and is overwritten by its next."""
+
+    pose: Pose
+    converged: bool = False
+    """False too where the lengths leave a direction free."""
+    steps: int = 0
+    residual_m: float = np.inf
+    """Root mean square over the cables of what their lengths are off."""
+
+
+class Kinematics(Protocol):
+    """Geometry of n cables and a platform of d controlled directions.
+
+    A twist is (velocity of the origin, angular velocity) along the axes of the room, and d of its
+    six components are controlled; `out`, where given, is written and returned.
+    """
+
+    n: int
+    directions: tuple[int, ...]
+    """Which of the twist's components are controlled, in order."""
+
+    def lengths(
+        self, pose: Pose, tension_N: FloatArray | None = None, out: FloatArray | None = None
+    ) -> FloatArray:
+        """Return the lengths (n,) that the winches have to pay out, under tensions (n,)."""
+
+    def jacobian(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
+        """Return J (n, d), the derivative of the lengths by the controlled twist."""
+
+    def wrench_matrix(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
+        """Return W = -J^T (d, n): tensions t give the platform the wrench W t, W t + w_e = 0."""
+
+    def wrench_matrices(self, poses: FloatArray, out: FloatArray) -> None:
+        """Write W (m, d, n) at the arrays of m poses (m, 4, 3); nan where a cable has no length."""
+
+    def pose_from_lengths(
+        self,
+        lengths_m: FloatArray,
+        start: Pose,
+        tension_N: FloatArray | None = None,
+        restarts: int = 0,
+    ) -> PoseSolution:
+        """Return the pose whose lengths are next to `lengths_m` (n,), searched from `start`."""
+
+    def covariance(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
+        """Return the covariance (6, 6) of a pose that was found from lengths, in m and rad."""
+
+
+class PlatformControl(Controller, Protocol):
+    """A controller whose set-point is a platform's, in the coordinates of its robot's file.
+
+    As a `Controller` it writes the axes' set-points itself, so that others may go on from there.
+    Positions, velocities and accelerations are (d,), one for each controlled direction: coordinates
+    of the origin, m, and the rotation vector from the orientation at home, rad. Tensions and
+    lengths are (n,).
+    """
+
+    position: FloatArray
+    """The set-point, to be written along with its derivatives."""
+    velocity: FloatArray
+    acceleration: FloatArray
+    shaped: FloatArray
+    """The set-point's position as the control follows it."""
+    tension_N: FloatArray
+    """The tensions of the last cycle."""
+    least_N: FloatArray
+    """The lowest tensions allowed."""
+    low_N: FloatArray
+    """The lowest tensions that are planned with."""
+    torque_Nm: FloatArray
+    """What the motors may be asked for."""
+    estimated: FloatArray
+    """Where the platform is, (d,)."""
+    residual_m: float
+    """How far the cables' lengths are from agreeing with each other, root mean square."""
+
+    @property
+    def inertia_kg_m2(self) -> FloatArray:
+        """Of each motor, (n,)."""
+
+    @property
+    def pose(self) -> FloatArray:
+        """Where the platform is, (7,): x y z, quaternion w x y z."""
+
+    @property
+    def free_lengths_m(self) -> FloatArray:
+        """Lengths of the cables without tension, as the motors' angles have them."""
+
+    def begin(self, feedback: AxisFeedback) -> None:
+        """Take the motors to stand where they are, and the platform where its cables have it."""
+
+    def stand_still(self) -> None:
+        """Have the set-point stand where the platform is."""
+
+    def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
+        """Return the lengths without tension of cables that hold `tension_N` at home."""
+
+    def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
+        """Take the cables to have these lengths without tension at the motors' angles."""
+
+    def missing(self) -> str:
+        """Return why the last cycle's tensions are not feasible, an empty text where they are."""
+
+    def stands(self, position: FloatArray) -> bool:
+        """Return whether the platform can be held, and accelerated, at a position."""
+
+    def feasible(self, position: FloatArray) -> str:
+        """Return why the platform cannot stand at a position, an empty text where it can."""
+
+    def feasible_path(self, position: FloatArray) -> str:
+        """Return what is in the straight way to a position, an empty text for nothing."""

@@ -1,0 +1,1 @@
+"""Kinematics of n cables in two to six directions."""

@@ -1,0 +1,116 @@
+"""Kernels of n cables on a platform with six directions: lengths, directions, wrenches.
+
+Tremblay (thesis), eqs. (3.1) to (3.14), in m and rad. A twist is the velocity of the platform's
+origin and its angular velocity, both along the axes of the room; a small change of pose likewise.
+Arrays, all of float64:
+
+    pose      (4, 3)      position p, and below it the rotation matrix Q
+    geometry  (10, n)     rows EXIT, ANCHOR (in the platform's frame), RADIUS of a swivel pulley,
+                          AXIS of its swivelling: unit vector along which the cable comes up to it
+    cables    (9, n)      J transposed (6, n), then rows FREE, ARC, ERROR
+"""
+
+from __future__ import annotations
+
+import math
+
+from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.jit import jit
+
+ANCHOR, RADIUS, AXIS, GEOMETRY_ROWS = 3, 6, 7, 10
+FREE, ARC, ERROR, CABLE_ROWS = 6, 7, 8, 9
+TINY = 1e-300
+
+
+@jit
+def run_cables(geometry: FloatArray, pose: FloatArray, cables: FloatArray) -> None:
+    """Write J^T, FREE and ARC of all cables at the pose; a cable's length is FREE + ARC.
+
+    Eqs. (3.2), (3.10): c = p + Q b - a, ρ = |c|, u = c/ρ, a row of J is (u, Q b × u). A cable
+    without length has a row of zeros.
+    """
+    px, py, pz = pose[0, 0], pose[0, 1], pose[0, 2]
+    xx, xy, xz = pose[1, 0], pose[1, 1], pose[1, 2]
+    yx, yy, yz = pose[2, 0], pose[2, 1], pose[2, 2]
+    zx, zy, zz = pose[3, 0], pose[3, 1], pose[3, 2]
+    for i in range(geometry.shape[1]):
+        bx, by, bz = geometry[3, i], geometry[4, i], geometry[5, i]
+        rx = xx * bx + xy * by + xz * bz
+        ry = yx * bx + yy * by + yz * bz
+        rz = zx * bx + zy * by + zz * bz
+        ux, uy, uz = px + rx - geometry[0, i], py + ry - geometry[1, i], pz + rz - geometry[2, i]
+        free = math.sqrt(ux * ux + uy * uy + uz * uz)
+        inverse = 1.0 / (free + TINY)
+        ux, uy, uz = ux * inverse, uy * inverse, uz * inverse
+        cables[0, i], cables[1, i], cables[2, i] = ux, uy, uz
+        cables[3, i], cables[4, i] = ry * uz - rz * uy, rz * ux - rx * uz
+        cables[5, i] = rx * uy - ry * ux
+        cables[FREE, i], cables[ARC, i] = free, 0.0
+    for i in range(geometry.shape[1]):
+        if geometry[RADIUS, i] > 0.0:
+            _wind(geometry, pose, cables, i)
+
+
+@jit
+def wrench_matrices(
+    geometry: FloatArray, poses: FloatArray, chosen: IntArray, cables: FloatArray, W: FloatArray
+) -> None:
+    """Write -J^T of the chosen directions (d,) into `W` (m, d, n) for poses (m, 4, 3).
+
+    A cable without length has nan. `cables` is overwritten.
+    """
+    for j in range(W.shape[0]):
+        run_cables(geometry, poses[j], cables)
+        for i in range(W.shape[2]):
+            for k in range(W.shape[1]):
+                W[j, k, i] = -cables[chosen[k], i] if cables[FREE, i] > 0.0 else math.nan
+
+
+@jit
+def _wind(geometry: FloatArray, pose: FloatArray, cables: FloatArray, i: int) -> None:
+    """Lead cable `i`, straight so far, over its swivel pulley.
+
+    In the plane of swivel axis k and anchor let the anchor be `beside` the axis and `along` it
+    from the exit point, where the cable comes in along k; with X = beside - r and d² = X² + along²
+    the free length is l = √(d² - r²), and the angle θ that is wound has sin θ = (X l + along r)/d²
+    and cos θ = (along l - X r)/d². The length is l + r θ, and its derivative by the anchor the
+    direction of the free part. An anchor within the pulley has l = 0.
+    """
+    r = geometry[RADIUS, i]
+    kx, ky, kz = geometry[AXIS, i], geometry[AXIS + 1, i], geometry[AXIS + 2, i]
+    straight = cables[FREE, i]
+    cx, cy, cz = straight * cables[0, i], straight * cables[1, i], straight * cables[2, i]
+    along = cx * kx + cy * ky + cz * kz
+    ex, ey, ez = cx - along * kx, cy - along * ky, cz - along * kz
+    beside = math.sqrt(ex * ex + ey * ey + ez * ez)
+    x = beside - r
+    square = max(x * x + along * along, TINY)
+    free = math.sqrt(max(square - r * r, 0.0))
+    sine, cosine = (x * free + along * r) / square, (along * free - x * r) / square
+    angle = math.atan2(sine, cosine)
+    if angle < -0.5 * math.pi:
+        angle += 2.0 * math.pi
+    sine /= max(beside, TINY)
+    ux, uy, uz = sine * ex + cosine * kx, sine * ey + cosine * ky, sine * ez + cosine * kz
+    # from the platform's origin to the anchor
+    rx = cx + geometry[0, i] - pose[0, 0]
+    ry = cy + geometry[1, i] - pose[0, 1]
+    rz = cz + geometry[2, i] - pose[0, 2]
+    cables[0, i], cables[1, i], cables[2, i] = ux, uy, uz
+    cables[3, i], cables[4, i] = ry * uz - rz * uy, rz * ux - rx * uz
+    cables[5, i] = rx * uy - ry * ux
+    cables[FREE, i], cables[ARC, i] = free, r * angle
+
+
+@jit
+def compare(
+    geometry: FloatArray, lengths: FloatArray, pose: FloatArray, cables: FloatArray
+) -> float:
+    """Write the cables at the pose, and their ERROR, eq. (3.13); return the sum of its squares."""
+    run_cables(geometry, pose, cables)
+    cost = 0.0
+    for i in range(lengths.size):
+        error = cables[FREE, i] + cables[ARC, i] - lengths[i]
+        cables[ERROR, i] = error
+        cost += error * error
+    return cost

@@ -1,0 +1,146 @@
+"""The cables' lengths of the last stop, for a start where the platform does not stand at home."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_profiles.platform import FURTHEST_m
+from cdpr_rt.core.estimate import AxisEstimate
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.state_file import StateFileError, read_state, write_state
+
+_FIELDS = ("cable_length_m", "cable_at_index_m")
+_MOST_OF_LONGEST = 2.0
+"""A platform that was let down anywhere has its cables paid out further than in use."""
+
+
+@dataclass(frozen=True)
+class StoppedLengths:
+    """Cable lengths when the power was taken, (n,), without tension."""
+
+    cable_length_m: FloatArray
+    cable_at_index_m: FloatArray
+    """With the motor at the index that it had found, nan where it had found none."""
+    date: str
+    """ISO 8601, UTC."""
+    position_rad: FloatArray
+    """The motors' angles that belong to `cable_length_m`; nan until they are known again."""
+
+    def at(self, position_rad: FloatArray, cable_m: FloatArray) -> FloatArray:
+        """Return the lengths (n,) at other angles (n,); `cable_m` (n,) is paid out per radian."""
+        return self.cable_length_m + cable_m * (position_rad - self.position_rad)
+
+
+class LastLengths:
+    """What a stop has left to the next start: in memory, and in a file where there is one."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path
+        self.lengths: StoppedLengths | None = None
+        self.why = "the robot has not been stopped with known lengths yet"
+        """Why there are none, where there are none."""
+        self.displaced = False
+        """Whether the platform has been let go since, other than at home."""
+
+    def load(self, n: int, longest_m: float) -> None:
+        """Read the file of a robot with n axes; one that is damaged leaves none.
+
+        No length counts above twice `longest_m`, the longest that a cable is in use.
+        """
+        if self.path is None:
+            return
+        most_m = min(_MOST_OF_LONGEST * longest_m, FURTHEST_m)
+        try:
+            held = read_state(self.path)
+            if held is not None:
+                self._take(held, n, most_m)
+        except StateFileError as error:
+            self.why = str(error)
+        except (KeyError, TypeError, ValueError):
+            self.why = (
+                f"{self.path}: is damaged: lengths of {n} cables are wanted, in metres, up to "
+                f"{most_m:.4g}"
+            )
+
+    def _take(self, held: dict[str, Any], n: int, most_m: float) -> None:
+        if held["stopped"] is not True:
+            self.why = f"{self.path}: the robot was in motion when it was last heard of"
+            return
+        lengths, at_index = (np.array([_length_m(x, most_m) for x in held[key]]) for key in _FIELDS)
+        if lengths.shape != (n,) or at_index.shape != (n,) or not (lengths > 0.0).all():
+            raise ValueError
+        nowhere = np.full(n, math.nan)
+        self.lengths = StoppedLengths(lengths, at_index, str(held["date"]), nowhere)
+
+    def begin_to_move(self, position_rad: FloatArray) -> None:
+        """Take the motors (n,) to have stood still since the stop; they may turn from now on.
+
+        Raises StateFileError.
+        """
+        if self.lengths is not None:
+            self.lengths = replace(self.lengths, position_rad=position_rad.copy())
+        self._write({"stopped": False})
+
+    def take(self) -> StoppedLengths | None:
+        """Return the lengths, and have none from now on, as cables are wound."""
+        lengths, self.lengths = self.lengths, None
+        self.why = "the robot has moved since"
+        return lengths
+
+    def keep(self, estimate: AxisEstimate, feedback: AxisFeedback) -> None:
+        """Keep the lengths at which it has stopped, where they are known; raises StateFileError.
+
+        Where they are not, and no cable has been wound since, those of the stop before are true.
+        """
+        if estimate.length_known.all():
+            turned = feedback.index_rad - feedback.position_rad
+            at_index = np.where(
+                feedback.index_known,
+                estimate.cable_length_m + estimate.cable_m_per_rad * turned,
+                math.nan,
+            )
+            date = datetime.now(UTC).isoformat(timespec="seconds")
+            here = feedback.position_rad.copy()
+            self.lengths = StoppedLengths(estimate.cable_length_m.copy(), at_index, date, here)
+        if self.lengths is not None:
+            lengths = {key: _plain(getattr(self.lengths, key)) for key in _FIELDS}
+            self._write({"stopped": True, "date": self.lengths.date, **lengths})
+
+    def _write(self, held: dict[str, Any]) -> None:
+        if self.path is not None:
+            write_state(self.path, held)
+
+
+def off_index_m(
+    last: StoppedLengths, length_m: FloatArray, feedback: AxisFeedback, cable_m: FloatArray
+) -> FloatArray:
+    """Return by how much cables are longer than their motors' indices tell, (n,).
+
+    Known but for whole turns; nan where an index is not known, now or then. `cable_m` (n,) is paid
+    out per radian.
+    """
+    at_index = length_m + cable_m * (feedback.index_rad - feedback.position_rad)
+    turn = math.tau * np.abs(cable_m)
+    off = np.remainder(at_index - last.cable_at_index_m + 0.5 * turn, turn) - 0.5 * turn
+    return np.where(feedback.index_known, off, math.nan)
+
+
+def _length_m(value: Any, most_m: float) -> float:
+    """Return a length, nan for None; raises TypeError and ValueError for what is none."""
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError
+    if not abs(value) <= most_m:
+        raise ValueError
+    return float(value)
+
+
+def _plain(values: FloatArray) -> list[float | None]:
+    return [float(x) if math.isfinite(x) else None for x in values]

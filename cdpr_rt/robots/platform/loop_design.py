@@ -1,0 +1,252 @@
+"""Design of a platform's loop from its rotors, cables, delays and mass, and its margins.
+
+Deviations are linear around a pose: the rotors' x (n,), as paid-out cable, and the platform's q
+(d,) hang together by cables of stiffness k_i = EA/ρ_i and damping b k_i,
+
+    m_r s² x = T - τ      M_p s² q = -J^T T      T = diag(k (1 + b s)) (J q - x)
+
+and the loop makes of x, late, the motors' pull τ = C(s) x. How far the eigenvalues of the return
+difference are from 0 is told by the largest singular value of the sensitivity (1 + C G)^-1, x =
+-G τ: its inverse, the modulus margin μ, is a gain margin of at least 1/(1 - μ) and a phase margin
+of at least 2 asin(μ/2) (Skogestad and Postlethwaite, Multivariable Feedback Control, 2.4.3).
+
+All is taken along the modes of the platform without cables' stretch: J = Q R and R^-T M_p R^-1 =
+U λ U^T, so that the tensions' directions Q U are orthonormal, λ is what each mode has of mass, and
+the loop's damping and stiffness are diagonal. G is a sum over the modes of rotors and platform on
+their cables, whose damping is proportional to their stiffness: Σ φ φ^T/(s² + (1 + b s) ω²).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
+from cdpr_rt.robots.platform.margin_kernel import keeps_margin
+from cdpr_rt.robots.platform_model import PlatformModel
+
+ComplexArray = NDArray[np.complex128]
+
+LEAST_MARGIN = 0.45
+"""Modulus margin that the design keeps, with all stiffness in STIFFNESS_SHARES."""
+STIFFNESS_SHARES = (0.7, 1.0, 1.3)
+OBSERVER_rad_s = 2.0 * math.pi * 400.0
+DAMPING_RATIO = 0.55
+_DRIVE_LATENCY_s, _LATENCY_CYCLES = 0.8e-3, 1.5
+_SMOOTHERS_Hz = ((0.0, 25.0), (0.55, 25.0), (0.55, 12.0), (0.8, 12.0), (0.8, 8.0), (0.9, 12.0))
+"""Shares of smooth velocity that are tried, each with the frequency of its low-pass."""
+_ROTOR_SHARES = (1.6, 0.8, 0.4)
+_LOOSE_SHARE = 0.075
+_INTEGRAL_RATE_1_s, _INTEGRAL_SHARE = 5.0, 0.15
+_CABLE_DAMPING_s = 2e-3
+_SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
+_STEP, _REFINEMENTS = 1.3, 3
+_LOWEST_Hz, _HIGHEST_Hz, _FREQUENCIES = 0.3, 150.0, 64
+
+
+@dataclass(frozen=True)
+class LoopGains:
+    """What the loop goes by in a cycle; see `loop_kernel.SETTINGS`."""
+
+    bandwidth_rad_s: float
+    """Of each mode of the platform, or less where the damping would ask for too much."""
+    damping_N_s_m: float
+    """The most that is asked of a cable in each mode."""
+    smooth: float
+    """Share of the low-passed velocity in the velocity that is damped."""
+    smoother_rad_s: float
+    """Double pole of the low-pass."""
+    loose_N_s_m: float
+    """Damping of cables that pull against each other."""
+    integral_1_s: float
+    rotor_kg: float
+    """Mass of a rotor, as its cable feels it."""
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """What a loop keeps at one of several poses, the worst over the stiffness."""
+
+    modulus: float
+    frequency_Hz: float
+    """Where that is."""
+    slowest_rad_s: float
+    fastest_rad_s: float
+    """Of the platform's modes in closed loop, without delays."""
+
+
+def latency_s(period_s: float) -> float:
+    """Return how late the loop acts: drive, transfer, and half a cycle of holding."""
+    return _DRIVE_LATENCY_s + _LATENCY_CYCLES * period_s
+
+
+def design_poses(model: PlatformModel) -> FloatArray:
+    """Return the set-points (m, d) at which a loop is designed and judged.
+
+    Home, the middle, the corners of the box, and the middle turned about each axis to and fro.
+    """
+    platform = model.platform
+    k, d = model.positions, model.size
+    low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
+    middle = np.concatenate([0.5 * (low + high), np.zeros(d - k)])
+    found = [model.home, middle]
+    for corner in itertools.product(*zip(low, high, strict=True)):
+        found.append(np.concatenate([corner, np.zeros(d - k)]))
+    if platform.workspace_angle_rad > 0.0:
+        for i in range(k, d):
+            for sign in (-1.0, 1.0):
+                found.append(middle + sign * platform.workspace_angle_rad * np.eye(d)[i])
+    return np.array(found)
+
+
+class LoopModel:
+    """The linear model of a robot around some poses, for loops to be designed and judged with."""
+
+    def __init__(
+        self,
+        model: PlatformModel,
+        rotors_kg: FloatArray,
+        stiffness_N: FloatArray,
+        period_s: float,
+        poses: FloatArray | None = None,
+    ) -> None:
+        """Take rotors' masses (n,) as the cables feel them, EA (n,), and set-points (m, d)."""
+        self.period_s, self.rotor_kg = period_s, float(rotors_kg.mean())
+        self._lightest_kg = float(rotors_kg.min())
+        self.poses = design_poses(model) if poses is None else poses
+        highest = min(_HIGHEST_Hz, 0.3 / period_s)
+        self.frequency_Hz = np.geomspace(_LOWEST_Hz, highest, _FREQUENCIES)
+        self._s = s = 2j * np.pi * self.frequency_Hz
+        self._late = np.exp(-s * latency_s(period_s)) / (1.0 + s / OBSERVER_rad_s) ** 2
+        m, d = len(self.poses), model.size
+        self._mass_kg = np.zeros((m, d))
+        self._plants = np.zeros((m, len(STIFFNESS_SHARES), len(s), d, d), complex)
+        for i, q in enumerate(self.poses):
+            self._take(i, model, q, rotors_kg, stiffness_N)
+
+    def _take(
+        self,
+        i: int,
+        model: PlatformModel,
+        q: FloatArray,
+        rotors_kg: FloatArray,
+        stiffness_N: FloatArray,
+    ) -> None:
+        """Fill in λ (d,), and G (stiffness, frequencies, d, d) along the modes, at pose `i`."""
+        pose, kinematics = model.pose(q), model.kinematics
+        M, room = np.zeros((6, 6)), np.zeros((4, 3))
+        write_mass_matrix(body_of(model.platform), pose.array, room, M)
+        M_p = M[np.ix_(kinematics.directions, kinematics.directions)]
+        J = kinematics.jacobian(pose)
+        orthogonal, R = np.linalg.qr(J)
+        inverse = np.linalg.inv(R)
+        self._mass_kg[i], modes = np.linalg.eigh(inverse.T @ M_p @ inverse)
+        n, d = J.shape
+        per_root = np.zeros((d + n, d + n))  # of the mass, its Cholesky factor's inverse
+        per_root[:d, :d] = np.linalg.inv(np.linalg.cholesky(M_p))
+        per_root[d:, d:] = np.diag(rotors_kg**-0.5)
+        stretch = np.hstack([J, -np.eye(n)]) @ per_root.T
+        k = stiffness_N / kinematics.lengths(pose)
+        s = self._s[:, None]
+        for plant, share in zip(self._plants[i], STIFFNESS_SHARES, strict=True):
+            squares, shapes = np.linalg.eigh(stretch.T @ (share * k[:, None] * stretch))
+            P = (orthogonal @ modes).T @ (per_root.T @ shapes)[d:]
+            plant[:] = (P / (s**2 + (1.0 + _CABLE_DAMPING_s * s) * squares)[:, None]) @ P.T
+
+    def margins(self, gains: LoopGains) -> list[LoopMargins]:
+        """Return the margins of a loop at each of the poses."""
+        damping, stiffness, modes = self._along_modes(gains)
+        of_speed, of_place = self._factors(gains)
+        C = (
+            of_speed[:, None] * damping[:, None, None]
+            + of_place[:, None] * stiffness[:, None, None]
+        )
+        difference = np.eye(C.shape[-1]) + C[..., None] * self._plants
+        least = np.linalg.svd(difference, compute_uv=False)[..., -1].min(axis=1)
+        return [
+            LoopMargins(
+                float(at.min()),
+                float(self.frequency_Hz[at.argmin()]),
+                float(omega.min()),
+                float(omega.max()),
+            )
+            for at, omega in zip(least, modes, strict=True)
+        ]
+
+    def _along_modes(self, gains: LoopGains) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the loop's damping and stiffness, and the platform's ω, of each mode (m, d)."""
+        mass, ratio = self._mass_kg + gains.rotor_kg, DAMPING_RATIO
+        inertial = 2.0 * ratio * gains.bandwidth_rad_s * mass
+        damping = 1.0 / (1.0 / inertial + 1.0 / gains.damping_N_s_m)
+        omega = damping / (2.0 * ratio * mass)
+        return damping, omega**2 * mass, omega
+
+    def _factors(self, gains: LoopGains) -> tuple[ComplexArray, ComplexArray]:
+        """Return by what damping and stiffness count in C(s), latency included, (frequencies,)."""
+        s = self._s
+        calm = 1.0 / (1.0 + s / gains.smoother_rad_s) ** 2
+        of_speed = self._late * s * (1.0 - gains.smooth + gains.smooth * calm)
+        return of_speed, self._late * (1.0 + gains.integral_1_s / s)
+
+    def _keeps(self, gains: LoopGains) -> bool:
+        damping, stiffness, _ = self._along_modes(gains)
+        room = np.zeros((2, *self._plants.shape[-2:]), complex)
+        factors = self._factors(gains)
+        return keeps_margin(self._plants, *factors, damping, stiffness, LEAST_MARGIN, room)
+
+    def design(self) -> LoopGains:
+        """Return the stiffest loop that keeps LEAST_MARGIN at all poses, with all stiffness.
+
+        The stiffest is the one whose modes are, in their geometric mean, in N/m of cable: dry
+        friction in the winches, about the same in each, is what keeps a platform from its target.
+        """
+        best, stiffest = None, 0.0
+        for (smooth, smoother_Hz), share in itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES):
+            gains = self._slowest(smooth, 2.0 * math.pi * smoother_Hz, share)
+            at_most = self._stiffness_N_m(replace(gains, bandwidth_rad_s=math.inf))
+            if best is None or at_most > stiffest:
+                found = self._quickest(gains)
+                if (stiffness := self._stiffness_N_m(found)) > stiffest:
+                    best, stiffest = found, stiffness
+        assert best is not None
+        return best
+
+    def _slowest(self, smooth: float, smoother_rad_s: float, share: float) -> LoopGains:
+        """Return the slowest loop with this part of smooth velocity, and of a rotor's damping."""
+        late_s = latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
+        most = self._lightest_kg / late_s / (1.0 - smooth)
+        gains = LoopGains(
+            0.0, share * most, smooth, smoother_rad_s, _LOOSE_SHARE * most, 0.0, self.rotor_kg
+        )
+        return self._with(gains, _SLOWEST_rad_s)
+
+    def _quickest(self, gains: LoopGains) -> LoopGains:
+        """Return the quickest loop from these gains on.
+
+        From slow to quick: a loop that keeps its margin all the way from one that is stable for
+        being slow is stable as well.
+        """
+        best, step, refinements = gains, _STEP, 0
+        while best.bandwidth_rad_s < _FASTEST_rad_s and refinements < _REFINEMENTS:
+            tried = self._with(best, best.bandwidth_rad_s * step)
+            if self._keeps(tried):
+                best = tried
+            else:
+                step, refinements = math.sqrt(step), refinements + 1
+        return best
+
+    def _with(self, gains: LoopGains, bandwidth_rad_s: float) -> LoopGains:
+        gains = replace(gains, bandwidth_rad_s=bandwidth_rad_s)
+        rate = _INTEGRAL_SHARE * 2.0 * DAMPING_RATIO * self._slowest_rad_s(gains)
+        return replace(gains, integral_1_s=min(_INTEGRAL_RATE_1_s, rate))
+
+    def _slowest_rad_s(self, gains: LoopGains) -> float:
+        return float(self._along_modes(gains)[2].min())
+
+    def _stiffness_N_m(self, gains: LoopGains) -> float:
+        return float(np.exp(np.log(self._along_modes(gains)[1]).mean()))

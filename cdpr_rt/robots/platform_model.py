@@ -1,0 +1,194 @@
+"""What a robot's file says of its platform, as the parts that compute with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cdpr_profiles import Robot
+from cdpr_profiles.platform import DIRECTIONS, Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
+from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.kinematics.pose_setpoint import place_all
+from cdpr_rt.robots.rigid_body import home_rotation, in_space, inertia_kg_m2
+from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
+from cdpr_rt.robots.workspace import CableWorkspace, G_m_s2, wrenches_in_motion
+
+RESERVE, _MARGIN_SHARE = 0.12, 0.4
+"""Share of the span of tensions that is left to what no plan knows: loops, friction, swinging. At
+most this share of what the tensions in the middle of the box can keep from their bounds."""
+_LEAST_ARM_m = 1e-3
+
+
+@dataclass(frozen=True)
+class PlatformModel:
+    """Kinematics, tension distribution and workspace of one platform; made by `platform_model`.
+
+    A position (d,) has one entry for each controlled direction: coordinates of the origin, m, of
+    which the last one is against gravity, and the rotation vector from the orientation at home,
+    rad. Positions (..., k) with coordinates only are those at home's orientation.
+    """
+
+    platform: Platform
+    kinematics: CableKinematics
+    about_mass: CableKinematics
+    """The same about the centre of mass, in whose place the origin is."""
+    low_N: FloatArray
+    high_N: FloatArray
+    """Bounds of the tensions, (n,)."""
+    reserve_N: float
+    """What the control keeps from them."""
+
+    @property
+    def positions(self) -> int:
+        """How many coordinates the origin has, k."""
+        return len(self.platform.home_m)
+
+    @property
+    def size(self) -> int:
+        """How many directions are controlled, d."""
+        return len(self.kinematics.directions)
+
+    @cached_property
+    def home(self) -> FloatArray:
+        """The position at home, (d,)."""
+        return np.concatenate([self.platform.home_m, np.zeros(self.size - self.positions)])
+
+    @cached_property
+    def home_pose(self) -> Pose:
+        """The pose at home."""
+        return _home_pose(self.platform)
+
+    @property
+    def speed(self) -> FloatArray:
+        """The highest speeds, (d,), in m/s and rad/s."""
+        return self._each(self.platform.speed_m_s, self.platform.angular_speed_rad_s)
+
+    @property
+    def acceleration(self) -> FloatArray:
+        """The highest accelerations, (d,), in m/s2 and rad/s2."""
+        platform = self.platform
+        return self._each(platform.acceleration_m_s2, platform.angular_acceleration_rad_s2)
+
+    @property
+    def angle_rad(self) -> float:
+        """Largest angle from home's orientation in which targets may lie."""
+        return self.platform.workspace_angle_rad
+
+    @property
+    def wrench_scale(self) -> FloatArray:
+        """What of each controlled direction counts as much as 1 N: 1, and for moments an arm, m."""
+        arm = max(float(np.linalg.norm(self.platform.anchor_points_m, axis=1).max()), _LEAST_ARM_m)
+        return self._each(1.0, arm)
+
+    def weight(self) -> FloatArray:
+        """Return the wrench of gravity on the platform at home's orientation, (d,)."""
+        wrench, up = np.zeros(6), self.positions - 1
+        wrench[up] = -self.platform.mass_kg * G_m_s2
+        centre = in_space(self.platform.centre_of_mass_m)
+        wrench[3:] = np.cross(self.home_pose.Q @ centre, wrench[:3])
+        return wrench[list(self.kinematics.directions)]
+
+    def workspace(
+        self, acceleration_m_s2: float | None = None, reserve_N: float | None = None
+    ) -> CableWorkspace:
+        """Return where the platform is held while it is accelerated along all directions.
+
+        By default as targets are: as much as the file has it, with the control's reserve. Where
+        targets may be turned there is as much of the angular acceleration; inertia is as at home.
+        """
+        platform = self.platform
+        wanted = platform.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
+        turning = None
+        if platform.workspace_angle_rad > 0.0:
+            share = wanted / platform.acceleration_m_s2
+            Q = self.home_pose.Q
+            about_room = Q @ inertia_kg_m2(platform) @ Q.T
+            turning = share * platform.angular_acceleration_rad_s2 * about_room
+        directions = self.kinematics.directions
+        wrenches = wrenches_in_motion(
+            platform.mass_kg, wanted, self.positions - 1, directions, turning
+        )
+        return CableWorkspace(
+            self.about_mass,
+            wrenches,
+            self.low_N,
+            self.high_N,
+            self.wrench_scale,
+            self.reserve_N if reserve_N is None else reserve_N,
+            in_space(platform.centre_of_mass_m),
+        )
+
+    def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionDistribution:
+        """Return the distribution that keeps tensions as near to the lower bounds as can be."""
+        return tension_distribution("minimum-deviation", low_N, high_N, self.wrench_scale, low_N)
+
+    def pose(self, position: FloatArray) -> Pose:
+        """Return the pose at a position (d,) or (k,)."""
+        array = self.poses(np.asarray(position, float)[None])[0]
+        return Pose(array[0], array[1:])
+
+    def poses(self, positions: FloatArray) -> FloatArray:
+        """Return the arrays of the poses (m, 4, 3) at positions (m, d) or (m, k)."""
+        given = np.asarray(positions, float)
+        q = np.zeros((len(given), self.size))
+        q[:, : given.shape[1]] = given
+        poses, room = np.zeros((len(q), 4, 3)), np.zeros((4, 3))
+        directions = np.array(self.kinematics.directions)
+        place_all(q, directions, self.home_pose.array, room, poses)
+        return poses
+
+    def _each(self, linear: float, angular: float) -> FloatArray:
+        return np.array([linear if i < 3 else angular for i in self.kinematics.directions])
+
+
+def platform_model(platform: Platform, low_N: FloatArray, high_N: FloatArray) -> PlatformModel:
+    """Return the model of a platform whose cables' tensions have these bounds, (n,).
+
+    Raises GeometryError for a geometry that no robot has.
+    """
+    low, high = np.array(low_N, float), np.array(high_N, float)
+    anchors = np.array(platform.anchor_points_m)
+    kinematics, about_mass = (
+        CableKinematics(
+            np.array(platform.exit_points_m),
+            anchors - centre,
+            directions_of(platform),
+            pulley_radius_m=np.array(platform.pulley_radius_m),
+            swivel_axes=np.array([in_space(axis) for axis in platform.pulley_axes]),
+            home=_home_pose(platform),
+        )
+        for centre in (0.0, np.array(platform.centre_of_mass_m))
+    )
+    without = PlatformModel(platform, kinematics, about_mass, low, high, 0.0)
+    box = np.array([platform.workspace_min_m, platform.workspace_max_m])
+    middle = without.poses(box.mean(axis=0)[None])
+    margin_N = float(without.workspace(0.0).margins(middle)[0][0])
+    reserve_N = min(RESERVE * float((high - low).min()), max(_MARGIN_SHARE * margin_N, 0.0))
+    return replace(without, reserve_N=reserve_N)
+
+
+def platform_model_of(robot: Robot) -> PlatformModel:
+    """Return the model of a robot's platform, within its limits; it has to have one."""
+    assert robot.platform is not None
+    limits, n = limits_of(robot), len(robot.axes)
+    low, high = (
+        np.broadcast_to(bound, (n,)).astype(float)
+        for bound in (limits.tension_min_N, limits.tension_max_N)
+    )
+    return platform_model(robot.platform, low, high)
+
+
+def directions_of(platform: Platform) -> tuple[int, ...]:
+    """Return which components of the twist the cables control."""
+    names = DIRECTIONS[len(platform.home_m)]
+    places = SPATIAL if len(names) == len(SPATIAL) else (0, 1, 5)
+    return tuple(i for name, i in zip(names, places, strict=True) if name in platform.controlled)
+
+
+def _home_pose(platform: Platform) -> Pose:
+    return Pose(in_space(platform.home_m), home_rotation(platform))

@@ -1,0 +1,83 @@
+"""A platform as a rigid body: its inertia, and the orientations that its targets may have."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from cdpr_profiles.platform import DIRECTIONS, Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.kinematics.pose import exponential
+
+LEAST_ARM_m = 0.01
+"""Anchor points nearer to the centre of mass than this are a point, which has no orientation."""
+_TWIST = {2: (0, 1, 5), 3: (0, 1, 2, 3, 4, 5)}
+
+
+def in_space(vector: tuple[float, ...]) -> FloatArray:
+    """Return a position of a plane or of space as (3,)."""
+    return np.pad(np.asarray(vector, float), (0, 3 - len(vector)))
+
+
+def rotation(vector_rad: FloatArray) -> FloatArray:
+    """Return the rotation matrix (3, 3) of a rotation vector (3,)."""
+    Q = np.empty((3, 3))
+    exponential(np.ascontiguousarray(vector_rad, float), Q)
+    return Q
+
+
+def home_rotation(platform: Platform) -> FloatArray:
+    """Return the rotation matrix (3, 3) of a platform at home."""
+    given = platform.home_rotation_rad
+    return rotation(np.array(given if len(given) == 3 else (0.0, 0.0, *given)))
+
+
+def inertia_kg_m2(platform: Platform) -> FloatArray:
+    """Return the inertia (3, 3) about the centre of mass, in the platform's frame.
+
+    Where the file has none it is that of a ball whose radius of gyration is half the anchor points'
+    distance from their middle (root of the mean of squares).
+    """
+    given = platform.inertia_kg_m2
+    if given is None:
+        anchors = np.array(platform.anchor_points_m)
+        away = ((anchors - anchors.mean(axis=0)) ** 2).sum(axis=1)
+        radius = max(LEAST_ARM_m, 0.5 * float(np.sqrt(away.mean())))
+        return np.asarray(platform.mass_kg * radius**2 * np.eye(3))
+    if len(given) == 1:
+        return np.asarray(given[0] * np.eye(3))
+    xx, yy, zz, xy, xz, yz = given
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def is_point(platform: Platform) -> bool:
+    """Return whether all cables end at the centre of mass, or all but."""
+    arms = np.array(platform.anchor_points_m) - np.array(platform.centre_of_mass_m)
+    return bool(np.linalg.norm(arms, axis=1).max() < LEAST_ARM_m)
+
+
+def free_directions(platform: Platform) -> tuple[int, ...]:
+    """Return in which components of the twist the platform could move without its cables."""
+    size = len(platform.home_m)
+    return tuple(range(size)) if is_point(platform) else _TWIST[size]
+
+
+def orientations(platform: Platform) -> FloatArray:
+    """Return rotation vectors (k, 3) from home that stand for all that targets may have.
+
+    None first; then those of the largest angle about each controlled axis, and, where several are
+    controlled, about the diagonals between these.
+    """
+    names = DIRECTIONS[len(platform.home_m)]
+    axes = [_TWIST[len(platform.home_m)][names.index(name)] - 3 for name in platform.controlled]
+    axes = [axis for axis in axes if axis >= 0]
+    angle = platform.workspace_angle_rad
+    if angle == 0.0 or not axes:
+        return np.zeros((1, 3))
+    ways = [sign * np.eye(3)[axis] for axis in axes for sign in (1.0, -1.0)]
+    if len(axes) > 1:
+        for signs in itertools.product((1.0, -1.0), repeat=len(axes)):
+            way = np.array(signs) @ np.eye(3)[axes]
+            ways.append(way / np.linalg.norm(way))
+    return np.concatenate([np.zeros((1, 3)), angle * np.array(ways)])

@@ -1,0 +1,124 @@
+"""A robot's file as the arrays of those of its axes that are run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from cdpr_profiles import Robot, RobotAxis
+from cdpr_profiles.devices.tension_sensor import load_tension_sensors
+from cdpr_rt.core.estimate import WinchArrays
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limits, reactions_of
+
+RATED_SPEED_SHARE: Final = 0.2
+"""Of the motors' rated speed, where a robot's file says no other."""
+TORQUE_RISE_S: Final = 0.005
+"""In which the whole torque may be built up, where a robot's file says no other rate."""
+CABLE_SAFETY: Final = 5.0
+"""Breaking force over the highest tension, where a robot's file says no other."""
+SLACK_SHARE: Final = 0.25
+"""Of the least tension, where a robot's file does not say what is slack."""
+FOLLOWING_m: Final = 0.15
+"""Following error of a platform's cables, where its file says no other: three times the lag at
+which its set-point waits for it."""
+LOW_SHARE: Final = 0.5
+"""Of the least tension, where torques alone tell of tensions."""
+
+
+def can_lower(robot: Robot) -> bool:
+    """Return whether there is a program that lets the robot's platform down."""
+    return robot.platform is not None
+
+
+def limits_of(robot: Robot) -> Limits:
+    """Return the limits of a robot's axes, those without a figure in its file filled in."""
+    axes, told = robot.axes, robot.limits
+
+    def each(values: tuple[float, ...] | None, otherwise: FloatArray | float) -> FloatArray:
+        if values is None:
+            return np.broadcast_to(otherwise, (len(axes),)).astype(float)
+        return np.broadcast_to(np.array(values), (len(axes),)).astype(float)
+
+    motors = [axis.winch.motor for axis in axes]
+    torque_Nm = each(told.torque_Nm, np.array([motor.rated_torque_Nm for motor in motors]))
+    speed = RATED_SPEED_SHARE * np.array([motor.rated_speed_rad_s for motor in motors])
+    strength = np.array([axis.winch.cable.breaking_force_N for axis in axes])
+    measured_N = math.inf
+    if robot.tension_sensors is not None:
+        measured_N = load_tension_sensors(robot.tension_sensors).stop_above_N
+    least_N = each(told.tension_min_N, -math.inf)
+    following = each(told.following_error_rad, math.inf)
+    if robot.platform is not None and "following_error_rad" not in told.model_fields_set:
+        cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
+        following = np.maximum(following, FOLLOWING_m / np.abs(cable_m))
+    figures: dict[str, Any] = {key: one for key, one in told if isinstance(one, int | float)}
+    return Limits(
+        torque_Nm=torque_Nm,
+        torque_rate_Nm_s=each(told.torque_rate_Nm_s, torque_Nm / TORQUE_RISE_S),
+        speed_rad_s=each(told.speed_rad_s, speed),
+        following_error_rad=following,
+        cable_length_min_m=each(told.cable_length_min_m, -math.inf),
+        cable_length_max_m=each(told.cable_length_max_m, math.inf),
+        tension_min_N=least_N,
+        tension_max_N=np.minimum(each(told.tension_max_N, strength / CABLE_SAFETY), measured_N),
+        slack_N=each(told.slack_N, SLACK_SHARE * least_N),
+        reactions=reactions_of(told.reactions, lowers=can_lower(robot)),
+        **figures,
+    )
+
+
+def supervised(limits: Limits, robot: Robot) -> Limits:
+    """Return what a robot's supervisor holds its cables against.
+
+    What is planned with are the limits themselves. A tension that is known from torques alone is
+    uncertain by the motors' friction: a platform's cables are told to be low at half the least.
+    """
+    if not can_lower(robot) or robot.tension_sensors is not None:
+        return limits
+    return replace(limits, tension_min_N=LOW_SHARE * np.asarray(limits.tension_min_N))
+
+
+def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:
+    """Return what the estimate needs of the axes.
+
+    Without a calibration the tension follows from drum and gear, friction left out.
+    """
+    cable = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
+
+    def each(key: str, otherwise: FloatArray) -> FloatArray:
+        pairs = zip((axis.calibration for axis in axes), otherwise, strict=True)
+        return np.array([getattr(known, key) if known else value for known, value in pairs])
+
+    none = np.zeros(len(axes))
+    return WinchArrays(
+        cable_m_per_rad=cable,
+        gain_m=each("gain_m", np.abs(cable)),
+        bias_Nm=each("bias_Nm", none),
+        friction_Nm=each("friction_Nm", none),
+        friction_per_N_m=each("friction_per_N_m", none),
+        inertia_kg_m2=np.array([axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]),
+    )
+
+
+def described(limits: Limits, n: int) -> dict[str, Any]:
+    """Return limits for a robot's description: arrays over the axes, None where there is none."""
+    told: dict[str, Any] = {}
+    for name in limits.__dataclass_fields__:
+        value = getattr(limits, name)
+        if name != "reactions":
+            each = np.broadcast_to(value, (n,)) if isinstance(value, np.ndarray) else value
+            told[name] = _finite(each)
+    wanted = DEFAULT_REACTIONS | dict(limits.reactions)
+    told["reactions"] = {limit.key: reaction.label for limit, reaction in wanted.items()}
+    return told
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [_finite(float(x)) for x in value]
+    return value if math.isfinite(value) else None

@@ -1,0 +1,250 @@
+"""What the cables of a robot can hold: its wrench-feasible workspace by tensions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_profiles import Robot
+from cdpr_profiles.platform import Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.kinematics.kinematics import PLANAR_POINT
+from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
+from cdpr_rt.robots.rigid_body import (
+    home_rotation,
+    in_space,
+    orientations,
+    rotation,
+)
+from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
+
+_NEWTON_STEPS = 30
+_MARGIN = 0.1
+_FINE = {2: 45, 3: 11}
+_GRIDS = {2: (25, 25), 3: (9, 9, 9)}
+_COARSE_GRIDS = {2: (15, 15), 3: (5, 5, 5)}
+_ANY_N = 1e9
+NONE_rad = np.zeros(3)
+"""The rotation vector of no turn."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle in a plane, or a box in space, m."""
+
+    low_m: tuple[float, ...]
+    high_m: tuple[float, ...]
+
+    def grid(self, *counts: int) -> FloatArray:
+        """Return so many points along each coordinate that fill the box, its edges among them.
+
+        Their shape is that of the counts reversed, and the coordinates: rows first in a plane.
+        """
+        sides = [np.linspace(*side) for side in zip(self.low_m, self.high_m, counts, strict=True)]
+        points = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
+        return np.asarray(points.transpose(*range(len(counts) - 1, -1, -1), len(counts)))
+
+
+def view_of(platform: Platform) -> Box:
+    """Return a box around everything that belongs to a robot, with some margin."""
+    points = np.array(
+        [
+            *platform.exit_points_m,
+            platform.home_m,
+            platform.workspace_min_m,
+            platform.workspace_max_m,
+        ]
+    )
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = _MARGIN * float((high - low).max())
+    return Box(tuple((low - margin).tolist()), tuple((high + margin).tolist()))
+
+
+def statics_of(robot: Robot) -> PlatformStatics:
+    """Return the statics of a robot that has a platform, within its limits."""
+    return PlatformStatics(platform_model_of(robot))
+
+
+class PlatformStatics:
+    """Tensions of a platform's n cables, wherever it stands.
+
+    For whole arrays of positions (..., dimensions), m, at which the platform has its orientation of
+    home, or is turned from that by rotation vectors (k, 3), rad. After eqs. (2.13) to (2.19) and
+    (3.80), with all wrenches about the centre of mass.
+    """
+
+    def __init__(self, model: PlatformModel) -> None:
+        """Take the platform's model."""
+        self.model, self.platform = model, model.platform
+        platform, size = self.platform, model.positions
+        self.low_N, self.high_N = model.low_N, model.high_N
+        self.exits_m = np.array(platform.exit_points_m)
+        self._Q = home_rotation(platform)
+        self._mass_m = in_space(platform.centre_of_mass_m)
+        anchors = np.array([in_space(b) for b in platform.anchor_points_m])
+        self.anchors_m = (anchors @ self._Q.T)[:, :size]
+        """Anchor points (n, dimensions) from the platform's origin, along the room's axes."""
+        self.box = Box(platform.workspace_min_m, platform.workspace_max_m)
+        self.turns = model.kinematics.directions == PLANAR_POINT
+        """Whether no cable controls the platform's orientation in its plane."""
+        self.orientations = orientations(platform)
+        """Rotation vectors (k, 3) from home that stand for those of all targets, none first."""
+
+    def points(self) -> FloatArray:
+        """Return positions that fill the box of targets, its edges among them."""
+        grids = _GRIDS if len(self.orientations) == 1 else _COARSE_GRIDS
+        return self.box.grid(*grids[len(self.platform.home_m)])
+
+    def lengths(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
+        """Return the cables' lengths (..., n), eqs. (2.2), (3.2), as if there were no pulleys."""
+        p = np.asarray(position_m, float)[..., None, :]
+        anchors = np.pad(self.anchors_m, ((0, 0), (0, 3 - p.shape[-1]))) @ rotation(turn_rad).T
+        ways = p + anchors[:, : p.shape[-1]] - self.exits_m
+        return np.asarray(np.linalg.norm(ways, axis=-1))
+
+    def poses(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
+        """Return the poses (m, 4, 3) at all positions."""
+        model = self.model
+        flat = np.reshape(position_m, (-1, model.positions))
+        turn = [turn_rad[i - 3] for i in model.kinematics.directions if i >= 3]
+        return model.poses(np.hstack([flat, np.tile(turn, (len(flat), 1))]))
+
+    def reserve_N(
+        self,
+        position_m: FloatArray,
+        acceleration_m_s2: float = 0.0,
+        turns_rad: FloatArray = NONE_rad,
+    ) -> FloatArray:
+        """Return how far all tensions can stay from both their bounds, N, (...).
+
+        Below zero by how much some cable must be outside. With an acceleration: the least over its
+        both signs along all directions at once, and as much of the angular acceleration where
+        targets may be turned. The least over all `turns_rad` (k, 3) too. -inf where no tensions
+        hold some direction.
+        """
+        turns = np.reshape(turns_rad, (-1, 3))
+        return np.asarray(
+            np.min([self._at(position_m, acceleration_m_s2, turn)[0] for turn in turns], axis=0)
+        )
+
+    def is_target(
+        self, position_m: FloatArray, turns_rad: FloatArray = NONE_rad
+    ) -> NDArray[np.bool_]:
+        """Return where the platform can be held and accelerated with the controller's reserve.
+
+        At every one of the turns (k, 3).
+        """
+        moving_N = self.reserve_N(position_m, self.platform.acceleration_m_s2, turns_rad)
+        return np.asarray(moving_N >= self.model.reserve_N)
+
+    def tensions_N(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
+        """Return the tensions (..., n) at rest that stay furthest from their bounds."""
+        return self._at(position_m, 0.0, turn_rad)[1]
+
+    def least_tensions_N(
+        self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad, reserve_N: float = 0.0
+    ) -> FloatArray:
+        """Return the tensions (..., n) at rest nearest to the lower bounds and a reserve above.
+
+        None is below that; nan where there are none.
+        """
+        n, low = self.model.kinematics.n, self.low_N + reserve_N
+        still = self.model.workspace(0.0)
+        least, weight = self.model.least_tensions(low, np.full(n, _ANY_N)), still.wrenches[0]
+        t, matrices = np.zeros(n), still.wrench_matrices(self.poses(position_m, turn_rad))
+        found = np.full((len(matrices), n), np.nan)
+        for k, W in enumerate(matrices):
+            if least.solve(W, weight, t) is TensionOutcome.FEASIBLE:
+                found[k] = t
+        return found.reshape(*np.shape(position_m)[:-1], n)
+
+    def angle_rad(self, position_m: FloatArray) -> FloatArray:
+        """Return by how much a platform that `turns` does at rest, (...); nan where it turns over.
+
+        No cable controls its orientation: it takes the one at which the tensions have no moment.
+        """
+        p, t = np.asarray(position_m, float), self.tensions_N(position_m)
+        angle, step = np.zeros(p.shape[:-1]), 1e-5
+        for _ in range(_NEWTON_STEPS):
+            moment = self._moment_Nm(p, t, angle)
+            slope = (self._moment_Nm(p, t, angle + step) - moment) / step
+            with np.errstate(divide="ignore", invalid="ignore"):
+                turned = -moment / slope
+            angle = angle + np.clip(np.where(np.isfinite(turned), turned, 0.0), -0.2, 0.2)
+        slope = (self._moment_Nm(p, t, angle + step) - self._moment_Nm(p, t, angle)) / step
+        arm = np.linalg.norm(self.anchors_m, axis=1).max()
+        stable = (slope < 0.0) | (arm < 1e-3)  # a point has no orientation
+        return np.where(stable & (np.abs(angle) < 0.5 * np.pi), angle, np.nan)
+
+    def largest_box(self, inside: Box) -> Box | None:
+        """Return the largest box within `inside` that is all of targets, None where there is none.
+
+        At all orientations. It is as exact as a grid of 45 by 45 points, 11 by 11 by 11 in space.
+        """
+        fine = _FINE[len(inside.low_m)]
+        points = inside.grid(*(fine for _ in inside.low_m))
+        good = self.is_target(points, self.orientations)
+        best, found = 0, None
+        for ends, rest in _slabs(good):
+            for more, row in [((), rest)] if rest.ndim == 1 else list(_slabs(rest)):
+                run = _longest_run(row)
+                sides = (ends, *([more] if more else []), run)
+                size = math.prod(last - first for first, last in sides)
+                if size > best:
+                    best, found = size, sides
+        if found is None:
+            return None
+        low, high = (points[tuple(side[end] for side in found)] for end in (0, 1))
+        return Box(tuple(low.tolist()), tuple(high.tolist()))
+
+    def _at(
+        self, position_m: FloatArray, acceleration_m_s2: float, turn_rad: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return margins (...) and tensions (..., n)."""
+        shape = np.shape(position_m)[:-1]
+        workspace = self.model.workspace(acceleration_m_s2, 0.0)
+        margins, tensions = workspace.margins(self.poses(position_m, turn_rad))
+        return margins.reshape(shape), tensions.reshape(*shape, -1)
+
+    def _moment_Nm(self, p: FloatArray, t: FloatArray, angle: FloatArray) -> FloatArray:
+        """Return the moment of the tensions about the centre of mass, (...)."""
+        c, s = np.cos(angle)[..., None], np.sin(angle)[..., None]
+
+        def turned(points: FloatArray) -> FloatArray:
+            x, y = points[..., 0], points[..., 1]
+            return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+        arm = turned(self.anchors_m - (self._Q @ self._mass_m)[:2])
+        way = self.exits_m - p[..., None, :] - turned(self.anchors_m)
+        way = way / np.linalg.norm(way, axis=-1, keepdims=True)
+        turning = arm[..., 0] * way[..., 1] - arm[..., 1] * way[..., 0]
+        return np.asarray((t * turning).sum(axis=-1))
+
+
+def _slabs(
+    good: NDArray[np.bool_],
+) -> Iterator[tuple[tuple[int, int], NDArray[np.bool_]]]:
+    """Yield (first, last) along the first coordinate, and what is good in all between."""
+    for first in range(len(good)):
+        rest = np.ones(good.shape[1:], bool)
+        for last in range(first, len(good)):
+            rest = rest & good[last]
+            yield (first, last), rest
+
+
+def _longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return the first and the last place of the longest run of True, 0 and 0 where there is none.
+
+    Of runs as long as each other, the one nearest to the middle.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
+    if not edges.size:
+        return 0, 0
+    first, last = edges[::2], edges[1::2] - 1
+    aside = np.abs(first + last - (good.size - 1)) / (4.0 * good.size)
+    best = int((last - first - aside).argmax())
+    return int(first[best]), int(last[best])

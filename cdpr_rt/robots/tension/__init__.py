@@ -1,0 +1,1 @@
+"""Tension distribution of n cables."""

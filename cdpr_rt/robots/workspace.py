@@ -1,0 +1,193 @@
+"""Where a robot's cables can hold its platform: wrench-feasible workspace of n cables."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.jit import bound
+from cdpr_rt.robots.interface import Kinematics
+from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.tension.null_space import null_spaces
+from cdpr_rt.robots.tension.tension_projection import write_margins
+
+G_m_s2 = 9.80665
+SHARES = np.linspace(0.0, 1.0, 33)
+
+
+class CableWorkspace:
+    """Poses at which tensions within bounds carry each of some wrenches.
+
+    The margin of a pose is the greatest distance, N, that all tensions can keep from both their
+    bounds while they carry the worst of the wrenches: W t + w_e = 0, eq. (3.80). Below zero it is
+    by how much some tension has to be outside.
+    """
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        wrenches: FloatArray,
+        low_N: FloatArray,
+        high_N: FloatArray,
+        wrench_scale: FloatArray,
+        reserve_N: float = 0.0,
+        centre_m: FloatArray | None = None,
+    ) -> None:
+        """Take wrenches (k, d) of all else on the platform and the tensions' bounds (n,).
+
+        Where those act at another point than the platform's origin, `centre_m` (3,) is that point
+        in the platform's frame, and the kinematics are those about it: weight then is the same
+        however the platform is turned. Poses are the origin's all the same.
+
+        Of the bounds a `reserve_N` is left on both sides to what no plan knows; `wrench_scale` (d,)
+        is that of `TensionDistribution`.
+        """
+        self.kinematics, self.reserve_N = kinematics, reserve_N
+        self.wrenches = np.ascontiguousarray(wrenches, float)
+        low, high = np.asarray(low_N, float) + reserve_N, np.asarray(high_N, float) - reserve_N
+        self._bounds = np.array([low, high, 0.5 * (low + high)])
+        self.low, self.high = self._bounds[0], self._bounds[1]
+        self._scale = np.array(wrench_scale, float)
+        self._centre = np.zeros(3) if centre_m is None else np.array(centre_m, float)
+        self._one, self._way = self._pass(1, 0.0), self._pass(len(SHARES), 0.0)
+        self._there = Pose(np.zeros(3))
+
+    def with_wrenches(self, wrenches: FloatArray) -> CableWorkspace:
+        """Return the same for other wrenches (k, d), without a reserve."""
+        low, high = self.low - self.reserve_N, self.high + self.reserve_N
+        return CableWorkspace(self.kinematics, wrenches, low, high, self._scale, 0.0, self._centre)
+
+    def margins(self, poses: FloatArray, most_N: float = math.inf) -> tuple[FloatArray, FloatArray]:
+        """Return margins (m,), at most `most_N`, and the worst wrenches' tensions (m, n).
+
+        `poses` (m, 4, 3) are `Pose.array` of each. Tensions are nan, and a margin -inf, where the
+        cables cannot hold some direction.
+        """
+        tried = self._pass(len(poses), most_N)
+        tried.poses[:] = poses
+        tried.run()
+        return tried.margins, tried.tensions
+
+    def wrench_matrices(self, poses: FloatArray) -> FloatArray:
+        """Return the W (m, d, n) by which tensions act at the poses, about the wrenches' point."""
+        tried = self._pass(len(poses), 0.0)
+        tried.poses[:] = poses
+        tried.run()
+        return tried.matrices
+
+    def stands(self, pose: Pose) -> bool:
+        """Return whether the platform is held at a pose; allocates no arrays."""
+        self._one.poses[0] = pose.array
+        self._one.run()
+        return bool(self._one.margins[0] >= 0.0)
+
+    def feasible(self, pose: Pose) -> str:
+        """Return why the platform is not held at a pose, an empty text where it is."""
+        return "" if self.stands(pose) else self._missing(self._one, 0)
+
+    def first_obstacle(self, poses: FloatArray) -> tuple[Pose, str] | None:
+        """Return the first of the poses (33, 4, 3) of a way that is not held, and why; or None.
+
+        A start that is not held is left first. The pose is overwritten by the next call.
+        """
+        self._way.poses[:] = poses
+        self._way.run()
+        held = self._way.margins >= 0.0
+        first = int(held.argmax()) if held.any() else len(held) - 1
+        if held[first:].all():
+            return None
+        k = first + int(held[first:].argmin())
+        self._there.array[:] = poses[k]
+        return self._there, self._missing(self._way, k)
+
+    def _pass(self, m: int, most_N: float) -> _Pass:
+        return _Pass(
+            self.kinematics, self.wrenches, self._scale, self._bounds, self._centre, m, most_N
+        )
+
+    def _missing(self, tried: _Pass, k: int) -> str:
+        margin_N = float(tried.margins[k])
+        why = missing(margin_N, tried.tensions[k], self.low, self.high)
+        return f"{why} (with a reserve of {self.reserve_N:.1f} N)" if self.reserve_N else why
+
+
+class _Pass:
+    """Margins and tensions of m poses at once, with the arrays that it takes to compute them."""
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        wrenches: FloatArray,
+        scale: FloatArray,
+        bounds: FloatArray,
+        centre: FloatArray,
+        m: int,
+        most_N: float,
+    ) -> None:
+        (k, d), n = wrenches.shape, kinematics.n
+        self.poses = np.zeros((m, 4, 3))
+        self._centre, self._aside, self._centred = centre, np.zeros((m, 3)), self.poses
+        if centre.any():
+            self._centred = np.zeros((m, 4, 3))
+        self.margins, self.tensions = np.zeros(m), np.zeros((m, n))
+        self._kinematics, self.matrices = kinematics, np.zeros((m, d, n))
+        spaces, particular = np.zeros((m, n + 1, n)), np.zeros((m, k, n))
+        null_directions, room = np.zeros(m, np.int64), np.zeros((4, max(n, 8), max(n, 8)))
+        self._null_spaces = bound(
+            null_spaces, self.matrices, wrenches, scale, bounds,
+            spaces, particular, null_directions, np.zeros((d, n + 1)), room,
+        )  # fmt: skip
+        self._write_margins = bound(
+            write_margins, spaces, particular, null_directions, bounds, most_N,
+            self.margins, self.tensions, np.zeros((4, n)), room,
+        )  # fmt: skip
+
+    def run(self) -> None:
+        """Write margins and tensions of `poses`."""
+        if self._centred is not self.poses:
+            self._centred[:] = self.poses
+            np.matmul(self.poses[:, 1:], self._centre, out=self._aside)
+            self._centred[:, 0] += self._aside
+        self._kinematics.wrench_matrices(self._centred, self.matrices)
+        self._null_spaces()
+        self._write_margins()
+
+
+def missing(margin_N: float, tension_N: FloatArray, low_N: FloatArray, high_N: FloatArray) -> str:
+    """Return in words why tensions (n,) are not feasible that are outside by a negative margin."""
+    if not math.isfinite(margin_N):
+        return "the cables cannot hold one direction, whatever their tensions"
+    i = int(np.argmax(np.maximum(low_N - tension_N, tension_N - high_N)))
+    return (
+        f"cable {i} would need {tension_N[i]:.1f} N, {low_N[i]:g} to {high_N[i]:g} N allowed: "
+        f"{-margin_N:.1f} N outside"
+    )
+
+
+def wrenches_in_motion(
+    mass_kg: float,
+    acceleration_m_s2: float,
+    up: int,
+    directions: Sequence[int],
+    turning_Nm: FloatArray | None = None,
+) -> FloatArray:
+    """Return what acts on a platform that is accelerated along all directions at once, (k, d).
+
+    The weight against coordinate `up`, with each combination of signs of accelerations along the
+    controlled positions, and of the moments `turning_Nm` (3, 3), a row for the angular acceleration
+    about each axis: whatever carries these carries all between them, rest among it. All of it about
+    the centre of mass.
+    """
+    motions = [np.eye(6)[i] * mass_kg * acceleration_m_s2 for i in directions if i < 3]
+    if turning_Nm is not None and turning_Nm.any():
+        motions += [np.concatenate([np.zeros(3), turning_Nm[i - 3]]) for i in directions if i >= 3]
+    if not acceleration_m_s2:
+        motions = []
+    signs = np.array(list(itertools.product((1.0, -1.0), repeat=len(motions))))
+    wrenches = signs @ np.reshape(motions, (-1, 6))
+    wrenches[:, up] -= mass_kg * G_m_s2
+    return np.ascontiguousarray(wrenches[:, list(directions)])

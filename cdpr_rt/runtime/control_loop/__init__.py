@@ -1,0 +1,1 @@
+"""The control loop: its engine, transitions, safe stop, commands and status."""

@@ -1,0 +1,242 @@
+"""Dispatches the commands that arrive in the shared memory, one a turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.shared_block import SharedBlockError
+from cdpr_rt.core.states import LoopState, Transition
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.control_loop.engine import HOLD, Engine
+from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
+from cdpr_rt.runtime.control_loop.transition_runner import Steps, TransitionRunner
+from cdpr_rt.runtime.control_loop.transitions import Transitions
+
+Command = Mapping[str, Any]
+_MOST_TEXT, _SHORT_TEXT = 1500, 200
+_LONGEST_CABLE_m = 1000.0
+_MOVING = frozenset({"enable", "program", "set"})
+
+
+class CommandDispatcher:
+    """Takes commands, refuses those that the state forbids, and replies once to each."""
+
+    def __init__(
+        self,
+        engine: Engine,
+        runner: TransitionRunner,
+        transitions: Transitions,
+        request_stop: Callable[[], None],
+    ) -> None:
+        self._engine, self._life = engine, engine.life
+        self._runner = runner
+        self._transitions = transitions
+        self._request_stop = request_stop
+        self._counters = engine.block.counters
+        # read in every cycle: a memoryview is faster
+        queues = ("urgent", "urgent_taken", "commands", "commands_taken")
+        self._urgent, self._urgent_taken, self._commands, self._commands_taken = (
+            self._counters[name].data for name in queues
+        )
+        self._handlers: dict[str, Callable[[Command], Steps | None]] = {
+            "configure": self._configure,
+            "check": self._check,
+            "enable": self._enable,
+            "disable": self._disable,
+            "acknowledge": self._acknowledge,
+            "program": self._program,
+            "set": self._set,
+            "hold": self._hold,
+            "lengths": self._lengths,
+            "shutdown": self._shutdown,
+        }
+
+    def poll(self) -> None:
+        """Take one stop request, then one command, if there are any."""
+        if self._urgent[0] != self._urgent_taken[0]:
+            self._take(self._urgent_taken, self._engine.block.take_urgent)
+        if self._commands[0] != self._commands_taken[0]:
+            self._take(self._commands_taken, self._engine.block.take_command)
+
+    def _take(self, taken: memoryview, take: Callable[[], Command | None]) -> None:
+        try:
+            command = take()
+        except (ValueError, RecursionError):  # no JSON: there is no number to reply to
+            taken[0] += 1
+            return
+        if isinstance(command, dict):
+            self._dispatch(command)
+
+    def _dispatch(self, command: Command) -> None:
+        number = command.get("number")
+        number = number if isinstance(number, int) else 0
+        do = command.get("do")
+        handler = self._handlers.get(do) if isinstance(do, str) else None
+        answer = partial(self._reply, number)
+        if do == "disable" and self._engine.reacting and self._runner.busy:
+            self._runner.listen(answer)  # in progress: replied to when the power is off
+            return
+        try:
+            if handler is None:
+                raise RefusedError(f"do: {do!r}; allowed: {', '.join(self._handlers)}")
+            if do in _MOVING and number <= int(self._counters["commands_void"][0]):
+                raise RefusedError(f"{do}: given up: a stop was asked for after it")
+            steps = handler(command)
+        except ControlError as error:
+            answer(str(error))
+            return
+        except Exception as error:  # whatever a command holds: the loop goes on
+            answer(f"{do}: {type(error).__name__}: {error}")
+            return
+        if steps is None:
+            answer("")
+        else:
+            self._runner.begin(steps, answer)
+
+    def _reply(self, number: int, error: str) -> None:
+        state = self._life.state.label
+        for most in (_MOST_TEXT, _SHORT_TEXT):  # letters may take a dozen bytes each
+            reply = {"to": number, "ok": not error, "text": error[:most], "state": state}
+            try:
+                self._engine.block.post_reply(reply)
+                return
+            except SharedBlockError:
+                continue  # too long, or the queue is full
+
+    # -- handlers: each acts at once, or returns the steps of a transition
+
+    def _configure(self, _command: Command) -> Steps:
+        self._require(Transition.CONFIGURE)
+        return self._transitions.configure()
+
+    def _check(self, _command: Command) -> Steps:
+        self._require(Transition.CHECK)
+        return self._transitions.check(reset=True)
+
+    def _acknowledge(self, _command: Command) -> Steps:
+        self._require(Transition.ACKNOWLEDGE)
+        return self._transitions.acknowledge()
+
+    def _enable(self, command: Command) -> Steps:
+        self._refuse_read_only("enable")
+        self._require(Transition.ENABLE)
+        name = self._known(command.get("program") or HOLD)
+        right = self._right("enable", command)
+        return self._transitions.enable(name, self._arguments(command), right)
+
+    def _disable(self, _command: Command) -> Steps | None:
+        self._refuse_read_only("disable")
+        self._life.require(Transition.DISABLE)
+        if self._life.state is LoopState.READY:
+            return None
+        return self._transitions.disable()
+
+    def _shutdown(self, _command: Command) -> None:
+        self._request_stop()
+
+    def _hold(self, _command: Command) -> None:
+        engine = self._engine
+        if self._life.state is LoopState.ACTIVE and self._runner.busy and not engine.reacting:
+            # power-on is in progress: hold afterwards
+            self._transitions.first_program = HOLD
+            return
+        self._require_running(HOLD)
+        if engine.program.name != HOLD:  # a repeated hold keeps its position
+            self._run(HOLD, {}, 0)
+
+    def _program(self, command: Command) -> None:
+        name = self._known(command.get("program"))
+        self._run(name, self._arguments(command), self._right("program", command))
+        if name != HOLD:
+            self._life.clear_reason()  # of the last hold
+
+    def _set(self, command: Command) -> None:
+        self._require_running("set")
+        right, program = self._right("set", command), self._engine.program
+        if program.needs_lease and right != self._engine.right.mover:
+            raise RefusedError(f"set: {program.name} was not started by who holds the right now")
+        program.command(self._arguments(command))
+        self._life.changed = True
+
+    def _lengths(self, command: Command) -> None:
+        device = self._engine.machine.device
+        if device is None or self._life.state not in (LoopState.READY, LoopState.ACTIVE):
+            raise RefusedError(f"lengths: not in state {self._life.state.label}")
+        self._right("lengths", command)
+        if not device.feedback.valid.all():
+            raise RefusedError("lengths: not every axis answers")
+        length_m = self._lengths_in(self._arguments(command), device.n)
+        self._engine.parts.estimator.set_lengths(device.feedback.position_rad, length_m)
+
+    @staticmethod
+    def _lengths_in(arguments: Mapping[str, Any], n: int) -> FloatArray:
+        lengths = arguments.get("cable_length_m")
+        if (
+            set(arguments) != {"cable_length_m"}
+            or not isinstance(lengths, list)
+            or len(lengths) != n
+        ):
+            raise RefusedError(f"wanted: allowed: cable_length_m, {n} lengths or null")
+        for i, length in enumerate(lengths):
+            is_number = isinstance(length, int | float) and not isinstance(length, bool)
+            if length is not None and not (is_number and 0.0 < length <= _LONGEST_CABLE_m):
+                raise RefusedError(
+                    f"cable_length_m[{i}]: {length!r}; allowed: above 0, up to {_LONGEST_CABLE_m:g}"
+                )
+        return np.array([math.nan if length is None else length for length in lengths])
+
+    def _run(self, name: str, arguments: Mapping[str, Any], right: int) -> None:
+        self._require_running(name)
+        self._engine.switch(name, arguments, right)
+
+    # -- preconditions
+
+    def _require(self, transition: Transition) -> None:
+        self._life.require(transition)
+        if self._runner.busy:
+            raise RefusedError(f"{transition.name.lower()}: another command is being carried out")
+
+    def _require_running(self, what: str) -> None:
+        engine = self._engine
+        shadow = engine.machine.read_only and self._life.state is LoopState.READY
+        if (engine.driving and not self._runner.busy) or shadow:
+            return
+        if self._life.state is LoopState.ACTIVE:
+            raise RefusedError(f"{what}: another command is being carried out")
+        raise RefusedError(
+            f"{what}: not in state {self._life.state.label}; allowed in {LoopState.ACTIVE.label}"
+        )
+
+    def _right(self, what: str, command: Command) -> int:
+        """Return the number of the grant that the command names, which must be the current one."""
+        number = command.get("right")
+        right = number if type(number) is int else 0
+        missing = self._engine.right.refusal(right)
+        if missing:
+            raise RefusedError(f"{what}: {missing}")
+        return right
+
+    def _refuse_read_only(self, what: str) -> None:
+        if self._engine.machine.read_only:
+            raise RefusedError(f"{what}: this daemon only listens (--read-only)")
+
+    def _known(self, name: Any) -> str:
+        programs = self._engine.parts.programs
+        if not isinstance(name, str) or name not in programs:
+            raise RefusedError(f"program: {name!r}; allowed: {', '.join(programs)}")
+        return name
+
+    @staticmethod
+    def _arguments(command: Command) -> Mapping[str, Any]:
+        arguments = command.get("wanted")
+        if arguments is None:
+            return {}
+        if not isinstance(arguments, dict):
+            raise RefusedError(f"wanted: {arguments!r}; allowed: a table")
+        return arguments

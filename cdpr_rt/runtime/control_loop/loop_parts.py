@@ -1,0 +1,39 @@
+"""The parts of a control loop, besides the machine that it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from cdpr_rt.core.estimate import Estimator
+from cdpr_rt.core.supervisor import Supervisor
+from cdpr_rt.programs.base import Program
+from cdpr_rt.robots.last_lengths import LastLengths
+
+
+@dataclass(frozen=True)
+class Lowering:
+    """How a platform is lowered before the power goes, where no brakes would hold it."""
+
+    program: str
+    """Name of the program; `{"blind": true}` has it lower without a pose."""
+    longest_s: float
+    """The longest that it may take."""
+
+
+@dataclass(frozen=True)
+class LoopParts:
+    """The parts of a control loop, all made for the n axes of its machine."""
+
+    programs: Mapping[str, Program]
+    """By name, in the order of their numbers; `idle` and `hold` are among them."""
+    supervisor: Supervisor
+    estimator: Estimator
+    lengths_disagree_m: Callable[[], float] | None = None
+    """Returns the residual of the forward kinematics, where cables are redundant."""
+    lowering: Lowering | None = None
+    """How the platform is lowered, None for a robot without such a program."""
+    last: LastLengths | None = None
+    """Stores the cables' lengths of the last stop, where a start can use them."""
+    enable_realtime: Callable[[], Sequence[str]] = tuple
+    """Called once before the first paced cycle; returns notices of what was not permitted."""

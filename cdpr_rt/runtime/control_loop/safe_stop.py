@@ -1,0 +1,252 @@
+"""Safe stop: braked under control, lowered, quick stop, or torque off."""
+
+from __future__ import annotations
+
+import traceback
+from enum import Enum, auto
+from typing import Final
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.limits import LENGTHS_UNRELIABLE, POSE_UNRELIABLE, Limit
+from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.control_loop.engine import HOLD, IDLE, Engine
+from cdpr_rt.runtime.control_loop.transition_runner import Steps, TransitionRunner
+
+_SETTLE_S: Final = 1.0
+_STILL_RAD_S: Final = 0.3
+_BRAKES_S: Final = 2.0
+_POWER_OFF_S: Final = 3.0
+_POWER_OFF_AT_LAST_S: Final = 0.5
+
+
+class StopMethod(Enum):
+    """How a motion is ended."""
+
+    BRAKE = auto()
+    """Under its program, which then holds the axes, or lowers the platform."""
+    LOWER_WITHOUT_POSE = auto()
+    """By the winches that still obey, without using the platform's pose."""
+    QUICK_STOP = auto()
+    """By the drives' own quick stop."""
+    TORQUE_OFF = auto()
+    """Without torque at once."""
+
+
+class SafeStop:
+    """Ends motions according to what has failed, then removes the drives' power.
+
+    - Axes without a platform, or with brakes: braked under their program, held by the brakes.
+    - A platform of known pose: moved home and lowered by the program of `Lowering`, which lowers it
+      in place where cables are slack.
+    - A drive lost, or a limit of `POSE_UNRELIABLE` exceeded: a platform is lowered without using
+      its pose; axes without a platform make a quick stop.
+    - A failure of any of these: quick stop.
+    """
+
+    def __init__(self, engine: Engine, runner: TransitionRunner) -> None:
+        self._engine = engine
+        self._runner = runner
+        self._machine, self._life = engine.machine, engine.life
+        self._supervisor, self._estimator = engine.parts.supervisor, engine.parts.estimator
+        self._lowering = engine.parts.lowering
+        self.without_pose = False
+        """Whether the platform is being lowered without using its pose."""
+
+    @property
+    def lowers(self) -> bool:
+        """Whether a platform is lowered before the power goes, as no brakes would hold it."""
+        return self._lowering is not None and not self._machine.has_brakes
+
+    # -- ending a motion
+
+    def react(self, reaction: Reaction, torque_Nm: FloatArray) -> None:
+        """React to the supervisor's finding, within its cycle.
+
+        `torque_Nm` (n,) is what is about to be sent.
+        """
+        engine, supervisor, state = self._engine, self._supervisor, self._life.state
+        if state not in (LoopState.READY, LoopState.ACTIVE):
+            return  # in a fault it is known already; the check of the bus has its own
+        # neither a controlled stop nor lowering is possible then
+        uncontrolled = engine.lost_bus or (
+            self.without_pose and supervisor.limit is Limit.NOT_FINITE
+        )
+        if uncontrolled:
+            reaction = max(reaction, Reaction.QUICK_STOP)
+        # without a pose it may be lowered fast, its lengths being correct
+        unreliable = supervisor.limit in (
+            {Limit.ENCODER_JUMP} if self.without_pose else LENGTHS_UNRELIABLE
+        )
+        if reaction > Reaction.HOLD and unreliable and self._lowering is not None:
+            self._estimator.forget_lengths()
+        if reaction <= engine.reacting and not self._invalidates_lowering():
+            return
+        reason = engine.program_error or supervisor.reason()
+        if reaction is Reaction.HOLD:
+            if engine.program.name != HOLD and engine.driving:
+                engine.hold(reason, supervisor.details())
+            return
+        self._life.set_fault_reason(reason, supervisor.details())
+        if state is LoopState.ACTIVE:
+            self.stop(reaction, LoopState.FAULT, torque_Nm)
+        else:
+            self._machine.power_off()
+            self.enter_fault()
+
+    def _invalidates_lowering(self) -> bool:
+        """Whether the finding forbids to go on lowering the platform by its pose."""
+        lowers_by_pose = self._engine.driving and self.lowers and not self.without_pose
+        return lowers_by_pose and self._supervisor.limit in POSE_UNRELIABLE
+
+    def remove_power(self, error: Exception) -> None:
+        """Remove the power at once after an exception, of a program for instance."""
+        traceback.print_exception(error)
+        self._life.set_fault_reason(f"{type(error).__name__}: {error}")
+        if self._life.state is LoopState.ACTIVE:
+            self.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
+
+    def stop(
+        self, reaction: Reaction, then: LoopState, torque_Nm: FloatArray | None = None
+    ) -> None:
+        """End the motion as `reaction` says and go to state `then`."""
+        engine, way = self._engine, self._method(reaction, then)
+        if way in (StopMethod.BRAKE, StopMethod.LOWER_WITHOUT_POSE) and not self._begin(way):
+            way = StopMethod.QUICK_STOP
+        engine.reacting = Reaction.QUICK_STOP if way is StopMethod.QUICK_STOP else reaction
+        if way in (StopMethod.QUICK_STOP, StopMethod.TORQUE_OFF):
+            if way is StopMethod.QUICK_STOP:
+                self._machine.quick_stop()
+            else:
+                self._machine.power_off()
+            engine.driving = False
+            if torque_Nm is not None:
+                torque_Nm[:] = 0.0
+            engine.switch(IDLE)
+        self._runner.begin(self.come_to_rest(then))
+
+    def _method(self, reaction: Reaction, then: LoopState) -> StopMethod:
+        """Return how to end the motion, by what is known of pose and drives."""
+        if reaction is Reaction.QUICK_STOP:
+            return StopMethod.QUICK_STOP
+        if reaction is not Reaction.CONTROLLED_STOP or not self._engine.driving:
+            return StopMethod.TORQUE_OFF
+        failed = then is LoopState.FAULT and self._supervisor.limit in POSE_UNRELIABLE
+        if self._lowering is None or not failed:
+            return StopMethod.BRAKE
+        return StopMethod.LOWER_WITHOUT_POSE if self.lowers else StopMethod.QUICK_STOP
+
+    def _begin(self, way: StopMethod) -> bool:
+        """Have the program brake or lower; return whether it does."""
+        try:
+            if way is StopMethod.LOWER_WITHOUT_POSE:
+                self._lower_without_pose()
+            else:
+                self._engine.program.stop()
+        except Exception:  # any mistake of a program: the drives can brake by themselves
+            traceback.print_exc()
+            return False
+        return True
+
+    def _lower_without_pose(self) -> None:
+        lowering = self._lowering
+        assert lowering is not None  # there is a platform to be lowered
+        if not self.without_pose:
+            self.without_pose = True
+            self._engine.switch(lowering.program, {"blind": True})
+
+    def enter_fault(self) -> None:
+        """Go to fault from a state without power."""
+        self._runner.begin(self._fault_steps())
+
+    # -- steps that take several cycles
+
+    def _fault_steps(self) -> Steps:
+        self._life.enter(LoopState.FAULT)
+        self._engine.driving = False
+        self._machine.set_brakes(False)
+        yield
+        self._engine.reacting = Reaction.NONE
+        yield from self.explain()
+
+    def come_to_rest(self, then: LoopState) -> Steps:
+        """Wait for the end of a stop that has begun, then remove the drives' power."""
+        engine, life, machine, runner = self._engine, self._life, self._machine, self._runner
+        controlled = engine.driving
+        if controlled:
+            yield from self._brake()
+        else:
+            machine.set_brakes(False)
+        yield from runner.wait_up_to(_POWER_OFF_S, machine.unpowered)
+        machine.power_off()
+        yield  # one command at least, so that it is sent
+        yield from runner.wait_up_to(_POWER_OFF_AT_LAST_S, machine.unpowered)
+        unconfirmed: list[str] = []
+        yield from runner.run_task(lambda: unconfirmed.append(machine.confirm_power_off()))
+        if controlled or machine.has_brakes:  # without control it may have fallen
+            yield from self._keep_lengths()
+        if any(unconfirmed):
+            reason = "; ".join(filter(None, (life.reason, *unconfirmed)))
+            life.set_fault_reason(reason, life.details)
+            then = LoopState.FAULT
+        life.enter(then)
+        engine.reacting = Reaction.NONE
+        if then is LoopState.FAULT:
+            yield from self.explain()
+
+    def _brake(self) -> Steps:
+        """Wait for standstill under the program, apply the brakes, remove the power.
+
+        A platform that no brakes would hold is lowered first.
+        """
+        engine, machine, wait_up_to = self._engine, self._machine, self._runner.wait_up_to
+        lowering = self._lowering
+        if lowering is None or engine.program.name != lowering.program:
+            yield from wait_up_to(engine.program.rest_s, self._at_rest)
+            engine.switch(lowering.program if lowering is not None and self.lowers else HOLD)
+        if lowering is not None and self.lowers:
+            yield from wait_up_to(lowering.longest_s, self._at_rest)
+        else:
+            yield from wait_up_to(_SETTLE_S, self._is_still)
+        machine.set_brakes(False)
+        yield from wait_up_to(_BRAKES_S, lambda: machine.brakes_are(False))
+        machine.power_off()
+        engine.driving = False
+        engine.switch(IDLE)
+
+    def _at_rest(self) -> bool:
+        return self._engine.program.at_rest
+
+    def _is_still(self) -> bool:
+        return bool(np.max(np.abs(self._estimator.estimate.velocity_rad_s)) < _STILL_RAD_S)
+
+    def _keep_lengths(self) -> Steps:
+        """Store the cables' lengths for the next start, where they are known."""
+        last, device = self._engine.parts.last, self._machine.device
+        if last is None or device is None:
+            return
+        estimate, feedback = self._estimator.estimate, device.feedback
+        try:
+            yield from self._runner.run_blocking(lambda: last.keep(estimate, feedback))
+        except ControlError as error:
+            self._engine.notices.append(str(error))
+
+    def explain(self) -> Steps:
+        """Add what drives and safety I/O report to the reason; leave a lost bus."""
+        life, machine = self._life, self._machine
+        found: list[str] = []
+        yield from self._runner.run_task(lambda: found.append(machine.explain(life.reason)))
+        if found:
+            life.set_fault_reason(found[0], life.details)
+        if self._engine.lost_bus:
+            yield from self.leave_cycles()
+
+    def leave_cycles(self) -> Steps:
+        """Stop the cycles and pause the machine; a lost bus is no error here."""
+        self._engine.stop_cycles()
+        try:
+            yield from self._runner.run_task(self._machine.pause)
+        except ControlError:
+            return

@@ -1,0 +1,223 @@
+"""What the control interface takes and gives, as JSON."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Final
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
+
+from cdpr_rt.runtime.right import LONGEST_S
+from cdpr_rt.service.lease import SHORTEST_S
+
+_MOST_KEYS, _MOST_NUMBERS, _LARGEST = 32, 64, 1e9
+_KEY: Final = "^[A-Za-z][A-Za-z0-9_]{0,39}$"
+_TEXT: Final = "^[ -~]{0,64}$"
+_SCALAR: Final[list[dict[str, Any]]] = [
+    {"type": "number", "minimum": -_LARGEST, "maximum": _LARGEST},
+    {"type": "string", "pattern": _TEXT},
+    {"type": "boolean"},
+    {"type": "null"},
+]
+_LIST: Final = {"type": "array", "items": {"anyOf": _SCALAR}, "maxItems": _MOST_NUMBERS}
+_WANTED: Final[dict[str, Any]] = {
+    "type": "object",
+    "propertyNames": {"pattern": _KEY},
+    "maxProperties": _MOST_KEYS,
+    "additionalProperties": {"anyOf": [*_SCALAR, _LIST]},
+}
+
+
+def _check_scalar(key: str, value: Any) -> None:
+    if isinstance(value, int | float):
+        good = abs(value) <= _LARGEST  # a whole number of any length too, which no float holds
+    else:
+        good = value is None or (isinstance(value, str) and re.fullmatch(_TEXT, value) is not None)
+    if not good:
+        raise ValueError(
+            f"{key}: allowed: a number up to {_LARGEST:g}, 64 characters of ASCII, true, false, "
+            f"null, or a list of {_MOST_NUMBERS} of these"
+        )
+
+
+def _checked(wanted: dict[str, Any]) -> dict[str, Any]:
+    """Raise ValueError for what no program can want; it is said in `_WANTED` as well."""
+    if len(wanted) > _MOST_KEYS:
+        raise ValueError(f"{len(wanted)} keys; allowed: {_MOST_KEYS}")
+    for key, value in wanted.items():
+        if re.fullmatch(_KEY, key) is None:
+            raise ValueError("key; allowed: a letter, then up to 39 letters, digits and _")
+        values = value if isinstance(value, list) else [value]
+        if len(values) > _MOST_NUMBERS:
+            raise ValueError(f"{key}: {len(values)} values; allowed: {_MOST_NUMBERS}")
+        for one in values:
+            _check_scalar(key, one)
+    return wanted
+
+
+_Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$", description="A program's name.")]
+_Client = Annotated[
+    str,
+    Field(
+        pattern=r"^[ -~]{1,64}$",
+        description="Who asks, as others see it: 1 to 64 characters of printable ASCII.",
+        examples=["maria@laptop"],
+    ),
+]
+_Wanted = Annotated[
+    dict[str, Any],
+    AfterValidator(_checked),
+    WithJsonSchema(_WANTED),
+    Field(
+        description="What the program is to do; its page tells which keys it knows.",
+        examples=[{"position_m": [0.2, 0.1, 1.8], "rotation_rad": [0.0, 0.0, 0.1]}],
+    ),
+]
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class Who(_Body):
+    """Who asks, for the record of events; the whole body may be left out."""
+
+    client: _Client = "somebody"
+
+
+class TakeControl(_Body):
+    """Who wants to move, and how long it may be silent."""
+
+    client: _Client
+    ttl_s: Annotated[
+        float,
+        Field(ge=SHORTEST_S, le=LONGEST_S, description="Without a sign of life this long: hold."),
+    ] = 2.0
+
+
+class Enable(Who):
+    """What runs from the first moment with power."""
+
+    program: _Name = "hold"
+    wanted: _Wanted = {}
+
+
+class Program(Who):
+    """What is to run from now on."""
+
+    program: _Name
+    wanted: _Wanted = {}
+
+
+class Set(Who):
+    """What the running program is to do now."""
+
+    wanted: _Wanted
+
+
+class _Answer(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+
+class Error(_Answer):
+    """Why something was refused or failed."""
+
+    error: str
+    state: str | None = None
+    """The loop's state, where it was the loop that refused."""
+
+
+class Done(_Answer):
+    """The loop has done it."""
+
+    text: str
+    state: str
+
+
+class Held(_Answer):
+    """The right to move, for whoever shows the token."""
+
+    token: str
+    ttl_s: float
+
+
+class Renewed(_Answer):
+    """The right to move goes on."""
+
+    ttl_s: float
+
+
+class Ticket(_Answer):
+    """What opens one WebSocket, as `ticket=` of its query."""
+
+    ticket: str
+    valid_s: float
+
+
+class StreamSession(_Answer):
+    """A session of the set-point stream, for the holder of the right to move."""
+
+    session: int
+    key: str = Field(description="32 bytes in hexadecimal; signs the packets.")
+    host: str = Field(description="Where the stream is received; 0.0.0.0 is every address.")
+    port: int
+
+
+class Control(_Answer):
+    """Who holds the right to move."""
+
+    held: bool
+    client: str | None
+    left_s: float
+
+
+class LoopLife(_Answer):
+    """The loop's process."""
+
+    pid: int
+    alive: bool
+    silent_s: float
+    """How long ago it turned last."""
+
+
+class Status(_Answer):
+    """Everything at a glance."""
+
+    robot: str
+    state: str
+    """unconfigured, inactive, ready, active, fault; starting, dead."""
+    program: str | None
+    program_progress: dict[str, Any] = {}
+    """What it tells of itself, such as `done`; of a platform `position_m`, `rotation_rad`, ..."""
+    reason: str
+    """Why it left active, holds, or is not ready; stays until acknowledged or enabled again."""
+    reason_limit: dict[str, Any] | None
+    read_only: bool
+    lockstep: bool
+    notices: list[str]
+    loop: LoopLife
+    control: Control
+    cycle: dict[str, Any] | None
+    """Figures of the newest cycle, null before the first."""
+    axes: list[dict[str, Any]]
+    parts: dict[str, dict[str, Any]]
+    """Recorder, live view, set-point stream and the service's own figures."""
+
+
+class Event(_Answer):
+    """Something that happened."""
+
+    number: int
+    time: str
+    """Date and time, UTC."""
+    kind: str
+    text: str
+    times: int
+    """How often it happened in a row."""
+    detail: dict[str, Any]
+
+
+class Events(_Answer):
+    """The last events, oldest first."""
+
+    events: list[Event]

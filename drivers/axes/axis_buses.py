@@ -1,0 +1,346 @@
+"""CiA 402 axes on several buses, exchanged once per cycle as one device."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_drivers.axes.answer_wait import AnswerWait
+from cdpr_drivers.axes.axis_group import AxisGroup
+from cdpr_drivers.axes.axis_layout import AxisConfig
+from cdpr_drivers.axes.axis_state import StateArrays
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.cia402 import POWER_OFF, State
+from cdpr_drivers.errors import BusError, DriverError, ModeRefusedError
+from cdpr_rt.core.exchange import AxisCommand, AxisFeedback, BoolArray
+
+_STOP_TIMEOUT_S = 1.0
+
+
+@dataclass(frozen=True)
+class BusAxes:
+    """The axes on one bus, and their numbers in the whole device, 0 to n - 1."""
+
+    name: str
+    network: CanNetwork
+    axes: Sequence[AxisConfig]
+    axis_numbers: Sequence[int]
+
+
+class AxisBuses:
+    """n axes on several buses; implements `cdpr_rt.core.exchange.AxisDevice` as `AxisGroup` does.
+
+    Where the axes are numbered bus by bus, the arrays of each bus are slices of the whole, and
+    nothing is copied; otherwise their values are moved once a cycle. What goes wrong on one bus
+    keeps none of the others from being exchanged, or from being switched off at the end.
+
+    Raises BusError when some buses keep time in lockstep and some do not, and DriverError for a PDO
+    map that does not serve torque control.
+    """
+
+    def __init__(self, buses: Sequence[BusAxes], period_s: float) -> None:
+        self.buses = tuple(buses)
+        self.period_s = period_s
+        self.clock = buses[0].network.clock
+        order = [number for bus in buses for number in bus.axis_numbers]
+        self.n = len(order)
+        arrays = StateArrays(self.n)
+        self.groups: list[AxisGroup] = []
+        self._location: dict[int, tuple[AxisGroup, int]] = {}
+        try:
+            first = 0
+            for bus in buses:
+                view = arrays.view(first, first + len(bus.axes))
+                group = AxisGroup(bus.network, bus.axes, period_s, view)
+                self.groups.append(group)
+                self._location |= {number: (group, i) for i, number in enumerate(bus.axis_numbers)}
+                first += group.n
+            self.lockstep = self._common_clock()
+        except BaseException:
+            for group in self.groups:
+                group.close()
+            raise
+        self._names = {group: bus.name for group, bus in zip(self.groups, buses, strict=True)}
+        self.axes = tuple(group.axes[i] for group, i in self._in_order())
+        self.feedback, self.command = arrays.feedback(), arrays.command()
+        self._reordering = AxisReordering(order, self.feedback, self.command)
+        if self._reordering.needed:
+            self.feedback, self.command = self._reordering.feedback, self._reordering.command
+        self._single_group = (
+            self.groups[0] if len(self.groups) == 1 and not self._reordering.needed else None
+        )
+        if self._single_group is not None:  # it counts the cycles
+            self.feedback, self.command = self._single_group.feedback, self._single_group.command
+        self.transmits = 0
+        """How often commands went out on all buses."""
+        self._answers = AnswerWait(self.groups[0].paced_wait_s)
+        self._sync_s = 0.0
+        self._failed = [False] * len(self.groups)
+        """Which buses have failed in this cycle."""
+        self._failure: BusError | None = None
+        self._closed = False
+
+    def _common_clock(self) -> bool:
+        for group, bus in zip(self.groups, self.buses, strict=True):
+            if group.lockstep != self.groups[0].lockstep:
+                clocks = ("paced", "lockstep")
+                raise BusError(
+                    f"bus {bus.name} ({group.network.url}) is {clocks[group.lockstep]}, bus "
+                    f"{self.buses[0].name} is {clocks[self.groups[0].lockstep]}: all buses of a "
+                    "robot keep time alike"
+                )
+        return self.groups[0].lockstep
+
+    # -- one cycle
+
+    def sync(self) -> None:
+        """Send the SYNC that opens the cycle, on one bus right after the other.
+
+        Where one of several fails, `receive` raises, once the others have answered.
+        """
+        self._failure = None
+        self._sync_s = time.monotonic()
+        if self._single_group is not None:
+            self._failed[0] = False
+            try:
+                self._single_group.sync()
+            except BusError as error:
+                self._mark_failed(0, error)
+                raise
+            return
+        self.feedback.cycle += 1
+        self.feedback.time_s = self.feedback.cycle * self.period_s
+        for i, group in enumerate(self.groups):
+            self._failed[i] = False
+            try:
+                group.sync()
+            except BusError as error:
+                self._mark_failed(i, error)
+
+    def receive(self) -> int:
+        """Wait for the answers on all buses and decode them; return how many axes answered."""
+        if self._single_group is not None and self.lockstep:
+            try:
+                return self._single_group.receive()
+            except BusError as error:
+                self._mark_failed(0, error)
+                raise
+        if self.lockstep:
+            return self._receive(0.0)
+        self._answers.sleep(self._sync_s)
+        waits = sum(group.waits for group in self.groups)
+        answered = self._receive(self._sync_s + self.groups[0].paced_wait_s)
+        too_early = sum(group.waits for group in self.groups) > waits
+        self._answers.learn(time.monotonic() - self._sync_s, too_early)
+        return answered
+
+    def _receive(self, deadline_s: float) -> int:
+        answered = 0
+        for i, group in enumerate(self.groups):
+            if self._failed[i]:
+                continue
+            try:
+                answered += group.receive(deadline_s)
+            except BusError as error:
+                self._mark_failed(i, error)
+        if self._reordering.needed:
+            self._reordering.gather()
+        if self._failure is not None:
+            raise self._failure
+        return answered
+
+    def _mark_failed(self, i: int, error: BusError) -> None:
+        """Note that a bus has failed, and that the feedback of its axes is not valid."""
+        self._failed[i] = True
+        self._failure = self._failure or error
+        feedback = self.groups[i].feedback
+        for flags in (feedback.valid, feedback.alive, feedback.rate_ok):
+            flags.fill(False)
+
+    def transmit(self) -> None:
+        """Send controlwords and torques on all buses, to act from the next SYNC on."""
+        if self._single_group is not None:
+            self._single_group.transmit()
+            self.transmits += 1
+            return
+        if self._reordering.needed:
+            self._reordering.scatter()
+        failure: BusError | None = None
+        for group in self.groups:
+            try:
+                group.transmit()
+            except BusError as error:
+                failure = failure or error
+        if self._reordering.needed:
+            self._reordering.gather_sent()
+        if failure is not None:
+            raise failure
+        self.transmits += 1
+
+    def alarm(self) -> str:
+        """Return why the drives of all buses have to be stopped, or an empty text."""
+        for group in self.groups:
+            text = group.alarm()
+            if text:
+                return f"bus {self._names[group]}: {text}"
+        return ""
+
+    @property
+    def missed(self) -> int:
+        """Answers that did not come in time since the beginning, over all axes."""
+        return sum(group.missed for group in self.groups)
+
+    # -- between cycles
+
+    def stop_cycling(self) -> None:
+        """Tell that no cycles run for a while; see `AxisGroup.stop_cycling`."""
+        for group in self.groups:
+            group.stop_cycling()
+
+    def tolerate_silence(self, cycles: int) -> None:
+        """Bridge so many cycles without an answer; see `AxisGroup.tolerate_silence`."""
+        for group in self.groups:
+            group.tolerate_silence(cycles)
+
+    def request(self, state: State) -> None:
+        """Ask all axes for a state; see `AxisGroup.request`. Where one refuses, none is enabled."""
+        try:
+            for group in self.groups:
+                group.request(state)
+        except DriverError:
+            for group in self.groups:
+                group.request(State.SWITCH_ON_DISABLED)
+            raise
+
+    def reached(self, state: State) -> bool:
+        """Return whether all axes report `state`."""
+        return all(group.reached(state) for group in self.groups)
+
+    def states(self) -> list[State]:
+        """Return the state each axis reported last."""
+        by_group = {id(group): group.states() for group in self.groups}
+        return [by_group[id(group)][i] for group, i in self._in_order()]
+
+    def faulted(self) -> BoolArray:
+        """Return which axes have been in fault since the last acknowledgement, (n,)."""
+        by_group = {id(group): group.faulted() for group in self.groups}
+        return np.array([by_group[id(group)][i] for group, i in self._in_order()])
+
+    def acknowledge_fault(self) -> None:
+        """Forget latched alarms and reset drives in fault; see `AxisGroup.acknowledge_fault`."""
+        for group in self.groups:
+            group.acknowledge_fault()
+
+    @property
+    def torque_modes(self) -> list[int]:
+        """Return the mode in which each drive obeys a torque, by its profile."""
+        by_group = {id(group): group.torque_modes for group in self.groups}
+        return [by_group[id(group)][i] for group, i in self._in_order()]
+
+    def ask_mode(self, modes: int | Sequence[int]) -> None:
+        """Ask for a mode of operation, one for all or one each; see `AxisGroup.ask_mode`."""
+        each = [modes] * self.n if isinstance(modes, int) else list(modes)
+        for group, bus in zip(self.groups, self.buses, strict=True):
+            group.ask_mode([each[number] for number in bus.axis_numbers])
+
+    def mode_confirmed(self) -> bool:
+        """Return whether every axis reports the mode it was asked for; raises SdoError."""
+        return all(group.mode_confirmed() for group in self.groups)
+
+    def unconfirmed_mode(self) -> ModeRefusedError:
+        """Return the error that names the first axis whose mode is not what was asked for."""
+        groups = (group for group in self.groups if not group.mode_confirmed())
+        return next(groups, self.groups[0]).unconfirmed_mode()
+
+    def group_of(self, axis: int) -> tuple[AxisGroup, int]:
+        """Return the group that an axis belongs to, and its number there."""
+        return self._location[axis]
+
+    def _in_order(self) -> list[tuple[AxisGroup, int]]:
+        return [self._location[number] for number in range(self.n)]
+
+    # -- the end
+
+    def close(self) -> str:
+        """Take torque and power from the drives of all buses; a second time does nothing.
+
+        Returns which drives have not confirmed that their power stage is off, else an empty text.
+        """
+        if self._closed:
+            return ""
+        self._closed = True
+        try:
+            self._stop_together()
+        finally:
+            # those with power last: they may take seconds, while the others' heartbeats go on
+            unconfirmed = [group.close() for group in sorted(self.groups, key=_has_power)]
+        return "; ".join(text for text in unconfirmed if text)
+
+    def _stop_together(self) -> None:
+        """Disable the drives of all buses in the same cycles, so that none waits for another."""
+        live = list(self.groups)
+        for group in live:
+            group.request(State.SWITCH_ON_DISABLED)
+        until_s = self.clock.now_s + _STOP_TIMEOUT_S
+        while live and self.clock.now_s < until_s:
+            self.command.torque_Nm[:] = 0.0
+            for step in (AxisGroup.sync, AxisGroup.receive, _transmit_zero):
+                live = [group for group in live if _succeeds(group, step)]
+            if not any(_has_power(group) for group in live):
+                return
+            if not self.lockstep:
+                self.clock.sleep(self.period_s)
+
+
+def _has_power(group: AxisGroup) -> bool:
+    return not all(state in POWER_OFF for state in group.states())
+
+
+def _transmit_zero(group: AxisGroup) -> None:
+    group.command.torque_Nm[:] = 0.0
+    group.transmit()
+
+
+def _succeeds(group: AxisGroup, step: Any) -> bool:
+    try:
+        step(group)
+    except BusError:
+        return False
+    return True
+
+
+class AxisReordering:
+    """Copies values between arrays in the order of the buses and in the order of the axes."""
+
+    def __init__(self, order: Sequence[int], feedback: AxisFeedback, command: AxisCommand) -> None:
+        n = len(order)
+        self.needed = list(order) != sorted(order)
+        self.feedback, self.command = AxisFeedback(n), AxisCommand(n)
+        self._numbers: NDArray[np.intp] = np.array(order, np.intp)
+        self._columns: NDArray[np.intp] = np.argsort(self._numbers)
+        self._pairs = [
+            (value, getattr(self.feedback, name))
+            for name, value in vars(feedback).items()
+            if isinstance(value, np.ndarray)
+        ]
+        self._bus_command = command
+
+    def gather(self) -> None:
+        """Copy the feedback of the buses to the device's."""
+        for in_bus_order, in_axis_order in self._pairs:
+            np.take(in_bus_order, self._columns, out=in_axis_order, mode="clip")
+
+    def scatter(self) -> None:
+        """Copy the commanded torques to those of the buses."""
+        in_axis_order, in_bus_order = self.command.torque_Nm, self._bus_command.torque_Nm
+        np.take(in_axis_order, self._numbers, out=in_bus_order, mode="clip")
+
+    def gather_sent(self) -> None:
+        """Copy the torques that were sent."""
+        sent, in_axis_order = self._bus_command.sent_torque_Nm, self.command.sent_torque_Nm
+        np.take(sent, self._columns, out=in_axis_order, mode="clip")

@@ -1,0 +1,338 @@
+"""Axes that another master runs: their feedback is received, and no frame is sent."""
+
+from __future__ import annotations
+
+import math
+import select
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from cdpr_drivers.axes import axis_codec as codec
+from cdpr_drivers.axes.axis_alarms import alarm_text
+from cdpr_drivers.axes.axis_buses import AxisReordering
+from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
+from cdpr_drivers.axes.axis_state import GroupState, StateArrays
+from cdpr_drivers.bus import BusHealth, BusUrl, FrameBuffer, open_port
+from cdpr_drivers.cia402 import STATE_TABLE, State
+from cdpr_profiles import Winch
+from cdpr_rt.core.clock import PacedClock
+from cdpr_rt.core.exchange import AxisCommand, AxisFeedback, BoolArray
+
+_SYNC_ID = 0x080
+_SYNC_HEAD = bytes([_SYNC_ID, 0, 0, 0])
+_SYNC_WAIT_S = 0.05
+"""How long one cycle waits for a SYNC before it ends without."""
+_PAUSE_S = 0.5
+"""After so long without a SYNC the alarms are cleared with the next one."""
+_ANSWER_SHARE = 1.0
+_LOCKSTEP_ANSWER_S = 0.2
+_SETTLE_SHARE = 0.25
+"""Of a period, after a cycle's answers: by then its SYNC has come on all buses."""
+_MOST_CYCLES_AHEAD = 8
+_FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
+_OTHER_MASTERS_ALARMS = codec.WRONG_MODE | codec.LEFT_ENABLED
+"""Alarms about the states and modes that the other master commands, which are none here."""
+
+
+@dataclass(frozen=True)
+class MonitoredBus:
+    """The axes on one bus, and their numbers in the whole device, 0 to n - 1."""
+
+    name: str
+    url: BusUrl
+    axes: Sequence[AxisConfig]
+    axis_numbers: Sequence[int]
+
+
+def monitored_axis(winch: Winch, node_id: int) -> AxisConfig:
+    """Return the axis of a drive that cannot be asked, from its profiles alone."""
+    motor = winch.motor
+    torque_Nm = motor.rated_torque_Nm
+    return AxisConfig(node_id, winch.drive, torque_Nm, winch.encoder_counts_per_turn, 0, torque_Nm)
+
+
+class ListeningDevice:
+    """n axes on several buses, received only; implements `cdpr_rt.core.exchange.AxisDevice`.
+
+    Time comes from the SYNC of the master that runs them: `sync` waits for the next one, up to
+    0.05 s. The cycles of further buses are matched to those of the first,
+    again also after some were lost. Torques are in the unit that the profiles say, since the
+    drives are not asked for their rated torque.
+
+    Raises BusError when a bus cannot be opened, and DriverError for a PDO map that does not serve
+    torque control.
+    """
+
+    lockstep = True
+    """The next cycle begins with the other master's SYNC, not at a deadline of this process."""
+
+    def __init__(self, buses: Sequence[MonitoredBus], period_s: float, clock: PacedClock) -> None:
+        self.buses = tuple(buses)
+        self.period_s = period_s
+        self.clock = clock
+        order = [number for bus in buses for number in bus.axis_numbers]
+        self.n = len(order)
+        arrays = StateArrays(self.n)
+        self._monitors: list[_BusMonitor] = []
+        first = 0
+        try:
+            for bus in buses:
+                view = arrays.view(first, first + len(bus.axes))
+                self._monitors.append(_BusMonitor(bus, period_s, view))
+                first += len(bus.axes)
+        except BaseException:
+            self.close()
+            raise
+        self.feedback: AxisFeedback = arrays.feedback()
+        self.command: AxisCommand = arrays.command()
+        self._reordering = AxisReordering(order, self.feedback, self.command)
+        if self._reordering.needed:
+            self.feedback, self.command = self._reordering.feedback, self._reordering.command
+        self._columns = np.argsort(np.array(order, np.intp))
+        self._settle_s = _SETTLE_SHARE * period_s
+        self._cycles_ahead = 0
+        self._synced = False
+        self._last_sync_s = -math.inf  # no master yet
+
+    @property
+    def silent_s(self) -> float:
+        """Return for how long no SYNC has come."""
+        return self.clock.now_s - self._last_sync_s
+
+    # -- one cycle
+
+    def sync(self) -> None:
+        """Wait for the SYNC of the other master; raises BusError when a bus is gone."""
+        first, *others = self._monitors
+        if others:
+            self._align_buses()
+        self._synced = first.await_sync(time.monotonic() + _SYNC_WAIT_S)
+        if not self._synced:
+            for monitor in self._monitors:
+                monitor.valid.fill(False)
+            return
+        now = time.monotonic()
+        if now - self._last_sync_s > _PAUSE_S:
+            self.forget_alarms()
+        self._last_sync_s = now
+        for monitor in others:
+            monitor.await_sync(now + monitor.wait_s)
+        self.feedback.cycle += 1
+        self.feedback.time_s = self.feedback.cycle * self.period_s
+
+    def receive(self) -> int:
+        """Receive the answers to the SYNC; return how many axes answered. Raises BusError."""
+        answered = 0
+        if self._synced:
+            for monitor in self._monitors:
+                answered += monitor.collect_answers(time.monotonic() + monitor.wait_s)
+                monitor.end_cycle()
+        if self._reordering.needed:
+            self._reordering.gather()
+        return answered
+
+    def _align_buses(self) -> None:
+        """Skip a cycle of those buses that stay ahead of others, which have lost one.
+
+        Only after several cycles, since SYNC does not come on all buses at the same instant.
+        """
+        first = self._monitors[0]
+        ahead = self._buses_ahead()
+        if first not in ahead and not first.sync_waiting(time.monotonic() + self._settle_s):
+            ahead = self._buses_ahead()
+        self._cycles_ahead += 1 if 0 < len(ahead) < len(self._monitors) else -1
+        self._cycles_ahead = max(self._cycles_ahead, 0)
+        if self._cycles_ahead >= _MOST_CYCLES_AHEAD:
+            self._cycles_ahead = 0
+            for monitor in ahead:
+                monitor.skip_cycle()
+
+    def _buses_ahead(self) -> list[_BusMonitor]:
+        return [monitor for monitor in self._monitors if monitor.sync_waiting()]
+
+    def transmit(self) -> None:
+        """Send nothing, whatever `command` says."""
+        self.command.sent_torque_Nm.fill(0.0)
+
+    def alarm(self) -> str:
+        """Return what is wrong with an axis as far as its frames show, or an empty text.
+
+        That no master runs the axes is no alarm; see `silent_s`.
+        """
+        for monitor in self._monitors:
+            if monitor.alarms:
+                return f"bus {monitor.name}: {alarm_text(monitor.axes, monitor.ints)}"
+        return ""
+
+    def forget_alarms(self) -> None:
+        """Forget latched alarms."""
+        for monitor in self._monitors:
+            monitor.forget_alarms()
+
+    # -- what is known of the axes
+
+    def states(self) -> list[State]:
+        """Return the state each axis reported last."""
+        return [State(int(state)) for state in self._row(codec.STATE)]
+
+    def faulted(self) -> BoolArray:
+        """Return which axes have been in fault since alarms were forgotten, (n,)."""
+        return np.asarray(self._row(codec.FAULTED) != 0)
+
+    @property
+    def missed(self) -> int:
+        """Answers that did not come since the beginning, over all axes."""
+        return int(sum(monitor.ints[codec.MISSED].sum() for monitor in self._monitors))
+
+    def _row(self, row: int) -> codec.Ints:
+        return np.concatenate([monitor.ints[row] for monitor in self._monitors])[self._columns]
+
+    # -- the end
+
+    def close(self) -> str:
+        """Leave the buses; returns an empty text, as no drive is to be switched off."""
+        for monitor in self._monitors:
+            monitor.close()
+        return ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class _BusMonitor:
+    """Receives the frames of one bus and keeps the state of its axes."""
+
+    def __init__(self, bus: MonitoredBus, period_s: float, arrays: StateArrays) -> None:
+        self.name = bus.name
+        self.axes = tuple(bus.axes)
+        self.health = BusHealth()
+        self.alarms = 0
+        self._layout = layout = GroupLayout(self.axes)
+        state = GroupState(self.axes, period_s, False, arrays)
+        self.ints, self._floats, self._words, self._flags = (
+            state.ints, state.floats, state.words, state.flags,
+        )  # fmt: skip
+        self.valid = state.feedback.valid
+        self._seen = state.ints[codec.SEEN]
+        self._rx = FrameBuffer(_FRAMES_PER_AXIS * len(self.axes) + _SPARE_FRAMES)
+        self._others = np.zeros(len(self._rx.rows) + 1, np.int64)
+        self._missing = 0
+        self._sync_pending = False
+        self._compile()
+        filters = [(i, 0x7FF) for i in (_SYNC_ID, *layout.identifiers)]
+        self._port = open_port(bus.url, filters, self.health)
+        lockstep = bus.url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
+        self.wait_s = _LOCKSTEP_ANSWER_S if lockstep else _ANSWER_SHARE * period_s
+        self._port.settimeout(0.0)
+        self._port.drain()
+
+    def _compile(self) -> None:
+        """Have the kernels compiled before there is a cycle to be late for."""
+        self._decode(0)
+        self.end_cycle()
+        self.ints[codec.MISSED] = self.ints[codec.SILENT_CYCLES] = 0
+        self.forget_alarms()
+
+    def forget_alarms(self) -> None:
+        """Forget latched alarms and what irregularities have been noted."""
+        for row in (codec.ALARM, codec.FAULTED, codec.SILENT_CYCLES, codec.HEARTBEAT_AGE):
+            self.ints[row] = 0
+        for row in (codec.FRAMES, codec.FLOOD, codec.EXTRA, codec.EMERGENCY):
+            self.ints[row] = 0
+        self._floats[codec.IRREGULAR] = 0.0
+        # the first index that the other master has latched counts as the axis' index
+        known = self._flags[codec.INDEX_KNOWN]
+        self.ints[codec.PROBE_ARMED] = self._layout.probe_mapped & ~known
+        self.alarms = 0
+
+    def sync_waiting(self, deadline: float = 0.0) -> bool:
+        """Decode what waits, or comes until `deadline`; return whether the next SYNC has come."""
+        if not self._sync_pending:
+            self._sync_pending = self._listen(deadline)
+        return self._sync_pending
+
+    def skip_cycle(self) -> None:
+        """Pass over the SYNC that has come; the answers to it are late then."""
+        self._sync_pending = False
+
+    def await_sync(self, deadline: float) -> bool:
+        """Wait for the next SYNC and begin its cycle; return whether it came in time."""
+        self.valid.fill(False)
+        if not self._sync_pending and not self._listen(deadline):
+            return False
+        self._sync_pending = False
+        self._seen.fill(0)
+        self._missing = len(self.axes)
+        return True
+
+    def collect_answers(self, deadline: float) -> int:
+        """Receive answers until all have come, time is up or the next SYNC; return how many."""
+        awaited_before = self._missing
+        if awaited_before:
+            self._sync_pending = self._listen(deadline)
+        answered, self._missing = awaited_before - self._missing, 0
+        return answered
+
+    def _listen(self, deadline: float) -> bool:
+        """Receive frames until a SYNC (true), the last answer awaited, or `deadline` (false).
+
+        While answers are awaited, their coming ends it as well; 0 for what waits already.
+        """
+        recv_into, rows = self._port.recv_into, self._rx.rows
+        awaited = self._missing > 0
+        while True:
+            last, came = 0, False
+            try:
+                for row in rows:
+                    if not recv_into(row):
+                        raise self._port.lost()
+                    if row[:4] == _SYNC_HEAD:
+                        came = True
+                        break
+                    last += 1
+            except BlockingIOError:
+                pass
+            except OSError as error:
+                raise self._port.lost(error) from error
+            if last:
+                self._missing -= min(self._decode(last), self._missing)
+            if came or (awaited and not self._missing):
+                return came
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                return False
+            if last < len(rows):
+                select.select([self._port], [], [], left)
+
+    def _decode(self, last: int) -> int:
+        layout = self._layout
+        return codec.decode(
+            self._rx.bytes,
+            layout.slots,
+            layout.fields,
+            STATE_TABLE,
+            self.ints,
+            self._floats,
+            self._words,
+            self._flags,
+            self._others,
+            last,
+        )
+
+    def end_cycle(self) -> None:
+        """Count who was silent, irregular or without heartbeat."""
+        codec.end_answers(self.ints, self._floats, self._flags)
+        alarms = self.ints[codec.ALARM]
+        alarms &= ~_OTHER_MASTERS_ALARMS
+        self.alarms = int(np.bitwise_or.reduce(alarms))
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._port.close()

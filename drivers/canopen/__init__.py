@@ -1,0 +1,1 @@
+"""Acyclic CANopen: network management, SDO, emergencies, error control, LSS."""

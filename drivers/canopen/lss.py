@@ -1,0 +1,319 @@
+"""LSS master of CiA 305: find drives by their identity, give them a node id and a bit rate.
+
+The `canopen` package's master is not used, since it takes any frame for the answer to the request
+before it: with several drives without a node id its fastscan can put together an identity that
+none of them has. It also waits 0.2 s for each number of an address and drops the error codes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+from cdpr_drivers.canopen.lss_link import LssError, LssLink
+from cdpr_drivers.errors import BusError
+
+__all__ = [
+    "BITRATE_INDEX",
+    "NODE_ID_UNKNOWN",
+    "UNCONFIGURED",
+    "LssAddress",
+    "LssError",
+    "LssMaster",
+]
+
+UNCONFIGURED = 255
+"""Node id of a device that has none."""
+NODE_ID_UNKNOWN = 0
+"""Node id of a device that does not report it, as early ones."""
+
+BITRATE_INDEX = {
+    1_000_000: 0,
+    800_000: 1,
+    500_000: 2,
+    250_000: 3,
+    125_000: 4,
+    50_000: 6,
+    20_000: 7,
+    10_000: 8,
+}
+"""Index of CiA 305's table by bit rate, bit/s."""
+
+_SWITCH_GLOBAL, _WAITING, _CONFIGURATION = 0x04, 0, 1
+_SELECT, _SELECTED = 0x40, 0x44
+_IDENTIFY, _IDENTIFIED = 0x46, 0x4F
+_IDENTIFY_UNCONFIGURED, _UNCONFIGURED_IDENTIFIED = 0x4C, 0x50
+_FASTSCAN, _FROM_THE_START = 0x51, 128
+_INQUIRE, _INQUIRE_NODE_ID = 0x5A, 0x5E
+_SET_NODE_ID, _SET_BIT_TIMING, _ACTIVATE, _STORE = 0x11, 0x13, 0x15, 0x17
+_REASONS = {
+    (_SET_NODE_ID, 1): "it takes node ids 1 to 127 only",
+    (_SET_BIT_TIMING, 1): "it does not support this bit rate",
+    (_STORE, 1): "it cannot store node id and bit rate",
+    (_STORE, 2): "its memory could not be written",
+}
+_VENDOR_SPECIFIC = 255
+
+_SEARCHES = 4
+_NEVER_USED = 127
+"""Node id that stands in a device during a search, and is taken out before it could count."""
+_ALL = (0, 0xFFFFFFFF)
+
+
+@dataclass(frozen=True, order=True)
+class LssAddress:
+    """The four numbers of 1018h, which together belong to one device only."""
+
+    vendor_id: int
+    product_code: int
+    revision: int
+    serial: int
+
+    @property
+    def numbers(self) -> tuple[int, int, int, int]:
+        """The numbers in the standard's order."""
+        return self.vendor_id, self.product_code, self.revision, self.serial
+
+    def __str__(self) -> str:
+        vendor, product, revision, _ = (f"{number:08X}h" for number in self.numbers)
+        return f"vendor {vendor}, product {product}, revision {revision}, serial {self.serial}"
+
+
+class LssMaster(LssLink):
+    """LSS on one bus; a context manager that leaves every device in the waiting state.
+
+    `timeout_s` is how long a device may take to answer. Silence is an answer too (fastscan asks
+    bit by bit), so it also decides how long a search takes. Raises BusError when the bus cannot
+    be opened, or is lost later.
+    """
+
+    def __enter__(self) -> Self:
+        self.release()
+        return self
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        try:
+            self.release()
+        except BusError:
+            if error is None:
+                raise
+        finally:
+            self.close()
+
+    # -- finding
+
+    def release(self) -> None:
+        """Return all devices to the waiting state; one that got its first node id boots now."""
+        self._send(bytes([_SWITCH_GLOBAL, _WAITING]))
+
+    def has_unconfigured(self) -> bool:
+        """Tell whether a device without a node id is on the bus (not all know this question)."""
+        return bool(self._ask(bytes([_IDENTIFY_UNCONFIGURED]), _UNCONFIGURED_IDENTIFIED))
+
+    def unconfigured(self) -> list[LssAddress]:
+        """Return the devices without a node id, by fastscan, sorted.
+
+        Raises LssError when they do not answer in a way that makes sense.
+        """
+        for _ in range(_SEARCHES):
+            found = self._fastscan_all()
+            if found is not None and all(self._confirms(address) for address in found):
+                self.release()
+                return sorted(found)
+            self._settle_s *= 2.0  # answers of several devices ran into the next question
+        raise LssError(
+            "the devices without a node id do not answer the fastscan in a way that makes sense; "
+            "give them a longer --timeout, or connect one at a time"
+        )
+
+    def find(
+        self,
+        vendor_id: int,
+        product_code: int,
+        revisions: tuple[int, int] = _ALL,
+        serials: tuple[int, int] = _ALL,
+        usual_revision: int | None = None,
+    ) -> list[LssAddress]:
+        """Return the devices of one type, with a node id or without, in inclusive ranges.
+
+        `usual_revision` is asked for first, which saves a search for each device that has it.
+        """
+        kind = vendor_id, product_code
+        found = []
+        for serial in self._bisect(serials, lambda part: self._identify(*kind, revisions, part)):
+            one = serial, serial
+
+            def of_one(part: tuple[int, int], one: tuple[int, int] = one) -> bool:
+                return self._identify(*kind, part, one)
+
+            if usual_revision is not None and of_one((usual_revision, usual_revision)):
+                found.append(LssAddress(*kind, usual_revision, serial))
+                continue
+            found += [
+                LssAddress(*kind, revision, serial) for revision in self._bisect(revisions, of_one)
+            ]
+        return found
+
+    def select(self, address: LssAddress) -> int:
+        """Put one device into the configuration state and return its node id, or one of the above.
+
+        Raises LssError when it does not answer.
+        """
+        self.release()
+        for part, number in enumerate(address.numbers):
+            question = bytes([_SELECT + part]) + number.to_bytes(4, "little")
+            if part < 3:
+                self._send(question)
+            elif not self._ask(question, _SELECTED):
+                raise LssError(f"no device answers to {address}")
+        return self._node_id()
+
+    def select_only(self) -> tuple[LssAddress, int]:
+        """Put the only device on the bus into the configuration state; return who it is.
+
+        Raises LssError when none answers, or more than one.
+        """
+        self._send(bytes([_SWITCH_GLOBAL, _CONFIGURATION]))
+        return LssAddress(*self._inquire()), self._node_id()
+
+    def _identify(
+        self,
+        vendor_id: int,
+        product_code: int,
+        revisions: tuple[int, int],
+        serials: tuple[int, int],
+    ) -> bool:
+        numbers = (vendor_id, product_code, *revisions, *serials)
+        *first, last = (
+            bytes([_IDENTIFY + part]) + number.to_bytes(4, "little")
+            for part, number in enumerate(numbers)
+        )
+        for question in first:
+            self._send(question)
+        return bool(self._ask(last, _IDENTIFIED))
+
+    def _bisect(
+        self, whole: tuple[int, int], any_in: Callable[[tuple[int, int]], bool]
+    ) -> list[int]:
+        """Return the numbers of a range that devices have; `any_in` asks for any in a part."""
+        found: list[int] = []
+        parts = [whole]
+        while parts:
+            low, high = parts.pop()
+            if not any_in((low, high)):
+                continue
+            if low == high:
+                found.append(low)
+                continue
+            middle = (low + high) // 2
+            parts += [(middle + 1, high), (low, middle)]
+        return found
+
+    def _fastscan_all(self) -> set[LssAddress] | None:
+        """Return what repeated fastscans find, None when one does not complete."""
+        self.release()
+        found: set[LssAddress] = set()
+        silenced: set[LssAddress] = set()
+        try:
+            while self._scan(0, _FROM_THE_START, 0, 0):
+                address = self._scan_address()
+                if address is None:
+                    return None
+                if address in silenced:
+                    raise LssError(
+                        f"{address} takes part in the fastscan after it has been found, which "
+                        "hides others: connect it alone and use --alone"
+                    )
+                # it is in configuration state now, so that the next scan passes it by; CANopenNode
+                # waits for a node id besides
+                if address in found or silenced:
+                    self._prepare_node_id(_NEVER_USED)
+                    silenced = found | {address}
+                found.add(address)
+        finally:
+            if silenced:
+                self._prepare_node_id(UNCONFIGURED)
+        return found
+
+    def _scan_address(self) -> LssAddress | None:
+        numbers = []
+        for part in range(4):
+            number = self._scan_number(part)
+            if number is None:
+                return None
+            numbers.append(number)
+        return LssAddress(*numbers)
+
+    def _prepare_node_id(self, node_id: int) -> None:
+        """Give all devices in the configuration state a node id that counts from `release` on."""
+        self._ask(bytes([_SET_NODE_ID, node_id]), _SET_NODE_ID)
+        self._collect(_SET_NODE_ID, self._settle_s)
+
+    def _confirms(self, address: LssAddress) -> bool:
+        try:
+            return self.select(address) in (UNCONFIGURED, NODE_ID_UNKNOWN)
+        except LssError:
+            return False
+
+    def _scan_number(self, part: int) -> int | None:
+        """Return one number of the lowest address, None when no device confirms it."""
+        number = 0
+        for bit in range(31, -1, -1):
+            if not self._scan(number, bit, part, part):
+                number |= 1 << bit
+        return number if self._scan(number, 0, part, (part + 1) % 4) else None
+
+    def _scan(self, number: int, bit: int, part: int, following: int) -> bool:
+        question = bytes([_FASTSCAN]) + number.to_bytes(4, "little")
+        if not self._ask(question + bytes([bit, part, following]), _IDENTIFIED):
+            return False
+        # each device that fits answers, and not all are equally quick
+        self._collect(_IDENTIFIED, self._settle_s)
+        return True
+
+    # -- asking the device in the configuration state
+
+    def _inquire(self) -> tuple[int, int, int, int]:
+        numbers = []
+        for part in range(4):
+            answer = self._ask_single(bytes([_INQUIRE + part]), _INQUIRE + part)
+            numbers.append(int.from_bytes(answer[1:5], "little"))
+        vendor, product, revision, serial = numbers
+        return vendor, product, revision, serial
+
+    def _node_id(self) -> int:
+        answer = self._ask(bytes([_INQUIRE_NODE_ID]), _INQUIRE_NODE_ID)
+        return NODE_ID_UNKNOWN if answer is None else answer[1]
+
+    def set_node_id(self, node_id: int) -> None:
+        """Give the selected device a node id, 1 to 127 or 255; raises LssError if refused.
+
+        It counts from the next reset of communication on, for good when stored.
+        """
+        self._set(_SET_NODE_ID, bytes([node_id]), f"node id {node_id}")
+
+    def set_bitrate(self, bitrate_bit_s: int) -> None:
+        """Give the selected device a bit rate of `BITRATE_INDEX`; raises LssError if refused.
+
+        It counts from `activate_bitrate` on, or when stored from the next power-on.
+        """
+        table = bytes([0, BITRATE_INDEX[bitrate_bit_s]])
+        self._set(_SET_BIT_TIMING, table, f"a bit rate of {bitrate_bit_s // 1000} kbit/s")
+
+    def store(self) -> None:
+        """Have the selected device keep node id and bit rate; raises LssError if it cannot."""
+        self._set(_STORE, b"", "to store its settings")
+
+    def activate_bitrate(self, delay_s: float) -> None:
+        """Have the selected device change over: `delay_s` of silence before and after."""
+        self._send(bytes([_ACTIVATE]) + round(delay_s * 1e3).to_bytes(2, "little"))
+
+    def _set(self, command: int, content: bytes, what: str) -> None:
+        error, own = self._ask_single(bytes([command]) + content, command)[1:3]
+        if error == 0:
+            return
+        reason = _REASONS.get((command, error), f"LSS error code {error}")
+        if error == _VENDOR_SPECIFIC:
+            reason = f"for a reason of the maker's own, code {own}"
+        raise LssError(f"the device refuses {what}: {reason}")

@@ -1,0 +1,1 @@
+"""Linear rails that move exit points."""

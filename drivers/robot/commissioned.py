@@ -1,0 +1,167 @@
+"""What commissioning has learnt of a robot's motors: found, checked, ready for the control."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from cdpr_drivers.canopen.boot.boot import BootReport
+from cdpr_drivers.errors import ConfigurationError
+from cdpr_profiles import Robot, RobotAxis
+from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_rt.control.compensation import AxisCompensation
+from cdpr_rt.identification.cogging_profile import (
+    CoggingProfile,
+    CoggingProfileError,
+    DriveIdentity,
+)
+from cdpr_rt.procedures.commissioning.commission_files import Paths
+from cdpr_rt.robots.robot_arrays import limits_of
+
+CoggingProfiles = tuple[CoggingProfile | None, ...]
+"""One for each axis of a robot, None where its motor has not been commissioned."""
+
+
+def identity_of(report: BootReport) -> DriveIdentity:
+    """Return what a cogging profile is bound to, besides the motor, of a drive that has booted."""
+    return DriveIdentity(
+        vendor_id=report.vendor_id,
+        product_code=report.product_code,
+        revision=report.revision,
+        serial=report.serial,
+        encoder_counts_per_turn=report.counts_per_turn,
+    )
+
+
+def folder_of(axis: RobotAxis) -> str:
+    """Return the name of the folder of an axis in that of its robot's commissioning."""
+    return folder_called(axis.name, axis.node_id)
+
+
+def folder_called(name: str, node_id: int) -> str:
+    """Return the name of the folder of an axis with this name at this node."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or f"node-{node_id}"
+
+
+def with_commissioned(robot: Robot, folder: Path | None) -> Robot:
+    """Return `robot` with the profiles that lie in `folder`, a subfolder for each axis.
+
+    Axes without one there keep what the robot's file says; None leaves all as they are. Raises
+    ConfigurationError for a folder that holds none at all.
+    """
+    if folder is None:
+        return robot
+    found = {i: folder / folder_of(axis) for i, axis in enumerate(robot.axes)}
+    # what lies there and is no file is refused when it is read, and not taken for nothing
+    there = {i: path for i, path in found.items() if os.path.lexists(Paths(path).profile)}
+    found = {i: path.resolve() for i, path in there.items()}
+    if not found:
+        subfolders = ", ".join(folder_of(axis) for axis in robot.axes)
+        raise ConfigurationError(
+            f"--commissioned {folder}: no {Paths(folder).profile.name} in a subfolder of an axis "
+            f"of {robot.name}; allowed: what `cdpr commission {robot.profile}` has left, in "
+            f"{subfolders}"
+        )
+    return _with_paths(robot, {i: found.get(i, a.commissioned) for i, a in enumerate(robot.axes)})
+
+
+def uncommissioned_text(robot: Robot) -> str:
+    """Return which axes have no profile though others do, an empty text where it is all or none."""
+    names = [axis.name for axis in robot.axes if axis.commissioned is None]
+    if len(names) in (0, len(robot.axes)):
+        return ""
+    return f"not commissioned, so not compensated: {', '.join(names)}"
+
+
+def without_commissioned(robot: Robot) -> Robot:
+    """Return `robot` as if no motor had been commissioned."""
+    return _with_paths(robot, {})
+
+
+def _with_paths(robot: Robot, paths: Mapping[int, Path | None]) -> Robot:
+    axes = (replace(axis, commissioned=paths.get(i)) for i, axis in enumerate(robot.axes))
+    return replace(robot, axes=tuple(axes))
+
+
+def load_profiles(robot: Robot) -> CoggingProfiles:
+    """Return the cogging profiles that the axes name.
+
+    Raises ConfigurationError, naming axis and file, for one that cannot be read, is of another
+    motor or cannot be true of it.
+    """
+    found = tuple(map(_load, robot.axes, _bounds(robot)))
+    lengths = {len(one.better.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
+    if len(lengths) > 1:
+        paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
+        raise ConfigurationError(
+            f"{paths}: better.table_Nm of {' and '.join(map(str, lengths))} values; allowed: as "
+            "many for every axis"
+        )
+    return found
+
+
+def _bounds(robot: Robot) -> list[MotorBounds]:
+    torques = np.broadcast_to(limits_of(robot).torque_Nm, (len(robot.axes),)).tolist()
+    return [MotorBounds(axis.winch.motor, t) for axis, t in zip(robot.axes, torques, strict=True)]
+
+
+def _load(axis: RobotAxis, bounds: MotorBounds) -> CoggingProfile | None:
+    path = axis.commissioned
+    if path is None:
+        return None
+    path = Paths(path).profile if path.is_dir() else path
+    return load_profile(path, bounds, f"axis {axis.name}: ")
+
+
+def load_profile(path: Path, bounds: MotorBounds, whose: str = "") -> CoggingProfile:
+    """Return the cogging profile of a motor; raises ConfigurationError, which begins with `whose`.
+
+    It names file, key and value of what cannot be true of the motor.
+    """
+    try:
+        profile = CoggingProfile.load(path)
+    except CoggingProfileError as error:
+        raise ConfigurationError(f"{whose}{error}") from error
+    try:
+        profile.require_true_of(bounds)
+    except CoggingProfileError as error:
+        raise ConfigurationError(f"{whose}{path}: {error}") from error
+    return profile
+
+
+def compensation_of(
+    robot: Robot, profiles: Sequence[CoggingProfile | None]
+) -> tuple[AxisCompensation | None, ...]:
+    """Return what the control compensates of each motor: the harmonic model and its friction."""
+    pairs = zip(profiles, _bounds(robot), strict=True)
+    return tuple(None if p is None else p.better.compensation(bounds) for p, bounds in pairs)
+
+
+def check_drive_identities(
+    robot: Robot, profiles: Sequence[CoggingProfile | None], reports: Sequence[BootReport]
+) -> None:
+    """Raise CoggingProfileError, naming the axis, where a profile is of another drive.
+
+    ConfigurationError where a winch's calibration is, as the torque constant of its drive is in it;
+    of drives without a serial number (0) nothing can be said.
+    """
+    bounds = _bounds(robot)
+    for i, report in enumerate(reports):
+        profile, axis = profiles[i], robot.axes[i]
+        of = 0 if axis.calibration is None else axis.calibration.drive_serial
+        if of and report.serial not in (0, of):
+            raise ConfigurationError(
+                f"{robot.path}: axes[{i}].calibration: is of a winch whose drive has serial {of}, "
+                f"that of axis {axis.name} has {report.serial}; calibrate it anew"
+            )
+        if profile is None:
+            continue
+        try:
+            profile.compensation("better", identity_of(report), bounds[i])
+        except CoggingProfileError as error:
+            raise CoggingProfileError(f"axis {axis.name}: {axis.commissioned}: {error}") from error

@@ -1,0 +1,162 @@
+"""The daemon's machine where another master runs the robot: it listens, and sends nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from cdpr_drivers.axes.listening import ListeningDevice, MonitoredBus, monitored_axis
+from cdpr_drivers.cia402 import POWER_OFF, State
+from cdpr_drivers.errors import BusError, DriverError
+from cdpr_drivers.robot.robot_buses import robot_urls
+from cdpr_profiles import Robot
+from cdpr_rt.core.clock import PacedClock
+from cdpr_rt.core.cycle import Watch
+from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.runtime.machine import MachineError
+
+_MASTER_S: Final = 1.0
+_NOTICE: Final = "read-only: nothing is sent; another master runs the drives"
+
+
+class ListeningMachine:
+    """All axes of `robot`, heard on the buses given with --bus; implements `Machine`.
+
+    What would have to be sent is refused, or left undone where it is part of an ending.
+    """
+
+    failures: tuple[type[Exception], ...] = (BusError,)
+    read_only = True
+    has_brakes = False
+    watches: Sequence[Watch] = ()
+    notices: Sequence[str] = (_NOTICE,)
+    safety = ""
+    """The other master's affair."""
+
+    def __init__(self, robot: Robot, buses: Sequence[str]) -> None:
+        self.clock = PacedClock()
+        self._robot = robot
+        self._urls = robot_urls(robot, buses)
+        self._device: ListeningDevice | None = None
+        self._patient_until_s = 0.0
+
+    @property
+    def device(self) -> ListeningDevice | None:
+        """The axes that are heard, None until `open` and after `close`."""
+        return self._device
+
+    # -- slow
+
+    def open(self) -> None:
+        """Join the buses; raises MachineError."""
+        robot = self._robot
+        buses = []
+        for name, url in self._urls.items():
+            axis_numbers = robot.axes_on(name)
+            axes = [
+                monitored_axis(robot.axes[i].winch, robot.axes[i].node_id) for i in axis_numbers
+            ]
+            buses.append(MonitoredBus(name, url, axes, axis_numbers))
+        try:
+            self._device = ListeningDevice(buses, robot.sync_period_s, self.clock)
+        except DriverError as error:
+            raise MachineError(str(error)) from error
+
+    def prepare(self) -> None:
+        """Begin to wait for the other master's SYNC."""
+        self._patient_until_s = self.clock.now_s + _MASTER_S
+
+    def acknowledge(self) -> None:
+        """Do nothing: there is no guard here that latches."""
+
+    def pause(self) -> None:
+        """Do nothing: the drives do not notice."""
+
+    def confirm_power_off(self) -> str:
+        """Return an empty text: the power is the other master's affair."""
+        return ""
+
+    def explain(self, reason: str) -> str:
+        """Return `reason`; the drives are not asked for more."""
+        return reason
+
+    def close(self) -> str:
+        """Leave the buses; return an empty text, as nothing is uncertain."""
+        device, self._device = self._device, None
+        return "" if device is None else device.close()
+
+    # -- in a cycle
+
+    def read_tension(self) -> TensionFeedback | None:
+        """Return None: load cells answer one master only."""
+        return None
+
+    def bus_state(self) -> dict[str, Any]:
+        """Return where each bus is found, and whether a master is heard."""
+        state = "closed" if self._device is None else "listening" if self._led else "no master"
+        return {name: {"url": str(url), "state": state} for name, url in self._urls.items()}
+
+    @property
+    def _led(self) -> bool:
+        return self._device is not None and self._device.silent_s < _MASTER_S
+
+    def prepared(self) -> bool:
+        """Whether a master runs the axes; raises MachineError after a while without."""
+        if not self._led and self.clock.now_s > self._patient_until_s:
+            raise MachineError(
+                f"no SYNC came for {_MASTER_S:g} s: no other master runs {self._robot.name}; "
+                "start it, then check again"
+            )
+        return self._led
+
+    def unprepared(self) -> str:
+        """Return that no other master was heard."""
+        return f"no other master runs {self._robot.name}"
+
+    def power_on(self) -> None:
+        """Refuse, by MachineError."""
+        raise MachineError(_NOTICE)
+
+    def power_off(self) -> None:
+        """Do nothing: the power is the other master's affair."""
+
+    def quick_stop(self) -> None:
+        """Do nothing, as `power_off`."""
+
+    def powered(self) -> bool:
+        """Return False: no drive obeys this loop."""
+        return False
+
+    def unpowered(self) -> bool:
+        """Whether no drive that can be heard has power."""
+        return self._device is None or all(state in POWER_OFF for state in self._device.states())
+
+    def reset_faults(self) -> None:
+        """Clear the alarms received so far; the drives keep their faults."""
+        if self._device is not None:
+            self._device.forget_alarms()
+
+    def intact(self) -> bool:
+        """Whether the buses are there."""
+        return self._device is not None
+
+    def faultless(self) -> bool:
+        """Whether no drive is in fault."""
+        faults = (State.FAULT, State.FAULT_REACTION)
+        return self._device is not None and not any(s in faults for s in self._device.states())
+
+    def set_brakes(self, released: bool) -> None:
+        """Do nothing, as `power_off`."""
+
+    def brakes_are(self, released: bool) -> bool:  # noqa: ARG002  # there are none here
+        """Return True: there are no brakes to wait for."""
+        return True
+
+    def states(self) -> list[str]:
+        """Return what each drive says of itself, in the standard's words."""
+        if self._device is None:
+            return []
+        return [
+            f"{axis.name} is {state.label}"
+            for axis, state in zip(self._robot.axes, self._device.states(), strict=True)
+        ]

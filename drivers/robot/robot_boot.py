@@ -1,0 +1,178 @@
+"""A robot's drives booted on its buses, as one device: what every session begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+
+from cdpr_drivers.axes.axis_buses import AxisBuses, BusAxes
+from cdpr_drivers.axes.axis_layout import AxisConfig
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.master_lock import MasterLock
+from cdpr_drivers.canopen.boot.boot import BootReport, BootReports, BootSettings, boot_all
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.cia402 import fault_text
+from cdpr_drivers.errors import (
+    BootError,
+    BusError,
+    ConfigurationError,
+    DriverError,
+    RobotBootError,
+    SdoError,
+)
+from cdpr_profiles import Robot, RobotAxis, Winch
+from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_rt.core.clock import Clock
+
+# what makes a drive stop by itself once nobody leads it, and bounds its torque until then
+_GUARDS = ("1016h", "6007h", "605Ah", "6072h")
+
+
+def open_networks(
+    stack: ExitStack, robot: Robot, urls: Mapping[str, BusUrl], clock: Clock
+) -> dict[str, CanNetwork]:
+    """Open the buses of `robot` as their only master here; `stack` closes them.
+
+    Raises ConfigurationError, also where another process of this machine runs drives on one of
+    them.
+    """
+    networks: dict[str, CanNetwork] = {}
+    for name, url in urls.items():
+        axes = [robot.axes[i] for i in robot.axes_on(name)]
+        nodes = [axis.node_id for axis in axes]
+        try:
+            stack.enter_context(MasterLock(url))
+            network = CanNetwork(url, clock, nodes, robot.master_node_id, robot.master_heartbeat_s)
+        except BusError as error:
+            raise ConfigurationError(f"bus {name}: {error}") from error
+        stack.callback(network.close)
+        for axis in axes:
+            eds = axis.winch.drive.eds
+            network.add_node(axis.node_id, load_dictionary(eds, axis.node_id))
+        networks[name] = network
+    return networks
+
+
+def boot_robot(
+    stack: ExitStack, robot: Robot, networks: Mapping[str, CanNetwork], torque_Nm: Sequence[float]
+) -> tuple[dict[int, BootReport], dict[int, str]]:
+    """Boot all buses at the same time; return reports, and why optional axes did not, by axis.
+
+    Each drive's torque is limited (6072h) to `torque_Nm`, one for each axis of the robot. `stack`
+    leaves the drives alone again. Raises RobotBootError for a mandatory one that does not
+    boot.
+    """
+
+    def boot_bus(name: str, network: CanNetwork) -> Callable[[], BootReports]:
+        wanted = {
+            axis.node_id: (axis.winch.drive, _settings(robot, axis, most_Nm))
+            for axis, most_Nm in ((robot.axes[i], torque_Nm[i]) for i in robot.axes_on(name))
+        }
+        return lambda: boot_all(network, wanted)
+
+    clock = next(iter(networks.values())).clock
+    tasks = clock.gather([boot_bus(*bus) for bus in networks.items()])
+    failures: list[DriverError] = []
+    booted: dict[int, BootReport] = {}
+    absent: dict[int, str] = {}
+    for name, task in zip(networks, tasks, strict=True):
+        try:
+            reports = task.result()
+        except (BootError, BusError) as error:
+            failures.append(error)
+            error.add_note(f"on bus {name}")
+            continue
+        for i in robot.axes_on(name):
+            node_id = robot.axes[i].node_id
+            if node_id in reports:
+                booted[i] = reports[node_id]
+                stack.callback(networks[name].release, node_id)
+            else:
+                absent[i] = str(reports.missing[node_id])
+    if failures:
+        raise RobotBootError("; ".join(_told(error) for error in failures)) from failures[0]
+    if not booted:
+        raise RobotBootError(f"{robot.name}: no drive booted; {'; '.join(absent.values())}")
+    return dict(sorted(booted.items())), absent
+
+
+def _told(error: DriverError) -> str:
+    *others, where = error.__notes__
+    return f"{where}: " + "; ".join([str(error), *others])
+
+
+def boot_settings(winch: Winch, torque_Nm: float) -> BootSettings:
+    """Return what the master wants of a winch's drive besides its profile, 6072h `torque_Nm`."""
+    return BootSettings(
+        winch.master_node_id,
+        winch.sync_period_s,
+        torque_Nm,
+        rated_torque_Nm=winch.motor.rated_torque_Nm,
+        counts_per_turn=winch.encoder_counts_per_turn,
+    )
+
+
+def _settings(robot: Robot, axis: RobotAxis, torque_Nm: float) -> BootSettings:
+    settings = boot_settings(axis.winch, torque_Nm)
+    # the robot's rate may have been changed since its file was read
+    return replace(settings, sync_period_s=robot.sync_period_s, mandatory=axis.mandatory)
+
+
+def device_of(
+    robot: Robot,
+    networks: Mapping[str, CanNetwork],
+    booted: Mapping[int, BootReport],
+    torque_Nm: Sequence[float],
+) -> AxisBuses:
+    """Return the axes that have booted as one device; raises the drivers' errors."""
+    place_of = {i: place for place, i in enumerate(booted)}
+    buses = []
+    for name, network in networks.items():
+        here = [i for i in robot.axes_on(name) if i in booted]
+        if not here:
+            continue
+        configs = [
+            AxisConfig.from_boot(robot.axes[i].winch.drive, booted[i], torque_Nm[i]) for i in here
+        ]
+        axis_numbers = [place_of[i] for i in here]
+        buses.append(BusAxes(name, network, configs, axis_numbers))
+    return AxisBuses(buses, robot.sync_period_s)
+
+
+def _lacking_guards(node: str, report: BootReport) -> str:
+    """Return what to look at where a drive lacks what makes it stop by itself, else nothing."""
+    lacking = [name for name in report.absent if name.startswith(_GUARDS)]
+    if not lacking:
+        return ""
+    return f"{node} lacks {', '.join(lacking)}: check what stops it when its master falls silent"
+
+
+def boot_notes(
+    robot: Robot, booted: Mapping[int, BootReport], absent: Mapping[int, str]
+) -> list[str]:
+    """Return what people should know of the drives that have booted, and of those that have not."""
+    notes = []
+    for i, report in booted.items():
+        axis = robot.axes[i]
+        notes.append(_lacking_guards(f"bus {axis.bus} node {axis.node_id}", report))
+    notes += [f"axis {i} (optional) is left out: {reason}" for i, reason in absent.items()]
+    return [note for note in notes if note]
+
+
+def faults_text(
+    axes: Sequence[RobotAxis], device: AxisBuses, networks: Mapping[str, CanNetwork], known: str
+) -> str:
+    """Return what each drive in fault says of it, asked by SDO, where that is not `known`."""
+    texts = []
+    for axis, faulted in zip(axes, device.faulted(), strict=True):
+        if not faulted:
+            continue
+        try:
+            code = networks[axis.bus].read_int(axis.node_id, 0x603F)
+            why = fault_text(code) if code else "no code given (603Fh = 0)"
+        except (SdoError, BusError):
+            why = "the drive does not say why"
+        if why not in known:
+            texts.append(f"bus {axis.bus} node {axis.node_id}: {why}")
+    return "; ".join(texts)

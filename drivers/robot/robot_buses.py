@@ -1,0 +1,93 @@
+"""Which real or simulated bus each bus of a robot is, from the file and the command line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.errors import BusError, ConfigurationError
+from cdpr_profiles import Robot
+
+_ASSIGNMENT = re.compile(r"(?P<bus>[A-Za-z0-9_-]+)=(?P<url>.+)", re.DOTALL)
+
+
+def simulated_url(name: str, bus: str) -> str:
+    """Return the URL of a robot's bus on the simulator `name`."""
+    return f"simbus:{name}-{bus}"
+
+
+def asks_for_own_simulator(texts: Sequence[str]) -> bool:
+    """Whether the command has to start a simulator of its own."""
+    return list(texts) == ["simbus:"]
+
+
+def robot_urls(robot: Robot, texts: Sequence[str]) -> dict[str, BusUrl]:
+    """Return the URL of each bus of `robot`, by its name there.
+
+    `texts` are what was given with --bus: `simbus:NAME`, which stands for simbus:NAME-BUS for
+    every bus, or BUS=URL for some; the others are where the robot's file says. Raises
+    ConfigurationError.
+    """
+    names = [bus.name for bus in robot.buses]
+    given = _given(robot, names, texts)
+    urls: dict[str, BusUrl] = {}
+    for bus in robot.buses:
+        text = given.get(bus.name, bus.url)
+        if text is None:
+            raise ConfigurationError(
+                f"{robot.path}: bus {bus.name!r} has no url; add it there or give "
+                f"--bus {bus.name}=URL, or --bus simbus:NAME for a simulated robot"
+            )
+        url = _parse(text)
+        if url.starts_own_simulator:
+            raise ConfigurationError(
+                f"--bus {bus.name}={text}: a single bus needs a name (simbus:NAME); `simbus:` "
+                "alone starts a simulator for all of them"
+            )
+        same = next((name for name, other in urls.items() if other == url), None)
+        if same is not None:
+            raise ConfigurationError(
+                f"buses {same!r} and {bus.name!r}: both are {url}; allowed: once"
+            )
+        urls[bus.name] = url
+    return urls
+
+
+def _given(robot: Robot, names: list[str], texts: Sequence[str]) -> dict[str, str]:
+    given: dict[str, str] = {}
+    for text in texts:
+        match = _ASSIGNMENT.fullmatch(text)
+        if match is None:
+            if len(texts) > 1:
+                raise ConfigurationError(
+                    f"--bus {text}: several are written BUS=URL, one for each bus"
+                )
+            return _for_all(robot, names, text)
+        bus = match["bus"]
+        if bus not in names:
+            raise ConfigurationError(f"--bus {text}: no bus {bus!r}; allowed: {', '.join(names)}")
+        if bus in given:
+            raise ConfigurationError(f"--bus {text}: {bus!r} was given before as {given[bus]}")
+        given[bus] = match["url"]
+    return given
+
+
+def _for_all(robot: Robot, names: list[str], text: str) -> dict[str, str]:
+    url = _parse(text)
+    if url.interface == "simbus" and url.channel and not robot.is_winch:
+        return {name: simulated_url(url.channel, name) for name in names}
+    if len(names) == 1:
+        return {names[0]: text}
+    each = " ".join(f"--bus {name}=URL" for name in names)
+    raise ConfigurationError(
+        f"--bus {text}: {robot.name} has {len(names)} buses; write {each}, or --bus simbus:NAME "
+        "for simulated ones"
+    )
+
+
+def _parse(text: str) -> BusUrl:
+    try:
+        return BusUrl.parse(text)
+    except BusError as error:
+        raise ConfigurationError(str(error)) from error

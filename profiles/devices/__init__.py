@@ -1,0 +1,1 @@
+"""Profiles of rails, safety I/O and load cells."""

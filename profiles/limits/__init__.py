@@ -1,0 +1,1 @@
+"""Limits of robots and motors: their kinds, figures and bounds."""

@@ -1,0 +1,178 @@
+"""What is wrong with the table [platform] of a robot's file, as far as the file alone tells."""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from cdpr_profiles.platform import DIRECTIONS, PlatformFile, controlled_by_default
+
+_WIDEST_m = 100.0
+_LEAST_ARM_m = 0.01
+"""Anchor points nearer together than this are meant to be one, or are in another unit."""
+_ROUNDING = 1e-6
+
+
+def platform_faults(
+    file: PlatformFile | None,
+    exits: Sequence[tuple[float, ...] | None],
+    anchors: Sequence[tuple[float, ...] | None],
+    pulley_axes: Sequence[tuple[float, ...] | None],
+) -> Iterator[tuple[str, str]]:
+    """Yield (key, problem) for what cannot be meant in [platform] and its points on the axes."""
+    if file is None:
+        for i, points in enumerate(zip(exits, anchors, strict=True)):
+            if points != (None, None):
+                yield f"axes[{i}]", "exit_point_m, anchor_point_m: allowed: along with [platform]"
+        return
+    size = len(file.home_m)
+    found = False
+    for name, points_m in (
+        ("exit_point_m", exits),
+        ("anchor_point_m", anchors),
+        ("pulley_axis", pulley_axes),
+    ):
+        for i, given in enumerate(points_m):
+            if given is None and name != "pulley_axis":
+                found = True
+                yield f"axes[{i}].{name}", "missing; allowed: one for each axis of a platform"
+            elif given is not None and len(given) != size:
+                found = True
+                problem = f"{len(given)} coordinates; allowed: {size}, as platform.home_m has"
+                yield f"axes[{i}].{name}", problem
+    yield from _box_faults(file)
+    yield from _count_faults(file, size)
+    if not found:
+        yield from _direction_faults(file, [anchor or () for anchor in anchors])
+        yield from _size_faults(file, [p or () for p in exits], [p or () for p in anchors])
+
+
+def _count_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
+    """Yield keys with another count of numbers than a plane's or a space's."""
+    angles, inertia = (1, 1) if size == 2 else (3, 6)
+    for key, allowed in (
+        ("inertia_kg_m2", inertia),
+        ("centre_of_mass_m", size),
+        ("home_rotation_rad", angles),
+    ):
+        given = getattr(file, key)
+        if given is not None and len(given) != allowed:
+            where = "a plane" if size == 2 else "space"
+            yield f"platform.{key}", f"{len(given)} numbers; allowed: {allowed} in {where}"
+
+
+def _size_faults(
+    file: PlatformFile,
+    exits: Sequence[tuple[float, ...]],
+    anchors: Sequence[tuple[float, ...]],
+) -> Iterator[tuple[str, str]]:
+    """Yield points, rotations and inertias of a size that no robot has, as in another unit."""
+    frame_m, platform_m = _widest(exits), _widest(anchors)
+    if frame_m > _WIDEST_m:
+        problem = (
+            f"exit points are up to {frame_m:g} m apart; allowed: up to {_WIDEST_m:g} m "
+            "(are they in millimetres?)"
+        )
+        yield "axes[0].exit_point_m", problem
+    if 0.0 < platform_m < _LEAST_ARM_m:
+        problem = (
+            f"anchor points are {platform_m:g} m apart at most; allowed: all alike, or "
+            f"{_LEAST_ARM_m:g} m and more (which unit are they in?)"
+        )
+        yield "axes[0].anchor_point_m", problem
+    if file.centre_of_mass_m is not None and math.hypot(*file.centre_of_mass_m) > frame_m:
+        problem = (
+            f"{math.hypot(*file.centre_of_mass_m):g} m off the origin; allowed: on the platform, "
+            f"not beyond the frame, whose exit points are {frame_m:g} m apart"
+        )
+        yield "platform.centre_of_mass_m", problem
+    if file.home_rotation_rad is not None and math.hypot(*file.home_rotation_rad) > math.pi:
+        size = math.hypot(*file.home_rotation_rad)
+        problem = f"{size:.4g} rad long; allowed: up to pi (is it in degrees?)"
+        yield "platform.home_rotation_rad", problem
+    if file.inertia_kg_m2 is not None and len(file.inertia_kg_m2) in (1, 6):
+        yield from _inertia_faults(file.inertia_kg_m2, file.mass_kg, frame_m)
+
+
+def _widest(points: Sequence[tuple[float, ...]]) -> float:
+    return max((math.dist(a, b) for a, b in combinations(points, 2)), default=0.0)
+
+
+def _inertia_faults(
+    given: tuple[float, ...], mass_kg: float, frame_m: float
+) -> Iterator[tuple[str, str]]:
+    """Yield faults of an inertia: no body has it, or none as small as its frame."""
+    key = "platform.inertia_kg_m2"
+    moments = np.array(given)
+    if len(given) == 6:
+        xx, yy, zz, xy, xz, yz = given
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    told = ", ".join(f"{moment:.4g}" for moment in moments)
+    if not moments.min() > 0.0:
+        yield key, f"principal moments {told}; allowed: all above 0"
+    elif len(moments) == 3 and moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
+        problem = f"principal moments {told}; allowed: none above the sum of the two others"
+        yield key, problem
+    elif math.sqrt(moments.max() / mass_kg) > 0.5 * frame_m:
+        problem = (
+            f"with {mass_kg:g} kg a radius of gyration of {math.sqrt(moments.max() / mass_kg):.3g} "
+            f"m; allowed: up to half the {frame_m:.3g} m between exit points (is it in kg m2?)"
+        )
+        yield key, problem
+
+
+def _direction_faults(
+    file: PlatformFile, anchors: Sequence[tuple[float, ...]]
+) -> Iterator[tuple[str, str]]:
+    """Yield faults of controlled directions, against the cables and what angles need."""
+    size, n = len(file.home_m), len(anchors)
+    known = DIRECTIONS[size]
+    controlled = file.controlled or controlled_by_default(anchors)
+    if set(controlled) - set(known) or not set(known[:size]) <= set(controlled):
+        positions, angles = ", ".join(known[:size]), ", ".join(known[size:])
+        problem = f"value {list(controlled)}; allowed: {positions}, and any of {angles}"
+        yield "platform.controlled", problem
+        return
+    if len(controlled) > n:
+        problem = f"{n}; allowed: {len(controlled)} and more to control {', '.join(controlled)}"
+        if size == 3 and len(controlled) == 6:
+            problem += ", or all anchor points alike: a point in space takes 3"
+        yield "axes", problem
+    if len(set(anchors)) == 1 and len(controlled) > size:
+        problem = f"value {list(controlled)}; allowed: no angle where all anchor points are alike"
+        yield "platform.controlled", problem
+    if file.workspace_angle_rad > 0.0:
+        if len(controlled) == size:
+            problem = f"value {file.workspace_angle_rad:g}; allowed: 0 where no angle is controlled"
+            yield "platform.workspace_angle_rad", problem
+        else:
+            for key in ("angular_speed_rad_s", "angular_acceleration_rad_s2"):
+                if getattr(file, key) is None:
+                    allowed = "allowed: given where workspace_angle_rad is above 0"
+                    yield f"platform.{key}", f"missing; {allowed}"
+    if file.tension_distribution.startswith("polygon") and n > len(controlled) + 2:
+        problem = (
+            f"value {file.tension_distribution!r}; allowed: for up to {len(controlled) + 2} cables "
+            f"where {len(controlled)} directions are controlled, not {n}"
+        )
+        yield "platform.tension_distribution", problem
+
+
+def _box_faults(file: PlatformFile) -> Iterator[tuple[str, str]]:
+    """Yield faults of the workspace; home may be below it, not beside or above it."""
+    size = len(file.home_m)
+    for key in ("workspace_min_m", "workspace_max_m"):
+        point = getattr(file, key)
+        if len(point) != size:
+            yield f"platform.{key}", f"{len(point)} coordinates; allowed: {size}, as home_m has"
+            return
+    box = zip(file.workspace_min_m, file.home_m, file.workspace_max_m, strict=True)
+    for i, (low, home, high) in enumerate(box):
+        if not low < high:
+            yield f"platform.workspace_max_m[{i}]", f"value {high:g}; allowed: above {low:g}"
+        elif i == size - 1 and home > high:
+            problem = f"value {home:g}; allowed: up to {high:g} (the last coordinate is upward)"
+            yield f"platform.home_m[{i}]", problem
+        elif i < size - 1 and not low <= home <= high:
+            yield f"platform.home_m[{i}]", f"value {home:g}; allowed: {low:g} to {high:g}"

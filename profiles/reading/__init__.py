@@ -1,0 +1,1 @@
+"""Reading of files that people write: bounds, units, messages."""

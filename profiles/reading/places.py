@@ -1,0 +1,79 @@
+"""Search path of profiles: beside the file that names them, the user's folder, shipped ones."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Literal, get_args
+
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import is_file, path_of
+from cdpr_profiles.reading.reader import closest
+
+Kind = Literal[
+    "motors", "drives", "cables", "winches", "robots", "tension_sensors", "safety_io", "rails"
+]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+SHIPPED = Path(__file__).resolve().parents[1]
+SERIES = ".series.toml"
+"""How the file of a whole series of motors or cables ends, which is no profile itself."""
+
+
+def user_folder() -> Path:
+    """Return the folder of the user's own profiles, in which each kind has a folder.
+
+    It is $XDG_CONFIG_HOME/cdpr-rt/profiles, by default ~/.config/cdpr-rt/profiles.
+    """
+    base = os.environ.get("XDG_CONFIG_HOME", "")
+    folder = Path(base) if base.startswith("/") else path_of(Path(), "~/.config")
+    return folder / "cdpr-rt" / "profiles"
+
+
+def profile_files(kind: Kind) -> Iterator[Path]:
+    """Yield the files of a kind, the user's own first."""
+    for folder in (user_folder() / kind, SHIPPED / kind):
+        yield from sorted(p for p in folder.glob("*.toml") if not p.name.endswith(SERIES))
+
+
+def find(kind: Kind, name: str | Path, beside: Path | None = None) -> Path | None:
+    """Return the file of a profile given by name or path, None where no file has this name.
+
+    `beside` is a folder that is searched first and that relative paths start from.
+    """
+    text = str(name)
+    if isinstance(name, Path) or "/" in text or text.endswith(".toml"):
+        return path_of(beside if beside is not None else Path(), text)
+    folders = [user_folder() / kind, SHIPPED / kind]
+    if beside is not None:
+        folders.insert(0, beside)
+    return next((p for folder in folders if is_file(p := folder / f"{text}.toml")), None)
+
+
+def require(kind: Kind, name: str | Path, beside: Path | None = None) -> Path:
+    """Return the file of a profile as `find` does; raises ProfileError where there is none."""
+    path = find(kind, name, beside)
+    if path is None:
+        raise unknown_profile(kind, name, beside)
+    return path
+
+
+def unknown_profile(
+    kind: Kind, name: str | Path, beside: Path | None = None, more: Iterable[str] = ()
+) -> ProfileError:
+    """Return the error for a name that no profile has; `more` names what else is allowed."""
+    known = {path.stem for path in profile_files(kind)} | set(more)
+    if beside is not None:
+        known |= {path.stem for path in beside.glob("*.toml")}
+    suggestion = closest(str(name), known)
+    hint = f"did you mean {suggestion!r}?" if suggestion else f"allowed: {', '.join(sorted(known))}"
+    return ProfileError(kind, "", f"no profile named {str(name)!r}; {hint} (or a path to a file)")
+
+
+def reference(kind: Kind, path: Path) -> str:
+    """Return a reference valid in any folder and for any user: a shipped profile's name, or a path.
+
+    A profile of the user's own that has the name of a shipped one takes the name from it.
+    """
+    shipped = path.parent == SHIPPED / kind and find(kind, path.stem) == path
+    return path.stem if shipped else str(path)

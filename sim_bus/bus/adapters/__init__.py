@@ -1,0 +1,1 @@
+"""The simulated bus for programs that know other adapters only."""

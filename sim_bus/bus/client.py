@@ -1,0 +1,160 @@
+"""One client of the bus on a socket: its filters and lost frames."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import re
+import select
+import socket
+import struct
+import time
+from collections.abc import Callable
+
+from cdpr_sim_bus.errors import BusSetupError
+
+PACKET_BYTES = 448
+"""Longest packet taken from a client; a bytes object of this size comes from Python's own pool."""
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+_SO_SNDBUFFORCE = 32
+_SO_TIMESTAMPNS = 35
+_TIMESPEC = struct.Struct("ll")
+_ANCILLARY_BYTES = socket.CMSG_SPACE(_TIMESPEC.size)
+_SEND_BUFFER_BYTES = 1 << 22
+_BACKLOG = 64
+_SEND_ATTEMPTS = 500
+_SEND_RETRY_S = 0.0002
+
+
+class Client:
+    """A peer that sends and takes frames through `sock`.
+
+    With `stamped` the kernel tells when each packet was sent, so that it counts as sent then
+    whenever it is read.
+    """
+
+    __slots__ = (
+        "delivered",
+        "dropped",
+        "essential",
+        "filters",
+        "receive",
+        "send",
+        "sent_s",
+        "sock",
+    )
+
+    def __init__(
+        self, sock: socket.socket, *, essential: bool = False, stamped: bool = False
+    ) -> None:
+        sock.setblocking(False)
+        _enlarge_buffer(sock)
+        self.sock = sock
+        self.essential = essential
+        """Whether the bus ends with this socket (a real CAN interface)."""
+        self.filters: list[tuple[int, int]] | None = None
+        """Pairs (identifier, mask) as for CAN_RAW_FILTER, None for everything."""
+        self.dropped = 0
+        self.delivered = False
+        """Whether a frame was delivered since this was last cleared."""
+        self.sent_s = 0.0
+        """When the last packet was sent, in seconds of the monotonic clock, where stamped."""
+        self.receive: Callable[[int], bytes] = sock.recv
+        if stamped:
+            sock.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+            self.receive = self._receive_stamped
+        self.send: Callable[[bytes], object] = self._send_retrying if essential else sock.send
+
+    def wants(self, can_id: int) -> bool:
+        """Return whether a frame with this identifier and these flags passes the filters."""
+        if self.filters is None:
+            return True
+        return any((can_id & mask) == (wanted & mask) for wanted, mask in self.filters)
+
+    def _receive_stamped(self, size: int) -> bytes:
+        """Return the next packet as `recv` does, and note when it was sent."""
+        packet, ancillary, _, _ = self.sock.recvmsg(size, _ANCILLARY_BYTES)
+        now_s = time.monotonic()
+        if ancillary:
+            seconds, ns = _TIMESPEC.unpack(ancillary[0][2])
+            # the kernel stamps with the clock of the wall; if that was set meanwhile, the packet
+            # counts as sent now at the latest
+            age_s = max(0.0, time.time() - seconds - ns * 1e-9)
+            self.sent_s = now_s - age_s
+        else:
+            self.sent_s = now_s
+        return packet
+
+    def _send_retrying(self, frame: bytes) -> None:
+        """Send, waiting while the transmit queue of a CAN interface is full."""
+        for _ in range(_SEND_ATTEMPTS):
+            try:
+                self.sock.send(frame)
+            except OSError as error:
+                if error.errno not in (errno.ENOBUFS, errno.EAGAIN):
+                    raise
+                select.select([], [], [], _SEND_RETRY_S)
+            else:
+                return
+        raise BlockingIOError
+
+
+def _enlarge_buffer(sock: socket.socket) -> None:
+    """Let a client fall far behind before it loses frames; privileged processes may go further."""
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+    with contextlib.suppress(PermissionError):
+        sock.setsockopt(socket.SOL_SOCKET, _SO_SNDBUFFORCE, _SEND_BUFFER_BYTES)
+
+
+def bus_address(name: str) -> str:
+    """Return the abstract AF_UNIX address of the bus `name`."""
+    return f"\0cdpr-rt/simbus/{name}"
+
+
+def listening_socket(name: str) -> socket.socket:
+    """Return the socket on which clients of the bus `name` arrive.
+
+    Raises:
+        BusSetupError: the name is malformed or in use.
+    """
+    if _NAME.fullmatch(name) is None:
+        raise BusSetupError(
+            f"bus name {name!r}: allowed are 1 to 64 letters, digits, '_', '.' or '-', beginning "
+            "with a letter or digit"
+        )
+    sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+    try:
+        sock.bind(bus_address(name))
+    except OSError as error:
+        sock.close()
+        if error.errno == errno.EADDRINUSE:
+            raise BusSetupError(
+                f"simbus:{name} is in use by another simulator; choose another name or stop it"
+            ) from None
+        raise BusSetupError(f"simbus:{name} cannot be opened: {error.strerror}") from None
+    sock.listen(_BACKLOG)
+    return sock
+
+
+def raw_can_socket(interface: str) -> socket.socket:
+    """Return a raw CAN socket on the network interface.
+
+    Raises:
+        BusSetupError: the kernel has no SocketCAN, or there is no such interface.
+    """
+    try:
+        sock = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    except OSError as error:
+        raise BusSetupError(
+            f"socketcan:{interface}: this kernel has no SocketCAN ({error.strerror})"
+        ) from None
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SEND_BUFFER_BYTES)
+        sock.bind((interface,))
+    except OSError as error:
+        sock.close()
+        raise BusSetupError(
+            f"socketcan:{interface}: cannot use this network interface ({error.strerror})"
+        ) from None
+    return sock

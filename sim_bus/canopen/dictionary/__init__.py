@@ -1,0 +1,1 @@
+"""Object dictionary, data types, stored parameters."""

@@ -1,0 +1,1 @@
+"""PDOs of a simulated node."""

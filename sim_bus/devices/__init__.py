@@ -1,0 +1,1 @@
+"""Simulated Modbus devices: load cells, safety I/O, rails."""

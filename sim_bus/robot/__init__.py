@@ -1,0 +1,1 @@
+"""Physics: motors, cables, platform, and the logs of what is true."""

@@ -1,0 +1,316 @@
+"""The plant file: the truth about one simulated drive and motor, which no controller may read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.winch import Winch
+
+MAX_COGGING_TERMS = 32
+_RATED_Nm, _PEAK_Arms = 3.00, 22.8
+"""Of the MPP0923D, whose figures the defaults are."""
+_Angle_deg = Annotated[float, Field(ge=-1e6, le=1e6)]
+_Section = TypeVar("_Section", bound=Profile)
+
+
+class MotorPlant(Profile):
+    """Rotor and torque constant."""
+
+    torque_constant_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.04
+    """Relative: true torque constant = nominal × (1 + this)."""
+    inertia_kg_m2: Annotated[float, Field(ge=1e-6, le=10.0)] = 1.130e-4
+    initial_angle_deg: Annotated[float, Field(ge=-36000.0, le=36000.0)] = 0.0
+    """Mechanical angle at power-up; the encoder counts from zero there."""
+    brake_torque_Nm: Annotated[float, Field(gt=0.0, le=1000.0)] = 8.0
+    """What the holding brake holds; it is released unless a physics board says otherwise."""
+
+
+class CoggingTerm(Profile):
+    """One harmonic of the cogging."""
+
+    order: Annotated[int, Field(ge=1, le=2000)] = 4
+    """Periods per motor turn."""
+    amplitude_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.06
+    phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 17.0
+    kind: Literal["torque", "current_offset"] = "torque"
+
+
+class RipplePlant(Profile):
+    """Torque ripple that grows with the current, 6 and 12 times per electrical turn.
+
+    Torque = torque constant x current x (1 + sixth sin(x) + twelfth sin(2 x)) with
+    x = 6 pole_pairs angle + phase.
+    """
+
+    pole_pairs: Annotated[int, Field(ge=1, le=500)] = 4
+    sixth: Annotated[float, Field(ge=0.0, le=0.2)] = 0.005
+    """Of the torque."""
+    twelfth: Annotated[float, Field(ge=0.0, le=0.2)] = 0.0025
+    phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 25.0
+
+
+class FrictionPlant(Profile):
+    """LuGre friction with a Stribeck curve."""
+
+    coulomb_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.08
+    breakaway_Nm: Annotated[float, Field(ge=0.0, le=200.0)] = 0.10
+    """At least `coulomb_Nm`; 1.25 times that where only `coulomb_Nm` is given."""
+    stribeck_rad_s: Annotated[float, Field(ge=1e-4, le=100.0)] = 0.2
+    viscous_Nms_rad: Annotated[float, Field(ge=0.0, le=10.0)] = 5e-4
+    sigma0_Nm_rad: Annotated[float, Field(gt=0.0, le=1e6)] = 20.0
+    """Stiffness of the bristles."""
+    sigma1_Nms_rad: Annotated[float, Field(ge=0.0, le=100.0)] = 0.02
+    """Damping of the bristles."""
+    direction_asymmetry: Annotated[float, Field(ge=-1.5, le=1.5)] = 0.1
+    """Relative: forward friction × (1 + a/2), backward × (1 − a/2)."""
+    angle_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.03
+    """Of the dry friction: it is × (1 + this · sin(angle + phase)), once a turn."""
+    angle_phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 70.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _breakaway_follows_coulomb(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "breakaway_Nm" not in data:
+            coulomb = data.get("coulomb_Nm")
+            if isinstance(coulomb, int | float):
+                return {**data, "breakaway_Nm": 1.25 * coulomb}
+        return data
+
+    @model_validator(mode="after")
+    def _breakaway_not_below_coulomb(self) -> Self:
+        if self.breakaway_Nm < self.coulomb_Nm:
+            raise ValueError(
+                f"breakaway_Nm = {self.breakaway_Nm} must not be below "
+                f"coulomb_Nm = {self.coulomb_Nm}"
+            )
+        return self
+
+
+class EncoderPlant(Profile):
+    """Incremental encoder with one index pulse a turn."""
+
+    counts_per_turn: Annotated[int, Field(ge=16, le=2**26)] = 8192
+    index_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 123.4
+    """Mechanical angle of the index pulse."""
+    index_present: bool = True
+    """False: the index pulse never comes."""
+    noise_counts: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.3
+    """Standard deviation of the reading before it is rounded."""
+    eccentricity_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 1.5e-4
+    """Error once a turn of a disc that is off the rotor's axis; none at the index."""
+    eccentricity_phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = 50.0
+    """From the index."""
+    interpolation_error: Annotated[float, Field(ge=0.0, le=0.25)] = 0.02
+    """Error once a line, which has four counts, as a share of it."""
+
+
+class DrivePlant(Profile):
+    """Delays and thresholds of the drive itself."""
+
+    current_loop_bandwidth_Hz: Annotated[float, Field(ge=10.0, le=5000.0)] = 500.0
+    feedback_delay_s: Annotated[float, Field(ge=0.0, le=0.01)] = 0.0005
+    """Age of the encoder reading that a SYNC latches."""
+    feedback_jitter_s: Annotated[float, Field(ge=0.0, le=0.001)] = 2e-5
+    """By which that age differs from one SYNC to the next, uniform within plus and minus this."""
+    mode_display_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.005
+    """From writing 6060h until the mode acts and 6061h shows it."""
+    enable_delay_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.002
+    """From the command to enable operation until the state is reached."""
+    i2t_time_constant_s: Annotated[float, Field(ge=0.01, le=1000.0)] = 10.0
+    overcurrent_Arms: Annotated[float, Field(gt=0.0, le=1000.0)] = 30.0
+    """Current that trips the overcurrent fault."""
+    overspeed_ratio: Annotated[float, Field(ge=1.0, le=10.0)] = 1.2
+    """Overspeed fault at this multiple of the maximum motor speed (6080h)."""
+
+
+class ThermalPlant(Profile):
+    """Warming of an energised drive and what it does to cogging and friction."""
+
+    cogging_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.001
+    friction_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.004
+    time_constant_s: Annotated[float, Field(ge=1.0, le=1e6)] = 600.0
+    rise_K: Annotated[float, Field(ge=0.0, le=80.0)] = 10.0
+    """Temperature rise that an energised drive settles at."""
+    ambient_C: Annotated[float, Field(ge=-40.0, le=85.0)] = 25.0
+    """Temperature at power-up, where the figures of the other sections hold."""
+
+
+class LoadPlant(Profile):
+    """What the motor turns, and what hangs on the cable."""
+
+    inertia_kg_m2: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Inertia of the load on the motor side, rigidly coupled."""
+    kind: Literal["none", "hung_mass", "fixed_anchor"] = "none"
+    """No cable; a mass that stands on the floor or hangs; the cable's end made fast."""
+    mass_kg: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
+    height_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """How far above the floor the mass hangs at power-up; 0: it stands there."""
+    slack_m: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Slack of the cable at power-up."""
+    pretension_N: Annotated[float, Field(ge=0.0, le=1e5)] = 0.0
+    """Tension of a fixed cable at power-up."""
+    cable_m: Annotated[float, Field(ge=0.01, le=1000.0)] = 3.0
+    """Free length of the cable at power-up; its stiffness stays that of this length."""
+    cable_stiffness_N: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
+    """Axial stiffness EA; that of the cable's profile where left out."""
+    cable_damping_s: Annotated[float, Field(ge=0.0, le=1.0)] = 0.002
+    """Damping of the cable over its stiffness."""
+    anchor_stiffness_N_m: Annotated[float, Field(ge=1.0, le=1e9)] | None = None
+    """Of a spring between cable and fixed anchor."""
+    drum_radius_error: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
+    """Relative: true drum radius = that of the winch's profile × (1 + this)."""
+    winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Dry friction of gear and drum without tension, on the motor side."""
+    friction_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.05
+    """Further dry friction, as a share of the torque that the tension exerts."""
+    gravity_m_s2: Annotated[float, Field(ge=0.0, le=30.0)] = 9.80665
+
+    @model_validator(mode="after")
+    def _slack_or_taut(self) -> Self:
+        if self.slack_m > 0.0 and (self.pretension_N > 0.0 or self.height_m > 0.0):
+            raise ValueError(
+                f"slack_m = {self.slack_m} must be 0 where pretension_N or height_m is given"
+            )
+        return self
+
+
+class LimitsPlant(Profile):
+    """Mechanical angles of the switches, over several turns; a switch left out does not exist."""
+
+    negative_deg: _Angle_deg | None = None
+    """Negative limit switch: active below."""
+    positive_deg: _Angle_deg | None = None
+    """Positive limit switch: active above."""
+    home_from_deg: _Angle_deg | None = None
+    home_to_deg: _Angle_deg | None = None
+    """Home switch: active between the two; one given alone leaves the other side open."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for low, high in (("negative_deg", "positive_deg"), ("home_from_deg", "home_to_deg")):
+            a, b = getattr(self, low), getattr(self, high)
+            if a is not None and b is not None and a >= b:
+                raise ValueError(f"{low} = {a} must be below {high} = {b}")
+        return self
+
+
+def _filled(section: _Section, values: dict[str, float]) -> _Section:
+    """Return a section with those values of its keys that it was not given."""
+    left_out = {k: v for k, v in values.items() if k not in section.model_fields_set}
+    return section.model_copy(update=left_out)
+
+
+class Plant(Profile):
+    """All sections of a plant file; every key has a default."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
+    motor: MotorPlant = MotorPlant()
+    cogging: Annotated[tuple[CoggingTerm, ...], Field(max_length=MAX_COGGING_TERMS)] = (
+        CoggingTerm(),
+    )
+    ripple: RipplePlant = RipplePlant()
+    friction: FrictionPlant = FrictionPlant()
+    encoder: EncoderPlant = EncoderPlant()
+    drive: DrivePlant = DrivePlant()
+    thermal: ThermalPlant = ThermalPlant()
+    load: LoadPlant = LoadPlant()
+    limits: LimitsPlant = LimitsPlant()
+
+    @classmethod
+    def load_file(cls, path: str | Path) -> Plant:
+        """Read a plant file.
+
+        Raises cdpr_profiles.errors.ProfileError naming file, key, value and what is allowed.
+        """
+        return read_toml_model(Path(path), cls)
+
+    def of(self, winch: Winch) -> Plant:
+        """Return this plant with what was left out as a winch's motor and encoder have it.
+
+        Inertia, counts and the current that trips are the profile's; cogging and friction grow
+        with the rated torque. What was said, and what this has filled in once, stays.
+        """
+        motor = winch.motor
+        size = motor.rated_torque_Nm / _RATED_Nm
+        current = motor.peak_current_Arms / _PEAK_Arms
+        rubbing = ("coulomb_Nm", "breakaway_Nm", "viscous_Nms_rad", "sigma0_Nm_rad")
+        friction = _filled(
+            self.friction,
+            {k: size * getattr(self.friction, k) for k in (*rubbing, "sigma1_Nms_rad")},
+        )
+        if friction.breakaway_Nm < friction.coulomb_Nm:  # one of them was said
+            friction = friction.model_copy(update={"coulomb_Nm": friction.breakaway_Nm})
+        filled: dict[str, object] = {
+            "motor": _filled(
+                self.motor,
+                {
+                    "inertia_kg_m2": motor.rotor_inertia_kg_m2,
+                    "brake_torque_Nm": size * self.motor.brake_torque_Nm,
+                },
+            ),
+            "ripple": _filled(self.ripple, {"pole_pairs": motor.pole_pairs}),
+            "friction": friction,
+            "encoder": _filled(self.encoder, {"counts_per_turn": winch.encoder_counts_per_turn}),
+            "drive": _filled(
+                self.drive, {"overcurrent_Arms": current * self.drive.overcurrent_Arms}
+            ),
+        }
+        if "cogging" not in self.model_fields_set:
+            filled["cogging"] = tuple(
+                term.model_copy(update={"amplitude_Nm": size * term.amplitude_Nm})
+                for term in self.cogging
+            )
+        return self.model_copy(update=filled)
+
+    @property
+    def inertia_kg_m2(self) -> float:
+        """Inertia of rotor and load together."""
+        return self.motor.inertia_kg_m2 + self.load.inertia_kg_m2
+
+    def cogging_Nm(
+        self, angle_rad: ArrayLike, *, energised: bool = True, rise_K: float = 0.0
+    ) -> NDArray[np.float64]:
+        """Return the torque that holds the rotor against the cogging at mechanical angles.
+
+        `angle_rad` counts from the mechanical zero, in which frame the index lies at
+        `encoder.index_deg`: c = Σ A sin(order·θ + phase). The offset ripple acts while energised.
+        """
+        angle = np.asarray(angle_rad, dtype=np.float64)
+        total = np.zeros_like(angle)
+        for term in self.cogging:
+            wave = term.amplitude_Nm * np.sin(term.order * angle + np.deg2rad(term.phase_deg))
+            if term.kind == "torque":
+                total += (1.0 + self.thermal.cogging_per_K * rise_K) * wave
+            elif energised:
+                total += (1.0 + self.motor.torque_constant_error) * wave
+        return total
+
+    def friction_Nm(
+        self,
+        velocity_rad_s: ArrayLike,
+        *,
+        angle_rad: ArrayLike | None = None,
+        rise_K: float = 0.0,
+    ) -> NDArray[np.float64]:
+        """Return the friction torque that opposes steady motion at the given velocities.
+
+        It is that at mechanical angles, and on average over a turn where they are left out.
+        """
+        v = np.asarray(velocity_rad_s, dtype=np.float64)
+        f = self.friction
+        sign = np.sign(v)
+        level = f.coulomb_Nm + (f.breakaway_Nm - f.coulomb_Nm) * np.exp(
+            -((v / f.stribeck_rad_s) ** 2)
+        )
+        dry = sign * (1.0 + 0.5 * f.direction_asymmetry * sign) * level
+        if angle_rad is not None:
+            angle = np.asarray(angle_rad, dtype=np.float64)
+            dry *= 1.0 + f.angle_share * np.sin(angle + np.deg2rad(f.angle_phase_deg))
+        scale = 1.0 + self.thermal.friction_per_K * rise_K
+        return np.asarray(scale * (dry + f.viscous_Nms_rad * v))

@@ -1,0 +1,246 @@
+"""A rigid platform on cables: its motion under their tensions, gravity and the floor (compiled)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_sim_bus.jit import jit
+
+MOST_CABLES = 16
+MOST_FEET = 16
+_F8 = np.float64
+PLATFORM_DTYPE = np.dtype(
+    [
+        # parameters
+        ("cables", np.int64),
+        ("feet", np.int64),
+        ("planar", np.int64),  # 1: moves in x and y and turns about z only
+        ("mass", _F8),
+        ("inertia", _F8, (3, 3)),  # kg m2, about the centre of mass, in the platform's frame
+        ("inverse_inertia", _F8, (3, 3)),
+        ("gravity", _F8, (3,)),  # m/s2
+        ("air", _F8),  # N s/m, and N m s/rad times `reach` squared
+        ("reach", _F8),  # m
+        ("mobility", _F8),  # 1/kg, how much a force along any cable accelerates its anchor point
+        ("exit", _F8, (MOST_CABLES, 3)),  # m, in the room
+        ("pulley_radius", _F8, (MOST_CABLES,)),  # m; 0: a point
+        ("pulley_axis", _F8, (MOST_CABLES, 3)),  # unit vector along which a cable comes to it
+        ("com", _F8, (3,)),  # m, centre of mass from the origin, in the platform's frame
+        ("anchor", _F8, (MOST_CABLES, 3)),  # m, from the centre of mass, in the platform's frame
+        ("foot", _F8, (MOST_FEET, 3)),  # m, likewise; what stands on the floor
+        ("floor", _F8),  # m, height of the floor against gravity; -inf without
+        ("floor_stiffness", _F8),  # N/m of each foot
+        ("floor_damping", _F8),  # N s/m
+        ("standing", np.int64),  # whether a foot touched the floor in the last step
+        ("floor_friction", _F8),  # share of the load that a foot resists sliding with
+        # state
+        ("position", _F8, (3,)),  # m, of the centre of mass
+        ("velocity", _F8, (3,)),
+        ("rotation", _F8, (3, 3)),  # from the platform's frame to the room
+        ("spin", _F8, (3,)),  # rad/s, in the room
+        ("bent", _F8, (MOST_FEET, 3)),  # m, by how much feet that stick are off where they stand
+        ("arm", _F8, (MOST_CABLES, 3)),  # m, anchor points from the centre of mass, in the room
+        ("way", _F8, (MOST_CABLES, 3)),  # unit vectors from anchor points along the cables
+    ]
+)
+
+PlatformArray = NDArray[np.void]
+
+
+@jit
+def update_cable_ends(p: Any, motors: Any) -> None:
+    """Update each motor's distance to the far end of its cable, and its rate."""
+    g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)
+    for i in range(p.cables):
+        m = motors[i]
+        for k in range(3):
+            arm = 0.0
+            for j in range(3):
+                arm += p.rotation[k, j] * p.anchor[i, j]
+            p.arm[i, k] = arm
+        free, wound = lead_cable(p, i)
+        vx, vy, vz = anchor_velocity(p, i)
+        way = p.way[i]
+        rise = way[0] * p.gravity[0] + way[1] * p.gravity[1] + way[2] * p.gravity[2]
+        level2 = 1.0 if g == 0.0 else 1.0 - (rise / g) ** 2
+        m.far_distance = free + wound
+        m.far_rate = -(vx * way[0] + vy * way[1] + vz * way[2])
+        m.far_level = math.sqrt(max(0.0, level2))
+        if wound > 0.0:  # only what is free sags, by the cube of its length
+            m.far_level *= (free / (free + wound)) ** 1.5
+
+
+@jit
+def lead_cable(p: Any, i: int) -> tuple[float, float]:
+    """Update the way of cable i; return what is free of it and what lies on its pulley, m.
+
+    The pulley swivels about the axis along which the cable comes, so that it points at the anchor
+    point. Seen from its middle, the cable comes at -r along the axis, and the anchor point at a
+    distance D lies at an angle φ from the axis: wound are θ = φ + asin(r / D), free are
+    sqrt(D² - r²) along the tangent at θ. Moving the anchor point along that lengthens the free
+    part alone, moving it across turns the tangent point by as much as it takes: the way is the
+    slope of the whole length, and a pulley makes no energy.
+    """
+    r = p.pulley_radius[i]
+    way = p.way[i]
+    for k in range(3):
+        way[k] = p.exit[i, k] - p.position[k] - p.arm[i, k]
+    if r <= 0.0:
+        free = max(1e-6, math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2))
+        for k in range(3):
+            way[k] /= free
+        return free, 0.0
+    axis = p.pulley_axis[i]
+    along = -(way[0] * axis[0] + way[1] * axis[1] + way[2] * axis[2])
+    for k in range(3):
+        way[k] = -way[k] - along * axis[k]
+    beside = max(1e-9, math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2))
+    distance = max(r + 1e-6, math.hypot(beside - r, along))
+    angle = math.atan2(beside - r, along) + math.asin(r / distance)
+    if angle < -0.5 * math.pi:
+        angle += 2.0 * math.pi
+    sine, cosine = math.sin(angle), math.cos(angle)
+    for k in range(3):
+        way[k] = -sine * way[k] / beside - cosine * axis[k]
+    return math.sqrt(distance * distance - r * r), r * angle
+
+
+@jit
+def anchor_velocity(p: Any, i: int) -> tuple[float, float, float]:
+    """Return the velocity of the anchor point of cable i in the room, m/s."""
+    w, r = p.spin, p.arm[i]
+    return (
+        p.velocity[0] + w[1] * r[2] - w[2] * r[1],
+        p.velocity[1] + w[2] * r[0] - w[0] * r[2],
+        p.velocity[2] + w[0] * r[1] - w[1] * r[0],
+    )
+
+
+@jit
+def step_platform(p: Any, motors: Any, h: float) -> None:
+    """Advance the platform by `h` seconds under the tensions of its motors' last step.
+
+    Symplectic Euler; the rotation is advanced along the spin exactly, so that it stays a rotation.
+    """
+    fx = p.mass * p.gravity[0] - p.air * p.velocity[0]
+    fy = p.mass * p.gravity[1] - p.air * p.velocity[1]
+    fz = p.mass * p.gravity[2] - p.air * p.velocity[2]
+    drag = p.air * p.reach * p.reach
+    tx, ty, tz = -drag * p.spin[0], -drag * p.spin[1], -drag * p.spin[2]
+    for i in range(p.cables):
+        t = motors[i].tension
+        x, y, z = t * p.way[i, 0], t * p.way[i, 1], t * p.way[i, 2]
+        r = p.arm[i]
+        fx += x
+        fy += y
+        fz += z
+        tx += r[1] * z - r[2] * y
+        ty += r[2] * x - r[0] * z
+        tz += r[0] * y - r[1] * x
+    if p.floor > -math.inf:
+        gx, gy, gz, hx, hy, hz = floor_force(p, h)
+        fx, fy, fz = fx + gx, fy + gy, fz + gz
+        tx, ty, tz = tx + hx, ty + hy, tz + hz
+    p.velocity[0] += h * fx / p.mass
+    p.velocity[1] += h * fy / p.mass
+    if p.planar:
+        p.spin[2] += h * tz * p.inverse_inertia[2, 2]
+        p.velocity[2] = p.spin[0] = p.spin[1] = 0.0
+    else:
+        p.velocity[2] += h * fz / p.mass
+        turn(p, h, tx, ty, tz)
+    for k in range(3):
+        p.position[k] += h * p.velocity[k]
+    rotate(p, h)
+
+
+@jit
+def turn(p: Any, h: float, tx: float, ty: float, tz: float) -> None:
+    """Advance the spin by Euler's equation, in the platform's frame."""
+    R = p.rotation
+    w = np.zeros(3)
+    t = np.zeros(3)
+    for k in range(3):
+        w[k] = R[0, k] * p.spin[0] + R[1, k] * p.spin[1] + R[2, k] * p.spin[2]
+        t[k] = R[0, k] * tx + R[1, k] * ty + R[2, k] * tz
+    l0 = p.inertia[0, 0] * w[0] + p.inertia[0, 1] * w[1] + p.inertia[0, 2] * w[2]
+    l1 = p.inertia[1, 0] * w[0] + p.inertia[1, 1] * w[1] + p.inertia[1, 2] * w[2]
+    l2 = p.inertia[2, 0] * w[0] + p.inertia[2, 1] * w[1] + p.inertia[2, 2] * w[2]
+    t[0] -= w[1] * l2 - w[2] * l1
+    t[1] -= w[2] * l0 - w[0] * l2
+    t[2] -= w[0] * l1 - w[1] * l0
+    for k in range(3):
+        n = p.inverse_inertia
+        w[k] += h * (n[k, 0] * t[0] + n[k, 1] * t[1] + n[k, 2] * t[2])
+    for k in range(3):
+        p.spin[k] = R[k, 0] * w[0] + R[k, 1] * w[1] + R[k, 2] * w[2]
+
+
+@jit
+def rotate(p: Any, h: float) -> None:
+    """Turn the platform by its spin during `h`: Rodrigues' formula, a column at a time."""
+    sx, sy, sz = p.spin[0], p.spin[1], p.spin[2]
+    speed = math.sqrt(sx * sx + sy * sy + sz * sz)
+    angle = h * speed
+    if angle < 1e-15:
+        return
+    x, y, z = sx / speed, sy / speed, sz / speed
+    sine, rest = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
+    R = p.rotation
+    for j in range(3):
+        a, b, c = R[0, j], R[1, j], R[2, j]
+        u, v, w = y * c - z * b, z * a - x * c, x * b - y * a
+        R[0, j] = a + sine * u + rest * (y * w - z * v)
+        R[1, j] = b + sine * v + rest * (z * u - x * w)
+        R[2, j] = c + sine * w + rest * (x * v - y * u)
+
+
+@jit
+def floor_force(p: Any, h: float) -> tuple[float, float, float, float, float, float]:
+    """Return force and moment of the floor over the next `h` s: each foot on a damped spring.
+
+    Along the floor it is one as well, as long as dry friction holds it: a foot that sticks stays
+    where it is, one that slides drags its spring along.
+    """
+    g = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2)
+    fx, fy, fz, tx, ty, tz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if g == 0.0:
+        return fx, fy, fz, tx, ty, tz
+    nx, ny, nz = -p.gravity[0] / g, -p.gravity[1] / g, -p.gravity[2] / g
+    R, w = p.rotation, p.spin
+    p.standing = 0
+    for i in range(p.feet):
+        q = p.foot[i]
+        rx = R[0, 0] * q[0] + R[0, 1] * q[1] + R[0, 2] * q[2]
+        ry = R[1, 0] * q[0] + R[1, 1] * q[1] + R[1, 2] * q[2]
+        rz = R[2, 0] * q[0] + R[2, 1] * q[1] + R[2, 2] * q[2]
+        height = (p.position[0] + rx) * nx + (p.position[1] + ry) * ny + (p.position[2] + rz) * nz
+        depth = p.floor - height
+        bent = p.bent[i]
+        if depth <= 0.0:
+            bent[0] = bent[1] = bent[2] = 0.0
+            continue
+        p.standing = 1
+        vx = p.velocity[0] + w[1] * rz - w[2] * ry
+        vy = p.velocity[1] + w[2] * rx - w[0] * rz
+        vz = p.velocity[2] + w[0] * ry - w[1] * rx
+        sinking = -(vx * nx + vy * ny + vz * nz)
+        load = max(0.0, p.floor_stiffness * depth + p.floor_damping * sinking)
+        sx, sy, sz = vx + sinking * nx, vy + sinking * ny, vz + sinking * nz
+        k, d = p.floor_stiffness, p.floor_damping
+        bent[0], bent[1], bent[2] = bent[0] + h * sx, bent[1] + h * sy, bent[2] + h * sz
+        x, y, z = k * bent[0] + d * sx, k * bent[1] + d * sy, k * bent[2] + d * sz
+        most, pull = p.floor_friction * load, math.sqrt(x * x + y * y + z * z)
+        if pull > most:
+            x, y, z = x * most / pull, y * most / pull, z * most / pull
+            bent[0], bent[1], bent[2] = (x - d * sx) / k, (y - d * sy) / k, (z - d * sz) / k
+        x, y, z = load * nx - x, load * ny - y, load * nz - z
+        fx, fy, fz = fx + x, fy + y, fz + z
+        tx += ry * z - rz * y
+        ty += rz * x - rx * z
+        tz += rx * y - ry * x
+    return fx, fy, fz, tx, ty, tz

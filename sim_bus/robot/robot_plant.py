@@ -1,0 +1,238 @@
+"""The plant file of a cable robot: the truth about platform, cables and motors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.winch import Winch
+from cdpr_sim_bus.robot.plant import CoggingTerm, LoadPlant, Plant
+
+Vector = tuple[Annotated[float, Field(ge=-1000.0, le=1000.0)], ...]
+_Relative = Annotated[float, Field(ge=-0.5, le=0.5)]
+_Share = Annotated[float, Field(ge=0.0, le=0.5)]
+_Time_s = Annotated[float, Field(ge=0.05, le=1e6)]
+_Angle_deg = Annotated[float, Field(ge=-180.0, le=180.0)]
+
+
+class PlatformPlant(Profile):
+    """The rigid body; errors are relative to the robot's profile."""
+
+    mass_error: _Relative = 0.0
+    """Relative: true mass = that of the profile × (1 + this)."""
+    centre_of_mass_m: Annotated[Vector, Field(min_length=2, max_length=3)] | None = None
+    """In the platform's frame; that of the profile where left out."""
+    radius_of_gyration_m: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
+    """About every axis; the profile's inertia where left out, and without one that of a plate whose
+    corners are the anchor points."""
+    air_Ns_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
+
+
+class GeometryPlant(Profile):
+    """Where points truly are: first a vector for each cable, then chance on top."""
+
+    exit_errors_m: tuple[Vector, ...] = ()
+    anchor_errors_m: tuple[Vector, ...] = ()
+    exit_sigma_m: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
+    anchor_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
+
+
+class CablesPlant(Profile):
+    """The cables and what winds them."""
+
+    stiffness_error: _Relative = 0.0
+    """Relative: true EA = that of the cable's profile × (1 + this)."""
+    damping_s: Annotated[float, Field(ge=0.0, le=0.05)] = 0.002
+    """Damping over stiffness."""
+    creep_shares: tuple[_Share, _Share] = (0.01, 0.01)
+    """Strain that follows the elastic one, as shares of it; a fast part and a slow one."""
+    creep_times_s: tuple[_Time_s, _Time_s] = (0.5, 60.0)
+    """After which 63 % of it have come."""
+    sag: bool = True
+    """Whether cables have weight."""
+    drum_radius_errors: tuple[_Relative, ...] = ()
+    """Relative, one for each axis or none."""
+    drum_radius_sigma: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
+    winch_friction_Nm: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Dry friction of gear and drum without tension, on the motor side."""
+    friction_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.02
+    """Further dry friction, as a share of the torque that the tension exerts."""
+
+
+class WindingPlant(Profile):
+    """How the cables lie on their drums, whose carriages guide them to and fro."""
+
+    run_out_m: Annotated[float, Field(ge=0.0, le=0.01)] = 3e-5
+    """How far a drum's middle is off its axis: so much more and less cable once a turn."""
+    pitch_m: Annotated[float, Field(ge=0.0, le=0.2)] = 0.006
+    """From one turn on the drum to the next."""
+    carriage_error: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+    """Share of its way along the drum by which a carriage lags behind; 1: it stands still."""
+    carriage_offset_m: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
+    """How far it is off its cable at power-up."""
+    carriage_distance_m: Annotated[float, Field(gt=0.0, le=10.0)] = 0.3
+    """From the drum."""
+    gear_stiffness_Nm_rad: Annotated[float, Field(ge=100.0, le=1e9)] = 10_000.0
+    """Of gear and belt, at the drum."""
+
+
+class StartPlant(Profile):
+    """How the robot stands at power-up."""
+
+    position_m: Vector | None = None
+    """Of the platform's origin; the profile's home where left out."""
+    angle_deg: _Angle_deg | None = None
+    """Of a platform in a plane; the profile's at home where left out."""
+    rotation_deg: Annotated[tuple[_Angle_deg, ...], Field(min_length=3, max_length=3)] | None = None
+    """Rotation vector of a platform in space; likewise."""
+    slack_m: Annotated[float, Field(ge=0.0, le=10.0)] = 0.02
+    """Of every cable."""
+
+
+class FloorPlant(Profile):
+    """What the platform stands on."""
+
+    height_m: Annotated[float, Field(ge=-1000.0, le=1000.0)] | None = None
+    """Where left out, such that the platform stands at rest where it is at power-up."""
+    present: bool = True
+    stiffness_N_m: Annotated[float, Field(gt=0.0, le=1e7)] = 1e6
+    damping_Ns_m: Annotated[float, Field(ge=0.0, le=1e5)] = 500.0
+    friction: Annotated[float, Field(ge=0.0, le=2.0)] = 0.3
+
+
+class VariationPlant(Profile):
+    """How much the motors differ from the one in [motor]: uniform within plus and minus these."""
+
+    cogging: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
+    """Of each amplitude, relative; phases are anything at all."""
+    friction: Annotated[float, Field(ge=0.0, le=0.9)] = 0.2
+    torque_constant: Annotated[float, Field(ge=0.0, le=0.3)] = 0.03
+
+
+class ScannerPlant(Profile):
+    """What measures the platform's pose from outside, where there is such a device."""
+
+    position_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.001
+    """Standard deviation of each coordinate."""
+    rotation_sigma_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.002
+    """Of each component of the rotation vector by which it errs."""
+    rate_Hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 10.0
+
+
+class RobotPlant(Profile):
+    """All sections of a robot's plant file; every key has a default.
+
+    `motor` is the plant of one motor as for a single winch, `motors`, where given, one each.
+    """
+
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
+    platform: PlatformPlant = PlatformPlant()
+    geometry: GeometryPlant = GeometryPlant()
+    cables: CablesPlant = CablesPlant()
+    winding: WindingPlant = WindingPlant()
+    start: StartPlant = StartPlant()
+    floor: FloorPlant = FloorPlant()
+    variation: VariationPlant = VariationPlant()
+    scanner: ScannerPlant = ScannerPlant()
+    motor: Plant = Plant()
+    motors: tuple[Plant, ...] = ()
+
+    @classmethod
+    def load_file(cls, path: str | Path) -> RobotPlant:
+        """Read a robot's plant file.
+
+        Raises cdpr_profiles.errors.ProfileError naming file, key, value and what is allowed.
+        """
+        return read_toml_model(Path(path), cls)
+
+    def require_fit(self, n: int, size: int) -> None:
+        """Raise ValueError where the plant does not fit a robot of n axes and 2 or 3 directions."""
+        geometry = self.geometry
+        errors = {
+            "geometry.exit_errors_m": geometry.exit_errors_m,
+            "geometry.anchor_errors_m": geometry.anchor_errors_m,
+        }
+        radii, motors = self.cables.drum_radius_errors, self.motors
+        for key, values in {**errors, "cables.drum_radius_errors": radii, "motors": motors}.items():
+            if values and len(values) != n:
+                raise ValueError(f"{key}: {len(values)} entries; allowed: {n}, one for each axis")
+        points: dict[str, Vector | None] = {
+            "platform.centre_of_mass_m": self.platform.centre_of_mass_m,
+            "start.position_m": self.start.position_m,
+        }
+        for key, vectors in errors.items():
+            points |= {f"{key}[{i}]": vector for i, vector in enumerate(vectors)}
+        for key, point in points.items():
+            if point is not None and len(point) != size:
+                raise ValueError(f"{key}: {len(point)} coordinates; allowed: {size}")
+        if size == 2 and self.start.rotation_deg is not None:
+            raise ValueError("start.rotation_deg: allowed: in space; in a plane start.angle_deg")
+        if size == 3 and self.start.angle_deg is not None:
+            raise ValueError("start.angle_deg: allowed: in a plane; in space start.rotation_deg")
+        for i, motor in enumerate(self.motors or (self.motor,)):
+            if motor.load.model_copy(update={"inertia_kg_m2": 0.0}) != LoadPlant():
+                where = f"motors[{i}].load" if self.motors else "motor.load"
+                raise ValueError(f"{where}: allowed: inertia_kg_m2; the platform is the load")
+
+    def motor_plants(self, n: int, winches: Sequence[Winch] = ()) -> list[Plant]:
+        """Return the plant of each of n motors; `winches`, where given, are theirs."""
+        plants = list(self.motors) or [self.motor] * n
+        if winches:
+            plants = [plant.of(winch) for plant, winch in zip(plants, winches, strict=True)]
+        if self.motors:
+            return plants
+        rng = np.random.default_rng(self.seed)
+        varied = [self._varied(i, base, rng) for i, base in enumerate(plants)]
+        return [_turned(plant, rng) for plant in varied]
+
+    def _varied(self, i: int, base: Plant, rng: np.random.Generator) -> Plant:
+        by = self.variation
+
+        def varied(share: float) -> float:
+            return 1.0 + share * rng.uniform(-1.0, 1.0)
+
+        cogging = tuple(
+            CoggingTerm(
+                order=term.order,
+                amplitude_Nm=term.amplitude_Nm * varied(by.cogging),
+                phase_deg=math.degrees(rng.uniform(-math.pi, math.pi)),
+                kind=term.kind,
+            )
+            for term in base.cogging
+        )
+        rubbing = varied(by.friction)
+        friction = base.friction.model_copy(
+            update={
+                "coulomb_Nm": base.friction.coulomb_Nm * rubbing,
+                "breakaway_Nm": base.friction.breakaway_Nm * rubbing,
+            }
+        )
+        error = base.motor.torque_constant_error + by.torque_constant * rng.uniform(-1.0, 1.0)
+        index = base.encoder.index_deg + rng.uniform(0.0, 360.0)
+        return base.model_copy(
+            update={
+                "seed": (self.seed + i) % 2**32,
+                "cogging": cogging,
+                "friction": friction,
+                "motor": base.motor.model_copy(update={"torque_constant_error": error}),
+                "encoder": base.encoder.model_copy(update={"index_deg": index % 360.0}),
+            }
+        )
+
+
+def _turned(plant: Plant, rng: np.random.Generator) -> Plant:
+    """Return a plant whose errors that come once a turn and more begin anywhere."""
+    ripple, friction, encoder = rng.uniform(-180.0, 180.0, 3).tolist()
+    return plant.model_copy(
+        update={
+            "ripple": plant.ripple.model_copy(update={"phase_deg": ripple}),
+            "friction": plant.friction.model_copy(update={"angle_phase_deg": friction}),
+            "encoder": plant.encoder.model_copy(update={"eccentricity_phase_deg": encoder}),
+        }
+    )

@@ -1,0 +1,159 @@
+"""The compensation looks up, hands over, looks ahead and fades in."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cdpr_rt.control.compensation import AxisCompensation, Compensation, FrictionFeedforward
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+
+M = 720
+ANGLES = np.arange(M) * 2 * math.pi / M
+TABLE = np.vstack([np.sin(4 * ANGLES), 2.0 + np.cos(3 * ANGLES)])
+
+
+def at(n=1, angle=0.0, velocity=1.0, index=0.0, known=True):
+    feedback, setpoint = AxisFeedback(n), Setpoint(n)
+    feedback.position_rad[:] = angle
+    feedback.index_rad[:] = index
+    feedback.index_known[:] = known
+    setpoint.position_rad[:] = angle
+    setpoint.velocity_rad_s[:] = velocity
+    return feedback, setpoint
+
+
+def settled(axis, feedback, setpoint, cycles=400):
+    compensation, out = Compensation([axis], 1e-3), np.zeros(1)
+    for _ in range(cycles):
+        compensation.torque(feedback, setpoint, out)
+    return out[0]
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(angle=st.floats(-50, 50), index=st.floats(-10, 10), forward=st.booleans())
+def test_table_is_interpolated_from_the_index(angle, index, forward):
+    feedback, setpoint = at(angle=angle, index=index, velocity=1.0 if forward else -1.0)
+    got = settled(AxisCompensation(TABLE, most_Nm=10.0), feedback, setpoint)
+    row = TABLE[0 if forward else 1]
+    place = ((angle - index) % (2 * math.pi)) / (2 * math.pi) * M
+    want = np.interp(place, np.arange(M + 1), np.append(row, row[0]))
+    assert got == pytest.approx(want, abs=1e-9)
+
+
+def test_hand_over_at_standstill_is_continuous():
+    axis = AxisCompensation(TABLE, blend_speed_rad_s=0.02, most_Nm=10.0)
+    got = [settled(axis, *at(angle=0.4, velocity=v)) for v in np.linspace(-0.03, 0.03, 61)]
+    assert np.max(np.abs(np.diff(got))) < 0.06 * np.ptp(got)
+    low, middle, high = got[0], got[30], got[-1]
+    assert middle == pytest.approx(0.5 * (low + high))
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(angle=st.floats(-50, 50), index=st.floats(-10, 10))
+def test_what_motors_take_up_standing_is_what_is_compensated_then(angle, index):
+    feedback, setpoint = at(n=3, angle=angle, index=index, velocity=0.0)
+    feedback.index_known[2] = False
+    rubbing = FrictionFeedforward(coulomb_forward_Nm=0.3, stribeck_backward_Nm=0.1)
+    axes = [
+        AxisCompensation(TABLE, rubbing, most_Nm=10.0),
+        None,
+        AxisCompensation(TABLE, most_Nm=10.0),
+    ]
+    compensation, out = Compensation(axes, 1e-3), np.zeros(3)
+    for _ in range(300):
+        compensation.torque(feedback, setpoint, out)
+    got = compensation.standing_Nm(feedback.position_rad, feedback)
+    assert got == pytest.approx(out, abs=1e-9)
+    assert got[1] == got[2] == 0.0
+
+
+@pytest.mark.parametrize("observer_s", [0.0, 0.003])
+def test_angle_is_the_one_when_the_torque_acts(observer_s):
+    axis = AxisCompensation(TABLE, look_ahead_s=0.002, observer_s=observer_s, most_Nm=10.0)
+    got = settled(axis, *at(angle=1.0, velocity=5.0))
+    assert got == pytest.approx(math.sin(4 * 1.01), abs=1e-4)
+
+
+def test_observer_follows_a_moving_deviation_without_lag():
+    axis = AxisCompensation(TABLE, look_ahead_s=0.01, observer_s=0.003, most_Nm=10.0)
+    compensation, out = Compensation([axis], 1e-3), np.zeros(1)
+    for k in range(400):
+        feedback, setpoint = at(angle=0.0, velocity=1.0)
+        feedback.position_rad[:] = 0.5 * k * 1e-3  # the set-point stands at 0, the rotor drifts
+        compensation.torque(feedback, setpoint, out)
+    angle = 0.5 * 399e-3 + 1.5 * 0.01
+    assert out[0] == pytest.approx(math.sin(4 * angle), abs=3e-4)
+
+
+def test_friction_is_that_of_the_rotor_and_never_pushes_back():
+    friction = FrictionFeedforward(0.08, 0.06, 0.02, 0.01, 0.2, 5e-4)
+    axis = AxisCompensation(np.zeros((2, M)), friction, observer_s=0.003, most_Nm=10.0)
+    assert settled(axis, *at(velocity=1.0)) == pytest.approx(0.08 + 0.02 * math.exp(-25.0) + 5e-4)
+    assert settled(axis, *at(velocity=-0.1)) == pytest.approx(-0.06 - 0.01 * math.exp(-0.25) - 5e-5)
+    compensation, out = Compensation([axis], 1e-3), np.zeros(1)
+    for k in range(400):
+        feedback, setpoint = at(velocity=0.3)
+        feedback.position_rad[:] = -0.3 * k * 1e-3  # so the rotor stands
+        compensation.torque(feedback, setpoint, out)
+    assert out[0] == pytest.approx(0.08 + 0.02, abs=1e-6)
+
+
+def test_fades_in_when_the_index_is_seen_and_stops_without():
+    compensation, out = (
+        Compensation([AxisCompensation(TABLE + 1.0, most_Nm=10.0)], 1e-3, 0.2),
+        np.zeros(1),
+    )
+    hidden, seen = at(known=False), at()
+    for _ in range(50):
+        compensation.torque(*hidden, out)
+        assert out[0] == 0.0
+    course = []
+    for _ in range(300):
+        compensation.torque(*seen, out)
+        course.append(out[0])
+    assert course[99] == pytest.approx(0.5)
+    assert course[199:] == pytest.approx(np.ones(101))
+    compensation.torque(*hidden, out)
+    assert out[0] == 0.0
+
+
+def test_axes_without_profile_get_nothing():
+    compensation, out = (
+        Compensation([None, AxisCompensation(TABLE + 1.0, most_Nm=10.0), None], 1e-3),
+        np.ones(3),
+    )
+    for _ in range(300):
+        compensation.torque(*at(3), out)
+    assert out == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_tables_of_another_shape_are_refused():
+    with pytest.raises(ValueError, match="shape"):
+        Compensation(
+            [AxisCompensation(TABLE, most_Nm=10.0), AxisCompensation(TABLE[:, :100], most_Nm=10.0)],
+            1e-3,
+        )
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    scale=st.sampled_from([1.0, 1e3, 1e6, 1e300]),
+    velocity=st.floats(-300, 300),
+    angle=st.floats(-50, 50),
+    most=st.floats(0.01, 1.0),
+)
+def test_no_table_and_no_friction_adds_more_than_the_axis_may_have(scale, velocity, angle, most):
+    friction = FrictionFeedforward(scale, scale, scale, -scale, 0.2, scale)
+    axis = AxisCompensation(scale * TABLE, friction, look_ahead_s=0.5, most_Nm=most)
+    feedback, setpoint = at(angle=angle, velocity=velocity)
+    assert abs(settled(axis, feedback, setpoint, 250)) <= most
+    standing = Compensation([axis], 1e-3).standing_Nm(feedback.position_rad, feedback)
+    assert abs(standing[0]) <= most
+
+
+def test_what_is_not_a_number_stays_none_for_the_supervisor_to_see():
+    axis = AxisCompensation(np.full((2, M), np.nan), most_Nm=0.5)
+    assert math.isnan(settled(axis, *at()))

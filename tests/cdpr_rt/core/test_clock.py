@@ -1,0 +1,244 @@
+"""Time and cooperative tasks: fixed order, waits, time-outs, ends; on the wall and without it."""
+
+from __future__ import annotations
+
+import math
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
+from cdpr_rt.core.task import TaskCancelled
+
+
+class Line:
+    """One end of a real socket as a source: what came, and when it was ticked."""
+
+    def __init__(self, clock: Clock, tick_s: float = math.inf) -> None:
+        self.sock, self.peer = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.sock.setblocking(False)
+        self.came: list[bytes] = []
+        self.ticks: list[float] = []
+        self._every_s, self._due_s = tick_s, 0.0
+        clock.add(self)
+
+    def fileno(self) -> int:
+        return self.sock.fileno()
+
+    def poll(self) -> bool:
+        try:
+            self.came.append(self.sock.recv(100))
+        except BlockingIOError:
+            return False
+        return True
+
+    def tick(self, now_s: float) -> float:
+        if now_s >= self._due_s:
+            self.ticks.append(now_s)
+            self._due_s = now_s + self._every_s
+        return self._due_s
+
+
+naps = st.lists(st.sampled_from([0.0, 0.001, 0.25, 0.5, 1.0, 3.0]), max_size=6)
+
+
+@given(st.lists(naps, max_size=5))
+def test_tasks_go_on_by_time_and_then_in_the_order_they_were_started(
+    plans: list[list[float]],
+) -> None:
+    clock = LockstepClock()
+    told: list[tuple[float, int]] = []
+
+    def nap(number: int, plan: list[float]) -> Callable[[], int]:
+        def work() -> int:
+            for seconds in plan:
+                clock.sleep(seconds)
+                told.append((clock.now_s, number))
+            return number
+
+        return work
+
+    tasks = clock.gather(nap(number, plan) for number, plan in enumerate(plans))
+    assert [task.result() for task in tasks] == list(range(len(plans)))
+    assert told == sorted(told)
+    assert clock.now_s == pytest.approx(max((sum(plan) for plan in plans), default=0.0))
+
+
+def test_time_without_a_wall_passes_only_where_somebody_waits() -> None:
+    clock = LockstepClock()
+    time.sleep(0.02)
+    assert clock.now_s == 0.0
+    began = time.monotonic()
+    assert not clock.wait(lambda: False, 3600.0)
+    assert clock.now_s == 3600.0
+    assert time.monotonic() - began < 60.0
+
+
+def test_a_wait_ends_with_what_comes_not_with_its_time_out() -> None:
+    clock = PacedClock()
+    line = Line(clock)
+    threading.Timer(0.05, line.peer.send, [b"here"]).start()
+    assert clock.wait(lambda: line.came, clock.now_s + 60.0)
+    assert line.came == [b"here"]
+
+
+def test_a_wait_is_never_shorter_than_its_time_out() -> None:
+    clock = PacedClock()
+    Line(clock)
+    for seconds in (0.0, 0.0004, 0.003, 0.02):
+        until = clock.now_s + seconds
+        assert not clock.wait(lambda: False, until)
+        assert clock.now_s >= until
+
+
+@pytest.mark.parametrize("kind", [PacedClock, LockstepClock])
+def test_a_task_waits_for_another_which_waits_for_a_third(kind: type[Clock]) -> None:
+    clock = kind()
+
+    def deep(levels: int) -> int:
+        clock.sleep(0.001)
+        return (
+            1 + sum(t.result() for t in clock.gather([lambda: deep(levels - 1)] * 2))
+            if levels
+            else 1
+        )
+
+    assert clock.start(lambda: deep(3)).done is False
+    assert [task.result() for task in clock.gather([lambda: deep(3)])] == [15]
+
+
+def test_what_a_task_raises_is_for_who_asks_for_its_result() -> None:
+    clock = LockstepClock()
+
+    def fail() -> None:
+        clock.sleep(1.0)
+        raise ValueError("no")
+
+    bad, good = clock.gather([fail, lambda: clock.sleep(2.0)])
+    assert good.result() is None
+    with pytest.raises(ValueError, match="no"):
+        bad.result()
+    assert clock.now_s == 2.0
+
+
+def test_a_cancelled_task_ends_where_it_waits_and_cleans_up() -> None:
+    clock = LockstepClock()
+    left: list[str] = []
+
+    def work() -> None:
+        try:
+            clock.sleep(math.inf)
+        except Exception:  # what a driver does about errors is not to keep it alive
+            left.append("caught")
+        finally:
+            left.append("finally")
+            clock.sleep(1.0)
+            left.append("waited")
+
+    task, unborn = clock.start(work), clock.start(lambda: left.append("unborn"))
+    clock.cancel(unborn)
+    clock.run_tasks()
+    clock.cancel(task)
+    assert left == ["finally"]
+    clock.sleep(2.0)
+    assert left == ["finally", "waited"]
+    assert task.done
+    with pytest.raises(TaskCancelled):
+        task.result()
+
+
+def test_who_cancels_a_task_waits_as_before() -> None:
+    clock = LockstepClock()
+    task = clock.start(lambda: clock.sleep(math.inf))
+    clock.run_tasks()
+    clock.cancel(task)
+    clock.sleep(1.0)
+    assert clock.now_s == 1.0
+    assert task.done
+
+
+def test_an_interrupt_comes_through_and_ends_all() -> None:
+    clock = PacedClock()
+    ended: list[int] = []
+
+    def work(number: int) -> None:
+        try:
+            if number == 1:
+                signal.raise_signal(signal.SIGINT)
+            clock.sleep(60.0)
+        finally:
+            ended.append(number)
+
+    with pytest.raises(KeyboardInterrupt):
+        clock.gather([lambda: work(0), lambda: work(1), lambda: work(2)])
+    assert ended == [1, 0]  # the third had not begun
+
+
+def test_a_turn_waits_for_nothing_and_runs_each_task_once() -> None:
+    clock = LockstepClock()
+    steps: list[int] = []
+    task = clock.start(lambda: [(steps.append(k), clock.sleep(0.001 * k)) for k in range(3)])
+    clock.run_tasks()
+    assert steps == [0, 1]  # a wait for no time gives way to nobody
+    clock.run_tasks()
+    assert steps == [0, 1]
+    assert clock.now_s == 0.0
+    clock.wait(lambda: task.done)
+    assert steps == [0, 1, 2]
+
+
+def test_sources_are_ticked_at_their_times_while_somebody_waits() -> None:
+    clock = LockstepClock()
+    line = Line(clock, tick_s=0.25)
+    clock.sleep(1.1)
+    assert line.ticks == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
+    clock.remove(line)
+    clock.remove(line)
+    clock.sleep(1.0)
+    assert len(line.ticks) == 5
+
+
+@pytest.mark.parametrize("kind", [PacedClock, LockstepClock])
+def test_work_aside_returns_what_it_does_and_raises_what_it_raises(kind: type[Clock]) -> None:
+    clock = kind()
+    steps: list[str] = []
+
+    def slow() -> int:
+        time.sleep(0.1)
+        steps.append("slow")
+        return threading.get_ident()
+
+    other = clock.start(lambda: steps.append("other"))
+    here = clock.run_blocking(slow) == threading.get_ident()
+    clock.wait(lambda: other.done)
+    # paced the rest goes on meanwhile; in lockstep its time stands still
+    assert (steps, here) == (
+        (["slow", "other"], True) if clock.lockstep else (["other", "slow"], False)
+    )
+    with pytest.raises(ZeroDivisionError):
+        clock.run_blocking(lambda: 1 // 0)
+
+
+def test_in_real_time_simulated_time_is_never_ahead_of_the_walls() -> None:
+    clock = LockstepClock(real_time=True)
+    clock.sleep(0.01)
+    begin_s, began_s = clock.now_s, time.monotonic()
+    for _ in range(10):
+        clock.sleep(0.02)
+        assert clock.now_s - begin_s <= time.monotonic() - began_s + 0.02
+
+
+def test_in_real_time_what_was_missed_is_not_made_up_for() -> None:
+    clock = LockstepClock(real_time=True)
+    clock.sleep(0.01)
+    time.sleep(0.3)  # as of a machine that was busy
+    clock.sleep(0.001)
+    began_s = time.monotonic()
+    clock.sleep(0.1)
+    assert time.monotonic() - began_s > 0.07

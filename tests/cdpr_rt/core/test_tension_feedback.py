@@ -1,0 +1,80 @@
+"""Readings handed from the task that samples to the cycle: whole, dated, not believed for long."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_rt.core.tension import TensionExchange, TensionFault, TensionWatch
+
+
+class Clock:
+    """A mock: the time alone, set by the test."""
+
+    now_s = 100.0
+
+
+def exchange(clock: Clock, n: int = 3) -> TensionExchange:
+    return TensionExchange([f"winch {i + 1}" for i in range(n)], 0.25, clock)
+
+
+def test_nothing_is_valid_before_it_was_read() -> None:
+    clock = Clock()
+    both = exchange(clock)
+    both.update()
+    assert not both.feedback.valid.any()
+    assert np.isinf(both.feedback.age_s).all()
+    assert both.reason() == "winch 1: tension sensor: no reading"
+
+
+def test_a_reading_has_its_time_and_grows_old() -> None:
+    clock = Clock()
+    both = exchange(clock)
+    for i in range(3):
+        both.publish(i, 10.0 * (i + 1), 100.0 + 0.01 * i, TensionFault.NONE)
+    clock.now_s = 100.1
+    both.update()
+    told = both.feedback
+    np.testing.assert_allclose(told.tension_N, [10.0, 20.0, 30.0])
+    np.testing.assert_allclose(told.age_s, [0.1, 0.09, 0.08])
+    assert told.valid.all() and both.reason() == ""
+    both.publish(1, 21.0, 100.2, TensionFault.NONE)
+    clock.now_s = 100.24
+    both.update()
+    np.testing.assert_array_equal(told.valid, [True, True, True])
+    clock.now_s = 100.36
+    both.update()
+    np.testing.assert_array_equal(told.valid, [False, True, False])
+    assert both.reason() == ("winch 1: tension sensor: stale, last read 0.36 s ago, 0.25 s allowed")
+    assert TensionWatch(both).stop_reason() == both.reason()
+    assert TensionWatch(both).alarm() == ""
+
+
+def test_a_fault_is_told_with_its_cable_and_goes_when_it_is_mended() -> None:
+    clock = Clock()
+    both = exchange(clock)
+    for i in range(3):
+        both.publish(i, 50.0, 100.0, TensionFault.NONE)
+    both.publish(2, 1020.0, 100.0, TensionFault.OVER_RANGE)
+    both.update()
+    np.testing.assert_array_equal(both.feedback.valid, [True, True, False])
+    assert both.feedback.fault[2] == TensionFault.OVER_RANGE
+    assert both.reason() == "winch 3: tension sensor: over range (1020.0 N)"
+    both.publish(2, 60.0, 100.0, TensionFault.BROKEN_WIRE)
+    both.update()
+    assert both.reason() == "winch 3: tension sensor: broken wire"
+    both.publish(2, 60.0, 100.0, TensionFault.NONE)
+    both.update()
+    assert both.feedback.valid.all()
+
+
+def test_a_watch_stops_what_pulls_too_hard() -> None:
+    clock = Clock()
+    both = exchange(clock)
+    watch = TensionWatch(both, 80.0)
+    for i, tension in enumerate((20.0, 79.9, 50.0)):
+        both.publish(i, tension, 100.0, TensionFault.NONE)
+    assert watch.stop_reason() == ""
+    both.publish(1, 80.1, 100.0, TensionFault.NONE)
+    assert watch.stop_reason() == "winch 2: 80.1 N, 80 N allowed"
+    both.publish(0, 0.0, 100.0, TensionFault.BROKEN_WIRE)
+    assert watch.stop_reason() == "winch 1: tension sensor: broken wire"

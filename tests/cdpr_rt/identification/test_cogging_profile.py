@@ -1,0 +1,196 @@
+"""A stored profile comes back as it was, and is refused where it does not belong."""
+
+import json
+import re
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_motor
+from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_rt.identification.cogging_profile import (
+    CoggingProfile,
+    CoggingProfileError,
+    DriveIdentity,
+    StoredFriction,
+    StoredHarmonic,
+    StoredMethod,
+)
+
+MOTOR = load_motor("MPP0923D")
+OTHER = MOTOR.model_copy(update={"model": "MPP1003D"})
+BOUNDS = MotorBounds(MOTOR)
+IDENTITY = DriveIdentity(
+    vendor_id=1, product_code=2, revision=3, serial=4, encoder_counts_per_turn=8192
+)
+FRICTION = StoredFriction(
+    coulomb_forward_Nm=0.08,
+    coulomb_backward_Nm=0.07,
+    stribeck_forward_Nm=0.02,
+    stribeck_backward_Nm=0.02,
+    stribeck_speed_rad_s=0.2,
+    viscous_Nms_rad=5e-4,
+)
+
+
+def profile() -> CoggingProfile:
+    angle = np.arange(16.0)
+    table = (list(0.06 * np.sin(angle)), list(0.06 * np.cos(angle)))
+    method = StoredMethod(table_Nm=table, friction=FRICTION, look_ahead_s=0.002, observer_s=0.003)
+    return CoggingProfile(
+        motor="MPP0923D",
+        drive="generic-cia402",
+        identity=IDENTITY,
+        temperature_C=31.5,
+        created=datetime(2024, 5, 1, tzinfo=UTC),
+        raw_data=["sweep-0.raw"],
+        inertia_kg_m2=1.1e-4,
+        harmonics=[
+            StoredHarmonic(
+                order=4,
+                amplitude_Nm=0.06,
+                amplitude_half_width_Nm=1e-5,
+                phase_deg=17.0,
+                phase_half_width_deg=0.1,
+                per_pole_pair=1.0,
+                hint="",
+            )
+        ],
+        residual_rms_Nm=1e-3,
+        repaired_fraction=0.0,
+        coverage=1.0,
+        thesis=method,
+        better=method,
+    )
+
+
+def test_round_trip(tmp_path):
+    path = tmp_path / "p.json"
+    profile().save(path)
+    assert CoggingProfile.load(path) == profile()
+    assert [p.name for p in tmp_path.iterdir()] == ["p.json"]
+
+
+def test_compensation_is_what_was_stored():
+    axis = profile().compensation("better", IDENTITY, BOUNDS)
+    assert axis.table_Nm.shape == (2, 16)
+    assert axis.look_ahead_s == 0.002
+    assert axis.friction.coulomb_backward_Nm == 0.07
+
+
+@pytest.mark.parametrize("key", list(IDENTITY.model_dump()))
+def test_another_drive_is_refused_by_name(key):
+    other = IDENTITY.model_copy(update={key: 99})
+    with pytest.raises(CoggingProfileError, match=f"{key} = {getattr(IDENTITY, key)}.*99"):
+        profile().compensation("better", other, BOUNDS)
+
+
+def test_another_motor_or_no_index_is_refused():
+    with pytest.raises(CoggingProfileError, match=r"MPP0923D.*MPP1003D"):
+        profile().compensation("better", IDENTITY, MotorBounds(OTHER))
+    with pytest.raises(CoggingProfileError, match="index"):
+        profile().compensation("better", IDENTITY, BOUNDS, index_will_be_seen=False)
+
+
+def spoil(change):
+    data = json.loads(profile().model_dump_json())
+    change(data)
+    return json.dumps(data)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (lambda: profile().model_dump_json()[:200], "is not valid JSON"),
+        (lambda: spoil(lambda d: d.pop("motor")), "motor"),
+        (lambda: spoil(lambda d: d["identity"].update(serial="x")), "identity.serial: value 'x'"),
+        (lambda: spoil(lambda d: d.update(colour="red")), "colour: unknown key"),
+        (
+            lambda: spoil(lambda d: d.update(inertia_kg_m2=-1.0)),
+            "inertia_kg_m2: value -1.0; allowed: greater than 0",
+        ),
+        (lambda: spoil(lambda d: d["better"]["table_Nm"][0].pop()), "better.table_Nm"),
+    ],
+)
+def test_a_damaged_file_is_refused_with_the_reason(tmp_path, text, message):
+    path = tmp_path / "p.json"
+    path.write_text(text())
+    with pytest.raises(CoggingProfileError, match=re.escape(message)) as error:
+        CoggingProfile.load(path)
+    assert str(path) in str(error.value)
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(CoggingProfileError, match="cannot be read"):
+        CoggingProfile.load(tmp_path / "none.json")
+
+
+def changed(path: str, value: object) -> CoggingProfile:
+    """Return the profile with one value replaced, the place given as `better.friction.x`."""
+    data = json.loads(profile().model_dump_json())
+    here, *keys, last = data, *path.split(".")
+    for key in keys:
+        here = here[int(key) if key.isdecimal() else key]
+    here[int(last) if last.isdecimal() else last] = value
+    return CoggingProfile.model_validate_json(json.dumps(data))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("better.table_Nm.0.3", 1e6, "better.table_Nm[0]: value 1e+06; allowed: -0.75 to 0.75 Nm"),
+        ("thesis.table_Nm.1.0", -0.76, "thesis.table_Nm[1]: value 0.76; allowed: -0.75 to 0.75"),
+        ("better.friction.coulomb_forward_Nm", 0.7, "better.table_Nm and friction together"),
+        ("better.friction.stribeck_backward_Nm", -2.0, "better.friction: value 2.07"),
+        (
+            "better.table_Nm",
+            [[0.5] * 16, [0.5] * 16],
+            "better.mean of table_Nm and friction over both directions: value 0.505; "
+            "allowed: -0.06 to 0.06 Nm, 2 % of the rated torque of MPP0923D",
+        ),
+        ("thesis.table_Nm", [[0.3] * 16, [0.0] * 16], "thesis.mean of table_Nm and friction"),
+        ("better.friction.coulomb_backward_Nm", -0.07, "better.mean of table_Nm and friction"),
+        ("better.friction.stribeck_forward_Nm", 0.16, "better.mean of table_Nm and friction"),
+        (
+            "better.friction.viscous_Nms_rad",
+            0.0012,
+            "better.friction.viscous_Nms_rad: value 0.0012; allowed: -0.001158 to 0.001158",
+        ),
+        ("better.friction.stribeck_speed_rad_s", 1e-9, "better.friction.stribeck_speed_rad_s"),
+        ("harmonics.0.amplitude_Nm", -0.8, "harmonics: sum of amplitude_Nm: value 0.8"),
+        ("inertia_kg_m2", 1e-9, "inertia_kg_m2: value 1e-09; allowed: 5.65e-05 to 0.00565 kg m2"),
+        ("inertia_kg_m2", 1.0, "inertia_kg_m2: value 1; allowed: 5.65e-05 to 0.00565 kg m2"),
+    ],
+)
+def test_what_no_such_motor_can_have_is_refused(key: str, value: object, message: str) -> None:
+    spoilt = changed(key, value)
+    for use in (
+        lambda: spoilt.require_true_of(BOUNDS),
+        lambda: spoilt.compensation("better", IDENTITY, BOUNDS),
+    ):
+        with pytest.raises(CoggingProfileError, match=re.escape(message)):
+            use()
+
+
+def test_friction_in_the_tables_is_no_bias() -> None:
+    level = [0.3] * 16, [-0.3] * 16
+    changed("thesis.table_Nm", level).require_true_of(BOUNDS)
+
+
+def test_an_axis_that_may_use_little_torque_allows_little_compensation() -> None:
+    profile().require_true_of(BOUNDS)
+    with pytest.raises(CoggingProfileError, match=r"allowed: -0.1 to 0.1 Nm, the axis' torque"):
+        profile().require_true_of(MotorBounds(MOTOR, 0.1))
+    assert profile().compensation("better", IDENTITY, BOUNDS).most_Nm == 0.75
+
+
+@pytest.mark.parametrize("key", ["look_ahead_s", "observer_s"])
+@pytest.mark.parametrize("value", ["NaN", "Infinity", "1e999", "-1.0", "10.0", "1" * 6000])
+def test_a_time_that_is_none_is_refused(tmp_path, key, value):
+    path = tmp_path / "p.json"
+    path.write_text(
+        re.sub(rf'"{key}": ?[0-9.e-]+', f'"{key}": {value}', profile().model_dump_json())
+    )
+    with pytest.raises(CoggingProfileError, match=r"p\.json"):
+        CoggingProfile.load(path)

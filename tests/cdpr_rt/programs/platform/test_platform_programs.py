@@ -1,0 +1,320 @@
+"""Tightening and letting go, on winches whose cables end at a platform that stands fast."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_rt.core.estimate import Estimator
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.programs.base import Program, ProgramError
+from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.platform.index_path import index_path
+from cdpr_rt.programs.platform.pretension import home_pretension_N
+from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
+from cdpr_rt.programs.registry import build_programs, platform_parts, warm_up_programs
+from cdpr_rt.robots.robot_arrays import limits_of, winches_of
+from cdpr_rt.robots.statics import statics_of
+
+PERIOD_S = 1e-3
+CABLE_m = np.full(3, -0.026)
+COULOMB_Nm = 0.08
+STIFFNESS_N_m = 1e4
+ROBOT = load_robot("planar-3")
+HOME_m = np.array([0.0, 1.3])
+
+
+class Standing:
+    """Three rotors with friction, a spring behind the slack of each."""
+
+    def __init__(self) -> None:
+        limits = limits_of(ROBOT)
+        axes = ROBOT.axes
+        model = model_of(axes, PERIOD_S, [2.3e-3] * 3, limits)
+        self.block = SharedBlock.create(3, 1.0, 1000.0)
+        self.estimator = Estimator(3, PERIOD_S, winches_of(axes))
+        parts = platform_parts(ROBOT, limits, model, self.estimator)
+        assert parts is not None
+        self.parts = parts
+        self.programs = build_programs(model, self.block, parts)
+        warm_up_programs(self.programs, 3, parts)
+        self.cable_m = model.cable_m_per_rad
+        self.inertia = axes[0].winch.motor.rotor_inertia_kg_m2
+        self.feedback, self.setpoint, self.torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
+        self.feedback.valid[:] = True
+        self.angle, self.speed, self.tension_N = np.zeros((3, 3))
+        self.slack_m = np.zeros(3)
+        self.program: Program = self.programs["hold"]
+
+    def loosen(self, slack_m: tuple[float, float, float]) -> None:
+        """Begin anew without torque, with so much slack."""
+        self.parts.forget()
+        self.estimator.reset()
+        self.speed[:] = self.torque[:] = self.tension_N[:] = 0.0
+        self.slack_m[:] = np.array(slack_m) - self.cable_m * self.angle
+        self.switch("idle")
+        self.run(0.05)
+        self.switch("hold")
+
+    def switch(self, name: str, wanted: Mapping[str, Any] | None = None) -> None:
+        program = self.programs[name]
+        program.check(wanted or {})
+        program.start(self.feedback, self.setpoint, self.torque)
+        program.command(wanted or {})
+        self.program = program
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / PERIOD_S)):
+            self.feedback.cycle += 1
+            self.feedback.position_rad[:] = np.round(self.angle * 8192 / 6.2832) * 6.2832 / 8192
+            self.feedback.torque_Nm[:] = self.torque
+            self.estimator.update(self.feedback)
+            self.program.update(self.feedback, self.setpoint, self.torque)
+            for _ in range(10):
+                self._step(PERIOD_S / 10)
+
+    def _step(self, h: float) -> None:
+        stretched = -(self.slack_m + self.cable_m * self.angle)
+        self.tension_N = np.maximum(STIFFNESS_N_m * stretched, 0.0)
+        friction = COULOMB_Nm * np.tanh(self.speed / 0.2)
+        force = self.torque + self.cable_m * self.tension_N - friction - 2e-3 * self.speed
+        self.speed += h / self.inertia * force
+        self.angle += h * self.speed
+
+    def until_done(self, within_s: float) -> dict[str, Any]:
+        for _ in range(round(within_s / 0.1)):
+            self.run(0.1)
+            told = self.program.progress()
+            if told["done"] or told.get("trouble"):
+                return told
+        raise AssertionError(f"not done within {within_s} s: {told}")
+
+
+@pytest.fixture(scope="module")
+def made() -> Standing:
+    return Standing()
+
+
+@pytest.fixture
+def robot(made: Standing) -> Iterator[Standing]:
+    made.loosen((0.02, 0.005, 0.03))
+    yield made
+
+
+def tightened(robot: Standing) -> Standing:
+    robot.switch("tighten")
+    robot.until_done(20.0)
+    return robot
+
+
+def test_slack_comes_in_and_lengths_are_those_of_home(robot: Standing):
+    assert not robot.parts.known
+    tightened(robot)
+    assert robot.tension_N.min() > 15.0
+    robot.run(0.01)
+    known_m = robot.estimator.estimate.cable_length_m
+    stiffness_N = ROBOT.axes[0].winch.cable.stiffness_N
+    # the spring that the cables end in has moved since; the lengths follow the motors' angles
+    moved_m = (robot.tension_N - home_pretension_N(robot.parts)) / STIFFNESS_N_m
+    home_m = statics_of(ROBOT).lengths(HOME_m) / (
+        1.0 + home_pretension_N(robot.parts) / stiffness_N
+    )
+    assert known_m + moved_m == pytest.approx(home_m, abs=3e-4)
+
+
+def test_tensions_grow_together_and_no_cable_is_jerked(robot: Standing):
+    robot.switch("tighten")
+    full_N = home_pretension_N(robot.parts)
+    shares, uneven_N = [], []
+    while not robot.parts.tight:
+        robot.run(0.002)
+        shares.append((robot.tension_N / full_N).max())
+        uneven_N.append(robot.tension_N[0] - robot.tension_N[1])  # would pull it sideways
+    assert 1.2 < max(shares[:-1]) < 1.7
+    # what a stand bears on which it presses with twice its weight, friction 0.3: 15.8 N
+    assert np.abs(uneven_N[:-1]).max() < 15.0
+
+
+def test_a_cable_that_ends_nowhere_is_told_and_all_are_let_go(robot: Standing):
+    robot.slack_m[1] = 5.0
+    robot.switch("tighten")
+    told = robot.until_done(60.0)
+    assert told["trouble"].startswith("cable 1: 1.00 m reeled in and not tight")
+    robot.run(0.5)
+    assert robot.program.at_rest
+    assert not robot.torque.any()
+    assert not robot.parts.tight
+
+
+def test_only_a_tight_robot_takes_positions_and_only_a_loose_one_rests(robot: Standing):
+    pose, idle = robot.programs["pose"], robot.programs["idle"]
+    with pytest.raises(ProgramError, match="cables are not tight; run tighten first"):
+        pose.check({"position_m": [0.0, 1.6]})
+    idle.check({})
+    tightened(robot)
+    pose.check({"position_m": [0.0, 1.6]})
+    with pytest.raises(ProgramError, match="hangs on its cables; lower it first"):
+        idle.check({})
+    with pytest.raises(ProgramError, match="hangs on its cables; lower it first"):
+        robot.programs["jog"].check({"velocity_rad_s": [0.0, 0.0, 0.0]})
+    robot.parts.slacken()
+    robot.switch("hold")
+    robot.run(0.1)  # each axis keeps its cable by itself now, as after brakes have held it
+    with pytest.raises(ProgramError, match="may hang on them; lower it first"):
+        idle.check({})
+
+
+def test_a_winch_that_pays_out_does_not_answer_an_encoder_that_jumps():
+    winches, feedback, torque = (
+        WinchSpeedLoop(np.full(3, 1e-4), CABLE_m, PERIOD_S),
+        AxisFeedback(3),
+        np.zeros(3),
+    )
+    winches.high_N[:] = 100.0
+    torque[:] = -20.0 * CABLE_m
+    winches.begin(feedback, np.zeros(3), torque)
+    winches.update(feedback, torque)
+    for jump in (1.5, -1.5):
+        feedback.position_rad[1] += jump
+        for _ in range(30):
+            winches.update(feedback, torque)
+            assert winches.tension_N == pytest.approx(20.0)
+
+
+def test_a_cable_that_gives_way_while_they_are_tightened_ends_it(robot: Standing):
+    robot.switch("tighten")
+    for _ in range(400):
+        robot.run(0.05)
+        if robot.program.progress()["stage"] == "pull":
+            break
+    robot.slack_m[0] += 5.0
+    told = robot.until_done(20.0)
+    assert told["trouble"].startswith("cable 0: 0.0")
+    assert "reeled in and not tight" in told["trouble"]
+
+
+def test_a_tight_robot_is_not_told_anew_where_it_is(robot: Standing):
+    tightened(robot)
+    with pytest.raises(ProgramError, match="the cables are tight already; lower it first"):
+        robot.programs["tighten"].check({"from": "home"})
+    robot.programs["tighten"].check({})
+
+
+def test_a_platform_let_go_elsewhere_is_not_taken_to_stand_at_home(robot: Standing):
+    tightened(robot)
+    robot.switch("lower", {"blind": True})
+    robot.run(2.0)
+    tighten = robot.programs["tighten"]
+    tighten.check({})  # its cables' lengths tell where it is
+    robot.estimator.forget_lengths()
+    with pytest.raises(ProgramError, match="stand it at home, then say from: home"):
+        tighten.check({})
+    robot.switch("tighten", {"from": "home"})
+    robot.until_done(20.0)
+    assert not robot.parts.last.displaced
+
+
+def test_a_platform_that_cannot_come_home_is_let_down_where_it_is(robot: Standing):
+    tightened(robot)
+    robot.switch("lower")
+    stuck = robot.programs["lower"]._approach
+    robot.programs["lower"]._approach = lambda: False  # type: ignore[attr-defined]
+    try:
+        robot.run(30.0)
+    finally:
+        robot.programs["lower"]._approach = stuck  # type: ignore[attr-defined]
+    assert robot.program.progress()["blind"]
+
+
+def test_holding_keeps_axes_before_and_the_platform_after(robot: Standing):
+    assert robot.programs["hold"].pose is None
+    tightened(robot)
+    before_Nm = robot.torque.copy()
+    robot.switch("hold")
+    robot.run(0.002)
+    assert robot.torque == pytest.approx(before_Nm, abs=0.02)
+    assert robot.program.pose is not None
+    assert robot.program.pose[:2] == pytest.approx(HOME_m, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "named"),
+    [
+        ({"from": "there"}, "from: value 'there'; allowed: home, lengths, last"),
+        ({"from": "lengths"}, "lengths are not known; allowed: home"),
+        ({"from": "last"}, "no lengths of the last stop: the robot has not been stopped"),
+        ({"to": "home"}, "key 'to'; allowed: from"),
+    ],
+)
+def test_lengths_that_are_not_there_are_refused(
+    robot: Standing, wanted: dict[str, str], named: str
+):
+    robot.parts.last.take()
+    robot.parts.last.why = "the robot has not been stopped with known lengths yet"
+    with pytest.raises(ProgramError, match=named):
+        robot.programs["tighten"].check(wanted)
+
+
+def test_lengths_that_disagree_are_refused(robot: Standing):
+    home_m = robot.parts.control.lengths_at_home(np.full(3, 20.0))
+    robot.estimator.set_lengths(robot.feedback.position_rad, home_m + np.array([0.2, 0.0, 0.2]))
+    robot.run(0.01)
+    robot.switch("tighten", {"from": "lengths"})
+    told = robot.until_done(20.0)
+    assert "the cables' lengths disagree by" in told["trouble"]
+    assert not robot.parts.tight
+
+
+def test_letting_go_ends_without_torque(robot: Standing):
+    tightened(robot)
+    robot.switch("lower", {"blind": True})
+    assert not robot.programs["lower"].at_rest
+    told = robot.until_done(20.0)
+    assert told["stage"] == "fade"
+    assert robot.program.at_rest
+    assert not robot.torque.any()
+    # the winches paid out no more than it took to take the load off
+    assert robot.tension_N.max() < 12.0
+
+
+def test_what_is_loose_already_is_not_wound_up_to_be_let_go(robot: Standing):
+    before = robot.angle.copy()
+    robot.switch("lower")
+    robot.until_done(20.0)
+    assert (robot.cable_m * (robot.angle - before)).min() > -0.002
+
+
+def test_every_motor_turns_once_on_the_way_to_its_index():
+    platform = ROBOT.platform
+    assert platform is not None
+    cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
+    statics = statics_of(ROBOT)
+    way = index_path(statics.model, cable_m, lambda _: True)
+    assert len(way) == 1  # lifting it is enough
+    ends = np.array([platform.home_m, *way])
+    assert (np.ptp(statics.lengths(ends), axis=0) > 2.0 * np.pi * np.abs(cable_m)).all()
+    # where it may not go up far enough it goes to the sides as well
+    way = index_path(statics.model, cable_m, lambda there: bool(there[1] < 1.5))
+    assert len(way) == 3
+    assert {float(np.sign(point[0])) for point in way[1:]} == {-1.0, 1.0}
+    assert all(point[1] < 1.5 for point in way)
+
+
+def test_a_set_point_waits_for_a_platform_that_does_not_come(robot: Standing) -> None:
+    tightened(robot)
+    robot.switch("pose", {"position_m": [0.0, 1.8]})
+    robot.run(1.0)
+    told = robot.program.progress()
+    assert not told["done"] and "behind" in told["held_back"]
+    went_m = robot.parts.control.shaped - HOME_m
+    assert 0.02 < went_m[1] < 0.1
+    robot.run(0.5)
+    assert robot.parts.control.shaped[1] - HOME_m[1] - went_m[1] < 0.005
+    robot.program.stop()
+    robot.run(0.2)
+    assert robot.program.at_rest

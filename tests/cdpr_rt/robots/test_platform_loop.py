@@ -1,0 +1,358 @@
+"""A platform's loop: its gains' laws, and its margins beside a model in time."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from platform_physics import PERIOD_S, Machine, heavier, planar, spatial
+from scipy.linalg import expm, null_space
+
+from cdpr_profiles import RobotAxis, load_robot
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
+from cdpr_rt.robots.platform import loop_kernel as loop
+from cdpr_rt.robots.platform.body_kernel import body_of
+from cdpr_rt.robots.platform.loop_design import (
+    DAMPING_RATIO,
+    LEAST_MARGIN,
+    STIFFNESS_SHARES,
+    LoopGains,
+    LoopModel,
+    OBSERVER_rad_s,
+)
+from cdpr_rt.robots.robot_arrays import limits_of
+
+_LATE_S, _CABLE_DAMPING_S = 0.8e-3, 2e-3
+
+
+def shipped(name: str) -> Machine:
+    robot = load_robot(name)
+    assert robot.platform is not None
+    limits = limits_of(robot)
+    bounds = [float(np.min(b)) for b in (limits.tension_min_N, limits.tension_max_N)]
+    return Machine(robot.platform, tuple(robot.axes), *bounds, float(np.min(limits.torque_Nm)))
+
+
+MACHINES = {"planar-3": planar, "spatial": spatial, "suspended-8": lambda: shipped("suspended-8")}
+SHIPPED = ("planar-4", "point-4", "suspended-6", "spatial-8")
+
+
+def loop_model(machine: Machine, period_s: float = PERIOD_S) -> LoopModel:
+    return LoopModel(machine.model(), rotors(machine), rigidity(machine), period_s)
+
+
+def rotors(machine: Machine) -> FloatArray:
+    motors = [axis.winch for axis in machine.axes]
+    return np.array([w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in motors])
+
+
+def rigidity(machine: Machine) -> FloatArray:
+    return np.array([axis.winch.cable.stiffness_N for axis in machine.axes])
+
+
+def mass_matrix(machine: Machine, q: FloatArray) -> FloatArray:
+    """Return M_p (d, d) of points on the platform that have its mass, centre and inertia."""
+    model, platform = machine.model(), machine.platform
+    pose, directions = model.pose(q), list(model.kinematics.directions)
+    M = np.zeros((6, 6))
+    for m, at in points_of(machine):
+        r = pose.Q @ at
+        X = np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+        moved = np.hstack([np.eye(3), -X])
+        M += m * moved.T @ moved
+    assert M[0, 0] == pytest.approx(platform.mass_kg)
+    return M[np.ix_(directions, directions)]
+
+
+def points_of(machine: Machine) -> list[tuple[float, FloatArray]]:
+    """Return six points, a mass and a place each, in the platform's frame."""
+    platform = machine.platform
+    m, centre = platform.mass_kg, np.zeros(3)
+    centre[: len(platform.centre_of_mass_m)] = platform.centre_of_mass_m
+    if platform.inertia_kg_m2 is None:  # a ball's, half the spread of the anchor points
+        anchors = np.array(platform.anchor_points_m)
+        spread = ((anchors - anchors.mean(axis=0)) ** 2).sum(axis=1).mean()
+        inertia = m * max(0.01**2, 0.25 * spread) * np.eye(3)
+    elif len(platform.inertia_kg_m2) == 1:
+        inertia = platform.inertia_kg_m2[0] * np.eye(3)
+    else:
+        xx, yy, zz, xy, xz, yz = platform.inertia_kg_m2
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    squares, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    ways = (axes * np.sqrt(3.0 * squares / m)).T
+    return [(m / 6.0, centre + way) for way in (*ways, *-ways)]
+
+
+# -- gains
+
+
+class Loop:
+    """`loop_kernel.correct` at a pose, without integral part."""
+
+    def __init__(self, machine: Machine, gains: LoopGains, q: FloatArray) -> None:
+        self.model = model = machine.model()
+        n, d, kinematics = machine.n, model.size, model.kinematics
+        self.settings = np.zeros(loop.SETTINGS)
+        for key, value in (
+            (loop.PERIOD, PERIOD_S), (loop.BANDWIDTH, gains.bandwidth_rad_s),
+            (loop.DAMPING, gains.damping_N_s_m), (loop.RATIO, DAMPING_RATIO),
+            (loop.ROTOR, gains.rotor_kg), (loop.REGULATOR_N, 1e12), (loop.MOST_N, 1e12),
+            (loop.STUCK, 1.0), (loop.DEAD, 1.0),
+        ):  # fmt: skip
+            self.settings[key] = value
+        self.pose, self.cables = model.pose(q), np.zeros((CABLE_ROWS, n))
+        run_cables(kinematics.geometry, self.pose.array, self.cables)
+        self.directions = np.array(kinematics.directions)
+        self.moves, self.n, self.d = np.zeros((4, 6)), n, d
+        self.state = np.zeros(2 * d + 1)
+        self.body = body_of(machine.platform)
+        self.wrench = np.zeros(d)
+
+    def force(self, share: float = 1.0, apart: float = 0.0) -> FloatArray:
+        force, d, n = np.zeros(self.d), self.d, self.n
+        loop.correct(
+            self.settings, self.state, self.model.wrench_scale, self.body, self.directions,
+            self.cables, self.pose.array, self.moves, np.zeros((7, 7, 7)), np.zeros((n, d)),
+            np.zeros((d, n)), self.wrench, force, share, apart,
+        )  # fmt: skip
+        return force
+
+    def gain(self, row: int, sign: float = 1.0) -> FloatArray:
+        """Return the force by each direction of one of the moves, (d, d)."""
+        columns = []
+        for i in self.directions:
+            self.moves[:] = 0.0
+            self.moves[row, i] = sign
+            columns.append(self.force())
+        return np.array(columns).T
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_gains_are_positive_definite_and_each_mode_has_its_damping_ratio(name: str) -> None:
+    machine = MACHINES[name]()
+    model = loop_model(machine)
+    gains = model.design()
+    for q, told in zip(model.poses, model.margins(gains), strict=True):
+        law = Loop(machine, gains, q)
+        K, D = law.gain(0), law.gain(3, -1.0)
+        np.testing.assert_allclose(law.gain(1), D, rtol=1e-9, atol=1e-9 * np.abs(D).max())
+        J = machine.model().kinematics.jacobian(law.pose)
+        M = mass_matrix(machine, q) + gains.rotor_kg * J.T @ J
+        for gain in (K, D):
+            np.testing.assert_allclose(gain, gain.T, atol=1e-9 * np.abs(gain).max())
+            assert np.linalg.eigvalsh(gain).min() > 0.0
+        squares, modes = np.linalg.eig(np.linalg.solve(M, K))
+        omega = np.sqrt(squares.real)
+        assert omega.min() == pytest.approx(told.slowest_rad_s, rel=1e-6)
+        assert omega.max() == pytest.approx(told.fastest_rad_s, rel=1e-6)
+        assert omega.max() < gains.bandwidth_rad_s
+        damped = 2.0 * DAMPING_RATIO * M @ modes.real * omega
+        np.testing.assert_allclose(D @ modes.real, damped, atol=1e-6 * np.abs(damped).max())
+        # no cable is asked for more damping than was allowed
+        orthogonal = np.linalg.eigvals(np.linalg.solve(J.T @ J, D)).real
+        assert orthogonal.max() < gains.damping_N_s_m
+
+
+def test_far_from_its_target_the_platform_comes_back_at_a_bounded_speed() -> None:
+    """The proportional part is bounded, the damping is not."""
+    machine = planar()
+    gains = loop_model(machine).design()
+    law = Loop(machine, gains, np.array([0.1, 1.9]))
+    law.settings[loop.REGULATOR_N] = 30.0
+    law.moves[0, 0] = 0.5
+    far = law.force()
+    assert np.linalg.norm(far) == pytest.approx(30.0)
+    law.moves[3, :2] = 0.2, -0.1
+    K_D = law.gain(3, -1.0)
+    law.moves[:] = 0.0
+    law.moves[0, 0] = 0.5
+    law.moves[3, :2] = 0.2, -0.1
+    assert law.force() == pytest.approx(far - K_D @ [0.2, -0.1])
+
+
+def test_rates_that_contradict_each_other_are_not_followed() -> None:
+    machine = planar()
+    law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
+    law.settings[loop.INTEGRAL] = 0.0
+    law.moves[0, :2], law.moves[3, :2] = (0.001, -0.002), (0.3, 0.1)
+    whole = law.force()
+    assert law.force(apart=0.1) == pytest.approx(whole)
+    assert law.force(apart=1.5) == pytest.approx(0.01 * whole)
+
+
+def test_nothing_is_integrated_that_cannot_be_had() -> None:
+    machine = planar()
+    law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
+    law.settings[loop.INTEGRAL], law.settings[loop.DEAD] = 5.0, 1e-9
+    law.moves[0, 0] = 0.01
+    law.force(share=0.5)
+    assert not law.state[:2].any()
+    first = law.force()
+    for _ in range(10):
+        grown = law.force()
+    assert grown[0] > first[0] > 0.0
+    law.moves[0, 0] = -0.01
+    before = law.state[0]
+    law.force(share=0.5)
+    assert law.state[0] < before
+
+
+def test_the_integral_part_sleeps_within_what_friction_hides_and_wakes_later() -> None:
+    machine = planar()
+    law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
+    law.settings[loop.INTEGRAL], law.settings[loop.DEAD] = 5.0, 1e-4
+    awake = []
+    for error in (3e-4, 1.5e-4, 0.5e-4, 0.5e-4, 1.5e-4, 3e-4, 3e-4):
+        law.moves[0, 0] = error
+        law.force()
+        awake.append(law.state[2])
+    assert awake[0] > 0.9
+    assert awake[3] < 0.1
+    assert awake[4] < 0.2
+    assert awake[6] > 0.9
+    law.moves[0, 0], law.moves[1, 1] = 0.0, 1e-3
+    law.force()
+    assert law.state[2] == 1.0
+
+
+def test_a_heavier_platform_gets_a_slower_loop() -> None:
+    slowest = []
+    for mass in (0.5, 2.0, 20.0):
+        model = loop_model(heavier(planar(), mass))
+        margins = model.margins(model.design())
+        assert min(m.modulus for m in margins) >= LEAST_MARGIN
+        slowest.append(min(m.slowest_rad_s for m in margins))
+    assert slowest[0] > slowest[1] > slowest[2]
+
+
+def test_the_lightest_rotor_decides_how_much_is_damped() -> None:
+    machine = planar()
+    winch = machine.axes[0].winch
+    geared = replace(machine.axes[0], winch=replace(winch, gear_ratio=8.0))  # four times as heavy
+    light = machine.axes[0]
+
+    def damping(*axes: RobotAxis) -> float:
+        gains = loop_model(dataclasses.replace(machine, axes=axes)).design()
+        return gains.loose_N_s_m * (1.0 - gains.smooth)
+
+    assert damping(geared, light, geared) == pytest.approx(damping(light, light, light))
+    assert damping(geared, geared, geared) == pytest.approx(4.0 * damping(light, light, light))
+
+
+# -- margins
+
+
+def radius(
+    machine: Machine, gains: LoopGains, q: FloatArray, share: float, period_s: float
+) -> float:
+    """Return the largest eigenvalue's magnitude of one cycle of robot and loop.
+
+    Cables and masses are discretised exactly, with torques that are held for a cycle and act
+    0.8 ms and a cycle behind the angles that they come from; observer, smoother and integral part
+    are those of the kernels, written anew.
+    """
+    model = machine.model()
+    pose = model.pose(q)
+    J = model.kinematics.jacobian(pose)
+    n, d = J.shape
+    k = share * rigidity(machine) / model.kinematics.lengths(pose)
+    mass = np.zeros((d + n, d + n))
+    M_p = mass_matrix(machine, q)
+    mass[:d, :d], mass[d:, d:] = M_p, np.diag(rotors(machine))
+    stretch = np.hstack([J, -np.eye(n)])
+    stiffness = np.linalg.solve(mass, stretch.T * k @ stretch)
+    pull = np.linalg.solve(mass, np.vstack([np.zeros((d, n)), -np.eye(n)]))
+    size = 2 * (d + n)
+    F = np.zeros((size + n, size + n))
+    F[: d + n, d + n : size] = np.eye(d + n)
+    F[d + n : size, : d + n], F[d + n : size, d + n : size] = (
+        -stiffness,
+        -_CABLE_DAMPING_S * stiffness,
+    )
+    F[d + n : size, size:] = pull
+    early, rest = expm(F * _LATE_S), expm(F * (period_s - _LATE_S))
+    M = M_p + gains.rotor_kg * J.T @ J
+    inertial = 2.0 * DAMPING_RATIO * gains.bandwidth_rad_s * M
+    limited = gains.damping_N_s_m * J.T @ J
+    D = np.linalg.inv(np.linalg.inv(inertial) + np.linalg.inv(limited))
+    K = D @ np.linalg.solve(M, D) / (4.0 * DAMPING_RATIO**2)
+    back, N = np.linalg.pinv(J), null_space(J.T)
+    z = np.exp(-OBSERVER_rad_s * period_s)
+    w = 1.0 - np.exp(-gains.smoother_rad_s * period_s)
+
+    def cycle(state: FloatArray) -> FloatArray:
+        plant, theta, omega, lagging, calm, integral, last, before = np.split(
+            state, np.cumsum([size, n, n, n, n, d, n])
+        )
+        predicted = theta + period_s * omega
+        error = plant[d : d + n] - predicted
+        theta, omega = predicted + (1.0 - z**2) * error, omega + (1.0 - z) ** 2 / period_s * error
+        lagging = lagging + w * (omega - lagging)
+        calm = calm + w * (lagging - calm)
+        speed = omega + gains.smooth * (calm - omega)
+        proportional = K @ back @ theta
+        integral = integral + gains.integral_1_s * period_s * proportional
+        tension = back.T @ (proportional + D @ back @ speed + integral)
+        tension = tension + gains.loose_N_s_m * N @ (N.T @ omega)
+        plant = (early @ np.concatenate([plant, before]))[:size]
+        plant = (rest @ np.concatenate([plant, last]))[:size]
+        return np.concatenate([plant, theta, omega, lagging, calm, integral, tension, last])
+
+    whole = np.eye(size + 4 * n + d + 2 * n)
+    return float(np.abs(np.linalg.eigvals(np.array([cycle(row) for row in whole]).T)).max())
+
+
+@pytest.mark.parametrize(
+    ("made", "period_s"),
+    [
+        *((make, period_s) for make in MACHINES.values() for period_s in (1e-3, 2e-3)),
+        *((lambda name=name: shipped(name), 1e-3) for name in SHIPPED),
+    ],
+    ids=[*(f"{name}-{ms}ms" for name in MACHINES for ms in (1, 2)), *SHIPPED],
+)
+def test_loops_are_stable_with_any_stiffness(made: Callable[[], Machine], period_s: float) -> None:
+    machine = made()
+    model = loop_model(machine, period_s)
+    gains = model.design()
+    margins = model.margins(gains)
+    assert min(one.modulus for one in margins) >= LEAST_MARGIN
+    for q in model.poses[:: max(1, len(model.poses) // 5)]:
+        for share in STIFFNESS_SHARES:
+            assert radius(machine, gains, q, share, period_s) < 1.0
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_margin_vanishes_where_the_loop_becomes_unstable(name: str) -> None:
+    """Damping scaled by g, stiffness by g²: from which g on do eigenvalues leave the circle?"""
+    machine = MACHINES[name]()
+    model = loop_model(machine)
+    q = model.poses[1]
+    there = LoopModel(machine.model(), rotors(machine), rigidity(machine), PERIOD_S, poses=q[None])
+    designed = model.design()
+
+    def scaled(g: float) -> LoopGains:
+        return replace(
+            designed,
+            bandwidth_rad_s=g * designed.bandwidth_rad_s,
+            damping_N_s_m=g * designed.damping_N_s_m,
+        )
+
+    def stable(g: float) -> bool:
+        gains = scaled(g)
+        return all(radius(machine, gains, q, k, PERIOD_S) < 1.0 for k in STIFFNESS_SHARES)
+
+    # with a modulus margin μ a loop bears 1/(1 - μ) times its gain, and more of its parts
+    assert stable(1.2)
+    low, high = 1.2, 20.0
+    assert not stable(high)
+    while high - low > 0.01 * low:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    moduli = [there.margins(scaled(g))[0].modulus for g in (1.0, 0.5 * (1.0 + low), low)]
+    assert moduli[0] >= LEAST_MARGIN
+    assert moduli[0] > moduli[1] > moduli[2]
+    assert moduli[2] < 0.15

@@ -1,0 +1,83 @@
+"""A platform's model as it follows from the robot's file."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from cdpr_profiles import load_robot
+from cdpr_profiles.platform import Platform
+from cdpr_rt.robots.platform_control import platform_control
+from cdpr_rt.robots.platform_model import RESERVE, directions_of, platform_model_of
+from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
+
+PLANAR, SUSPENDED = load_robot("planar-3"), load_robot("suspended-8")
+
+
+def platform_with(points: int, *anchors: tuple[float, ...]) -> Platform:
+    platform = PLANAR.platform if len(anchors[0]) == 2 else SUSPENDED.platform
+    assert platform is not None
+    exits = (platform.exit_points_m * 2)[:points]
+    all_anchors = (anchors * points)[:points]
+    return dataclasses.replace(
+        platform, exit_points_m=exits, anchor_points_m=all_anchors, controlled=()
+    )
+
+
+@pytest.mark.parametrize(
+    ("platform", "directions"),
+    [
+        (platform_with(3, (0.1, 0.0), (-0.1, 0.0)), (0, 1)),
+        (platform_with(4, (0.1, 0.0), (-0.1, 0.0)), (0, 1, 5)),
+        (platform_with(4, (0.0, 0.0)), (0, 1)),
+        (platform_with(8, (0.1, 0.0, 0.0), (-0.1, 0.0, 0.1)), (0, 1, 2, 3, 4, 5)),
+        (platform_with(6, (0.0, 0.0, 0.0)), (0, 1, 2)),
+    ],
+)
+def test_directions_follow_from_the_points(platform: Platform, directions: tuple[int, ...]) -> None:
+    assert directions_of(platform) == directions
+
+
+def test_the_reserve_is_a_part_of_what_tensions_can_keep_from_their_bounds() -> None:
+    planar, suspended = platform_model_of(PLANAR), platform_model_of(SUSPENDED)
+    assert planar.reserve_N == RESERVE * 130.0
+    box = np.array([suspended.platform.workspace_min_m, suspended.platform.workspace_max_m])
+    middle = suspended.poses(box.mean(axis=0)[None])
+    margins, _ = suspended.workspace(0.0, 0.0).margins(middle)
+    assert 0.0 < suspended.reserve_N < 0.5 * margins[0] < RESERVE * 1990.0
+    control = platform_control(planar, PLANAR.axes, np.full(3, 4.5), 1e-3)
+    assert control.position == pytest.approx(planar.platform.home_m)
+
+
+def test_weight_and_wrench_scale_are_those_of_the_directions() -> None:
+    planar, suspended = platform_model_of(PLANAR), platform_model_of(SUSPENDED)
+    assert planar.weight() == pytest.approx([0.0, -2.0 * 9.80665])
+    assert suspended.weight() == pytest.approx([0.0, 0.0, -980.665, 0.0, 0.0, 0.0])
+    arm = np.linalg.norm(suspended.platform.anchor_points_m, axis=1).max()
+    assert suspended.wrench_scale == pytest.approx([1.0, 1.0, 1.0, arm, arm, arm])
+    pose = suspended.pose(np.array([1.0, 2.0, 3.0]))
+    assert suspended.poses(np.array([[1.0, 2.0, 3.0]]))[0] == pytest.approx(pose.array)
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(
+    st.tuples(st.floats(-1.9, 1.9), st.floats(0.2, 2.9)),
+    st.tuples(st.floats(-150.0, 150.0), st.floats(-150.0, 150.0)),
+)
+def test_least_tensions_of_three_cables_have_the_least_sum(
+    place: tuple[float, float], wrench: tuple[float, float]
+) -> None:
+    model, t = platform_model_of(PLANAR), np.zeros(3)
+    W = model.kinematics.wrench_matrix(model.pose(np.array(place)))
+    outcome = model.least_tensions(model.low_N, model.high_N).solve(W, np.array(wrench), t)
+    bounds = list(zip(model.low_N, model.high_N, strict=True))
+    least = linprog([1, 1, 1], None, None, W, -np.array(wrench), bounds)
+    u = np.linalg.svd(W)[2][2]
+    if outcome is TensionOutcome.FEASIBLE and ((u > 0.01).all() or (u < -0.01).all()):
+        assert t.sum() == pytest.approx(least.fun, rel=1e-6)
+        assert (t - model.low_N).min() == pytest.approx(0.0, abs=1e-7)

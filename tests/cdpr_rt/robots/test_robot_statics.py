@@ -1,0 +1,300 @@
+"""What a planar robot's cables can hold: against linear programming, statics and the controller."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from cdpr_profiles import ProfileError, load_robot
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_rt.robots.checks import findings, refuse_impossible
+from cdpr_rt.robots.platform.cable_control import CableControl
+from cdpr_rt.robots.platform_model import RESERVE, platform_model
+from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of
+from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
+
+PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()
+UP = np.array([0.0, 9.80665])
+LOW, HIGH = np.full(3, 20.0), np.full(3, 150.0)
+
+
+def shipped() -> PlatformStatics:
+    return statics_of(load_robot("planar-3"))
+
+
+def by_linear_programming(statics: PlatformStatics, p: np.ndarray, a: np.ndarray) -> float:
+    """Return the greatest distance of all tensions from their bounds: another way to the same."""
+    ways = statics.exits_m - p - statics.anchors_m
+    W = (ways / np.linalg.norm(ways, axis=1)[:, None]).T
+    force = statics.platform.mass_kg * (a + UP)
+    bounds = np.concatenate([-statics.low_N, statics.high_N])
+    rows = np.hstack([np.concatenate([-np.eye(3), np.eye(3)]), np.ones((6, 1))])
+    found = linprog(
+        [0.0, 0.0, 0.0, -1.0],
+        A_ub=rows, b_ub=bounds, A_eq=np.hstack([W, np.zeros((2, 1))]), b_eq=force,
+        bounds=[(None, None)] * 4,
+    )  # fmt: skip
+    assert found.success
+    return float(-found.fun)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.floats(-1.9, 1.9), st.floats(0.05, 2.9), st.floats(-5, 5), st.floats(-5, 5))
+def test_the_reserve_is_what_linear_programming_finds(
+    x: float, y: float, ax: float, ay: float
+) -> None:
+    statics, p, a = shipped(), np.array([x, y]), np.array([ax, ay])
+    model = statics.model
+    w_e = -statics.platform.mass_kg * (a + UP)
+    margins, worst = model.workspace(0.0).with_wrenches(w_e[None]).margins(model.poses(p[None]))
+    tensions, reserve = worst[0], margins[0]
+    assert reserve == pytest.approx(by_linear_programming(statics, p, a), abs=1e-6)
+    ways = statics.exits_m - p - statics.anchors_m
+    pull = tensions @ (ways / np.linalg.norm(ways, axis=1)[:, None])
+    np.testing.assert_allclose(pull, statics.platform.mass_kg * (a + UP), atol=1e-9)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.floats(-2.2, 2.2), st.floats(-0.5, 3.3))
+def test_what_can_be_held_is_what_the_controller_distributes(x: float, y: float) -> None:
+    statics, p = shipped(), np.array([x, y])
+    weight = np.array([0.0, -9.80665 * statics.platform.mass_kg])
+    W, t = statics.model.kinematics.wrench_matrix(statics.model.pose(p)), np.zeros(3)
+    outcome = statics.model.least_tensions(LOW, HIGH).solve(W, weight, t)
+    reserve = float(statics.reserve_N(p))
+    if abs(reserve) > 1e-6:
+        assert (outcome is TensionOutcome.FEASIBLE) == (reserve > 0.0)
+    if reserve > 1e-6:
+        least = statics.least_tensions_N(p)
+        assert (least >= LOW - 1e-6).all() and least.sum() <= t.sum() + 1e-6
+
+
+def test_in_motion_the_worst_direction_counts_and_arrays_keep_their_shape() -> None:
+    statics, points = shipped(), shipped().box.grid(4, 3)
+    assert points.shape == (3, 4, 2)
+    moving = statics.reserve_N(points, 2.0)
+    worst = [
+        min(
+            by_linear_programming(statics, p, np.array([i, j]))
+            for i in (-2.0, 2.0)
+            for j in (-2.0, 2.0)
+        )
+        for p in points.reshape(-1, 2)
+    ]
+    np.testing.assert_allclose(moving.ravel(), worst, atol=1e-6)
+
+
+def test_the_platform_turns_to_where_the_tensions_have_no_moment() -> None:
+    statics = shipped()
+    p = np.array([0.5, 1.5])
+    angle, t = float(statics.angle_rad(p)), statics.tensions_N(p)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    arms = statics.anchors_m @ turn.T
+    ways = statics.exits_m - p - arms
+    pulls = t[:, None] * ways / np.linalg.norm(ways, axis=1)[:, None]
+    assert np.sum(arms[:, 0] * pulls[:, 1] - arms[:, 1] * pulls[:, 0]) == pytest.approx(0, abs=1e-9)
+    assert statics.angle_rad(p * [-1, 1]) == pytest.approx(-angle)
+    assert 1e-3 < abs(angle) < 0.1
+
+
+def test_the_largest_box_is_all_of_targets_and_no_wider_one_is() -> None:
+    statics, plane = shipped(), Box((-2.0, 0.0), (2.0, 3.0))
+    found = statics.largest_box(plane)
+    assert found is not None
+    spare_N = RESERVE * 130.0
+    assert statics.reserve_N(found.grid(41, 41), 2.0).min() > spare_N - 1.0
+    wider = Box((found.low_m[0] - 0.15, found.low_m[1]), (found.high_m[0] + 0.15, found.high_m[1]))
+    assert statics.reserve_N(wider.grid(41, 41), 2.0).min() < spare_N
+    heavy = dataclasses.replace(statics.platform, mass_kg=60.0)
+    assert PlatformStatics(platform_model(heavy, LOW, HIGH)).largest_box(plane) is None
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.floats(-1.2, 1.2), st.floats(0.8, 2.7))
+def test_targets_are_what_the_controller_takes(x: float, y: float) -> None:
+    robot, p = load_robot("planar-3"), np.array([x, y])
+    assert robot.platform is not None
+    statics = shipped()
+    control = CableControl(statics.model, list(robot.axes), np.full(3, 4.5), 1e-3)
+    moving_N = float(statics.reserve_N(p, statics.platform.acceleration_m_s2))
+    # the controller counts no more than it must of the acceleration
+    if abs(moving_N - statics.model.reserve_N) > 0.5:
+        assert (control.feasible(p) == "") == bool(statics.is_target(p))
+
+
+def test_a_platform_that_is_a_point_does_not_turn_and_may_sit_in_an_exit_point() -> None:
+    platform = dataclasses.replace(shipped().platform, anchor_points_m=((0.0, 0.0),) * 3)
+    statics = PlatformStatics(platform_model(platform, LOW, HIGH))
+    assert statics.angle_rad(np.array([0.3, 1.5])) == 0.0
+    at_exits = statics.reserve_N(np.array(platform.exit_points_m))
+    assert (at_exits == -np.inf).all()
+
+
+# -- checks
+
+
+def told_of(folder: Path, *replaced: tuple[str, str]) -> list[tuple[str, str, bool]]:
+    text = PLANAR
+    for old, new in replaced:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "mine.toml"
+    path.write_text(text)
+    return [(f.key, f.text, f.impossible) for f in findings(load_robot(path))]
+
+
+def test_the_shipped_robot_is_held_with_a_reserve_in_its_whole_box() -> None:
+    robot, statics = load_robot("planar-3"), shipped()
+    assert findings(robot) == [] and refuse_impossible(robot) == []
+    points = statics.box.grid(31, 31)
+    assert statics.reserve_N(points, statics.platform.acceleration_m_s2).min() > 18.0
+    assert findings(load_robot("spatial-8")) == []
+
+
+def test_a_home_where_the_platform_would_tip_is_doubtful(tmp_path: Path) -> None:
+    apart = [
+        ("[-2.0, 3.0]", "[-1.0, 2.5]"),
+        ("[2.0, 3.0]", "[2.5, 2.0]"),
+        ("[0.0, 0.0]", "[-0.5, -0.5]"),
+    ]
+    box = [
+        ("[-0.6, 1.4]", "[0.4, 1.3]"),
+        ("[0.6, 2.4]", "[1.1, 1.6]"),
+        ("[0.0, 1.3]", "[0.75, 1.25]"),
+    ]
+    told = told_of(tmp_path, *apart, *box)
+    assert any(key == "platform.home_m" and "tip it on its stand" in text for key, text, _ in told)
+
+
+SUSPENDED = (SHIPPED / "robots" / "suspended-8.toml").read_text()
+
+
+def findings_of(folder: Path, text: str) -> dict[str, str]:
+    path = folder / "space.toml"
+    path.write_text(text)
+    return {finding.key: finding.text for finding in findings(load_robot(path))}
+
+
+@pytest.mark.parametrize("name", ["planar-4", "point-4", "suspended-6", "suspended-8", "spatial-8"])
+def test_every_shipped_robot_holds_its_box_at_all_orientations(name: str) -> None:
+    robot = load_robot(name)
+    assert findings(robot) == []
+    statics = statics_of(robot)
+    assert (
+        len(statics.orientations) == {3: 3, 6: 15}.get(statics.model.size, 1) or name == "point-4"
+    )
+    moving = statics.reserve_N(
+        statics.points(), statics.platform.acceleration_m_s2, statics.orientations
+    )
+    assert moving.min() > statics.model.reserve_N
+
+
+def test_angles_that_nothing_controls_in_space_are_told(tmp_path: Path) -> None:
+    free = 'controlled = ["x", "y", "z"]\nmass_kg'
+    text = re.sub(r"workspace_angle_rad.*\n", "", SUSPENDED.replace("mass_kg", free, 1))
+    assert "rx, ry, rz left out" in findings_of(tmp_path, text)["platform.controlled"]
+
+
+def test_points_in_a_line_or_an_upright_plane_are_told_to_hold_nothing(tmp_path: Path) -> None:
+    level = re.sub(r"(anchor_point_m = \[.*), .*, .*\]", r"\1, 0.0, 0.0]", SUSPENDED)
+    assert "all anchor points lie in one line" in findings_of(tmp_path, level)["platform.home_m"]
+    camera = (SHIPPED / "robots" / "point-4.toml").read_text()
+    for i, exit_m in enumerate(re.findall(r"exit_point_m = (\[.*\])", camera)):
+        camera = camera.replace(exit_m, f"[{-3.0 + 2.0 * i}, 0.0, 4.0]", 1)
+    assert "all exit points lie in one line" in findings_of(tmp_path, camera)["platform.home_m"]
+
+
+def test_orientations_that_cables_cannot_hold_are_told_with_the_angle_that_they_can(
+    tmp_path: Path,
+) -> None:
+    text = SUSPENDED.replace("workspace_angle_rad = 0.2618", "workspace_angle_rad = 0.6")
+    told = findings_of(tmp_path, text)["platform.workspace_min_m"]
+    assert re.search(
+        r"turned by 34 deg about .*; workspace_angle_rad up to 0\.\d+ is possible", told
+    )
+
+
+def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
+    text = SUSPENDED.replace("angular_speed_rad_s = 0.25", "angular_speed_rad_s = 0.6")
+    assert "platform.speed_m_s" in findings_of(tmp_path, text)
+
+
+def test_a_mass_beside_the_origin_is_held_by_other_tensions() -> None:
+    statics = statics_of(load_robot("suspended-8"))
+    aside = dataclasses.replace(statics.platform, centre_of_mass_m=(0.2, 0.0, 0.0))
+    other = PlatformStatics(platform_model(aside, statics.low_N, statics.high_N))
+    p = np.array([0.5, 0.3, 1.5])
+    t, pose = other.tensions_N(p), other.model.pose(p)
+    W = other.model.kinematics.wrench_matrix(pose)
+    weight = np.array([0.0, 0.0, -9.80665 * aside.mass_kg])
+    wrench = np.concatenate([weight, np.cross([0.2, 0.0, 0.0], weight)])
+    np.testing.assert_allclose(W @ t + wrench, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "key", "problem", "impossible"),
+    [
+        ([("mass_kg = 2.0", "mass_kg = 60.0")], "platform.home_m", "of up to 12.6 kg", True),
+        ([("mass_kg = 2.0", "mass_kg = 2000.0")], "platform.home_m", "of up to 12.6 kg", True),
+        ([("period_s = 0.001", "period_s = 0.01")], "sync_period_s", "up to 0.005", True),
+        ([("mass_kg = 2.0", "mass_kg = 15.0")], "platform.workspace_min_m", "up to 3 kg is", True),
+        ([("[0.0, 1.3]", "[0.5, 0.3]")], "platform.home_m", "further inside", True),
+        ([("[0.0, 1.3]", "[0.6, -0.5]")], "platform.home_m", "only a place", True),
+        ([("[-0.6, 1.4]", "[-0.6, 0.9]")], "platform.workspace_min_m", "2.40) m they", False),
+        ([("n_m_s2 = 2.0", "n_m_s2 = 50")], "platform.home_m", "acceleration_m_s2 up to", True),
+        ([("torque_Nm = 4.5", "torque_Nm = 2.5")], "limits.tension_max_N", "up to 96 N", True),
+        ([("speed_m_s = 0.5", "speed_m_s = 5")], "platform.speed_m_s", "allowed: up to 1.9", True),
+        ([("[-0.075, 0.0433]", "[-75.0, 43.3]")], "axes[0].anchor_point_m", "in millimetres", True),
+        ([("[0.0, 0.0]", "[2.0, 3.0]")], "axes[2].exit_point_m", "0 m from that of axes[1]", True),
+        ([("[0.0, 0.0]", "[0.0, 3.0]")], "platform.home_m", "tension_min_N up to 2 is", True),
+        ([("[-2.0, 3.0]", "[-0.5, 2.0]")], "platform.workspace_min_m", "from the exit point", True),
+        (
+            [("slack_N", "cable_length_max_m = 2.5\nslack_N")],
+            "limits.cable_length_max_m",
+            "axes[0] has 2.97 m",
+            True,
+        ),
+        (
+            [("torque_Nm = 4.5", "torque_Nm = 11.0"), ("max_N = 150", "max_N = 400"),
+             ("[0.6, 2.4]", "[0.6, 2.8]")],
+            "platform.workspace_max_m",
+            "motor is rated for 3 Nm",
+            False,
+        ),
+        (
+            [("[-0.075, 0.0433]", "[0.0751, 0.0433]"), ("[0.075, 0.0433]", "[-0.075, 0.0433]")],
+            "axes[0].anchor_point_m",
+            "turn the platform over",
+            True,
+        ),
+        (
+            [("[-0.075, 0.0433]", "[-0.075, 0.0]"), ("[0.075, 0.0433]", "[0.075, 0.0]"),
+             ("[0.0, -0.0866]", "[0.0, -0.3]")],
+            "axes[0].anchor_point_m",
+            "which no cable can prevent",
+            False,
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_work_is_told_with_what_would(
+    tmp_path: Path, replaced: list[tuple[str, str]], key: str, problem: str, impossible: bool
+) -> None:
+    told = told_of(tmp_path, *replaced)
+    about = [(text, bad) for found, text, bad in told if found == key]
+    assert about, told
+    assert any(problem in text and bad is impossible for text, bad in about), about
+    robot = load_robot(tmp_path / "mine.toml")
+    if impossible:
+        with pytest.raises(ProfileError, match=r"mine\.toml: ") as caught:
+            refuse_impossible(robot)
+        assert f"{key}: " in str(caught.value)
+    else:
+        assert any(f"{key}: " in line for line in refuse_impossible(robot))

@@ -1,0 +1,116 @@
+"""Wrench-feasible workspace of any robot: its margin against linear programming, and its words."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from cdpr_rt.robots.kinematics.kinematics import (
+    PLANAR,
+    PLANAR_POINT,
+    POINT,
+    SPATIAL,
+    CableKinematics,
+)
+from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.workspace import SHARES, CableWorkspace, wrenches_in_motion
+
+SHAPES = [(PLANAR_POINT, 2), (PLANAR_POINT, 3), (PLANAR, 4), (PLANAR, 5), (POINT, 4), (POINT, 7)]
+SHAPES += [(SPATIAL, 6), (SPATIAL, 7), (SPATIAL, 8), (SPATIAL, 9)]
+LOW_N, HIGH_N = 20.0, 900.0
+
+
+def made_up(
+    directions: tuple[int, ...], n: int, rng: np.random.Generator
+) -> tuple[CableWorkspace, Pose]:
+    a, b = rng.uniform(-3.0, 3.0, (n, 3)), rng.uniform(-0.3, 0.3, (n, 3))
+    d = len(directions)
+    wrenches = rng.normal(0.0, 80.0, (int(rng.integers(1, 5)), d))
+    low, high = LOW_N * rng.uniform(0.5, 1.5, n), HIGH_N * rng.uniform(0.5, 1.5, n)
+    robot = CableKinematics(a, b, directions)
+    pose = Pose(rng.uniform(-0.8, 0.8, 3)).plus(np.array([0, 0, 0, *rng.uniform(-0.2, 0.2, 3)]))
+    return CableWorkspace(robot, wrenches, low, high, np.ones(d)), pose
+
+
+def by_linear_programming(workspace: CableWorkspace, pose: Pose) -> float:
+    W = workspace.kinematics.wrench_matrix(pose)
+    d, n = W.shape
+    rows = np.hstack([np.vstack([-np.eye(n), np.eye(n)]), np.ones((2 * n, 1))])
+    bounds = np.concatenate([-workspace.low, workspace.high])
+    told = [
+        linprog(
+            [0.0] * n + [-1.0], rows, bounds, np.hstack([W, np.zeros((d, 1))]), -w_e,
+            [(None, None)] * (n + 1),
+        )
+        for w_e in workspace.wrenches
+    ]  # fmt: skip
+    return float(min(-found.fun for found in told))
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(st.sampled_from(SHAPES), st.integers(0, 2**32 - 1))
+def test_the_margin_is_what_linear_programming_finds(
+    shape: tuple[tuple[int, ...], int], seed: int
+) -> None:
+    workspace, pose = made_up(*shape, np.random.default_rng(seed))
+    (margin,), (t,) = workspace.margins(pose.array[None])
+    W = workspace.kinematics.wrench_matrix(pose)
+    if np.linalg.cond(W) > 1e4:
+        return
+    assert margin == pytest.approx(by_linear_programming(workspace, pose), abs=1e-5, rel=1e-7)
+    # the tensions carry one of the wrenches, and have the margin
+    missing = np.abs(W @ t + workspace.wrenches).max(axis=1)
+    assert missing.min() < 1e-6
+    inside = np.minimum(t - workspace.low, workspace.high - t).min()
+    assert inside == pytest.approx(margin, abs=1e-6)
+    assert workspace.stands(pose) == (margin >= 0.0)
+    assert (workspace.feasible(pose) == "") == (margin >= 0.0)
+
+
+def test_what_no_tension_holds_is_told() -> None:
+    flat = CableKinematics(
+        np.array([[-1.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), np.zeros((3, 2)), (0, 1)
+    )
+    weight = wrenches_in_motion(2.0, 0.0, 1, (0, 1))
+    workspace = CableWorkspace(flat, weight, np.zeros(3), np.full(3, 9.0), np.ones(2))
+    assert "cannot hold one direction" in workspace.feasible(Pose(np.zeros(3)))
+    assert "cannot hold one direction" in workspace.feasible(Pose(np.array([1.0, 0.0, 0.0])))
+    margins, _ = workspace.margins(Pose(np.zeros(3)).array[None])
+    assert margins[0] == -math.inf
+    assert "N outside" in workspace.feasible(Pose(np.array([0.5, -0.3, 0.0])))
+
+
+def test_a_platform_in_motion_needs_more_in_every_direction() -> None:
+    told = wrenches_in_motion(2.0, 3.0, 2, SPATIAL)
+    assert told.shape == (8, 6)
+    assert {tuple(row) for row in np.abs(told[:, :2])} == {(6.0, 6.0)}
+    assert sorted(set(told[:, 2])) == pytest.approx([-2.0 * 9.80665 - 6.0, -2.0 * 9.80665 + 6.0])
+    assert not told[:, 3:].any()
+
+
+def test_the_first_place_in_the_way_is_found() -> None:
+    ceiling = np.array([[-2.0, -2.0, 3.0], [2.0, -2.0, 3.0], [2.0, 2.0, 3.0], [-2.0, 2.0, 3.0]])
+    robot = CableKinematics(ceiling, np.zeros((4, 3)), POINT)
+    weight = wrenches_in_motion(10.0, 0.0, 2, POINT)
+    workspace = CableWorkspace(robot, weight, np.full(4, 1.0), np.full(4, 200.0), np.ones(3))
+
+    def first_obstacle(start: tuple[float, ...], end: tuple[float, ...]) -> tuple[Pose, str] | None:
+        poses = np.zeros((len(SHARES), 4, 3))
+        poses[:, 0] = (1.0 - SHARES[:, None]) * np.array(start) + SHARES[:, None] * np.array(end)
+        poses[:, 1:] = np.eye(3)
+        return workspace.first_obstacle(poses)
+
+    start, end = (0.0, 0.0, 1.0), (4.0, 0.0, 1.0)
+    obstacle = first_obstacle(start, end)
+    assert obstacle is not None
+    there, why = obstacle
+    assert "N outside" in why and there.p[0] == pytest.approx(2.0, abs=0.25)
+    assert first_obstacle(start, (1.0, 0.5, 0.5)) is None
+    # a start that is not held is left
+    assert first_obstacle((2.5, 0.0, 1.0), start) is None
+    assert first_obstacle((2.5, 0.0, 1.0), end) is not None

@@ -1,0 +1,308 @@
+"""Who is let in: over real sockets."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import socket
+import stat
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from cdpr_rt.service import listening
+from cdpr_rt.service.http import access_control, tickets
+from cdpr_rt.service.http.access_control import AccessPolicy, is_own_host
+from cdpr_rt.service.listening import ListenError, listen_tcp, listen_unix
+from tests.cdpr_rt.service.http.service_rig import KEY, Rig, wait_for
+
+THROTTLE_S = 4.0
+"""So late that no busy machine makes it of an answer at once."""
+RIGHT = {"Authorization": f"Bearer {KEY.decode()}"}
+UPGRADE = {
+    "Connection": "Upgrade",
+    "Upgrade": "websocket",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+}
+
+
+# -- the key
+
+
+def test_without_the_key_there_is_the_status_and_nothing_else(rig: Rig) -> None:
+    with httpx.Client(base_url=rig.guarded_url) as client:
+        assert client.get("/status").status_code == 200
+        paths = client.get("/openapi.json").json()["paths"]
+        asked = 0
+        for path, methods in paths.items():
+            for method in methods:
+                if path == "/status":
+                    continue
+                answer = client.request(method, path, json={})
+                assert answer.status_code == 401, path
+                assert answer.headers["www-authenticate"] == "Bearer"
+                asked += 1
+        assert asked > 12
+        assert client.post("/status").status_code == 401
+    assert rig.loop.commands == []
+
+
+def test_where_no_key_was_given_any_user_may_look_on_and_stop_and_nothing_else(rig: Rig) -> None:
+    with httpx.Client(base_url=rig.url) as client:
+        refused = 0
+        for path, methods in client.get("/openapi.json").json()["paths"].items():
+            for method in methods:
+                answer = client.request(method, path, json={})
+                if method == "get" or path in ("/hold", "/disable"):
+                    assert answer.status_code == 200, path
+                else:
+                    assert answer.status_code == 401, path
+                    assert "--key-file" in answer.json()["error"]
+                    refused += 1
+        assert refused > 8
+    with (
+        pytest.raises(InvalidStatus, match="401"),
+        connect(f"ws://127.0.0.1:{rig.port}/control?client=x"),
+    ):
+        pass
+    with connect(f"ws://127.0.0.1:{rig.port}/live") as onlooker:
+        onlooker.recv()
+    assert {command["do"] for command in rig.loop.commands} == {"hold", "disable"}
+    assert rig.service.lease.holder() is None
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["", "Bearer", "Bearer x", f"Basic {KEY.decode()}", f"Bearer {KEY.decode()}x", "Bearer \xe9"],
+)
+def test_a_wrong_key_opens_nothing(rig: Rig, given: str) -> None:
+    headers = {"Authorization": given.encode("latin-1")}
+    answer = httpx.post(f"{rig.guarded_url}/hold", headers=headers)
+    assert answer.status_code == 401
+    assert rig.loop.commands == []
+
+
+def test_the_key_opens_everything(rig: Rig) -> None:
+    assert httpx.post(f"{rig.guarded_url}/hold", headers=RIGHT).status_code == 200
+    assert [command["do"] for command in rig.loop.commands] == ["hold"]
+
+
+def test_wrong_keys_are_answered_ever_more_slowly_and_the_right_one_at_once(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(access_control, "_THROTTLE_S", THROTTLE_S)
+    spent_s = []
+    with httpx.Client(base_url=rig.guarded_url, headers={"Authorization": "Bearer x"}) as guesser:
+        while not spent_s or spent_s[-1] < THROTTLE_S:
+            begin = time.monotonic()
+            assert guesser.post("/hold").status_code == 401
+            spent_s.append(time.monotonic() - begin)
+        begin = time.monotonic()
+        assert httpx.post(f"{rig.guarded_url}/hold", headers=RIGHT).status_code == 200
+        assert httpx.get(f"{rig.guarded_url}/control", headers=RIGHT).status_code == 200
+        assert time.monotonic() - begin < THROTTLE_S
+
+
+def test_guesses_at_the_token_are_slowed_down_but_no_stop_is(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(access_control, "_THROTTLE_S", THROTTLE_S)
+    url = rig.guarded_url
+    maria = {"client": "maria", "ttl_s": 10.0}
+    held = httpx.post(f"{url}/control", json=maria, headers=RIGHT).json()
+    with httpx.Client(base_url=url, headers={**RIGHT, "X-Control-Token": "guessed"}) as guesser:
+        spent_s = 0.0
+        while spent_s < THROTTLE_S:
+            begin = time.monotonic()
+            assert guesser.put("/control").status_code == 409
+            spent_s = time.monotonic() - begin
+        begin = time.monotonic()
+        assert guesser.post("/hold").status_code == 200
+        right = {**RIGHT, "X-Control-Token": held["token"]}
+        assert httpx.put(f"{url}/control", headers=right).status_code == 200
+        assert time.monotonic() - begin < THROTTLE_S
+
+
+# -- tickets
+
+
+def ticket_of(rig: Rig) -> str:
+    answer = httpx.post(f"{rig.guarded_url}/ticket", headers=RIGHT)
+    assert answer.json()["valid_s"] == tickets.VALID_S
+    return str(answer.json()["ticket"])
+
+
+def opened(rig: Rig, port: int, query: str, origin: str | None = None) -> int:
+    """Return the status of the answer to who opens the WebSocket of `/control`."""
+    try:
+        with connect(
+            f"ws://127.0.0.1:{port}/control?client=page&{query}",
+            origin=origin,  # type: ignore[arg-type]  # a str of its own
+        ) as connection:
+            connection.recv(5.0)
+    except InvalidStatus as refused:
+        return refused.response.status_code
+    wait_for(lambda: rig.service.lease.holder() is None)
+    return 101
+
+
+def test_a_ticket_opens_one_websocket_where_the_key_is_asked(rig: Rig) -> None:
+    ticket = ticket_of(rig)
+    own = f"http://127.0.0.1:{rig.guarded_port}"
+    assert opened(rig, rig.guarded_port, f"ticket={ticket}", own) == 101
+    assert opened(rig, rig.guarded_port, f"ticket={ticket}", own) == 401
+    assert httpx.post(f"{rig.guarded_url}/ticket").status_code == 401
+
+
+def test_a_ticket_is_of_no_use_to_another_page_or_at_another_address(rig: Rig) -> None:
+    ticket = ticket_of(rig)
+    assert opened(rig, rig.guarded_port, f"ticket={ticket}", "http://evil.example") == 403
+    assert opened(rig, rig.port, f"ticket={ticket}") == 401
+    with httpx.Client(base_url=rig.guarded_url) as client:
+        assert client.get("/events", params={"ticket": ticket}).status_code == 401
+    assert opened(rig, rig.guarded_port, f"ticket={ticket}") == 101  # nobody has used it up
+
+
+@pytest.mark.parametrize("query", ["", "ticket=", "ticket=made-up", "x&" * 2000 + "ticket=1"])
+def test_without_a_ticket_that_was_given_no_websocket_opens(rig: Rig, query: str) -> None:
+    ticket_of(rig)
+    assert opened(rig, rig.guarded_port, query) == 401
+
+
+def test_a_ticket_is_good_for_a_short_time_and_there_are_not_many() -> None:
+    now_s = 0.0
+    given = tickets.Tickets(lambda: now_s)
+    late = given.issue()
+    now_s = tickets.VALID_S
+    assert not given.redeem(late)
+    many = [given.issue() for _ in range(tickets.MOST_TICKETS + 1)]
+    assert [given.redeem(one) for one in many] == [False] + [True] * tickets.MOST_TICKETS
+
+
+def test_the_description_names_the_key(rig: Rig) -> None:
+    described = httpx.get(f"{rig.guarded_url}/openapi.json").json()
+    assert described["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
+    assert described["paths"]["/enable"]["post"]["security"] == [{"key": []}]
+    assert described["paths"]["/status"]["get"]["security"] == []
+
+
+# -- pages of others
+
+
+@pytest.mark.parametrize(
+    "host", ["robot.example.com", "127.0.0.1.example.com", "localhost.evil:80", "", "[::1].x"]
+)
+def test_a_name_that_was_pointed_here_is_not_ours(rig: Rig, host: str) -> None:
+    answer = httpx.get(f"{rig.url}/status", headers={"Host": host})
+    assert answer.status_code == 403
+
+
+def test_nor_does_the_key_make_it_ours(rig: Rig) -> None:
+    foreign = {"Host": "robot.example.com"}
+    for path in ("/status", "/docs", "/control"):
+        answer = httpx.get(f"{rig.guarded_url}{path}", headers={**RIGHT, **foreign})
+        assert answer.status_code == 403
+    answer = httpx.post(f"{rig.guarded_url}/hold", headers={**RIGHT, **foreign})
+    assert answer.status_code == 403
+    assert rig.loop.commands == []
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "robot.example.com"},
+        {"Origin": "http://robot.example.com"},
+        {"Host": "robot.example.com", "Origin": "http://robot.example.com"},
+    ],
+)
+def test_a_page_of_another_host_opens_no_websocket(
+    rig: Rig, headers: dict[str, str], caplog: pytest.LogCaptureFixture
+) -> None:
+    refused = rig.service.counts["refused"]
+    for url, key in ((rig.url, {}), (rig.guarded_url, RIGHT)):
+        for path in ("/live", "/control?client=page"):
+            answer = httpx.get(f"{url}{path}", headers={**UPGRADE, **key, **headers})
+            assert answer.status_code == 403
+    assert rig.service.counts["refused"] == refused + 4
+    assert not [record for record in caplog.records if record.levelno >= logging.ERROR]
+
+
+@pytest.mark.parametrize("host", ["localhost", "LOCALHOST:8080", "127.0.0.1:1", "[::1]:99"])
+def test_this_machines_own_names_are_ours(rig: Rig, host: str) -> None:
+    assert httpx.get(f"{rig.url}/status", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("origin", ["http://example.com", "null", "https://127.0.0.1", ""])
+def test_a_page_of_another_host_cannot_even_stop_the_robot(rig: Rig, origin: str) -> None:
+    for url, client in ((rig.url, httpx.Client()), ("http://robot", rig.client())):
+        with client:
+            answer = client.post(f"{url}/hold", headers={"Origin": origin})
+            assert answer.status_code == 403
+    assert rig.loop.commands == []
+
+
+def test_a_page_of_our_own_may(rig: Rig) -> None:
+    assert httpx.post(f"{rig.url}/hold", headers={"Origin": rig.url}).status_code == 200
+
+
+# -- sockets
+
+
+def test_the_unix_socket_is_for_this_user_only(rig: Rig) -> None:
+    assert stat.S_IMODE(rig.socket.stat().st_mode) == 0o600
+    assert rig.socket.stat().st_uid == os.getuid()
+
+
+def test_a_socket_in_use_is_refused_and_one_left_behind_is_replaced(
+    rig: Rig, tmp_path: Path
+) -> None:
+    with pytest.raises(ListenError, match="another daemon listens there"):
+        listen_unix(rig.socket)
+    left = tmp_path / "left.sock"
+    listen_unix(left).close()
+    assert left.exists()
+    with listen_unix(left):
+        assert listening._answers(left)
+
+
+def test_a_file_in_the_sockets_place_is_left_alone(tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    file.write_text("mine")
+    with pytest.raises(ListenError, match="something else"):
+        listen_unix(file)
+    assert file.read_text() == "mine"
+
+
+def test_what_cannot_be_replaced_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_path: Path) -> None:  # as of a stranger's socket in /tmp
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    left = tmp_path / "left.sock"
+    listen_unix(left).close()
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(ListenError, match=r"left\.sock: Operation not permitted"):
+        listen_unix(left)
+    with pytest.raises(ListenError, match="name too long"):
+        listen_unix(tmp_path / (300 * "x"))
+
+
+def test_an_address_in_use_is_named(rig: Rig) -> None:
+    with pytest.raises(ListenError, match=f"127.0.0.1:{rig.port}: .*in use"):
+        listen_tcp("127.0.0.1", rig.port)
+    with pytest.raises(ListenError, match=r"no\.such\.host"):
+        listen_tcp("no.such.host.invalid", 1)
+
+
+def test_a_listener_on_loopback_does_not_answer_to_names_of_the_network() -> None:
+    name = f"{socket.gethostname().lower()}.local:8000"
+    assert is_own_host(name, AccessPolicy.on_tcp(None, "0.0.0.0").hosts)
+    inside = AccessPolicy.on_tcp(None, "localhost", loopback=True)
+    assert not is_own_host(name, inside.hosts)
+    assert is_own_host("localhost:8000", inside.hosts)
+    assert is_own_host("127.0.0.1:8000", inside.hosts)

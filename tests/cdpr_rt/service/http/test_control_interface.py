@@ -1,0 +1,432 @@
+"""Commands, the right to move, status, events and metrics over a real socket."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from cdpr_rt.service.streams.setpoint_stream import SetpointStream, listen_udp
+from cdpr_rt.service.streams.stream_client import StreamClient
+from cdpr_rt.service.streams.stream_packet import Standing, StreamSession
+from tests.cdpr_rt.service.http.service_rig import AXES, Rig, running, wait_for
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with running(tmp_path_factory.mktemp("service")) as rig:
+        yield rig
+
+
+@pytest.fixture
+def rig(shared: Rig) -> Rig:
+    shared.reset()
+    return shared
+
+
+@pytest.fixture
+def own_rig(tmp_path: Path) -> Iterator[Rig]:
+    with running(tmp_path) as rig:
+        yield rig
+
+
+def take(client: httpx.Client, name: str = "maria", ttl_s: float = 2.0) -> dict[str, str]:
+    answer = client.post("/control", json={"client": name, "ttl_s": ttl_s})
+    assert answer.status_code == 200, answer.text
+    return {"X-Control-Token": answer.json()["token"]}
+
+
+def test_what_moves_needs_the_right_to_move_and_never_reaches_the_loop_without(rig: Rig) -> None:
+    with rig.client() as client:
+        for path, body in (
+            ("/enable", {}),
+            ("/program", {"program": "jog"}),
+            ("/set", {"wanted": {}}),
+        ):
+            for headers in ({}, {"X-Control-Token": "made up"}):
+                answer = client.post(path, json=body, headers=headers)
+                assert answer.status_code == 409
+                assert "right to move" in answer.json()["error"]
+    assert rig.loop.commands == []
+
+
+def test_its_holder_moves_and_others_are_told_who_that_is(rig: Rig) -> None:
+    with rig.client() as client:
+        headers = take(client)
+        wanted = {"velocity_rad_s": [0.5, 0]}
+        answer = client.post(
+            "/enable",
+            json={"program": "jog", "wanted": wanted, "client": "maria"},
+            headers=headers,
+        )
+        assert answer.json() == {"text": "", "state": "active"}
+        refused = client.post("/control", json={"client": "jan"})
+        assert refused.status_code == 409
+        assert "maria holds the right to move" in refused.json()["error"]
+        assert client.get("/control").json()["client"] == "maria"
+    (command,) = rig.loop.commands
+    assert command["do"] == "enable"
+    assert (command["program"], command["wanted"]) == ("jog", wanted)
+    assert command["client"] == "maria"
+
+
+def test_an_order_carries_the_number_of_the_taking_it_was_given_under(rig: Rig) -> None:
+    with rig.client() as client:
+        for name in ("maria", "jan"):
+            headers = take(client, name)
+            for path, body in (
+                ("/enable", {}),
+                ("/program", {"program": "jog"}),
+                ("/set", {"wanted": {}}),
+                ("/lengths", {"wanted": {}}),
+            ):
+                assert client.post(path, json=body, headers=headers).status_code == 200
+            client.delete("/control", headers=headers)
+        client.post("/hold")
+    numbers = [command.get("right") for command in rig.loop.commands]
+    last = int(rig.block.counters["right_number"][0])
+    assert numbers == [last - 1] * 4 + [last] * 4 + [None], "hold is everybody's"
+
+
+def test_power_on_needs_no_body(rig: Rig) -> None:
+    with rig.client() as client:
+        assert client.post("/enable", headers=take(client)).status_code == 200
+    assert rig.loop.commands[-1]["program"] == "hold"
+
+
+@pytest.mark.parametrize("path", ["/enable", "/set", "/hold", "/control"])
+def test_what_is_no_json_is_told_from_what_is_not_allowed(rig: Rig, path: str) -> None:
+    json_type = {"Content-Type": "application/json"}
+    with rig.client() as client:
+        answer = client.post(path, content=b'{"client": ', headers=json_type)
+        assert answer.status_code == 400
+        assert answer.json()["error"].startswith("the body is not JSON: ")
+        assert client.post(path, json={"client": 1}).status_code == 422
+    assert rig.loop.commands == []
+
+
+class Unstartable:
+    name = "recording"
+
+    def start(self) -> None:
+        raise OSError("no folder to record into")
+
+
+def test_the_status_tells_what_does_not_work_of_what_was_asked_for(own_rig: Rig) -> None:
+    service = own_rig.service
+    sock = listen_udp("127.0.0.1", 0)
+    ended = partial(service.note_failure, SetpointStream.name)
+    stream = SetpointStream(service.block, service.lease, sock, ended=ended)
+    sock.close()
+    service.start_parts([Unstartable(), stream])  # type: ignore[list-item]  # it gets no further
+    wait_for(lambda: bool(stream.status()["error"]))
+    with own_rig.client() as client:
+        parts = client.get("/status").json()["parts"]
+        events = [event["text"] for event in client.get("/events").json()["events"]]
+    assert parts["recording"]["error"] == "cannot start: no folder to record into"
+    assert parts["stream"]["error"].startswith("the set-point stream ended: ")
+    assert {f"recording: {parts['recording']['error']}", parts["stream"]["error"]} <= set(events)
+
+
+def test_the_holder_alone_is_given_a_session_of_the_stream(rig: Rig) -> None:
+    with rig.client() as client:
+        headers = take(client)
+        answer = client.post("/stream", headers=headers)
+        assert answer.status_code == 404
+        assert "takes no set-point stream" in answer.json()["error"]
+        stream = SetpointStream(rig.block, rig.service.lease, listen_udp("127.0.0.1", 0))
+        rig.service.start_parts([stream])
+        try:
+            for wrong in ({}, {"X-Control-Token": "made up"}):
+                assert client.post("/stream", headers=wrong).status_code == 409
+            told = client.post("/stream", headers=headers).json()
+            assert (told["host"], told["port"]) == stream.address
+            given = StreamSession(told["session"], bytes.fromhex(told["key"]))
+            with StreamClient(told["host"], told["port"], given) as hand:
+                wait_for(lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != [])
+                assert hand.state is not None
+                assert hand.state.standing is Standing.ACCEPTED
+                client.delete("/control", headers=headers)
+                take(client, "jan")
+                answered = hand.answered
+                wait_for(
+                    lambda: hand.send((0.0, 0.0, 0.0)) and hand.receive() != []
+                    and hand.answered > answered + 2
+                )  # fmt: skip
+                assert hand.state.standing is Standing.NO_RIGHT
+            assert rig.block.samples["right"].max() < rig.block.counters["right_number"][0]
+        finally:
+            rig.service.stop_parts()
+            rig.service.parts, rig.service.stream = [], None
+
+
+@pytest.mark.parametrize("do", ["hold", "disable", "shutdown"])
+def test_anybody_may_stop_while_somebody_else_moves(rig: Rig, do: str) -> None:
+    with rig.client() as client:
+        take(client)
+        assert client.post(f"/{do}").status_code == 200
+    assert [command["do"] for command in rig.loop.commands] == [do]
+
+
+def test_silence_ends_the_right_by_itself(rig: Rig) -> None:
+    with rig.client() as client:
+        headers = take(client, ttl_s=0.3)
+        assert 0.0 < rig.lease_left_s <= 0.3
+        client.put("/control", headers=headers)
+        time.sleep(0.4)
+        assert rig.lease_left_s < 0.0
+        answer = client.put("/control", headers=headers)
+        assert answer.status_code == 409
+        assert "run out" in answer.json()["error"]
+        take(client, "jan")
+
+
+def test_given_back_the_loop_knows_at_once(rig: Rig) -> None:
+    with rig.client() as client:
+        headers = take(client, ttl_s=10.0)
+        assert client.delete("/control", headers=headers).json()["held"] is False
+    assert rig.lease_left_s < 0.0
+
+
+def test_the_right_outlasts_a_command_that_takes_long_but_not_a_client_that_leaves(
+    rig: Rig,
+) -> None:
+    rig.loop.answers = False
+    with rig.client() as client:
+        headers = take(client, ttl_s=0.4)
+        asking = threading.Thread(
+            target=lambda: client.post("/enable", json={}, headers=headers), daemon=True
+        )
+        asking.start()
+        time.sleep(1.0)
+        assert rig.lease_left_s > 0.0
+        rig.loop.answers = True
+        asking.join(5.0)
+        rig.loop.answers = False
+    with rig.client() as client:
+        wait_for(lambda: rig.lease_left_s < 0.0)
+        headers = take(client, ttl_s=0.4)
+        with pytest.raises(httpx.ReadTimeout):
+            client.post("/enable", json={}, headers=headers, timeout=0.6)
+    wait_for(lambda: rig.lease_left_s < 0.0, 2.0)
+
+
+def test_what_the_loop_refuses_is_passed_on_with_its_state(rig: Rig) -> None:
+    with rig.client() as client:
+        answer = client.post("/check")
+    assert answer.status_code == 409
+    assert answer.json() == {"error": "check: node 3 does not answer", "state": "inactive"}
+
+
+def test_many_who_ask_for_hold_at_once_are_one_command(rig: Rig) -> None:
+    rig.loop.answers = False
+    answers: list[int] = []
+    begin = threading.Barrier(20)
+
+    def ask() -> None:
+        with rig.client() as client:
+            client.get("/control")
+            begin.wait()
+            answers.append(client.post("/hold", timeout=30.0).status_code)
+
+    threads = [threading.Thread(target=ask) for _ in range(20)]
+    for thread in threads:
+        thread.start()
+    wait_for(lambda: int(rig.block.counters["commands"][0]) > 0)
+    time.sleep(0.5)
+    rig.loop.answers = True
+    for thread in threads:
+        thread.join()
+    assert answers == [200] * 20
+    assert len(rig.loop.commands) < 10  # some may have come when it was done already
+
+
+def test_a_loop_that_does_not_answer_is_said_to(rig: Rig) -> None:
+    rig.loop.answers = False
+    with rig.client() as client:
+        answer = client.post("/hold")
+    assert answer.status_code == 503
+    assert "has not answered 'hold' within 3 s" in answer.json()["error"]
+
+
+def test_a_loop_that_does_not_turn_gets_no_commands(rig: Rig) -> None:
+    rig.loop.turns = False
+    rig.block.counters["loop_alive_ns"] -= 6_000_000_000
+    with rig.client() as client:
+        assert client.get("/status").json()["loop"]["silent_s"] > 5.0
+        answer = client.post("/hold")
+    assert answer.status_code == 503
+    assert "has not turned" in answer.json()["error"]
+    assert rig.block.take_command() is None
+
+
+def test_a_loop_that_dies_is_said_to_be_dead_also_to_those_who_wait(own_rig: Rig) -> None:
+    rig = own_rig
+    rig.loop.answers = False
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    rig.block.counters["loop_pid"] = process.pid
+    answers: list[httpx.Response] = []
+
+    def ask() -> None:
+        with rig.client() as client:
+            answers.append(client.post("/acknowledge"))
+
+    waiting = threading.Thread(target=ask)
+    waiting.start()
+    wait_for(lambda: int(rig.block.counters["commands"][0]) == 1)
+    process.kill()
+    waiting.join(5.0)
+    assert answers[0].status_code == 503
+    with rig.client() as client:
+        status = client.get("/status").json()
+        assert (status["state"], status["reason"]) == ("dead", "the loop has died")
+        assert status["loop"]["alive"] is False
+        assert client.post("/hold").status_code == 503
+        rig.block.write_status({"state": "dead", "reason": "the loop has died: killed by signal 9"})
+        assert client.get("/status").json()["reason"].endswith("signal 9")
+        kinds = [(event["kind"], event["text"]) for event in client.get("/events").json()["events"]]
+    assert ("state", "dead") in kinds
+    process.wait()
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "where"),
+    [
+        ("/control", "{}", "body.client"),
+        ("/control", '{"client": "x", "ttl_s": NaN}', "body.ttl_s"),
+        ("/control", '{"client": "x", "ttl_s": 1e999}', "body.ttl_s"),
+        ("/control", '{"client": "two\\nlines"}', "body.client"),
+        ("/control", '{"client": "\\ud800"}', "body.client"),
+        ("/program", '{"program": "../jog"}', "body.program"),
+        ("/program", '{"program": "jog", "unknown": 1}', "body.unknown"),
+        ("/program", '{"program": "jog", "wanted": {"v": [NaN]}}', "body.wanted"),
+        ("/program", '{"program": "jog", "wanted": {"v": 1e10}}', "body.wanted"),
+        ("/program", '{"program": "jog", "wanted": {"v": [-' + "9" * 400 + "]}}", "body.wanted"),
+        ("/program", '{"program": "jog", "wanted": {"\\ud800": 1}}', "body.wanted"),
+        ("/set", '{"wanted": {"v": [[[[[1]]]]]}}', "body.wanted"),
+        ("/set", '{"wanted": {"v": [' + "1," * 64 + "1]}}", "body.wanted"),
+        ("/set", '{"wanted": 5}', "body.wanted"),
+        ("/set", "[" * 5000, "parsing the body"),
+        ("/set", '{"wanted": {"v": ' + "9" * 5000 + "}}", "parsing the body"),
+        ("/set", "\x00", "JSON"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_by_name(rig: Rig, path: str, body: str, where: str) -> None:
+    with rig.client() as client:
+        headers = {**take(client), "content-type": "application/json"}
+        answer = client.post(path, content=body, headers=headers)
+    assert answer.status_code in (400, 422)
+    assert where in answer.json()["error"]
+    assert rig.loop.commands == []
+
+
+@pytest.mark.parametrize("depth", [20, 210, 900, 980, 2000])
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('{"wanted": {"v": ', "}}"),
+        ('{"wanted": ', "}"),
+        ('{"client": ', "}"),
+        ('{"unknown": ', ', "wanted": {}}'),
+        ("", ""),
+    ],
+)
+def test_however_deep_a_body_is_it_is_refused_and_nothing_breaks(
+    rig: Rig, capfd: pytest.CaptureFixture[str], depth: int, before: str, after: str
+) -> None:
+    with rig.client() as client:
+        headers = {**take(client), "content-type": "application/json"}
+        for opened, closed in (("[", "]"), ('{"a":', "}")):
+            body = before + opened * depth + "1" + closed * depth + after
+            answer = client.post("/set", content=body, headers=headers)
+            assert answer.status_code in (400, 422), answer.text
+            assert len(answer.json()["error"]) < 300
+    assert rig.loop.commands == []
+    assert capfd.readouterr().err == ""
+
+
+def test_a_command_too_long_for_the_loop_is_refused(rig: Rig) -> None:
+    wanted = {f"key_{k}": ["x" * 64] * 3 for k in range(30)}
+    with rig.client() as client:
+        answer = client.post("/set", json={"wanted": wanted}, headers=take(client))
+    assert answer.status_code == 413
+    assert rig.loop.commands == []
+
+
+def test_status_is_strict_json_with_every_axis(rig: Rig) -> None:
+    def refuse(constant: str) -> Any:
+        raise AssertionError(constant)
+
+    rig.loop.publish(reason_limit={"value": float("nan")}, driving=False)
+    with rig.client() as client:
+        wait_for(lambda: client.get("/status").json()["cycle"] is not None)
+        status = json.loads(client.get("/status").text, parse_constant=refuse)
+    assert status["reason_limit"] == {"value": None}
+    assert status["driving"] is False
+    assert [axis["name"] for axis in status["axes"]] == list(AXES)
+    assert [axis["position_rad"] for axis in status["axes"]] == [0.0, 1.0]
+    assert status["axes"][0]["tension_N"] is None
+    assert status["cycle"]["state"] == "ready"
+
+
+def test_events_tell_what_happened_in_order(rig: Rig) -> None:
+    with rig.client() as client:
+        wait_for(lambda: bool(client.get("/events").json()["events"]))
+        last = client.get("/events").json()["events"][-1]["number"]
+        for _ in range(3):
+            client.post("/hold", json={"client": "maria"})
+        rig.loop.publish(state="fault", reason="speed of left: 9 rad/s, 5 allowed")
+        wait_for(lambda: client.get("/status").json()["state"] == "fault")
+        found: list[dict[str, Any]] = []
+
+        def told() -> bool:
+            found[:] = client.get("/events", params={"after": last}).json()["events"]
+            return len(found) == 3
+
+        wait_for(told)
+    assert [event["kind"] for event in found] == ["command", "state", "reason"]
+    assert (found[0]["text"], found[0]["times"]) == ("hold by maria", 3)
+    assert "5 allowed" in found[2]["text"]
+
+
+def test_metrics_are_read_by_prometheus_own_parser_and_count_every_cycle(own_rig: Rig) -> None:
+    rig = own_rig
+    with rig.client() as client:
+        wait_for(lambda: int(rig.block.counters["rows"][0]) > 500)
+        rig.loop.turns = False
+        time.sleep(0.5)
+        text = client.get("/metrics").text
+    samples = {
+        (sample.name, tuple(sample.labels.values())): sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+    cycles = samples[("cdpr_cycles_total", ())]
+    assert cycles == int(rig.block.counters["rows"][0])
+    unseen = samples[("cdpr_rows_not_seen_total", ())]
+    counted = samples[("cdpr_cycle_compute_seconds_count", ())]
+    assert cycles - 20 <= counted + unseen <= cycles
+    assert samples[("cdpr_cycle_compute_seconds_sum", ())] == pytest.approx(counted * 1e-4)
+    assert samples[("cdpr_state", ("ready",))] == 1.0
+    assert samples[("cdpr_axis_position_radians", ("right",))] == 1.0
+    assert ("cdpr_axis_tension_newtons", ("right",)) not in samples
+
+
+def test_the_page_needs_nothing_from_elsewhere(rig: Rig) -> None:
+    with rig.client() as client:
+        answer = client.get("/docs")
+        paths = client.get("/openapi.json").json()["paths"]
+    assert "default-src 'none'" in answer.headers["content-security-policy"]
+    assert "<script" not in answer.text.lower()
+    for path in paths:
+        assert f"</span> {path}</h2>" in answer.text

@@ -1,0 +1,341 @@
+"""The WebSockets: figures as they come, readers that do not read, the right to move."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from itertools import pairwise
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect, unix_connect
+
+from cdpr_rt.service.http import control_socket, websocket_routes
+from tests.cdpr_rt.service.http.service_rig import AXES, KEY, Rig, running, wait_for
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with running(tmp_path_factory.mktemp("live")) as rig:
+        yield rig
+
+
+@pytest.fixture
+def rig(shared: Rig) -> Rig:
+    shared.reset()
+    return shared
+
+
+def ask(connection: ClientConnection, **order: Any) -> dict[str, Any]:
+    connection.send(json.dumps(order))
+    answer: dict[str, Any] = json.loads(connection.recv(5.0))
+    return answer
+
+
+def open_unix(rig: Rig, path: str) -> ClientConnection:
+    return unix_connect(str(rig.socket), f"ws://robot{path}")
+
+
+def closed_for(connection: ClientConnection) -> tuple[int, str]:
+    with pytest.raises(ConnectionClosed) as closing:
+        while True:
+            connection.recv(10.0)
+    assert closing.value.rcvd is not None
+    return closing.value.rcvd.code, closing.value.rcvd.reason
+
+
+# -- looking on
+
+
+def test_it_begins_with_what_stays_and_goes_on_with_what_changes(rig: Rig) -> None:
+    with open_unix(rig, "/live?rate_Hz=50&fields=cycle,position_rad,tension_N") as connection:
+        messages = [json.loads(connection.recv(5.0)) for _ in range(30)]
+        rig.loop.publish(state="fault", reason="broken cable of left")
+        deadline = time.monotonic() + 10.0
+        missing = {"fault", "broken cable of left"}
+        while missing:
+            message = json.loads(connection.recv(5.0))
+            missing.discard(message.get("event", {}).get("text"))
+            missing.discard(message.get("status", {}).get("state"))
+            assert time.monotonic() < deadline, missing
+    assert [message["kind"] for message in messages[:3]] == ["description", "status", "cycle"]
+    assert messages[0]["description"]["axes"][0]["name"] == AXES[0]
+    cycles = [message for message in messages if message["kind"] == "cycle"]
+    numbers = [message["cycle"] for message in cycles]
+    assert numbers == sorted(set(numbers))
+    skipped = [message["skipped"] for message in cycles[1:]]
+    assert [b - a - 1 for a, b in pairwise(numbers)] == skipped
+    assert cycles[0]["position_rad"] == [0.0, 1.0]
+    assert cycles[0]["tension_N"] == [None, None]
+    assert "velocity_rad_s" not in cycles[0]
+
+
+def test_never_faster_than_asked_for(rig: Rig) -> None:
+    with open_unix(rig, "/live?rate_Hz=10&fields=cycle") as connection:
+        begin = time.monotonic()
+        cycles = 0
+        while cycles < 8:
+            cycles += json.loads(connection.recv(5.0))["kind"] == "cycle"
+        assert time.monotonic() - begin > 0.65
+
+
+@pytest.mark.parametrize("query", ["rate_Hz=51", "rate_Hz=0", "rate_Hz=nan", "rate_Hz=x"])
+def test_no_rate_beyond_what_a_person_can_see(rig: Rig, query: str) -> None:
+    with pytest.raises(InvalidStatus):
+        open_unix(rig, f"/live?{query}")
+
+
+def test_a_field_that_no_cycle_has_is_named(rig: Rig) -> None:
+    with open_unix(rig, "/live?fields=cycle,colour") as connection:
+        assert closed_for(connection) == (1008, "fields: colour is none of a cycle's")
+
+
+@pytest.mark.parametrize("letter", ["\x01", "\u00e9", "\U0001fff0"])
+def test_a_field_of_strange_letters_is_refused_without_a_traceback(
+    rig: Rig, letter: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with open_unix(rig, f"/live?fields={quote(80 * letter)}") as connection:
+        code, reason = closed_for(connection)
+    assert code == 1008
+    assert reason.startswith("fields: ") and reason.isascii()
+    assert caplog.text == ""
+
+
+def test_a_client_that_does_not_read_is_dropped_and_others_are_not(rig: Rig) -> None:
+    dropped = rig.service.counts["slow_clients_dropped"]
+    asleep = socket.create_connection(("127.0.0.1", rig.port))
+    asleep.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    asleep.sendall(
+        b"GET /live?rate_Hz=50 HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
+        b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    with open_unix(rig, "/live?rate_Hz=50&fields=cycle") as connection:
+        longest, before = 0.0, time.monotonic()
+        deadline = before + 60.0
+        while rig.service.counts["slow_clients_dropped"] == dropped:
+            connection.recv(5.0)
+            now = time.monotonic()
+            longest, before = max(longest, now - before), now
+            assert now < deadline
+        json.loads(connection.recv(5.0))
+        assert longest < 2.0
+    asleep.close()
+    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+
+
+def test_pings_whose_answers_nobody_reads_do_not_pile_up(rig: Rig) -> None:
+    flood = socket.create_connection(("127.0.0.1", rig.guarded_port))
+    flood.sendall(
+        b"GET /control?client=x&ttl_s=10 HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\n"
+        b"Authorization: Bearer " + KEY + b"\r\n"
+        b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+        b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    told = b""
+    while b'"held"' not in told:
+        told += flood.recv(4096)
+    pings = (b"\x89\xfd" + b"\0" * 4 + b"p" * 125) * 500
+    with pytest.raises(OSError, match=r"reset|pipe"):
+        for _ in range(400):  # 26 MB
+            flood.sendall(pings)
+    flood.close()
+
+
+def test_no_more_lookers_on_than_can_be_served(rig: Rig) -> None:
+    with ExitStack() as watching:
+        for _ in range(websocket_routes._MOST_LIVE):
+            watching.enter_context(open_unix(rig, "/live?rate_Hz=1"))
+        wait_for(lambda: rig.service.counts["live_clients"] == websocket_routes._MOST_LIVE)
+        with open_unix(rig, "/live") as connection:
+            assert closed_for(connection)[0] == control_socket.BUSY
+    wait_for(lambda: rig.service.counts["live_clients"] == 0)
+
+
+# -- moving
+
+
+def test_the_connection_is_the_right_to_move(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=1") as connection:
+        assert json.loads(connection.recv(5.0))["kind"] == "held"
+        with open_unix(rig, "/control?client=jan") as other:
+            code, reason = closed_for(other)
+            assert code == control_socket.REFUSED
+            assert "maria holds" in reason
+        assert ask(connection, do="program", program="jog", wanted={"v": [1]}, id=7) == {
+            "kind": "reply",
+            "id": 7,
+            "ok": True,
+            "error": None,
+            "state": "ready",
+        }
+        assert ask(connection, do="set", wanted={"v": [2]})["ok"] is True
+        assert rig.lease_left_s > 0.0
+    wait_for(lambda: rig.lease_left_s < 0.0, 1.0)
+    assert [command["do"] for command in rig.loop.commands] == ["program", "set"]
+    assert rig.loop.commands[1]["client"] == "maria"
+
+
+def test_a_connection_cut_off_loses_it_at_once(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
+        connection.recv(5.0)
+        assert rig.lease_left_s > 5.0
+        connection.socket.shutdown(socket.SHUT_RDWR)
+        wait_for(lambda: rig.lease_left_s < 0.0, 2.0)
+
+
+def test_a_hold_goes_before_all_orders_of_its_own_connection(rig: Rig) -> None:
+    rig.loop.answers = False
+    with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
+        connection.recv(5.0)
+        connection.send(json.dumps({"do": "program", "program": "jog", "id": 0}))
+        wait_for(lambda: len(rig.service.link._pending) == 1)
+        for number, order in enumerate(("set", "set", "hold", "set"), 1):
+            wanted = {} if order == "hold" else {"wanted": {}}
+            connection.send(json.dumps({"do": order, "id": number, **wanted}))
+        refused = [json.loads(connection.recv(5.0)) for _ in range(2)]
+        assert [(one["id"], one["ok"]) for one in refused] == [(1, False), (2, False)]
+        assert refused[0]["error"] == "set: a stop was asked for after it"
+        rig.loop.answers = True
+        answers = {one["id"]: one for one in (json.loads(connection.recv(5.0)) for _ in range(3))}
+        assert answers.keys() == {0, 3, 4}
+        assert answers[3]["ok"] and answers[4]["ok"]
+    # this loop, unlike the real one, obeys what a stop has made void
+    assert [command["do"] for command in rig.loop.commands] == ["hold", "program", "set"]
+
+
+def test_who_goes_while_an_order_waits_loses_the_right_at_once(rig: Rig) -> None:
+    rig.loop.answers = False
+    with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
+        connection.recv(5.0)
+        connection.send(json.dumps({"do": "set", "wanted": {}}))
+        wait_for(lambda: len(rig.service.link._pending) == 1)
+        connection.socket.shutdown(socket.SHUT_RDWR)
+        wait_for(lambda: rig.lease_left_s < 0.0, 1.0)
+
+
+def test_who_waits_for_an_answer_is_not_called_silent(rig: Rig) -> None:
+    rig.loop.answers = False
+    with open_unix(rig, "/control?client=maria&ttl_s=0.5") as connection:
+        connection.recv(5.0)
+        connection.send(json.dumps({"do": "set", "wanted": {}}))
+        time.sleep(1.2)
+        rig.loop.answers = True
+        assert json.loads(connection.recv(5.0))["ok"] is True
+
+
+def test_who_has_lost_the_right_may_stop_all_the_same(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=5") as connection:
+        token = json.loads(connection.recv(5.0))["token"]
+        rig.service.lease.release(token)
+        rig.service.lease.take("jan", 5.0)
+        assert ask(connection, do="renew")["ok"] is False
+        assert ask(connection, do="hold")["ok"] is True
+    assert [command["do"] for command in rig.loop.commands] == ["hold"]
+
+
+def test_a_client_that_is_there_but_silent_loses_it(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria&ttl_s=0.3") as connection:
+        connection.recv(5.0)
+        assert ask(connection, do="renew")["ok"] is True
+        assert closed_for(connection)[0] == control_socket.SILENT
+    assert rig.lease_left_s < 0.0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        '{"do": "enable"}',
+        '{"do": "program"}',
+        '{"do": "program", "program": "jog", "wanted": {"v": [1e999]}}',
+        '{"do": "set", "wanted": {"v": NaN}}',
+        '{"do": "set", "wanted": {"v": ' + "9" * 400 + "}}",
+        '{"do": "set", "wanted": 1}',
+        '{"do": "renew", "more": 1}',
+        "[" * 9000,
+        '{"do": "set", "wanted": {"v": ' + 150 * "[" + 150 * "]" + "}}",
+        '{"do": "set", "wanted": {"v": ' + 900 * "[" + 900 * "]" + "}}",
+    ],
+)
+def test_nonsense_is_answered_and_moves_nothing(rig: Rig, text: str) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send(text)
+        answer = json.loads(connection.recv(5.0))
+        assert answer["ok"] is False
+        assert answer["error"]
+        assert ask(connection, do="renew")["ok"] is True
+    assert rig.loop.commands == []
+
+
+def test_bytes_are_no_order(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send(b'{"do": "hold"}')
+        assert json.loads(connection.recv(5.0))["ok"] is False
+    assert rig.loop.commands == []
+
+
+def test_what_is_no_text_ends_the_connection_without_a_traceback(
+    rig: Rig, caplog: pytest.LogCaptureFixture
+) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send(b'{"do": "\xff"}', text=True)
+        assert closed_for(connection)[0] == 1007
+    wait_for(lambda: rig.lease_left_s < 0.0)
+    assert caplog.text == ""
+    assert rig.loop.commands == []
+
+
+def test_a_message_in_pieces_without_end_is_not_kept(rig: Rig) -> None:
+    pieces = 0
+
+    def nothing_for_ever() -> Iterator[str]:
+        nonlocal pieces
+        while pieces < 100_000:
+            pieces += 1
+            yield ""
+
+    with open_unix(rig, "/control?client=maria&ttl_s=10") as connection:
+        connection.recv(5.0)
+        with pytest.raises(ConnectionClosed):
+            connection.send(nothing_for_ever())
+    assert pieces < 100_000
+    wait_for(lambda: rig.lease_left_s < 0.0)
+
+
+def test_a_message_too_long_or_too_many_end_the_connection(rig: Rig) -> None:
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        connection.send("x" * 20_000)
+        assert closed_for(connection)[0] == 1009
+    wait_for(lambda: rig.lease_left_s < 0.0)
+    with open_unix(rig, "/control?client=maria") as connection:
+        connection.recv(5.0)
+        for _ in range(150):
+            connection.send('{"do": "renew"}')
+        assert closed_for(connection)[0] == control_socket.UNFIT
+    wait_for(lambda: rig.lease_left_s < 0.0)
+
+
+def test_a_websocket_needs_the_key_too(rig: Rig) -> None:
+    guarded = f"ws://127.0.0.1:{rig.guarded_port}"
+    key = {"Authorization": f"Bearer {KEY.decode()}"}
+    for path in ("/live", "/control?client=x"):
+        with pytest.raises(InvalidStatus) as refused:
+            connect(guarded + path)
+        assert refused.value.response.status_code == 401
+        with pytest.raises(InvalidStatus) as refused:
+            connect(guarded + path, origin="http://example.com", additional_headers=key)
+        assert refused.value.response.status_code == 403
+        with connect(guarded + path, additional_headers=key) as connection:
+            connection.recv(5.0)

@@ -1,0 +1,422 @@
+"""The set-point stream over real UDP sockets, among friends and others."""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import itertools
+import math
+import os
+import resource
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.errors import ControlError
+from cdpr_rt.runtime.right import PublishedRight
+from cdpr_rt.service.lease import Lease, LeaseError
+from cdpr_rt.service.streams.setpoint_stream import (
+    SetpointStream,
+    StreamError,
+    is_loopback,
+    listen_udp,
+)
+from cdpr_rt.service.streams.stream_client import StreamClient
+from cdpr_rt.service.streams.stream_packet import (
+    Hello,
+    Standing,
+    StreamSession,
+    StreamSetpoint,
+    seal,
+)
+
+KEY = b"a key that is long enough"
+
+
+class Robot:
+    """A receiver with what stands behind it."""
+
+    def __init__(self, key: bytes | None = None, host: str = "127.0.0.1", port: int = 0) -> None:
+        self.block = SharedBlock.create(1, 0.1, 1000.0)
+        self.lease = Lease(PublishedRight(self.block))
+        sock = listen_udp(host, port, key is not None)
+        self.stream = SetpointStream(self.block, self.lease, sock, key)
+        self.stream.start()
+        _, self.port = self.stream.address
+
+    def give(self) -> StreamSession:
+        """Take the right to move, where nobody has it, and give its holder a session."""
+        with contextlib.suppress(LeaseError):
+            self.token = self.lease.take("console", 10.0)
+        return self.stream.sessions.issue(self.token)
+
+    @property
+    def until_ns(self) -> int:
+        return int(self.block.counters["right_until_ns"][0])
+
+    @property
+    def posted(self) -> int:
+        return int(self.block.counters["samples"][0])
+
+    def count(self, name: str) -> int:
+        return int(self.stream.status()["packets"][name])
+
+
+@contextmanager
+def robot(key: bytes | None = None, host: str = "127.0.0.1") -> Iterator[Robot]:
+    one = Robot(key, host)
+    try:
+        yield one
+    finally:
+        one.stream.stop()
+
+
+def until(what: Callable[[], bool], seconds: float = 5.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < deadline, "not in time"
+        time.sleep(0.005)
+
+
+def converse(client: StreamClient, what: Callable[[], bool], seconds: float = 5.0) -> None:
+    """Stream at about 100 Hz until `what`."""
+    deadline = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < deadline, f"not in time; {client.state}"
+        client.send((0.0, 0.0, 0.1))
+        time.sleep(0.01)
+        client.receive()
+
+
+@pytest.mark.parametrize("key", [None, KEY])
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_a_client_streams_and_sees_the_robot(host: str, key: bytes | None) -> None:
+    with (
+        robot(key, host) as there,
+        StreamClient(host, there.port, key or there.give()) as client,
+    ):
+        # the robot knows how long an answer took to come back once a packet has said so
+        converse(
+            client,
+            lambda: (
+                client.answered >= 5
+                and client.state is not None
+                and not math.isnan(client.state.round_trip_s)
+            ),
+        )
+        assert client.state is not None
+        assert client.state.standing == Standing.ACCEPTED
+        assert 0.0 < client.round_trip_s < 1.0
+        assert 0.0 <= client.state.round_trip_s < 1.0
+        assert there.posted >= 5
+        assert there.until_ns > time.monotonic_ns()
+        told = there.stream.status()
+        assert told["holder"] is not None
+        assert told["round_trip_s"] is not None
+        client.close()
+        until(lambda: there.stream.status()["holder"] is None)
+        assert (there.until_ns == 0) is (key is not None), "its own right, or the console's"
+
+
+def test_a_client_goes_on_after_the_robot_was_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cdpr_rt.service.streams.stream_client._SILENCE_S", 0.3)
+    with robot(KEY) as first:
+        port = first.port
+        client = StreamClient("127.0.0.1", port, KEY)
+        converse(client, lambda: client.answered >= 2)
+    for _ in range(30):  # nobody listens
+        client.send((0.0, 0.0, 0.0))
+        client.receive()
+        time.sleep(0.01)
+    again = Robot(KEY, port=port)
+    try:
+        converse(client, lambda: again.posted >= 3)
+    finally:
+        client.close()
+        again.stream.stop()
+
+
+def test_the_second_waits_for_the_first() -> None:
+    with robot(KEY) as there, StreamClient("127.0.0.1", there.port, KEY) as second:
+        with StreamClient("127.0.0.1", there.port, KEY) as first:
+            converse(first, lambda: first.answered >= 2)
+            converse(second, lambda: there.count("busy") > 0)
+            assert there.stream.status()["holder"] is not None
+        taken = there.count("accepted")
+        converse(second, lambda: there.count("accepted") >= taken + 3)
+
+
+def test_nobody_else_on_this_machine_streams_or_gets_the_right_to_move() -> None:
+    """Whoever can reach the port but not the control interface, also as the holder falls silent."""
+    with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as hand:
+        converse(hand, lambda: hand.answered >= 2)
+        there.lease.release(there.token)
+        posted = there.posted
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+            StreamClient("127.0.0.1", there.port, KEY) as guest,
+            StreamClient("127.0.0.1", there.port, StreamSession(5, bytes(32))) as guesser,
+        ):
+            stranger.connect(("127.0.0.1", there.port))
+            for sequence in range(30):
+                stranger.send(StreamSetpoint(5, sequence, sequence, (0.0, 0.0, 0.1)).pack())
+                for one in (guest, guesser):
+                    one.send((0.0, 0.0, 0.1))
+                    assert one.receive() == []
+                time.sleep(0.01)
+            until(lambda: there.count("unsigned") == 30 and there.count("session") > 30)
+            with pytest.raises(BlockingIOError):
+                stranger.recv(1, socket.MSG_DONTWAIT)
+        assert (there.posted, there.lease.holder(), there.until_ns) == (posted, None, 0)
+
+
+def test_a_wrong_key_is_not_answered() -> None:
+    with robot(KEY) as there:
+        with StreamClient("127.0.0.1", there.port, b"another key that is long") as client:
+            for _ in range(20):
+                assert not client.send((0.0, 0.0, 0.0))
+                assert client.receive() == []
+                time.sleep(0.01)
+        guessed = StreamSession(5, KEY)
+        with StreamClient("127.0.0.1", there.port, guessed) as client:
+            for _ in range(20):
+                client.send((0.0, 0.0, 0.0))
+                assert client.receive() == []
+        until(lambda: there.count("tag") >= 21)
+        assert (there.posted, there.until_ns) == (0, 0)
+
+
+def test_forged_hellos_do_not_keep_out_who_has_the_key() -> None:
+    forged = seal(Hello(7, bytes(16)), b"a key of its own")
+    with robot(KEY) as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger:
+        forger.connect(("127.0.0.1", there.port))
+        for _ in range(10):  # at once more than any limit of tries would allow
+            before = there.count("tag")
+            for _ in range(100):
+                forger.send(forged)
+            until(lambda least=before + 100: there.count("tag") >= least)
+        with StreamClient("127.0.0.1", there.port, KEY) as client:
+            converse(client, lambda: forger.send(forged) > 0 and client.answered >= 5)
+        assert there.posted >= 5
+
+
+def test_elsewhere_than_on_loopback_a_key_is_needed() -> None:
+    assert is_loopback("127.0.0.1") and is_loopback("::1") and is_loopback("localhost")
+    for host in ("0.0.0.0", "::"):
+        with pytest.raises(StreamError, match="no key is shared"):
+            listen_udp(host, 0)
+    with pytest.raises(StreamError, match="no address"):
+        listen_udp("no such host.invalid", 0)
+    listen_udp("0.0.0.0", 0, has_key=True).close()
+    with pytest.raises(ControlError, match="at least 16"), robot(b"short"):
+        pass
+
+
+def test_an_address_in_use_is_told() -> None:
+    with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
+        converse(client, lambda: client.answered >= 1)  # with the holder's socket in place
+        with pytest.raises(StreamError, match="in use"):
+            listen_udp("127.0.0.1", there.port)
+
+
+FLOOD = """
+import socket, sys, time
+from cdpr_rt.service.streams.stream_packet import StreamSetpoint, seal
+socks = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(8)]
+for sock in socks:
+    sock.connect(("127.0.0.1", int(sys.argv[1])))
+    sock.setblocking(False)
+parcels = [b"x" * 128, bytes(1400), b"CDPS" + bytes(124)]
+setpoint = StreamSetpoint(5, 1, 1, (0.0, 0.0, 0.0))
+parcels += [setpoint.pack(), seal(setpoint, b"a key of its own")]
+print(flush=True)
+while True:
+    for sock in socks:
+        for parcel in parcels:
+            try:
+                sock.send(parcel)
+            except OSError:
+                time.sleep(0.0002)
+"""
+
+
+@contextmanager
+def flooding(port: int) -> Iterator[None]:
+    """Send nonsense and strangers' set-points as fast as a process of its own can."""
+    command = [sys.executable, "-c", FLOOD, str(port)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            process.stdout.readline()
+            yield
+        finally:
+            process.kill()
+
+
+def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
+    with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
+        converse(client, lambda: client.answered >= 2)
+        with flooding(there.port):
+            until(lambda: there.count("magic") > 1000)
+            size_kB = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            cpu_s, begin_s = time.process_time(), time.monotonic()
+            sent, posted = client.sent, there.posted
+            converse(client, lambda: client.sent >= sent + 60, 20.0)
+            share = (time.process_time() - cpu_s) / (time.monotonic() - begin_s)
+            until(lambda: there.posted >= posted + 60)
+            assert share < 0.6
+            assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < size_kB + 20_000
+            assert there.count("session") > 0
+
+
+def test_descriptors_beyond_what_select_takes_do_not_end_it() -> None:
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(2048, limits[1]), limits[1]))
+    held: list[int] = []
+    try:
+        while not held or held[-1] < 1024:
+            held.append(os.dup(0))
+        with robot() as there, StreamClient("127.0.0.1", there.port, there.give()) as client:
+            converse(client, lambda: client.answered >= 5)
+            assert there.stream.status()["holder"] is not None
+    finally:
+        for one in held:
+            os.close(one)
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+# -- fuzz
+
+HEAD = struct.Struct("<4sBBHI")
+FLOATS = st.floats(allow_nan=True, allow_infinity=True)
+BYTES64 = st.integers(0, (1 << 64) - 1)
+SIGNED64 = st.integers(-(1 << 63), (1 << 63) - 1)
+SETPOINTS = st.builds(
+    lambda session, sequence, sent, echo, held, floats, buttons, right: StreamSetpoint(
+        session, sequence, sent, tuple(floats[:3]), tuple(floats[3:7]), floats[7], buttons,
+        echo, held, right,
+    ).pack(),
+    st.sampled_from([0, 1, 99, 0xFFFFFFFF]), BYTES64, SIGNED64, SIGNED64, SIGNED64,
+    st.lists(FLOATS | st.sampled_from([0.0, 1.0]), min_size=8, max_size=8),
+    st.integers(0, 0xFFFFFFFF), st.binary(min_size=16, max_size=16),
+)  # fmt: skip
+HEADED = st.builds(
+    lambda magic, version, kind, status, session, rest: HEAD.pack(
+        magic, version, kind, status, session
+    ) + rest,
+    st.sampled_from([b"CDPS", b"XXXX"]), st.integers(0, 3), st.integers(0, 7),
+    st.integers(0, 65535), st.integers(0, 0xFFFFFFFF),
+    st.sampled_from([12, 44, 52, 84, 116, 148, 180]).flatmap(
+        lambda size: st.binary(min_size=size, max_size=size)
+    ),
+)  # fmt: skip
+
+
+def mangled(data: bytes, cut: int, at: int, bit: int) -> bytes:
+    if at < len(data):
+        data = data[:at] + bytes([data[at] ^ 1 << bit]) + data[at + 1 :]
+    return data[: len(data) - cut] if cut else data
+
+
+GOOD = StreamSetpoint(1, 1, 1, (0.0, 0.0, 0.0))
+HOSTILE = (
+    st.binary(max_size=300)
+    | HEADED
+    | SETPOINTS
+    | st.builds(
+        mangled,
+        SETPOINTS | st.just(GOOD.pack()),
+        st.sampled_from([0, 0, 1, 32]),
+        st.integers(0, 170),
+        st.integers(0, 7),
+    )
+)
+
+
+PLAUSIBLE = st.builds(
+    lambda sent, floats, scale: StreamSetpoint(
+        1, 0, sent, tuple(floats), (0.6, 0.0, -0.8, 0.0), scale
+    ),
+    st.integers(-10, (1 << 63) - 1),
+    st.lists(st.floats(-15.0, 15.0), min_size=3, max_size=3),
+    st.floats(0.0, 2.0),
+)
+
+
+@pytest.fixture(scope="module", params=[None, KEY], ids=["open", "keyed"])
+def besieged(request: pytest.FixtureRequest) -> Iterator[tuple[Robot, StreamClient]]:
+    key = request.param
+    with (
+        robot(key) as there,
+        StreamClient("127.0.0.1", there.port, key or there.give()) as client,
+    ):
+        converse(client, lambda: client.answered >= 2)
+        yield there, client
+
+
+@settings(
+    max_examples=120, deadline=None, derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)  # fmt: skip
+@given(packets=st.lists(HOSTILE, min_size=1, max_size=12))
+def test_nothing_hostile_gets_through_or_disturbs(
+    besieged: tuple[Robot, StreamClient], packets: list[bytes]
+) -> None:
+    there, client = besieged
+    client.receive()  # who hears nothing for 2.5 s greets anew
+    holder = there.stream.status()["holder"]
+    before = there.posted, there.count("accepted")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as enemy:
+        for packet in packets:
+            enemy.sendto(packet, ("127.0.0.1", there.port))
+    client.send((0.0, 0.0, 0.2), scale=0.5)
+    until(lambda: there.posted > before[0])
+    assert (there.posted, there.count("accepted")) == (before[0] + 1, before[1] + 1)
+    assert there.stream.status()["holder"] == holder
+    sample = there.block.samples[before[0] % len(there.block.samples)]
+    assert sample["position_m"].tolist() == [0.0, 0.0, 0.2]
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(packets=st.lists(HOSTILE | PLAUSIBLE, min_size=1, max_size=12))
+def test_whatever_reaches_the_loop_can_be_worked_with(
+    alone: tuple[Robot, socket.socket], packets: list[bytes | StreamSetpoint]
+) -> None:
+    """The holder itself signs all of it, good-byes and leaps of its numbers among it."""
+    there, sock = alone
+    given, numbers = there.give(), itertools.count(1)
+    before, total = there.posted, sum(there.stream.status()["packets"].values())
+    for packet in (GOOD, *packets):
+        if isinstance(packet, StreamSetpoint):
+            data = replace(packet, session=given.number, sequence=next(numbers)).pack()
+        else:
+            data = packet[:8] + struct.pack("<I", given.number) + packet[12:]
+            data = data if len(packet) >= HEAD.size else packet
+        sock.send(data + hmac.digest(given.key, data, "sha256"))
+    until(lambda: sum(there.stream.status()["packets"].values()) == total + 1 + len(packets))
+    assert there.posted > before
+    samples = there.block.samples
+    for sample in samples[: min(there.posted, len(samples))]:
+        assert all(math.isfinite(x) and abs(x) <= 20.0 for x in sample["position_m"].tolist())
+        assert math.hypot(*sample["quaternion"].tolist()) == pytest.approx(1.0)
+        assert 0.0 < sample["scale"] <= 100.0
+        assert sample["sent_ns"] >= 0
+    assert any(thread.name == "set-point stream" for thread in threading.enumerate())
+
+
+@pytest.fixture(scope="module")
+def alone() -> Iterator[tuple[Robot, socket.socket]]:
+    with robot() as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.connect(("127.0.0.1", there.port))
+        yield there, sock

@@ -1,0 +1,150 @@
+"""Finding the encoder index of a simulated drive: by homing and by touch probe."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from cdpr_drivers.axes import touch_probe
+from cdpr_drivers.axes.homing import MIRRORED, Homing, HomingStep
+from cdpr_drivers.cia402 import Mode, State
+from cdpr_drivers.errors import DriveFaultError
+from cdpr_sim_bus.cia402.homing import METHODS
+from tests.drivers.axis_rig import DRIVE, Rig, open_rig, start_simulator
+
+COUNT_RAD = math.tau / 8192
+
+
+def _home(rig: Rig, method: int, timeout_s: float = 30.0) -> Homing:
+    homing = Homing(rig.group, 0, method, timeout_s)
+    homing.configure()
+    rig.enable(Mode.HOMING)
+    rig.run(40.0, homing.update)
+    rig.reach(State.SWITCH_ON_DISABLED)
+    return homing
+
+
+def _turn(rig: Rig, torque_Nm: float, seconds: float = 3.0) -> None:
+    """Turn the motor by hand-set torque until its index is known."""
+    feedback = rig.group.feedback
+    rig.enable(Mode.CYCLIC_TORQUE)
+    rig.group.command.torque_Nm[0] = torque_Nm
+    rig.run(seconds, lambda: bool(feedback.index_known[0]))
+    rig.group.command.torque_Nm[0] = 0.0
+    rig.reach(State.SWITCH_ON_DISABLED)
+    assert feedback.index_known[0]
+
+
+def _turns_apart(a_rad: float, b_rad: float) -> float:
+    return abs(math.remainder(a_rad - b_rad, math.tau))
+
+
+@pytest.mark.parametrize("method", [33, 34])
+def test_homing_puts_the_origin_on_the_index_from_either_side(rig: Rig, method: int) -> None:
+    assert _home(rig, method).step is HomingStep.DONE
+    feedback = rig.group.feedback
+    assert feedback.index_known[0]
+    assert feedback.index_rad[0] == 0.0
+    assert abs(feedback.position_rad[0]) < 0.2  # stopped just past it
+    # the probe, which knows nothing of homing, finds it at a whole number of turns
+    touch_probe.arm(rig.group, 0)
+    _turn(rig, 0.25)
+    assert _turns_apart(feedback.index_rad[0], 0.0) <= COUNT_RAD
+
+
+def test_the_probe_finds_one_place_in_both_directions(rig: Rig) -> None:
+    found = []
+    for torque_Nm in (0.25, -0.25, 0.25):
+        touch_probe.arm(rig.group, 0)
+        assert not rig.group.feedback.index_known[0]
+        _turn(rig, torque_Nm)
+        found.append(float(rig.group.feedback.index_rad[0]))
+    assert _turns_apart(found[0], found[1]) <= COUNT_RAD
+    assert _turns_apart(found[0], found[2]) <= COUNT_RAD
+
+
+def test_a_drive_that_counts_homing_directions_the_other_way_round(bus: str) -> None:
+    mirrored = DRIVE.model_copy(update={"homing_sign": -1})
+    with open_rig(bus, drive=mirrored) as rig:
+        Homing(rig.group, 0, 34).configure()
+        assert rig.network.read_int(1, 0x6098) == 33
+        Homing(rig.group, 0, 37 if 37 in DRIVE.homing_methods else 35).configure()
+        assert rig.network.read_int(1, 0x6098) in (35, 37)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_mirror_of_a_method_is_its_own_the_other_way_round(method: int) -> None:
+    assert METHODS[MIRRORED[method]] == METHODS[method].mirrored()
+    if method < 15:  # the same without index
+        assert MIRRORED[method + 16] == MIRRORED[method] + 16
+
+
+def test_homing_in_place_tells_no_index(rig: Rig) -> None:
+    assert _home(rig, 37).step is HomingStep.DONE
+    assert not rig.group.feedback.index_known[0]
+
+
+def test_an_earlier_homing_is_not_taken_for_this_one(rig: Rig) -> None:
+    _home(rig, 37)
+    homing = Homing(rig.group, 0, 34)
+    homing.configure()
+    rig.enable(Mode.HOMING)
+    begin = rig.group.feedback.time_s
+    rig.run(40.0, homing.update)
+    assert homing.step is HomingStep.DONE
+    assert rig.group.feedback.time_s - begin > 0.1  # it took a motion
+    assert rig.group.feedback.index_known[0]
+
+
+def test_a_method_the_profile_lacks_is_refused(rig: Rig) -> None:
+    with pytest.raises(DriveFaultError, match="homing method 19 is not among"):
+        Homing(rig.group, 0, 19)
+
+
+def test_homing_that_takes_too_long_is_halted(rig: Rig) -> None:
+    homing = Homing(rig.group, 0, 34, timeout_s=0.3)
+    homing.configure()
+    rig.enable(Mode.HOMING)
+    with pytest.raises(DriveFaultError, match=r"not done within 0\.3 s"):
+        rig.run(2.0, homing.update)
+    assert homing.step is HomingStep.FAILED
+    rig.run(1.0)
+    still = rig.group.feedback.position_rad[0]
+    rig.run(1.0)
+    assert rig.group.feedback.position_rad[0] == pytest.approx(still, abs=0.01)
+    assert not rig.group.feedback.index_known[0]
+    rig.reach(State.SWITCH_ON_DISABLED)
+
+
+@pytest.fixture(scope="module")
+def bus_without_index(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    plant: Path = tmp_path_factory.mktemp("plant") / "no-index.toml"
+    plant.write_text("[encoder]\nindex_present = false\n")
+    simulator = start_simulator(plant=plant)
+    try:
+        yield simulator.bus
+    finally:
+        simulator.stop()
+
+
+def test_no_index_is_a_homing_error_that_is_told(bus_without_index: str) -> None:
+    with open_rig(bus_without_index) as rig:
+        with pytest.raises(DriveFaultError, match="homing error"):
+            _home(rig, 33)
+        assert not rig.group.feedback.index_known[0]
+
+
+def test_the_probe_sees_nothing_where_there_is_no_index(bus_without_index: str) -> None:
+    with open_rig(bus_without_index) as rig:
+        touch_probe.arm(rig.group, 0)
+        with pytest.raises(AssertionError):
+            _turn(rig, 0.2, seconds=1.0)
+
+
+def test_a_map_without_the_probe_is_told(bus: str) -> None:
+    drive = DRIVE.model_copy(update={"tpdos": DRIVE.tpdos[:1]})
+    with open_rig(bus, drive=drive) as rig, pytest.raises(DriveFaultError, match="60B9h"):
+        touch_probe.arm(rig.group, 0)

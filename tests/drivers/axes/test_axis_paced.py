@@ -1,0 +1,133 @@
+"""A group of axes on a paced bus, where time does not wait for anybody."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+
+import pytest
+
+from cdpr_drivers.bus import member, open_shared_port
+from cdpr_drivers.cia402 import Mode, State, state_of
+from tests.drivers.axis_rig import DRIVE, Rig, open_network
+
+pytestmark = pytest.mark.alone
+
+PERIOD_S = 10e-3
+"""Slow enough for two processes of a busy machine."""
+
+
+@pytest.fixture(scope="module")
+def paced_bus() -> Iterator[str]:
+    bus = f"simbus:paced-{uuid.uuid4().hex[:6]}"
+    command = [sys.executable, "-m", "cdpr_tools.cli", "sim", "up", "winch-mpp0923d", "--bus", bus]
+    command += ["--paced", "--nodes", "2", "--exit-with-stdin"]
+    simulator = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert simulator.stdout is not None
+    assert "ready" in json.loads(simulator.stdout.readline())
+    try:
+        yield bus
+    finally:
+        simulator.communicate()
+
+
+@pytest.fixture(params=["packed", "python-can"])
+def rig(
+    paced_bus: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Rig]:
+    if request.param == "python-can":
+        monkeypatch.setattr(member, "open_port", open_shared_port)
+    with open_network(paced_bus, [1, 2]) as network:
+        for node in (1, 2):
+            network.reset(node)
+            assert network.read_int(node, 0x1001) == 0
+        rig = Rig(paced_bus, network, DRIVE, [1, 2], period_s=PERIOD_S)
+        with rig.group:
+            yield rig
+
+
+def _cycles(rig: Rig, count: int, patience_s: float = 1.0) -> list[str]:
+    """Run cycles a period apart; return the alarm after each.
+
+    `patience_s` is how long an answer may take: a busy machine shall not look like a lost drive.
+    """
+    alarms = []
+    deadline = time.monotonic()
+    for _ in range(count):
+        deadline = max(deadline + PERIOD_S, time.monotonic())  # what was late is not made up for
+        time.sleep(max(0.0, deadline - time.monotonic()))
+        rig.group.sync()
+        rig.group.receive(time.monotonic() + patience_s)
+        rig.group.transmit()
+        alarms.append(rig.group.alarm())
+    return alarms
+
+
+def _enable(rig: Rig) -> None:
+    rig.group.ask_mode(Mode.CYCLIC_TORQUE)
+    _cycles(rig, 40)
+    rig.group.request(State.OPERATION_ENABLED)
+    _cycles(rig, 20)
+    assert rig.group.reached(State.OPERATION_ENABLED)
+
+
+def test_axes_are_exchanged_in_real_time(rig: Rig) -> None:
+    assert not rig.group.lockstep
+    _enable(rig)
+    before, missed = rig.group.feedback.position_rad.copy(), rig.group.missed
+    rig.group.command.torque_Nm[:] = [0.3, -0.3]
+    assert set(_cycles(rig, 60)) == {""}
+    assert (rig.group.feedback.position_rad - before)[0] > 0.1
+    assert (rig.group.feedback.position_rad - before)[1] < -0.1
+    assert rig.group.missed == missed
+
+
+def test_the_wait_for_an_answer_ends_within_the_period(rig: Rig) -> None:
+    _cycles(rig, 20)
+    rig.misbehave(2, 250, node=2)
+    waits = []
+    for _ in range(20):
+        rig.group.sync()
+        begin = time.monotonic()
+        rig.group.receive()
+        waits.append(time.monotonic() - begin)
+        rig.group.transmit()
+        time.sleep(1e-3)
+    assert 0.59 * PERIOD_S < sorted(waits)[len(waits) // 2] < PERIOD_S
+    assert not rig.group.feedback.valid[1]
+    rig.misbehave(2, 0, node=2)
+
+
+def test_two_lost_answers_are_bridged_and_the_third_is_an_alarm(rig: Rig) -> None:
+    _enable(rig)
+    rig.misbehave(2, 2, node=2)
+    assert "no answer" not in "".join(_cycles(rig, 20, 0.1))
+    rig.misbehave(2, 200, node=2)
+    alarms = [text for text in _cycles(rig, 5, 0.02) if text]
+    assert alarms
+    assert "node 2: no answer to SYNC for 3 cycles" in alarms[0]
+    rig.misbehave(2, 0, node=2)
+
+
+def test_an_answer_that_comes_late_is_not_taken_for_the_next_one(rig: Rig) -> None:
+    _cycles(rig, 20)
+    group = rig.group
+    group.sync()
+    group._late = True  # as after a cycle that was given up too early
+    time.sleep(2 * PERIOD_S)
+    group.sync()
+    assert not group.feedback.valid.any()
+    assert group.receive() == 2
+    group.transmit()
+
+
+def test_close_switches_off(paced_bus: str, rig: Rig) -> None:
+    _enable(rig)
+    assert rig.group.close() == ""
+    with open_network(paced_bus, [1, 2]) as network:
+        for node in (1, 2):
+            assert state_of(network.read_int(node, 0x6041)) == State.SWITCH_ON_DISABLED

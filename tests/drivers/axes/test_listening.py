@@ -1,0 +1,318 @@
+"""Axes of another master, taken in on buses where a script is master and drives in one."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import socket
+import struct
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+import pytest
+
+from cdpr_drivers.axes.listening import ListeningDevice, MonitoredBus, monitored_axis
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.adapters.simbus_socket import connect, exchange
+from cdpr_drivers.cia402 import State
+from cdpr_drivers.errors import BusError
+from cdpr_profiles import load_winch
+from cdpr_rt.core.clock import PacedClock
+from cdpr_sim_bus.bus.hub import Hub
+from tests.drivers.bus_log import BusLog, logged
+
+WINCH = load_winch("winch-mpp0923d")
+COUNTS = WINCH.encoder_counts_per_turn
+PERIOD_S = 0.02
+ENABLED, FAULT = 0x0237, 0x0218
+FRAME = struct.Struct("=IB3x8s")
+
+
+class Stage:
+    """One bus; `says` sends any frame on it, as master or as drive."""
+
+    def __init__(self, name: str) -> None:
+        self.bus = f"simbus:{name}"
+        self.hub = Hub([], name=name)
+        self.hub.listen()
+        self.thread = threading.Thread(target=self.hub.run)
+        self.thread.start()
+        self.sock: socket.socket = connect(name)
+
+    def says(self, identifier: int, data: bytes = b"") -> None:
+        self.sock.send(FRAME.pack(identifier, len(data), data.ljust(8, b"\0")))
+
+    def answers(self, node: int, counts: int, word: int = ENABLED, torque: int = 0) -> None:
+        self.says(0x180 + node, struct.pack("<Hih", word, counts, torque))
+
+    def settle(self) -> None:
+        """Wait until the hub has dealt with all that was said."""
+        exchange(self.sock, None)
+
+    def end(self) -> None:
+        self.hub.stop()
+        self.thread.join()
+        self.hub.close()
+
+    def close(self) -> None:
+        self.sock.close()
+        if self.thread.is_alive():
+            self.end()
+
+
+def device(stages: Sequence[Stage], nodes: Sequence[Sequence[int]]) -> ListeningDevice:
+    """Return a device whose axes go round the buses: the first of each, the second of each..."""
+    axis_numbers: list[list[int]] = [[] for _ in stages]
+    order = sorted((k, b) for b, each in enumerate(nodes) for k in range(len(each)))
+    for place, (_, bus) in enumerate(order):
+        axis_numbers[bus].append(place)
+    buses = [
+        MonitoredBus(
+            f"b{i}", BusUrl.parse(stage.bus), [monitored_axis(WINCH, n) for n in each], where
+        )
+        for i, (stage, each, where) in enumerate(zip(stages, nodes, axis_numbers, strict=True))
+    ]
+    return ListeningDevice(buses, PERIOD_S, PacedClock())
+
+
+@contextmanager
+def open_stages(count: int) -> Iterator[list[Stage]]:
+    with ExitStack() as stack:
+        stages = []
+        for i in range(count):
+            stages.append(Stage(f"listen-{os.getpid()}-{random.randrange(1 << 30)}-{i}"))
+            stack.callback(stages[-1].close)
+        yield stages
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    with open_stages(1) as (one,):
+        yield one
+
+
+@pytest.fixture
+def two() -> Iterator[list[Stage]]:
+    with open_stages(2) as both:
+        yield both
+
+
+def cycle(device: ListeningDevice) -> int:
+    device.sync()
+    answered = device.receive()
+    device.command.torque_Nm[:] = 1.0
+    device.transmit()
+    return answered
+
+
+def test_feedback_is_what_the_drives_say(stage: Stage) -> None:
+    with device([stage], [[1, 2]]) as ears:
+        for k in range(1, 4):
+            stage.says(0x080)
+            stage.answers(1, COUNTS * k, torque=-500)
+            stage.answers(2, -COUNTS // 4, FAULT)
+            stage.settle()
+            assert cycle(ears) == 2
+        feedback = ears.feedback
+        assert feedback.cycle == 3
+        assert feedback.time_s == pytest.approx(3 * PERIOD_S)
+        np.testing.assert_allclose(feedback.position_rad, [3 * math.tau, -math.tau / 4], atol=1e-3)
+        half = 0.5 * WINCH.motor.rated_torque_Nm
+        np.testing.assert_allclose(feedback.torque_Nm, [-half, 0.0])
+        assert feedback.statusword.tolist() == [ENABLED, FAULT]
+        assert feedback.valid.all() and feedback.alive.all() and feedback.rate_ok.all()
+        assert ears.states() == [State.OPERATION_ENABLED, State.FAULT]
+        assert ears.faulted().tolist() == [False, True]
+        assert "node 2: the drive is in fault" in ears.alarm()
+        ears.forget_alarms()
+        assert (ears.alarm(), ears.faulted().tolist()) == ("", [False, False])
+        assert ears.command.sent_torque_Nm.tolist() == [0.0, 0.0]
+
+
+def others(log: BusLog, said: int) -> int:
+    """Return how many frames crossed the bus which the script did not send."""
+    return len(log.frames) - said
+
+
+def test_not_one_frame_is_sent(two: list[Stage]) -> None:
+    with logged(two[0].bus) as first, logged(two[1].bus) as second:
+        with device(two, [[1], [1]]) as ears:
+            assert cycle(ears) == 0  # without a master
+            for k in range(50):
+                for bus in two:
+                    bus.says(0x080)
+                    bus.answers(1, k)
+                    bus.settle()
+                assert cycle(ears) == 2
+            two[0].says(0x081, bytes([0x10, 0x82, 0x11, 0, 0, 0, 0, 0]))
+            two[0].says(0x701, b"\0")
+            two[1].says(0x080)
+            for _ in range(3):
+                cycle(ears)
+            ears.forget_alarms()
+        for bus in two:
+            bus.settle()
+    assert (others(first, 102), others(second, 101)) == (0, 0)
+
+
+def test_without_a_master_a_cycle_ends_soon_and_says_so(stage: Stage) -> None:
+    with device([stage], [[1]]) as ears:
+        assert ears.silent_s == math.inf
+        begin = time.monotonic()
+        for _ in range(3):
+            assert cycle(ears) == 0
+        assert 0.1 < time.monotonic() - begin < 2.0
+        assert ears.feedback.cycle == 0
+        assert (ears.alarm(), ears.missed, ears.silent_s > 0.5) == ("", 0, True)
+        assert not ears.feedback.valid[0]
+        stage.says(0x080)
+        stage.answers(1, 5)
+        stage.settle()
+        assert cycle(ears) == 1
+        assert ears.silent_s < 0.5
+        assert cycle(ears) == 0
+        assert not ears.feedback.valid[0]
+
+
+def test_silence_of_a_drive_is_an_alarm_until_the_master_begins_anew(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cdpr_drivers.axes.listening._LOCKSTEP_ANSWER_S", 0.01)
+    with device([stage], [[1, 2]]) as ears:
+        for _ in range(3):
+            assert ears.alarm() == ""
+            stage.says(0x080)
+            stage.answers(2, 0)
+            stage.settle()
+            assert cycle(ears) == 1
+        assert "node 1: no answer to SYNC for 3 cycles" in ears.alarm()
+        assert ears.missed == 3
+        assert ears.feedback.valid.tolist() == [False, True]
+        time.sleep(0.6)
+        stage.says(0x080)
+        stage.answers(1, 0)
+        stage.answers(2, 0)
+        stage.settle()
+        assert cycle(ears) == 2
+        assert ears.alarm() == ""
+
+
+def test_what_the_other_master_does_with_its_drives_is_no_alarm(stage: Stage) -> None:
+    with device([stage], [[1]]) as ears:
+        for word, mode in ((ENABLED, 10), (0x0240, 6), (ENABLED, 6), (0x0231, 8), (ENABLED, 8)):
+            stage.says(0x080)
+            stage.answers(1, 0, word)
+            stage.says(0x281, struct.pack("<bHi", mode, 0, 0))
+            stage.settle()
+            assert cycle(ears) == 1
+            assert ears.alarm() == ""
+
+
+def test_an_index_that_the_master_latches_is_known_here_too(stage: Stage) -> None:
+    with device([stage], [[1]]) as ears:
+        for status in (1, 3, 3):
+            stage.says(0x080)
+            stage.answers(1, 4000)
+            stage.says(0x281, struct.pack("<bHi", 10, status, 1000))
+            stage.settle()
+            cycle(ears)
+            cycle(ears)
+        assert ears.feedback.index_known[0]
+        assert ears.feedback.index_rad[0] == pytest.approx(1000 / COUNTS * math.tau)
+        stage.says(0x701, b"\0")  # the drive restarts: its origin is another one
+        stage.settle()
+        cycle(ears)
+        assert not ears.feedback.index_known[0]
+
+
+def test_a_backlog_is_taken_in_cycle_by_cycle(two: list[Stage]) -> None:
+    with device(two, [[1, 2], [1, 2]]) as ears:
+        for k in range(1, 200):
+            for bus in two:
+                bus.says(0x080)
+                bus.answers(1, k)
+                bus.answers(2, -k)
+        for bus in two:
+            bus.settle()
+        for k in range(1, 200):
+            assert cycle(ears) == 4
+            counts = np.rint(ears.feedback.position_rad * COUNTS / math.tau)
+            # the axes go round the buses
+            assert counts.tolist() == [k, k, -k, -k]
+        assert ears.feedback.cycle == 199
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("behind", [0, 1])
+def test_a_bus_that_has_lost_cycles_is_caught_up_with(
+    two: list[Stage], behind: int, swapped: bool
+) -> None:
+    """SYNCs that only one of the buses heard leave the buses a cycle apart, but not for long."""
+    with device(two, [[1], [1]]) as ears:
+        alone = two[behind]
+        alone.says(0x080)
+        alone.answers(1, -1)
+        alone.settle()
+        stop = threading.Event()
+
+        def play() -> None:
+            for k in range(40):
+                for bus in reversed(two) if swapped else two:
+                    bus.says(0x080)
+                    bus.answers(1, k)
+                if stop.wait(PERIOD_S):
+                    return
+
+        player = threading.Thread(target=play)
+        player.start()
+        together = []
+        try:
+            while player.is_alive():
+                cycle(ears)
+                first, second = np.rint(ears.feedback.position_rad * COUNTS / math.tau).tolist()
+                together.append(first == second and bool(ears.feedback.valid.all()))
+        finally:
+            stop.set()
+            player.join()
+        assert sum(together[-20:]) >= 15
+
+
+def test_a_flood_does_not_hold_a_cycle_up(stage: Stage) -> None:
+    with device([stage], [[1]]) as ears:
+        stop = threading.Event()
+
+        def flood() -> None:
+            while not stop.is_set():
+                stage.answers(1, 7)
+
+        thread = threading.Thread(target=flood)
+        thread.start()
+        try:
+            begin = time.monotonic()
+            for _ in range(4):
+                cycle(ears)
+            assert time.monotonic() - begin < 2.0
+        finally:
+            stop.set()
+            thread.join()
+
+
+def test_a_bus_that_goes_away_is_told(stage: Stage) -> None:
+    with device([stage], [[1]]) as ears:
+        stage.end()
+        with pytest.raises(BusError, match="gone away"):
+            cycle(ears)
+
+
+def test_a_bus_that_is_not_there_is_told() -> None:
+    axis = monitored_axis(WINCH, 1)
+    with pytest.raises(BusError, match="no simulated bus"):
+        ListeningDevice(
+            [MonitoredBus("left", BusUrl.parse("simbus:nobody"), [axis], [0])],
+            PERIOD_S,
+            PacedClock(),
+        )

@@ -1,0 +1,104 @@
+"""SDO, NMT and EMCY of the master, beside a simulated drive."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+
+import pytest
+
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.errors import BusError, SdoError
+from tests.drivers.axis_rig import Rig, open_network, start_simulator
+
+
+@pytest.fixture
+def network(rig: Rig) -> CanNetwork:
+    return rig.network
+
+
+@pytest.mark.parametrize(
+    ("index", "sub", "value", "words"),
+    [
+        (0x6041, 0, 1, "read only object"),
+        (0x6060, 0, 77, "06090030h"),
+        (0x1018, 1, 1, "06010002h"),
+    ],
+)
+def test_an_abort_is_told_in_words_with_node_and_object(
+    network: CanNetwork, index: int, sub: int, value: int, words: str
+) -> None:
+    with pytest.raises(SdoError) as caught:
+        network.write(1, index, sub, value)
+    assert f"node 1: object {index:04X}h:{sub} cannot be set to {value}" in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_a_value_too_large_for_its_type_never_leaves(network: CanNetwork) -> None:
+    with pytest.raises(SdoError, match="does not fit"):
+        network.write(1, 0x6060, 0, 1000)
+
+
+def test_an_object_the_eds_lacks_is_told(network: CanNetwork) -> None:
+    with pytest.raises(SdoError, match="5F00h:0 is not in the drive's EDS"):
+        network.read(1, 0x5F00)
+    with pytest.raises(SdoError, match="1018h:9 is not in the drive's EDS"):
+        network.read(1, 0x1018, 9)
+
+
+def test_a_silent_node_is_told_after_the_attempts(bus: str) -> None:
+    with open_network(bus, [9]) as network:
+        begin_s = network.clock.now_s
+        with pytest.raises(SdoError, match="node 9"):
+            network.read(9, 0x1000, attempts=1)
+        assert network.clock.now_s - begin_s == pytest.approx(0.5)
+
+
+def test_long_values_come_in_segments(network: CanNetwork) -> None:
+    assert network.read(1, 0x1008) == "Generic CiA 402 torque servo"
+
+
+def test_several_tasks_may_use_it_at_once(rig: Rig) -> None:
+    def work(node_objects: list[tuple[int, int, int]]) -> bool:
+        return all(
+            rig.network.read_int(1, index, sub) == value
+            for _ in range(40)
+            for index, sub, value in node_objects
+        )
+
+    jobs = [
+        [(0x1018, 1, 0x00CD9A01), (0x6076, 0, 3000)],
+        [(0x1018, 2, 0x402), (0x608F, 1, 8192)],
+        [(0x1000, 0, 0x00020192), (0x608F, 2, 1)],
+    ]
+    tasks = [rig.network.clock.start(partial(work, job)) for job in jobs]
+    rig.set_mode()
+    for _ in range(1000):  # one answer each a cycle, for all three ask the same node
+        rig.cycle()
+        rig.network.clock.run_tasks()
+    assert all(task.result() for task in tasks)
+    assert rig.group.alarm() == ""
+
+
+def test_emergencies_between_cycles_are_kept_and_raise_the_alarm(rig: Rig) -> None:
+    rig.set_mode()
+    rig.group.stop_cycling()
+    rig.misbehave(1, 0x8611)
+    clock = rig.network.clock
+    assert clock.wait(lambda: rig.network.emergencies, clock.now_s + 2.0)
+    kept = rig.network.emergencies[-1]
+    assert (kept.node_id, kept.code) == (1, 0x8611)
+    assert "8611h following error" in str(kept)
+    text, _ = rig.until_alarm(0.01)
+    assert "8611h" in text or "in fault" in text
+
+
+def test_a_bus_that_is_gone_is_a_bus_error() -> None:
+    simulator = start_simulator()
+    with open_network(simulator.bus, [1]) as network:
+        assert network.read_int(1, 0x1000) == 0x00020192
+        simulator.stop()
+        begin = time.monotonic()
+        with pytest.raises(BusError, match="gone away"):
+            network.read_int(1, 0x1000)
+        assert time.monotonic() - begin < 2.0

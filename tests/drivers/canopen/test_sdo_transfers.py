@@ -1,0 +1,263 @@
+"""SDO from the master's side: long data, cancelling, duplicates, retries, devices that vanish."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.canopen.sdo_abort import abort_text
+from cdpr_drivers.errors import SdoAbortError, SdoCancelledError, SdoTimeoutError
+from tests.drivers.axis_rig import open_network
+from tests.drivers.canopen.scripted_node import abort, endless, expedited, scripted
+
+SCRIPTED = 9
+
+
+@pytest.fixture(scope="module")
+def bus(simulated_bus: str) -> str:
+    """A bus that is not switched off and on between the tests."""
+    return simulated_bus
+
+
+@pytest.fixture(scope="module")
+def network(bus: str) -> Iterator[CanNetwork]:
+    with open_network(bus, [1, 2, SCRIPTED], lead=False) as opened:
+        yield opened
+
+
+# -- what comes back
+
+
+def test_data_of_any_length_come_back_as_written(network: CanNetwork) -> None:
+    for size in (1, 4, 5, 7, 8, 13, 889, 890, 2500):
+        data = bytes((7 * k + size) & 0xFF for k in range(size))
+        network.write_bytes(1, 0x2F10, 0, data)
+        assert network.read_bytes(1, 0x2F10) == data
+        assert network.read_bytes(1, 0x2F10, block=True) == data
+
+
+def test_a_node_without_block_transfer_is_read_in_segments(network: CanNetwork, bus: str) -> None:
+    text = b"a name of more than seven letters"
+
+    def answer(request: bytes) -> list[bytes]:
+        if request[0] >> 5 == 5:
+            return [abort(request, 0x05040001)]
+        if request[0] == 0x40:
+            answer.at = 0  # type: ignore[attr-defined]
+            return [b"\x41" + request[1:4] + struct.pack("<I", len(text))]
+        at: int = answer.at  # type: ignore[attr-defined]
+        part = text[at : at + 7]
+        answer.at = at + 7  # type: ignore[attr-defined]
+        last = at + 7 >= len(text)
+        return [bytes([request[0] & 0x10 | (7 - len(part)) << 1 | last]) + part]
+
+    with scripted(bus, SCRIPTED, answer):
+        assert network.read_bytes(SCRIPTED, 0x1008, block=True) == text
+
+
+def test_segments_lost_from_a_block_are_sent_again(network: CanNetwork, bus: str) -> None:
+    data = bytes(range(70))
+    segments = [bytes([k + 1]) + data[7 * k : 7 * k + 7] for k in range(10)]
+    segments[9] = bytes([10 | 0x80]) + segments[9][1:]
+    acknowledged: list[int] = []
+
+    def answer(request: bytes) -> list[bytes]:
+        kind = request[0] & 0x03
+        if kind == 0:
+            return [b"\xc2" + request[1:4] + struct.pack("<I", len(data))]
+        if kind == 3:
+            return segments[:4] + segments[5:]  # the fifth is lost
+        if kind == 2:
+            acknowledged.append(request[1])
+            if len(acknowledged) == 1:
+                return [bytes([k + 1 | s[0] & 0x80]) + s[1:] for k, s in enumerate(segments[4:])]
+            return [b"\xc1"]
+        return []
+
+    with scripted(bus, SCRIPTED, answer):
+        assert network.read_bytes(SCRIPTED, 0x1008, block=True) == data
+    assert acknowledged == [4, 6]
+
+
+# -- abort codes
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (0x05040005, "out of memory"),
+        (0x06040042, "exceed the PDO length"),
+        (0x08000022, "present device state"),
+        (0x06090099, "value error, of a kind no standard names"),
+        (0xDEADBEEF, "a code no standard has"),
+    ],
+)
+def test_abort_codes_are_told_in_words_and_as_a_number(
+    network: CanNetwork, bus: str, code: int, words: str
+) -> None:
+    with (
+        scripted(bus, SCRIPTED, lambda request: [abort(request, code)]),
+        pytest.raises(SdoAbortError) as caught,
+    ):
+        network.read_int(SCRIPTED, 0x1000)
+    assert caught.value.code == code
+    assert f"node {SCRIPTED}: object 1000h:0 cannot be read: " in str(caught.value)
+    assert words in str(caught.value)
+    assert f"({code:08X}h)" in str(caught.value)
+
+
+def test_every_code_of_the_standard_has_words_of_its_own() -> None:
+    # CiA 301, table of SDO abort codes
+    codes = [
+        *(
+            0x05030000,
+            0x05040000,
+            0x05040001,
+            0x05040002,
+            0x05040003,
+            0x05040004,
+        ),
+        *(
+            0x05040005,
+            0x06010000,
+            0x06010001,
+            0x06010002,
+            0x06020000,
+            0x06040041,
+        ),
+        *(
+            0x06040042,
+            0x06040043,
+            0x06040047,
+            0x06060000,
+            0x06070010,
+            0x06070012,
+        ),
+        *(
+            0x06070013,
+            0x06090011,
+            0x06090030,
+            0x06090031,
+            0x06090032,
+            0x06090036,
+        ),
+        *(
+            0x060A0023,
+            0x08000000,
+            0x08000020,
+            0x08000021,
+            0x08000022,
+            0x08000023,
+        ),
+        *(0x08000024,),
+    ]
+    texts = {abort_text(code) for code in codes}
+    assert len(texts) == len(codes) == 31
+    assert not any("no standard" in text for text in texts)
+
+
+# -- cancelling
+
+
+@pytest.mark.parametrize("block", [False, True], ids=["segments", "blocks"])
+def test_a_transfer_of_a_task_is_cancelled(network: CanNetwork, bus: str, block: bool) -> None:
+    clock = network.clock
+
+    def endless_blocks(request: bytes) -> list[bytes]:
+        if request[0] >> 5 != 5:
+            return []
+        if request[0] & 0x03 == 0:
+            return [b"\xc0" + request[1:4] + bytes(4)]
+        return [bytes([k]) + bytes(7) for k in range(1, 128)]
+
+    assert not network.cancel(SCRIPTED)  # nothing runs
+    with scripted(bus, SCRIPTED, endless_blocks if block else endless) as node:
+        task = clock.start(lambda: network.read_bytes(SCRIPTED, 0x1008, block=block))
+        while len(node.requests) < 3:
+            clock.sleep(0.01)
+        assert network.cancel(SCRIPTED)
+        assert clock.wait(lambda: task.done, clock.now_s + 5.0)
+        clock.sleep(0.1)
+        assert node.requests[-1] == b"\x80\x08\x10\x00" + struct.pack("<I", 0x08000000)
+        told = f"node {SCRIPTED}: object 1008h:0 cannot be read: the transfer was cancelled"
+        with pytest.raises(SdoCancelledError, match=told):
+            task.result()
+        # the next transfer is none the worse for it
+        node.answer = lambda request: [expedited(request, 4711)]
+        assert network.read_int(SCRIPTED, 0x1000) == 4711
+
+
+def test_the_drive_is_told_and_serves_the_next_request(network: CanNetwork) -> None:
+    network.write_bytes(1, 0x2F10, 0, bytes(6000))
+    task = network.clock.start(lambda: network.read_bytes(1, 0x2F10))
+    network.clock.sleep(0.001)
+    assert network.cancel(1)
+    network.clock.wait(lambda: task.done)
+    with pytest.raises(SdoCancelledError):
+        task.result()
+    assert network.read_int(1, 0x1018, 1) == 0x00CD9A01
+
+
+# -- what goes wrong on the wire
+
+
+def test_duplicated_answers_are_left_aside_and_counted(network: CanNetwork, bus: str) -> None:
+    values = {0x1000: 1, 0x1001: 2, 0x1014: 3, 0x1006: 4, 0x1005: 5}
+
+    def answer(request: bytes) -> list[bytes]:
+        index = int.from_bytes(request[1:3], "little")
+        return [expedited(request, values[index])] * 2
+
+    with scripted(bus, SCRIPTED, answer):
+        for _ in range(3):
+            for index, value in values.items():
+                assert network.read_int(SCRIPTED, index) == value
+    assert network.clients[SCRIPTED].unexpected >= 3
+    assert "two devices have this node id" in network.duplicate_node(SCRIPTED)
+
+
+def test_duplicated_segments_do_not_double_the_data(network: CanNetwork, bus: str) -> None:
+    text = b"abcdefghijklmnopqrst"
+    parts = [text[:7], text[7:14], text[14:]]
+    sent = 0
+
+    def answer(request: bytes) -> list[bytes]:
+        nonlocal sent
+        if request[0] == 0x40:
+            return [b"\x41" + request[1:4] + struct.pack("<I", len(text))] * 2
+        part = parts[sent]
+        sent += 1
+        command = request[0] & 0x10 | (7 - len(part)) << 1 | (sent == 3)
+        return [bytes([command]) + part] * 2
+
+    with scripted(bus, SCRIPTED, answer):
+        assert network.read_bytes(SCRIPTED, 0x1008) == text
+
+
+def test_a_lost_request_is_repeated(network: CanNetwork, bus: str) -> None:
+    def answer(request: bytes) -> list[bytes]:
+        asked.append(request)
+        first = sum(r[0] == 0x40 for r in asked) == 1
+        return [] if first or request[0] != 0x40 else [expedited(request, 7)]
+
+    asked: list[bytes] = []
+    with scripted(bus, SCRIPTED, answer):
+        assert network.read_int(SCRIPTED, 0x1000) == 7
+    assert [request[0] for request in asked] == [0x40, 0x80, 0x40]  # the first one was given up
+
+
+def test_a_drive_that_vanishes_in_the_middle_is_told_and_the_other_goes_on(
+    network: CanNetwork,
+) -> None:
+    network.write_bytes(1, 0x2F10, 0, bytes(700))
+    network.write(1, 0x2F00, 10, 5)  # for good: no test may follow that needs drive 1
+    begin = time.monotonic()
+    with pytest.raises(SdoTimeoutError) as caught:
+        network.read_bytes(1, 0x2F10)
+    assert time.monotonic() - begin < 3.0
+    assert "node 1: object 2F10h:0 cannot be read: no answer within 0.5 s" in str(caught.value)
+    assert network.read_int(2, 0x1018, 1) == 0x00CD9A01

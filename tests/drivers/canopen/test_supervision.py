@@ -1,0 +1,328 @@
+"""What the supervision table in docs/supervision.md promises, one test for each row.
+
+Rows whose test stands elsewhere: master lost (test_axis_group: drives stop when the master dies or
+hangs), bus gone (test_axis_group: a killed simulator), drive in fault, mode and state changes
+(test_axis_group), two devices with one node id at boot (test_boot_network).
+"""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.bus.health import BusState
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.cia402 import STATE_TABLE, State
+from cdpr_drivers.errors import SdoError
+from cdpr_rt.core.clock import Clock, PacedClock
+from cdpr_rt.errors import TripError
+from tests.drivers.axis_rig import (
+    HEARTBEAT_S,
+    MASTER,
+    PERIOD_S,
+    Rig,
+    dictionary,
+    open_network,
+    open_rig,
+)
+from tests.drivers.axis_rig import start_simulator as _start_simulator
+from tests.drivers.bus_log import BusLog, logged
+from tests.drivers.canopen.scripted_node import scripted
+
+RAISE_FAULT, DROP, MUTE, SILENT, DOUBLE, BABBLE = 1, 2, 5, 6, 7, 9
+NODES = [1, 2, 3]
+
+
+@pytest.fixture(scope="module")
+def three_drives() -> Iterator[str]:
+    simulator = _start_simulator(nodes=3)
+    try:
+        yield simulator.bus
+    finally:
+        simulator.stop()
+
+
+@pytest.fixture
+def trio(three_drives: str) -> Iterator[Rig]:
+    """Three drives, enabled."""
+    with open_network(three_drives, NODES) as network:
+        for node in NODES:
+            _eventually(network.clock, lambda node=node: _answers(network, node))
+            network.reset(node)
+            assert network.read_int(node, 0x1001) == 0
+    with open_rig(three_drives, NODES) as rig:
+        rig.enable()
+        rig.run(0.3)
+        yield rig
+
+
+def _answers(network: CanNetwork, node: int) -> bool:
+    try:
+        return network.read_int(node, 0x1000, attempts=1) > 0
+    except SdoError:
+        return False
+
+
+def _eventually(clock: Clock, condition: Callable[[], object]) -> None:
+    assert clock.wait(condition, clock.now_s + 5.0)
+
+
+def _drive_into(rig: Rig, trouble: Callable[[], None]) -> str:
+    """Drive until there is an alarm and switch off, as every loop does; return why."""
+    group = rig.group
+    with pytest.raises(TripError) as caught, group:
+        for cycle in range(5000):
+            group.sync()
+            group.receive()
+            text = group.alarm()
+            group.command.torque_Nm[:] = 0.0 if text else 0.03
+            if cycle == 150:
+                trouble()
+            group.transmit()
+            if text:
+                raise TripError(text)
+    return str(caught.value)
+
+
+def _stopped(log: BusLog, node: int) -> tuple[int, int]:
+    """Return the cycles in which a node was told to stop, and said that its power was off."""
+    pushed = [f.cycle for f in log.of(0x200 + node) if any(f.data[2:])]
+    assert pushed
+    # controlword disable voltage and no torque
+    told = [f.cycle for f in log.of(0x200 + node) if f.cycle >= pushed[-1] and not any(f.data)]
+    off = [f.cycle for f in log.of(0x180 + node) if f.cycle > pushed[-1] and _is_off(f.data)]
+    return told[0], off[0]
+
+
+def _is_off(tpdo: bytes) -> bool:
+    return bool(STATE_TABLE[tpdo[0] & 0x7F] == State.SWITCH_ON_DISABLED)
+
+
+# -- a node is lost
+
+
+@pytest.mark.parametrize(
+    ("sub", "value", "told"),
+    [(MUTE, 1, "node 2: no heartbeat"), (SILENT, 1500, "node 2: no answer to SYNC")],
+    ids=["heartbeat stops", "falls silent"],
+)
+def test_the_others_stop_within_two_heartbeats_of_the_last_one(
+    trio: Rig, sub: int, value: int, told: str
+) -> None:
+    with logged(trio.bus) as log:
+        text = _drive_into(trio, lambda: trio.misbehave(sub, value, node=2))
+    assert told in text
+    for node in (1, 3):
+        commanded, off = _stopped(log, node)
+        last_heard = [f.cycle for f in log.of(0x702) if f.cycle <= commanded][-1]
+        assert (commanded - last_heard) * PERIOD_S <= 2 * HEARTBEAT_S
+        assert (off - last_heard) * PERIOD_S <= 2 * HEARTBEAT_S
+        if sub == SILENT:  # then the missing answer tells, long before a heartbeat is due
+            last_answer = [f.cycle for f in log.of(0x182) if f.cycle <= commanded][-1]
+            assert commanded - last_answer <= 3
+
+
+def test_a_node_lost_between_cycles_is_an_alarm(trio: Rig) -> None:
+    trio.reach(State.SWITCH_ON_DISABLED)
+    trio.group.stop_cycling()
+    trio.misbehave(MUTE, 1, node=3)
+    _eventually(trio.network.clock, lambda: trio.network.alarm_text)
+    assert "node 3 is lost: no heartbeat for" in trio.network.alarm_text
+    assert "node 3 is lost" in trio.group.alarm()
+
+
+def test_all_are_heard_between_cycles(trio: Rig) -> None:
+    trio.reach(State.SWITCH_ON_DISABLED)
+    trio.group.stop_cycling()
+    trio.network.clock.sleep(1.6)  # longer than the patience
+    assert trio.network.alarm_text == ""
+
+
+def test_a_restart_between_cycles_is_an_alarm_and_voids_the_index(trio: Rig) -> None:
+    trio.group.set_index(1, 0.0)
+    trio.reach(State.SWITCH_ON_DISABLED)
+    trio.group.stop_cycling()
+    trio.network.send(0, bytes([129, 2]))
+    _eventually(trio.network.clock, lambda: trio.network.alarm_text)
+    text, _ = trio.until_alarm(0.01)
+    assert "node 2: the drive has restarted" in text
+    assert not trio.group.feedback.index_known[1]
+    assert not trio.group.feedback.alive[1]
+
+
+def test_a_node_that_leaves_operational_between_cycles_is_an_alarm(trio: Rig) -> None:
+    trio.reach(State.SWITCH_ON_DISABLED)
+    trio.group.stop_cycling()
+    _eventually(trio.network.clock, lambda: trio.network.wait_for_heartbeat(1, 1.0) == 5)
+    trio.network.send(0, bytes([128, 1]))
+    _eventually(trio.network.clock, lambda: trio.network.alarm_text)
+    assert "node 1 is not operational any more (NMT state 127, pre-op" in trio.network.alarm_text
+
+
+# -- emergency messages
+
+
+def test_an_emergency_is_told_in_words_and_kept_until_it_is_taken_back(trio: Rig) -> None:
+    text = _drive_into(trio, lambda: trio.misbehave(RAISE_FAULT, 0x4310, node=3))
+    assert "node 3: " in text
+    assert "4310h drive temperature too high" in text
+    network = trio.network
+    (standing,) = network.log.standing(3)
+    assert str(standing).startswith("node 3: 4310h drive temperature too high (error register 09h")
+    assert "temperature" in str(standing)
+    assert network.log.standing(1) == []
+    assert [record.code for record in network.error_history(3)] == [0x4310]
+    assert str(network.error_history(3)[0]) == "4310h drive temperature too high"
+    network.write(3, 0x6040, 0, 0x80)
+    _eventually(network.clock, lambda: not network.log.standing(3))
+    assert [e.code for e in network.log.of(3)] == [0x4310, 0]  # the history is kept
+    assert "error reset" in str(network.log.of(3)[-1])
+
+
+# -- answers that are missing, double, or too many
+
+
+def test_a_double_answer_is_taken_once_and_never_for_the_next_cycles(trio: Rig) -> None:
+    # a simulator that loses its core between the two copies sends the second one after the next
+    # SYNC, where nobody can know it for what it is: that is not what is looked at here
+    assert any(_follows_through_double_answers(trio) for _ in range(4))
+    assert trio.group.alarm() == ""
+
+
+def _follows_through_double_answers(trio: Rig) -> bool:
+    group = trio.group
+    trio.run(0.3)
+    before = group.repeated
+    trio.misbehave(DOUBLE, 20, node=3)  # the last to answer: nothing is awaited after it
+    with logged(trio.bus) as log:
+        for _ in range(60):
+            group.command.torque_Nm[:] = 0.2
+            trio.cycle()
+        positions = group.feedback.position_rad.copy()
+        flagged = group.feedback.rate_ok.copy()
+    assert list(flagged) == [True, True, False]
+    # what the feedback holds is what the drives said to this very SYNC
+    last = max(f.cycle for f in log.frames)
+    told = []
+    for node in NODES:
+        (answer,) = [f for f in log.of(0x180 + node) if f.cycle == last]
+        counts = int.from_bytes(answer.data[2:6], "little", signed=True)
+        told.append(counts * 2 * np.pi / 8192)
+    return bool(np.allclose(positions, told, rtol=1e-6)) and group.repeated - before == 20
+
+
+def test_the_rate_is_good_again_once_the_answers_are(trio: Rig) -> None:
+    trio.misbehave(DOUBLE, 3, node=2)
+    trio.run(0.02)
+    assert not trio.group.feedback.rate_ok.all() or trio.group.repeated == 3
+    trio.run(0.3)
+    assert trio.group.feedback.rate_ok.all()
+    assert trio.group.feedback.alive.all()
+
+
+def test_double_answers_without_end_are_two_devices(trio: Rig) -> None:
+    text = _drive_into(trio, lambda: trio.misbehave(DOUBLE, 255, node=2))
+    assert "node 2: its answers to SYNC are unsteady" in text
+    assert "two devices may have this node id" in text
+    assert "node 1" not in text
+
+
+def test_a_node_that_answers_sdo_but_not_sync_is_named_with_advice(trio: Rig) -> None:
+    def switch_tpdo_off() -> None:
+        trio.network.write(2, 0x1800, 1, 0x8000_0182)
+
+    text = _drive_into(trio, switch_tpdo_off)
+    assert "node 2: no answer to SYNC" in text
+    assert "its TPDOs are off or changed: boot it anew" in text
+    assert trio.network.read_int(2, 0x1018, 1) == 0x00CD9A01
+
+
+def test_a_node_that_babbles_is_named_and_the_others_are_served(trio: Rig) -> None:
+    trio.misbehave(BABBLE, 60, node=2)
+    for _ in range(40):
+        trio.cycle()
+    assert list(trio.group.feedback.valid) == [True, True, True]
+    assert "node 2: EMCY FF00h" in trio.group.alarm()
+    assert "floods the bus" in trio.group.alarm()
+    assert "node 1" not in trio.group.alarm()
+    assert trio.network.read_int(1, 0x1018, 1) == 0x00CD9A01
+    trio.misbehave(BABBLE, 0, node=2)
+    assert trio.group.close() == ""
+    assert trio.group.reached(State.SWITCH_ON_DISABLED)
+
+
+def test_a_flood_of_emergencies_between_cycles_is_named(three_drives: str) -> None:
+    with (
+        open_network(three_drives, NODES) as network,
+        scripted(three_drives, 2, lambda _request: []) as node,
+    ):
+        for _ in range(150):
+            node.send(0x082, b"\x00\xff\x81\0\0\0\0\0")
+        _eventually(network.clock, lambda: len(network.log.of(2)) == 150)
+        assert "node 2: FF00h device specific" in network.alarm_text
+        network.clear_alarm()
+        node.send(0x082, b"\x00\xff\x81\0\0\0\0\0")
+        _eventually(network.clock, lambda: network.alarm_text)
+        assert "node 2 floods the bus: 151 emergency messages within 1 s" in network.alarm_text
+        assert network.read_int(1, 0x1018, 1) == 0x00CD9A01
+
+
+# -- the wire
+
+
+class _Server:
+    """A socketcand server that tells of the errors of its controller."""
+
+    def __init__(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.url = f"socketcand://127.0.0.1:{self._listener.getsockname()[1]}/can0"
+        self._client: socket.socket | None = None
+        self._thread = threading.Thread(target=self._greet, daemon=True)
+        self._thread.start()
+
+    def _greet(self) -> None:
+        self._client, _ = self._listener.accept()
+        self._client.sendall(b"< hi >")
+        for _ in ("open", "rawmode"):
+            self._client.recv(100)
+            self._client.sendall(b"< ok >")
+
+    def tell(self, message: bytes) -> None:
+        self._thread.join(5.0)
+        assert self._client is not None
+        self._client.sendall(message)
+
+    def close(self) -> None:
+        if self._client is not None:
+            self._client.close()
+        self._listener.close()
+
+
+def test_bus_off_is_an_alarm_until_the_controller_has_come_back() -> None:
+    server = _Server()
+    network = CanNetwork(BusUrl.parse(server.url), PacedClock(), [1], MASTER, HEARTBEAT_S)
+    try:
+        network.add_node(1, dictionary(1))
+        server.tell(b"< error 20000080 1.0 >")
+        _eventually(network.clock, lambda: network.health.errors == 1)
+        assert network.alarm_text == ""  # a disturbed frame is sent again by the controller
+        server.tell(b"< error 20000040 1.0 >")
+        _eventually(network.clock, lambda: network.alarm_text)
+        assert "the CAN controller is bus-off" in network.alarm_text
+        assert "restart the interface" in network.alarm_text
+        network.clear_alarm()
+        assert "bus-off" in network.alarm_text  # its cause is not gone
+        server.tell(b"< error 20000100 1.0 >")
+        _eventually(network.clock, lambda: network.health.state is BusState.ACTIVE)
+        assert "bus-off" in network.alarm_text  # latched
+        network.clear_alarm()
+        assert network.alarm_text == ""
+        assert (network.health.bus_offs, network.health.restarts) == (1, 1)
+    finally:
+        network.close()
+        server.close()

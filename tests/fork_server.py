@@ -1,0 +1,364 @@
+"""Processes of the command line, forked from one that has imported all of it.
+
+To import numba, numpy and what else a command stands on, to load its kernels, and to take all that
+apart at its end takes a second of processor time, and the tests start hundreds of commands. A
+process started here is one of its own in all else: arguments, environment, folder, descriptors,
+session and signals are those that `subprocess` was asked for. It does what a process does at its
+end (threads, atexit, what is written) except for freeing its memory piece by piece.
+
+The two processes of a daemon look for their parent, the launcher. It has a server of its own, from
+which it adopts them: for that moment, orphans below it are its children.
+
+What cannot be had by a fork is started as usual, as is all that has CDPR_TEST_FORKS=0 in its
+environment.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import fcntl
+import gc
+import importlib
+import json
+import os
+import pkgutil
+import resource
+import runpy
+import select
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+_COMMAND = "cdpr_tools.cli"
+_OF_A_LAUNCHER = {"cdpr_tools.daemon.loop_process", "cdpr_tools.daemon.service_process"}
+_STARTED_BY = [sys.executable, "-P", str(Path(__file__).resolve())]
+_ROOM = " " * 8192
+"""A last word of the server's, in whose place go the words of what is forked: /proc shows them."""
+_SPECIAL = ("PYTHON", "NUMBA", "LD_", "MALLOC", "OPENBLAS", "OMP")
+"""Variables that Python and libraries read when they start."""
+_FINDS_ITS_CHILDREN = "verify"
+"""The command that looks for its processes by their environment, which /proc shows as at first."""
+_LAUNCHES = "run"
+"""The command whose processes, and their tests, look for their parent."""
+_PR_SET_CHILD_SUBREAPER = 36
+_SWITCH = "CDPR_TEST_FORKS"
+_MOST_BYTES = 1 << 17
+_OUT_OF_THE_WAY = 200
+
+
+_Popen = subprocess.Popen
+_connections: dict[int, socket.socket] = {}
+"""By the process that they belong to: one that was forked has to make its own."""
+_address: list[str] = []
+_own: list[socket.socket] = []
+"""Of a launcher: the way to its own server."""
+
+
+def _ask(request: dict[str, Any], descriptors: Sequence[int] = ()) -> int:
+    """Return the server's answer to `request`; the server is started when first needed."""
+    if not _address:
+        _address.append(f"\0cdpr-tests/{os.getpid()}")
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        listener.bind(_address[0])
+        listener.listen()
+        lifeline, kept = os.pipe()
+        os.set_inheritable(kept, False)  # open for as long as this process lives
+        numbers = [listener.fileno(), lifeline]
+        _Popen([*_STARTED_BY, *map(str, numbers), _ROOM], pass_fds=numbers)
+        listener.close()
+        os.close(lifeline)
+    pid = os.getpid()
+    if pid not in _connections:
+        _connections[pid] = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        _connections[pid].connect(_address[0])
+    message = json.dumps(request | {"address": _address[0]}).encode()
+    socket.send_fds(_connections[pid], [message], list(descriptors))
+    return int(_connections[pid].recv(64))
+
+
+class ForkingPopen(_Popen):  # type: ignore[type-arg]
+    """subprocess.Popen that has commands of ours forked from the server."""
+
+    _forked = False
+
+    def _execute_child(self, *given: Any) -> None:
+        args, executable, preexec_fn, _, pass_fds, cwd, env, _, _, shell = given[:10]
+        p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite = given[10:16]
+        _, gid, gids, uid, umask, session, group = given[16:]
+        words = [os.fspath(word) for word in args] if isinstance(args, list | tuple) else []
+        wanted = dict(os.environ if env is None else env)
+        special = executable, preexec_fn, shell or None, gid, gids, uid
+        module = _module_of(words)
+        if (
+            module not in ({_COMMAND} | _OF_A_LAUNCHER if _own else {_COMMAND})
+            or any(value is not None for value in special)
+            or umask != -1
+            or group != -1
+            or wanted.get(_SWITCH) == "0"
+            or any(_of_start(wanted, name) for name in {*wanted, *os.environ})
+            or _limits() != _AT_FIRST
+        ):
+            super()._execute_child(*given)
+            return
+        standard = [
+            number if mine == -1 else mine
+            for number, mine in enumerate((p2cread, c2pwrite, errwrite))
+        ]
+        request = {
+            "words": words,
+            "env": wanted,
+            "cores": sorted(os.sched_getaffinity(0)),
+            "cwd": os.fspath(cwd) if cwd else str(Path.cwd()),
+            "session": bool(session),
+            "pass": list(pass_fds),
+        }
+        if _own:
+            self.pid = _adopt(request, [*standard, *pass_fds])
+        else:
+            self.pid = _ask(request, [*standard, *pass_fds])
+            self._forked = True
+            self._pidfd = os.pidfd_open(self.pid)
+        self._child_created = True
+        null = getattr(self, "_devnull", None)
+        for ours, theirs in ((p2cwrite, p2cread), (c2pread, c2pwrite), (errread, errwrite)):
+            if theirs != -1 and ours != -1 and theirs != null:
+                os.close(theirs)
+        if null is not None:
+            os.close(null)
+        self._closed_child_pipe_fds = True
+
+    def _try_wait(self, wait_flags: int) -> tuple[int, int]:
+        if not self._forked:
+            return super()._try_wait(wait_flags)  # type: ignore[misc,no-any-return]
+        poll = select.poll()
+        poll.register(self._pidfd, select.POLLIN)
+        if not poll.poll(0 if wait_flags == os.WNOHANG else None):
+            return 0, 0
+        status = _ask({"status": self.pid})
+        os.close(self._pidfd)
+        return self.pid, status
+
+    def _internal_poll(self, *given: Any, **more: Any) -> int | None:
+        if not self._forked:
+            return super()._internal_poll(*given, **more)  # type: ignore[misc,no-any-return]
+        if self.returncode is None:
+            pid, status = self._try_wait(os.WNOHANG)
+            if pid == self.pid:
+                self._handle_exitstatus(status)  # type: ignore[attr-defined]
+        return self.returncode
+
+
+def _module_of(words: list[str]) -> str:
+    """Return the module that is run, empty where it is something else."""
+    if words[:2] == [sys.executable, "-P"]:
+        words = [words[0], *words[2:]]
+    return words[2] if words[:2] == [sys.executable, "-m"] and len(words) > 2 else ""
+
+
+def _adopt(request: dict[str, Any], descriptors: Sequence[int]) -> int:
+    """Return the process that the launcher's own server has started as a child of this one."""
+    prctl = ctypes.CDLL(None).prctl
+    prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    try:
+        socket.send_fds(_own[0], [json.dumps(request).encode()], list(descriptors))
+        return int(_own[0].recv(64))
+    finally:
+        prctl(_PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0)
+
+
+def _limits() -> list[tuple[int, int]]:
+    """Return the limits that a process inherits."""
+    return [resource.getrlimit(what) for what in (resource.RLIMIT_NOFILE, resource.RLIMIT_FSIZE)]
+
+
+_AT_FIRST = _limits()
+
+
+def _of_start(wanted: dict[str, str], name: str) -> bool:
+    return name.startswith(_SPECIAL) and wanted.get(name) != os.environ.get(name)
+
+
+def install() -> None:
+    """Have this process start commands by forks from now on."""
+    subprocess.Popen = ForkingPopen  # type: ignore[misc]
+
+
+# -- the server
+
+
+def _serve(listener: socket.socket, lifeline: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.path.append(str(Path(__file__).parent))
+    kernel_locks = importlib.import_module("kernel_locks")
+    sys.path.pop()
+    kernel_locks.install()
+    _import_all()
+    kernels = kernel_locks.Kernels()
+    gc.collect()
+    selector = selectors.DefaultSelector()
+    selector.register(listener, selectors.EVENT_READ)
+    selector.register(lifeline, selectors.EVENT_READ)
+    while True:
+        for key, _ in selector.select():
+            if key.fd == lifeline:
+                os._exit(0)
+            assert isinstance(key.fileobj, socket.socket)
+            if key.fileobj is listener:
+                selector.register(listener.accept()[0], selectors.EVENT_READ)
+            elif not _obey(key.fileobj, selector, kernels):
+                selector.unregister(key.fileobj)
+                key.fileobj.close()
+
+
+def _obey(client: socket.socket, selector: selectors.BaseSelector, kernels: Any) -> bool:
+    """Answer one request of a client; return False where it has gone."""
+    message, descriptors = _received(client)
+    if not message:
+        return False
+    request = json.loads(message)
+    if "status" in request:
+        answer = os.waitpid(request["status"], 0)[1]
+    else:
+        kernels.load()
+        gc.freeze()
+        answer = os.fork()
+        if answer == 0:
+            _address[:] = [request["address"]]
+            for key in [*selector.get_map().values()]:
+                os.close(key.fd)
+            selector.close()
+            _become(request, descriptors)
+        for descriptor in descriptors:
+            os.close(descriptor)
+    client.send(str(answer).encode())
+    return True
+
+
+def _received(client: socket.socket) -> tuple[bytes, list[int]]:
+    try:
+        message, descriptors, _, _ = socket.recv_fds(client, _MOST_BYTES, 16)
+    except ConnectionError:
+        return b"", []
+    return message, descriptors
+
+
+def _import_all() -> None:
+    for name in ("cdpr_tools.commands", "cdpr_tools.daemon", "cdpr_sim_bus", "cdpr_rt"):
+        package = importlib.import_module(name)
+        for module in pkgutil.walk_packages(package.__path__, f"{name}."):
+            importlib.import_module(module.name)
+
+
+def _serve_launcher(client: socket.socket) -> NoReturn:
+    """Start processes that the launcher, the parent of this one, becomes the parent of."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    while True:
+        message, descriptors = _received(client)
+        if not message:
+            os._exit(0)
+        told, tell = os.pipe()
+        wait, go = os.pipe()
+        between = os.fork()
+        if between == 0:
+            child = os.fork()
+            if child:
+                os.write(tell, str(child).encode())
+                os._exit(0)
+            for number in (told, tell, go, client.fileno()):
+                os.close(number)
+            os.read(wait, 1)  # until this one is the launcher's
+            os.close(wait)
+            _become(json.loads(message), descriptors)
+        os.waitpid(between, 0)
+        client.send(os.read(told, 64))
+        for number in (told, tell, wait, go, *descriptors):
+            os.close(number)
+
+
+def _become(request: dict[str, Any], descriptors: list[int]) -> NoReturn:
+    words = request["words"]
+    module = _module_of(words)
+    arguments = words[words.index(module) + 1 :]
+    _be_shown_as(words)
+    if request["session"]:
+        os.setsid()
+    if arguments[:1] == [_LAUNCHES]:
+        _get_own_server(descriptors)
+    if module == _COMMAND and _FINDS_ITS_CHILDREN not in arguments[:2]:
+        install()
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    os.sched_setaffinity(0, request["cores"])
+    os.environ.clear()
+    os.environ.update(request["env"])
+    os.chdir(request["cwd"])
+    away = [fcntl.fcntl(number, fcntl.F_DUPFD, _OUT_OF_THE_WAY) for number in descriptors]
+    for number in descriptors:
+        os.close(number)
+    for number, place in zip(away, [0, 1, 2, *request["pass"]], strict=True):
+        os.dup2(number, place)
+        os.close(number)
+    sys.stdin = open(0, closefd=False)  # noqa: SIM115
+    sys.stdout = open(1, "w", 1 if os.isatty(1) else -1, closefd=False)  # noqa: SIM115
+    sys.stderr = open(  # noqa: SIM115
+        2, "w", 1, closefd=False, errors="backslashreplace"
+    )
+    sys.argv = [module, *arguments]
+    sys.modules.pop(module, None)
+    with _quick_end():
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    sys.exit()
+
+
+def _get_own_server(descriptors: list[int]) -> None:
+    mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    if os.fork() == 0:
+        for number in (mine.fileno(), *descriptors):
+            os.close(number)
+        _serve_launcher(its)
+    its.close()
+    # where no descriptor has to go that the process is to have
+    _own.append(socket.socket(fileno=fcntl.fcntl(mine, fcntl.F_DUPFD_CLOEXEC, _OUT_OF_THE_WAY)))
+    mine.close()
+
+
+@contextmanager
+def _quick_end() -> Iterator[None]:
+    """At the end of the block do what an interpreter does at its own, but free no memory.
+
+    Any end but an exit in order is left to the interpreter.
+    """
+    code: Any = None
+    try:
+        yield
+    except SystemExit as ended:
+        code = ended.code
+        if not isinstance(code, int | None):
+            raise
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        sys.exit(code)
+    os._exit((code or 0) & 0xFF)
+
+
+def _be_shown_as(words: list[str]) -> None:
+    """Have /proc show this process with these words."""
+    fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+    begin, end = int(fields[45]), int(fields[46])
+    text = b"\0".join(word.encode() for word in words)[: end - begin - 1]
+    ctypes.memmove(begin, text.ljust(end - begin, b"\0"), end - begin)
+
+
+if __name__ == "__main__":
+    _serve(socket.socket(fileno=int(sys.argv[1])), int(sys.argv[2]))

@@ -1,0 +1,352 @@
+"""Programs that nobody here wrote, on the other side of ours or beside it.
+
+Our master against slaves built on `canopen.LocalNode`; our drives against the `canopen` package's
+master; python-can's own command-line tools as listeners and players on a simulated bus.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import can
+import canopen
+import pytest
+from canopen.profiles.p402 import BaseNode402
+
+from cdpr_profiles import load_winch
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.clock import ClockMode
+
+WINCH = "winch-mpp0923d"
+PROFILE = load_winch(WINCH)
+EDS = str(PROFILE.drive.eds)
+
+
+def wait_for(condition: Callable[[], bool], timeout_s: float = 8.0) -> bool:
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.01)
+    return condition()
+
+
+def cdpr(*words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "cdpr_tools.cli", *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+@contextmanager
+def third_party_on(name: str) -> Iterator[canopen.Network]:
+    network = canopen.Network()
+    network.NOTIFIER_CYCLE = 0.05
+    network.connect(interface="simbus", channel=name)
+    try:
+        yield network
+    finally:
+        network.sync.stop()
+        network.disconnect()
+
+
+# -- a third party's slaves, our master
+
+
+@pytest.fixture
+def empty_bus() -> Iterator[str]:
+    """A bus without any node of ours; paced, as a third-party slave runs by wall time."""
+    name = f"empty-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    hub = Hub([], mode=ClockMode.PACED, name=name)
+    hub.listen()
+    thread = threading.Thread(target=hub.run)
+    thread.start()
+    try:
+        yield name
+    finally:
+        hub.stop()
+        thread.join()
+        hub.close()
+
+
+def test_a_slave_without_process_data_boots_as_far_as_it_goes(empty_bus: str) -> None:
+    """`LocalNode` answers SDO, but after a reset its heartbeats are boot-up messages."""
+    bus = f"simbus:{empty_bus}"
+    with third_party_on(empty_bus) as network:
+        node = network.create_node(1, EDS)
+        node.nmt.state = "PRE-OPERATIONAL"
+        told = cdpr("drive", "info", WINCH, "--bus", bus, "--json")
+        assert told.returncode == 0, told.stderr
+        assert json.loads(told.stdout.splitlines()[-1])["profile_fits"] is True
+        ended = cdpr("drive", "enable", WINCH, "--bus", bus)
+        assert ended.returncode == 1
+        assert "node 1 did not boot (step K): no heartbeat came" in ended.stderr
+        assert node.sdo[0x1A00][2].raw == 0x60640020  # configured it was
+
+        def restart(_id: int, data: bytearray, _time: float) -> None:
+            if data[0] in (129, 130):
+                node.nmt.send_command(130)
+                node.nmt.state = "PRE-OPERATIONAL"
+
+        network.subscribe(0, restart)
+        ended = cdpr("drive", "enable", WINCH, "--bus", bus)
+        assert ended.returncode == 1
+        assert "node 1: no answer to SYNC" in ended.stderr
+        assert "its TPDOs are off" in ended.stderr
+        assert len(ended.stderr.strip().splitlines()) == 1
+
+
+class ThirdPartyServo:
+    """A drive on `canopen.LocalNode`: its SDO server, NMT, heartbeat and PDO maps, little else."""
+
+    STATES = ((0x80, 0x80, 0x40), (0x02, 0x00, 0x40), (0x0F, 0x0F, 0x27), (0x0F, 0x07, 0x23))
+
+    def __init__(self, network: canopen.Network, node_id: int) -> None:
+        self.network = network
+        self.node = network.create_node(node_id, EDS)
+        self.states: list[int] = []
+        network.subscribe(0x000, self._on_nmt)
+        network.subscribe(0x080, self._on_sync)
+        network.subscribe(0x200 + node_id, self._on_rpdo)
+        self.node.sdo[0x6041].raw = 0x40
+        self.node.nmt.state = "PRE-OPERATIONAL"
+
+    def _on_nmt(self, _id: int, data: bytearray, _time: float) -> None:
+        if data[0] in (129, 130):
+            self.node.nmt.send_command(130)
+            self.node.nmt.state = "PRE-OPERATIONAL"
+        elif data[0] == 1:
+            self.node.tpdo.read()
+            self.node.rpdo.read()
+
+    def _on_rpdo(self, _id: int, data: bytearray, _time: float) -> None:
+        if len(data) != 4 or self.node.nmt.state != "OPERATIONAL":
+            return
+        word, target = struct.unpack("<Hh", data)
+        assert target == 0 or self.states[-1:] == [0x27]
+        state = 0x21
+        for mask, value, reached in self.STATES:
+            if word & mask == value:
+                state = reached
+                break
+        if self.states[-1:] != [state]:
+            self.states.append(state)
+        self.node.sdo[0x6041].raw = state
+        self.node.sdo[0x6061].raw = self.node.sdo[0x6060].raw
+
+    def _on_sync(self, _id: int, _data: bytearray, _time: float) -> None:
+        if self.node.nmt.state != "OPERATIONAL":
+            return
+        for number in (1, 2):
+            pdo = self.node.tpdo[number]
+            for variable in pdo:
+                variable.raw = self.node.sdo[variable.index].raw
+            pdo.transmit()
+
+
+def test_a_third_partys_servo_is_enabled_and_switched_off(empty_bus: str, tmp_path: Path) -> None:
+    winch = tmp_path / "slow.toml"
+    text = PROFILE.path.read_text()
+    assert "sync_period_s = 0.001" in text
+    winch.write_text(text.replace("sync_period_s = 0.001", "sync_period_s = 0.04"))
+    with third_party_on(empty_bus) as network:
+        servo = ThirdPartyServo(network, 1)
+        words = ("drive", "enable", str(winch), "--bus", f"simbus:{empty_bus}", "--seconds", "0.3")
+        ended = cdpr(*words)
+        assert ended.returncode == 0, ended.stderr
+        assert "operation enabled, no torque" in ended.stdout
+        states = servo.states
+        assert states[states.index(0x21) :][:3] == [0x21, 0x23, 0x27]
+        assert states[-1] == 0x40
+        assert wait_for(lambda: servo.node.nmt.state == "PRE-OPERATIONAL")
+
+
+# -- our drives, a third party's master
+
+
+@contextmanager
+def simulator(*options: str) -> Iterator[str]:
+    name = f"third-party-{os.getpid()}-{uuid.uuid4().hex[:6]}"
+    words = ["sim", "up", WINCH, "--bus", f"simbus:{name}", "--exit-with-stdin", *options]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cdpr_tools.cli", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    try:
+        assert process.stdout is not None
+        assert b"ready" in process.stdout.readline()
+        yield name
+    finally:
+        process.communicate(timeout=20)
+
+
+@pytest.fixture(scope="module")
+def drives() -> Iterator[str]:
+    """Two drives with the node ids 1 and 2."""
+    with simulator("--nodes", "2", "--paced") as name:
+        yield name
+
+
+def test_the_stock_lss_master_configures_new_drives_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(canopen.lss.LssMaster, "RESPONSE_TIMEOUT", 0.04)
+    shorter = SimpleNamespace(sleep=lambda seconds: time.sleep(0.3 * seconds))
+    monkeypatch.setattr("canopen.lss.time", shorter)
+    with simulator("--nodes", "2", "--unconfigured") as name, third_party_on(name) as network:
+        lss = network.lss
+        serials = set()
+        for node_id in (10, 11):
+            # a busy machine answers later than the library waits
+            scans = (lss.fast_scan() for _ in range(4))
+            found, numbers = next((one for one in scans if one[0]), (False, None))
+            assert found
+            assert numbers[:3] == [0x00CD9A01, 0x402, 0x10000]
+            serials.add(numbers[3])
+            assert [lss.inquire_lss_address(cs) for cs in range(0x5A, 0x5E)] == numbers
+            lss.configure_node_id(node_id)
+            lss.store_configuration()
+            lss.send_switch_state_global(lss.WAITING_STATE)
+        assert serials == {1, 2}
+        assert lss.fast_scan() == (False, None)
+        network.scanner.search()
+        assert wait_for(lambda: sorted(network.scanner.nodes) == [10, 11])
+
+
+def test_the_stock_master_hears_emergencies_of_the_right_node(drives: str) -> None:
+    with third_party_on(drives) as network:
+        nodes = [network.add_node(BaseNode402(node_id, EDS)) for node_id in (1, 2)]
+        codes: dict[int, list[int]] = {1: [], 2: []}
+        for node in nodes:
+            node.emcy.add_callback(lambda error, n=node.id: codes[n].append(error.code))
+        nodes[1].sdo[0x2F00][1].raw = 0xFF02
+        assert wait_for(lambda: codes == {1: [], 2: [0xFF02]})
+        assert nodes[1].sdo[0x1003][1].raw & 0xFFFF == 0xFF02
+        assert nodes[0].sdo[0x1003][0].raw == 0
+        nodes[1].sdo[0x6040].raw = 0x80
+        assert wait_for(lambda: codes[2] == [0xFF02, 0])
+        assert nodes[1].sdo[0x1001].raw == 0
+
+
+def test_the_stock_master_moves_data_in_blocks_through_two_drives_at_once(drives: str) -> None:
+    contents = {1: os.urandom(20_000), 2: os.urandom(777)}
+
+    def there_and_back(node: canopen.RemoteNode, content: bytes) -> None:
+        sizes = {"size": len(content)}
+        with node.sdo.open(0x2F10, 0, "wb", block_transfer=True, **sizes) as stream:
+            stream.write(content)
+        with node.sdo.open(0x2F10, 0, "rb", block_transfer=True) as stream:
+            got[node.id] = stream.read()
+
+    got: dict[int, bytes] = {}
+    with third_party_on(drives) as network:
+        nodes = [network.add_node(node_id, EDS) for node_id in (1, 2)]
+        threads = [
+            threading.Thread(target=there_and_back, args=(node, contents[node.id]))
+            for node in nodes
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert got == contents
+
+
+# -- python-can's own tools
+
+
+@contextmanager
+def tool(*words: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a command of python-can; end it as its user does, by Ctrl-C."""
+    process = subprocess.Popen(
+        [sys.executable, "-u", "-m", *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    try:
+        yield process
+    finally:
+        process.send_signal(2)
+        process.communicate(timeout=20)
+
+
+def test_the_stock_logger_and_player_take_part(drives: str, tmp_path: Path) -> None:
+    """What a third party's master did is logged, and played back it does the same again."""
+    log = tmp_path / "session.log"
+    words = ("can.logger", "-i", "simbus", "-c", drives, "-f", str(log))
+    with tool(*words) as logger, third_party_on(drives) as network:
+        node = network.add_node(2, EDS)
+        assert logger.stdout is not None
+        assert b"Connected to" in logger.stdout.readline()
+        node.nmt.state = "PRE-OPERATIONAL"
+        assert wait_for(lambda: _ask(node) == 0 and log.exists() and log.stat().st_size > 0)
+        node.sdo[0x6072].raw = 321
+        node.nmt.state = "OPERATIONAL"
+        network.sync.transmit()
+        time.sleep(0.2)
+    messages = list(can.LogReader(str(log)))
+    identifiers = [message.arbitration_id for message in messages]
+    assert {0x000, 0x080, 0x602, 0x582, 0x282} <= set(identifiers)
+    assert all(b.timestamp >= a.timestamp for a, b in pairwise(messages))
+    with third_party_on(drives) as network:
+        node = network.add_node(2, EDS)
+        node.nmt.state = "PRE-OPERATIONAL"
+        node.sdo[0x6072].raw = 111
+        player = ("can.player", "-i", "simbus", "-c", drives, "--ignore-timestamps", str(log))
+        played = subprocess.run(
+            [sys.executable, "-m", *player], capture_output=True, timeout=30, check=False
+        )
+        assert played.returncode == 0, played.stderr
+        assert wait_for(lambda: node.sdo[0x6072].raw == 321)
+
+
+def _ask(node: canopen.RemoteNode) -> int:
+    return int(node.sdo[0x1001].raw)
+
+
+def test_the_stock_viewer_shows_the_bus(drives: str) -> None:
+    master, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
+    viewer = subprocess.Popen(
+        [sys.executable, "-m", "can.viewer", "-i", "simbus", "-c", drives],
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        env=os.environ | {"TERM": "xterm"},
+        start_new_session=True,
+    )
+    os.close(terminal)
+    os.set_blocking(master, False)
+    screen = b""
+
+    def shows(text: bytes) -> bool:
+        nonlocal screen
+        with suppress(OSError):
+            screen += os.read(master, 65536)
+        return text in screen
+
+    try:
+        with third_party_on(drives) as network:
+            node = network.add_node(1, EDS)
+            assert wait_for(lambda: shows(b"Count"))
+            assert node.sdo[0x1000].raw == 0x20192
+            assert wait_for(lambda: shows(b"0x581")), screen
+        os.write(master, b"\x1b")
+        assert wait_for(lambda: shows(b"") and viewer.poll() is not None), screen
+        assert viewer.returncode == 0
+    finally:
+        viewer.kill()
+        viewer.wait()
+        os.close(master)

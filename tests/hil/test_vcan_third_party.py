@@ -1,0 +1,137 @@
+"""Third-party software on a real vcan0: a stock master, python-can's logger, and our LSS."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+import canopen
+import pytest
+from canopen.profiles.p402 import BaseNode402
+
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.canopen.lss import LssAddress, LssMaster
+from cdpr_profiles import load_drive
+from cdpr_rt.core.clock import PacedClock
+from cdpr_sim_bus.bus.client import raw_can_socket
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.bus.node_protocol import LocalNode
+from cdpr_sim_bus.canopen import CanopenSlave, ObjectDictionary, SlaveApplication
+from cdpr_sim_bus.canopen.lss import UNCONFIGURED
+from cdpr_sim_bus.cia402.drive import SimDrive
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.robot.plant import Plant
+
+pytestmark = pytest.mark.vcan
+
+EDS = load_drive("generic-cia402").eds
+NODE = 5
+
+
+def wait_for(condition: Callable[[], bool], timeout_s: float = 8.0) -> bool:
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.02)
+    return condition()
+
+
+@contextmanager
+def on_vcan(*nodes: LocalNode) -> Iterator[None]:
+    """Run nodes of ours on vcan0, in a thread."""
+    hub = Hub(nodes, mode=ClockMode.PACED, name="vcan0")
+    hub.attach(raw_can_socket("vcan0"), essential=True)
+    thread = threading.Thread(target=hub.run)
+    thread.start()
+    try:
+        yield
+    finally:
+        hub.stop()
+        thread.join()
+        hub.close()
+
+
+@contextmanager
+def third_party() -> Iterator[canopen.Network]:
+    network = canopen.Network()
+    network.NOTIFIER_CYCLE = 0.05
+    network.connect(interface="socketcan", channel="vcan0")
+    try:
+        yield network
+    finally:
+        network.sync.stop()
+        network.disconnect()
+
+
+def new_device(serial: int) -> CanopenSlave:
+    od = ObjectDictionary.from_eds(EDS, UNCONFIGURED)
+    od.set_default(0x1018, 4, serial)
+    return CanopenSlave(od, UNCONFIGURED, SlaveApplication())
+
+
+def test_the_stock_master_enables_a_drive_while_the_stock_logger_writes(tmp_path: Path) -> None:
+    log = tmp_path / "vcan0.log"
+    command = [
+        sys.executable,
+        "-u",
+        "-m",
+        "can.logger",
+        *("-i", "socketcan", "-c", "vcan0"),
+        "-f",
+        str(log),
+    ]
+    logger = subprocess.Popen(command, stdout=subprocess.PIPE)
+    try:
+        with on_vcan(SimDrive(EDS, NODE, Plant())), third_party() as network:
+            assert logger.stdout is not None
+            assert b"Connected to" in logger.stdout.readline()
+            network.scanner.search(10)
+            assert wait_for(lambda: network.scanner.nodes == [NODE])
+            node = network.add_node(BaseNode402(NODE, str(EDS)))
+            node.sdo.RESPONSE_TIMEOUT = 2.0
+            content = bytes(range(256)) * 2
+            with node.sdo.open(0x2F10, 0, "wb", size=len(content), block_transfer=True) as stream:
+                stream.write(content)
+            assert node.sdo.upload(0x2F10, 0) == content
+            node.sdo[0x1017].raw = 100
+            node.nmt.wait_for_heartbeat(timeout=5)
+            node.setup_402_state_machine()
+            node.nmt.state = "OPERATIONAL"
+            network.sync.start(0.05)
+            node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
+            node.state = "OPERATION ENABLED"
+            assert node.state == "OPERATION ENABLED"
+            codes: list[int] = []
+            node.emcy.add_callback(lambda error: codes.append(error.code))
+            node.sdo[0x2F00][1].raw = 0xFF01
+            assert wait_for(lambda: codes == [0xFF01])
+            assert wait_for(node.is_faulted)
+    finally:
+        logger.send_signal(2)
+        logger.communicate(timeout=20)
+    identifiers = {message.arbitration_id for message in can.LogReader(str(log))}
+    wanted = {0x000, 0x080, 0x080 + NODE, 0x180 + NODE, 0x580 + NODE, 0x600 + NODE, 0x700 + NODE}
+    assert wanted <= identifiers
+
+
+def test_new_devices_get_their_node_ids_by_lss() -> None:
+    serials = (0x0001FFFF, 0xFFFFFFF0)
+    wanted = [LssAddress(0x00CD9A01, 0x402, 0x10000, serial) for serial in serials]
+    with (
+        on_vcan(*(new_device(serial) for serial in serials)),
+        LssMaster(BusUrl.parse("socketcan:vcan0"), PacedClock(), 0.03) as master,
+    ):
+        assert master.unconfigured() == wanted
+        assert master.select(wanted[1]) == UNCONFIGURED
+        master.set_node_id(9)
+        master.release()
+        assert master.wait_for_boot_up(9)
+        assert master.node_id_in_use(9) == "it answers to SDO"
+        assert master.node_id_in_use(10, 0.1) == ""

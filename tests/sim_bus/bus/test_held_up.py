@@ -1,0 +1,145 @@
+"""A simulator that is held up on a paced bus: what was sent meanwhile counts as sent then."""
+
+from __future__ import annotations
+
+import socket
+import time
+from itertools import pairwise
+
+import pytest
+
+from cdpr_profiles import load_winch
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.cia402.drive import SimDrive
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.frame import pack_frame
+from cdpr_sim_bus.robot.plant import Plant
+
+pytestmark = pytest.mark.alone
+
+MASTER = 127
+CONSUMER_S = 0.1
+SYNC, HEARTBEAT = pack_frame(0x080), pack_frame(0x700 + MASTER, b"\x05")
+
+
+class Held:
+    """A paced hub that runs only when the test lets it, and clients that send meanwhile."""
+
+    def __init__(self, *nodes: object) -> None:
+        self.hub = Hub(nodes, mode=ClockMode.PACED)  # type: ignore[arg-type]
+        self.clients = []
+        for _ in range(2):
+            mine, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            mine.setblocking(False)
+            self.hub.attach(theirs)
+            self.clients.append(mine)
+
+    def catch_up(self, seconds: float = 0.0) -> None:
+        """Let the hub run until nothing waits, at least for `seconds`."""
+        end = time.monotonic() + seconds
+        self.hub.turn(0.0)
+        while (wait_s := self.hub.wait_s()) == 0.0 or time.monotonic() < end or self._has_frames():
+            self.hub.turn(min(wait_s or 0.0, 1e-3))
+
+    def _has_frames(self) -> bool:
+        return bool(self.hub._watcher.readable(0.0, exactly=False))
+
+    def received(self, client: int = 0) -> list[bytes]:
+        frames = []
+        while True:
+            try:
+                frames.append(self.clients[client].recv(64))
+            except BlockingIOError:
+                return frames
+
+    def close(self) -> None:
+        self.hub.close()
+        for client in self.clients:
+            client.close()
+
+
+def test_frames_of_all_clients_are_taken_at_the_times_they_were_sent(stub_node: type) -> None:
+    held = Held(node := stub_node(sync_period_s=0.01))
+    begin_s = time.monotonic()
+    sent = []
+    for k in range(100):
+        client = held.clients[k % 2]
+        client.send(SYNC if k % 2 else pack_frame(0x100 + k))
+        sent.append(time.monotonic() - begin_s)
+        time.sleep(0.002)
+    time.sleep(0.1)
+    held.catch_up()
+    held.close()
+    names = [int.from_bytes(frame[:4], "little") for frame, _ in node.seen]
+    assert names == [0x080 if k % 2 else 0x100 + k for k in range(100)]
+    taken = [now for _, now in node.seen]
+    offset = taken[0] - sent[0]
+    # a frame may lie for a moment between being sent and being noted here
+    assert [t - offset for t in taken] == pytest.approx(sent, abs=2e-3)
+    assert all(a <= b for a, b in pairwise(node.advanced))
+
+
+def test_a_timer_goes_off_between_the_frames_around_it(stub_node: type) -> None:
+    held = Held(node := stub_node(sync_period_s=0.01))
+    held.catch_up()
+    start = held.hub.clock.now(time.monotonic())
+    node.timers.append(start + 0.03)
+    for _ in range(5):
+        held.clients[0].send(SYNC)
+        time.sleep(0.01)
+    time.sleep(0.05)
+    held.catch_up()
+    before = [now for frame, now in node.seen if now < start + 0.03]
+    fired = next(now for now in node.advanced if now >= start + 0.03)
+    held.close()
+    assert 2 <= len(before) <= 4
+    assert fired < start + 0.06
+
+
+@pytest.fixture
+def held_drive() -> Held:
+    held = Held(SimDrive.for_winch(load_winch("winch-mpp0923d"), Plant()))
+    held.catch_up(0.05)
+    request = bytes([0x23, 0x16, 0x10, 0x01]) + (MASTER << 16 | 100).to_bytes(4, "little")
+    held.clients[0].send(pack_frame(0x601, request))
+    held.clients[0].send(HEARTBEAT)
+    held.catch_up(0.02)
+    assert any(frame[:2] == b"\x81\x05" for frame in held.received())
+    return held
+
+
+def _emergencies(held: Held) -> list[int]:
+    return [
+        int.from_bytes(frame[8:10], "little")
+        for frame in held.received()
+        if frame[:2] == b"\x81\x00"
+    ]
+
+
+def test_no_heartbeat_is_lost_by_holding_up_the_simulator(held_drive: Held) -> None:
+    """Half a second, five times what the drive tolerates, between the same heartbeats."""
+    cycles, heartbeats = held_drive.clients
+    for k in range(100):
+        cycles.send(SYNC)
+        if k % 8 == 0:
+            heartbeats.send(HEARTBEAT)
+        time.sleep(0.005)
+    held_drive.catch_up()
+    assert _emergencies(held_drive) == []
+    assert held_drive.hub.sync_count == 100
+    held_drive.catch_up(2 * CONSUMER_S)
+    assert _emergencies(held_drive) == [0x8130]
+    held_drive.close()
+
+
+def test_a_silence_while_it_is_held_up_is_a_silence(held_drive: Held) -> None:
+    cycles, heartbeats = held_drive.clients
+    heartbeats.send(HEARTBEAT)
+    for _ in range(50):
+        cycles.send(SYNC)
+        time.sleep(0.005)
+    heartbeats.send(HEARTBEAT)
+    held_drive.catch_up()
+    # lost in the middle, and taken back with the heartbeat at the end
+    assert _emergencies(held_drive) == [0x8130, 0x0000]
+    held_drive.close()

@@ -1,0 +1,245 @@
+"""Several clients and nodes on one bus."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from cdpr_sim_bus.bus.client import PACKET_BYTES
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.errors import BusSetupError, SimulatorError
+from cdpr_sim_bus.frame import ERR_FLAG, RTR_FLAG, pack_frame
+
+StartBus = Callable[..., Any]
+
+
+def test_everybody_but_the_sender_gets_a_frame(start_bus: StartBus, stub_node: type) -> None:
+    node = stub_node()
+    bus = start_bus(node)
+    sender, *others = [bus.join() for _ in range(4)]
+    sender.send(0x123, b"hello")
+    for other in others:
+        assert other.recv() == pack_frame(0x123, b"hello")
+    assert sender.quiet()
+    assert [frame for frame, _ in node.seen] == [pack_frame(0x123, b"hello")]
+
+
+def test_filters_are_those_of_raw_can(start_bus: StartBus) -> None:
+    bus = start_bus()
+    sender, picky, deaf = bus.join(), bus.join(), bus.join()
+    picky.filters((0x180, 0x780), (0x605, 0x7FF | RTR_FLAG))
+    deaf.filters()
+    for can_id in (0x17F, 0x181, 0x1FF, 0x200, 0x605, 0x605 | RTR_FLAG, 0x606):
+        sender.send(can_id)
+    assert [picky.recv_id() for _ in range(3)] == [0x181, 0x1FF, 0x605]
+    assert picky.quiet()
+    assert deaf.quiet()
+    picky.filters((0x606, 0x7FF))
+    sender.send(0x181)
+    sender.send(0x606)
+    assert picky.recv_id() == 0x606
+
+
+def test_long_filter_lists_come_in_parts(start_bus: StartBus) -> None:
+    bus = start_bus()
+    sender, picky = bus.join(), bus.join()
+    picky.sock.send(json.dumps({"filters": [[1, 0x7FF]]}).encode())
+    picky.sock.send(json.dumps({"more_filters": [[2, 0x7FF]]}).encode())
+    picky.status()
+    for can_id in (1, 2, 3):
+        sender.send(can_id)
+    assert [picky.recv_id(), picky.recv_id()] == [1, 2]
+    assert picky.quiet()
+
+
+def test_lss_answers_that_are_the_same_are_one_frame(start_bus: StartBus, stub_node: type) -> None:
+    both = (pack_frame(0x7E4, b"\x4f" + bytes(7)), pack_frame(0x584, bytes(8)))
+    bus = start_bus(stub_node(1, answers=both), stub_node(2, answers=both))
+    master = bus.join()
+    master.send(0x080)
+    assert [master.recv_id() for _ in range(3)] == [0x584, 0x584, 0x7E4]
+    assert master.quiet()
+
+
+def test_answers_to_one_sync_come_in_the_order_of_arbitration(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    nodes = [
+        stub_node(3, answers=(pack_frame(0x283), pack_frame(0x183))),
+        stub_node(1, answers=(pack_frame(0x181), pack_frame(0x081))),
+        stub_node(2, answers=(pack_frame(0x582, b"1"), pack_frame(0x582, b"2"))),
+    ]
+    bus = start_bus(*nodes)
+    master, watcher = bus.join(), bus.join()
+    master.send(0x80)
+    expected = [0x081, 0x181, 0x183, 0x283, 0x582, 0x582]
+    assert [watcher.recv_id() for _ in range(7)] == [0x80, *expected]
+    frames = [master.recv() for _ in range(6)]
+    assert [int.from_bytes(frame[:4], "little") for frame in frames] == expected
+    # frames of one identifier keep their order
+    assert [frame[8:9] for frame in frames[-2:]] == [b"1", b"2"]
+
+
+def test_clients_that_wait_together_contend_for_the_bus(stub_node: type) -> None:
+    """Frames sent while the hub is busy go out by identifier, each client's own in its order."""
+    hub = Hub([node := stub_node()], mode=ClockMode.PACED)
+    pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(3)]
+    for mine, theirs in pairs:
+        hub.attach(theirs)
+        mine.settimeout(5.0)
+    for (mine, _), can_ids in zip(pairs, ((0x300, 0x100), (0x200, 0x400), (0x080,)), strict=True):
+        for can_id in can_ids:
+            mine.send(pack_frame(can_id))
+    stop = stub_node.receive
+
+    def receive_then_stop(frame: bytes, now: float) -> None:
+        stop(node, frame, now)
+        if len(node.seen) == 5:
+            hub.stop()
+
+    node.receive = receive_then_stop
+    hub.run()
+    hub.close()
+    order = [int.from_bytes(frame[:4], "little") for frame, _ in node.seen]
+    # 0x100 stands behind 0x300 in its client's queue and cannot overtake it
+    assert order == [0x080, 0x200, 0x300, 0x100, 0x400]
+    for mine, _ in pairs:
+        mine.close()
+
+
+def test_nodes_hear_each_other_and_only_what_they_accept(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    # with a cycle period bus time is held after SYNC, so that nothing but frames can matter
+    talker = stub_node(1, sync_period_s=0.001, answers=(pack_frame(0x181, b"x"),))
+    listener = stub_node(2, accepts=frozenset((0x181,)))
+    bus = start_bus(talker, listener)
+    member = bus.join()
+    member.send(0x80)
+    assert member.recv_id() == 0x181
+    member.send(0x300)
+    member.status()
+    assert [frame for frame, _ in listener.seen] == [pack_frame(0x181, b"x")]
+    assert pack_frame(0x181, b"x") not in [frame for frame, _ in talker.seen]
+    listener.accepts = frozenset((0x300,))
+    member.send(0x601)
+    member.send(0x300)
+    member.status()
+    assert [frame[:2] for frame, _ in listener.seen] == [b"\x81\x01", b"\x00\x03"]
+
+
+def test_a_client_that_does_not_read_loses_frames_and_holds_up_nobody(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    bus = start_bus(stub_node(1, sync_period_s=0.001, answers=(pack_frame(0x181, bytes(8)),)))
+    master, sleeper = bus.join(), bus.join()
+    count = 0
+    started = time.monotonic()
+    while not (dropped := master.status()["dropped"]):
+        for _ in range(1000):
+            master.send(0x80)
+            assert master.recv_id() == 0x181
+        count += 1000
+        assert time.monotonic() - started < 20.0
+    # what did get into the sleeper's queue is whole and in order
+    kept = 0
+    sleeper.sock.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        while True:
+            expected = 0x80 if kept % 2 == 0 else 0x181
+            assert sleeper.recv_id() == expected
+            kept += 1
+    assert kept + dropped == 2 * count
+
+
+def test_a_client_that_leaves_disturbs_nobody(start_bus: StartBus) -> None:
+    bus = start_bus()
+    one, two, leaver = bus.join(), bus.join(), bus.join()
+    for can_id in range(50):
+        one.send(can_id)
+    leaver.sock.close()
+    for can_id in range(50, 100):
+        one.send(can_id)
+    assert [two.recv_id() for _ in range(100)] == list(range(100))
+    back = bus.join()
+    one.send(0x99)
+    assert back.recv_id() == 0x99
+
+
+def test_frames_that_no_bus_carries_are_counted_and_dropped(start_bus: StartBus) -> None:
+    bus = start_bus()
+    sender, other = bus.join(), bus.join()
+    sender.sock.send((0x123).to_bytes(4, "little") + b"\x09" + bytes(11))
+    sender.sock.send(pack_frame(0x20 | ERR_FLAG, bytes(8)))
+    assert other.quiet()
+    status = sender.status()
+    assert (status["malformed"], status["frames"]) == (2, 0)
+
+
+def test_status_tells_what_the_bus_is(start_bus: StartBus, stub_node: type) -> None:
+    bus = start_bus(stub_node(7), stub_node(9), mode=ClockMode.PACED, bitrate=500_000)
+    status = bus.join().status()
+    assert status["name"] == bus.name
+    assert (status["mode"], status["bitrate"], status["nodes"]) == ("paced", 500_000, [7, 9])
+    assert status["truth_log"] is None
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [
+        b"not a frame nor JSON",
+        b"[1, 2, 3, 4, 5, 6, 7]",
+        b'{"filters": [[1]]}',
+        b'{"filters": [[1, -1]]}',
+        b'{"filters": 7, "status": true}',
+        b'{"stat": true}',
+        b'{"status":true}'.ljust(PACKET_BYTES),
+    ],
+)
+def test_wrong_control_messages_get_an_answer(start_bus: StartBus, packet: bytes) -> None:
+    member = start_bus().join()
+    member.sock.send(packet)
+    assert list(json.loads(member.recv())) == ["error"]
+    member.status()
+
+
+def test_a_name_in_use_is_refused(start_bus: StartBus) -> None:
+    bus = start_bus()
+    second = Hub(name=bus.name)
+    with pytest.raises(BusSetupError, match=f"simbus:{bus.name} is in use"):
+        second.listen()
+    second.close()
+
+
+@pytest.mark.parametrize("name", ["", "a b", "/tmp/x", "x" * 65, "-x", "é"])
+def test_a_malformed_name_is_refused(name: str) -> None:
+    hub = Hub(name=name)
+    with pytest.raises(BusSetupError, match="allowed are 1 to 64 letters"):
+        hub.listen()
+    hub.close()
+
+
+def test_a_real_interface_carries_the_same_nodes_and_its_end_ends_the_hub(
+    stub_node: type,
+) -> None:
+    """A connected socket stands for the raw CAN socket: one frame a packet, as there."""
+    node = stub_node(4, answers=(pack_frame(0x184, b"truth"),))
+    hub = Hub([node], name="socketcan:can0")
+    mine, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    mine.settimeout(5.0)
+    hub.attach(theirs, essential=True)
+    mine.send(pack_frame(0x80))
+    mine.send(pack_frame(0x123))
+    mine.shutdown(socket.SHUT_WR)
+    with pytest.raises(SimulatorError, match="connection closed"):
+        hub.run()
+    assert mine.recv(64) == pack_frame(0x184, b"truth")
+    hub.close()
+    assert node.closed
+    mine.close()

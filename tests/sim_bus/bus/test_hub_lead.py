@@ -1,0 +1,288 @@
+"""A bus in lockstep that one master leads: its time moves by that master's packets alone."""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import struct
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from cdpr_sim_bus.bus.hub import Hub
+from cdpr_sim_bus.clock import HOLD_S, ClockMode
+from cdpr_sim_bus.fleet import Fleet
+from cdpr_sim_bus.frame import pack_frame
+
+StartBus = Callable[..., Any]
+GO = struct.Struct("<8sdd")
+SYNC, ANSWER = pack_frame(0x080), pack_frame(0x181, b"answer")
+
+
+def beat(node_id: int) -> bytes:
+    return pack_frame(0x700 + node_id, b"\x05")
+
+
+def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: type) -> None:
+    bus = start_bus(node := stub_node(7, timers=(0.0, 0.01)))
+    member = bus.join()
+    time.sleep(0.1)
+    assert member.status()["bus_time_s"] == 0.0
+    assert node.advanced == []
+    member.send(0x123)
+    # switched on, then the frame, then the wall
+    assert [member.recv(), member.recv()] == [beat(7), beat(7)]
+    assert node.advanced[0] == 0.0
+    assert node.seen[0][0] == pack_frame(0x123)
+    assert 0.0 < node.seen[0][1] < 0.01
+    assert 0.01 in node.advanced
+    assert not member.status()["led"]
+
+
+def test_a_led_bus_stands_however_long_its_master_takes(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    node = stub_node(7, sync_period_s=0.01, answers=(ANSWER,), timers=(0.0, 0.025))
+    bus = start_bus(node)
+    member, other = bus.join(), bus.join()
+    assert member.lead() == (0.0, 0.025)
+    assert other.recv() == beat(7)
+    assert other.status()["led"]
+    for k in range(1, 4):
+        time.sleep(0.05)
+        before = [beat(7)] * (k == 3)
+        assert member.sync() == ([*before, ANSWER], k * 0.01, math.inf if k == 3 else 0.025)
+    time.sleep(HOLD_S + 0.1)
+    assert member.status()["bus_time_s"] == 0.03
+    assert node.advanced == [0.0, 0.01, 0.02, 0.03]
+
+
+def test_a_go_ends_at_the_first_frame_for_its_sender(start_bus: StartBus, stub_node: type) -> None:
+    one, two = stub_node(1, timers=(0.1, 0.4)), stub_node(2, timers=(0.2, 0.3))
+    bus = start_bus(one, two)
+    member, other = bus.join(), bus.join()
+    member.filters((0x701, 0x7FF))
+    member.lead()
+    assert member.go(1.0) == ([beat(1)], 0.1, 0.2)
+    assert member.go(0.15) == ([], 0.15, 0.2)
+    assert member.go(1.0) == ([beat(1)], 0.4, math.inf)
+    assert member.go(1.0) == ([], 1.0, math.inf)
+    assert member.go(0.5) == ([], 1.0, math.inf)
+    assert member.go(math.inf) == ([], 1.0, math.inf)
+    assert member.go(math.nan) == ([], 1.0, math.inf)
+    assert [other.recv() for _ in range(4)] == [beat(1), beat(2), beat(2), beat(1)]
+    assert one.advanced == two.advanced == [0.0, 0.1, 0.15, 0.2, 0.3, 0.4, 1.0]
+
+
+def test_a_go_comes_after_all_that_was_sent_before(start_bus: StartBus, stub_node: type) -> None:
+    node = stub_node(1, accepts=frozenset(range(0x800)))
+    bus = start_bus(node)
+    member = bus.join()
+    member.lead()
+    for k in range(200):
+        member.send(0x200 + k)
+    assert member.go(0.5) == ([], 0.5, math.inf)
+    assert [int.from_bytes(frame[:4], "little") for frame, _ in node.seen] == [
+        0x200 + k for k in range(200)
+    ]
+    assert {now for _, now in node.seen} == {0.0}
+    assert member.go(0.0) == ([], 0.5, math.inf)
+
+
+def test_what_came_before_a_go_ends_it_before_time_moves(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    node = stub_node(1, answers=(ANSWER,))
+    bus = start_bus(node)
+    member, other = bus.join(), bus.join()
+    member.lead()
+    other.send(0x123)
+    other.status()
+    assert member.go(1.0) == ([pack_frame(0x123)], 0.0, math.inf)
+    assert member.go(1.0) == ([], 1.0, math.inf)
+    # without 1006h a SYNC moves nothing
+    assert member.sync() == ([ANSWER], 1.0, math.inf)
+
+
+def test_frames_of_others_move_nothing_on_a_led_bus(start_bus: StartBus, stub_node: type) -> None:
+    node = stub_node(1, sync_period_s=0.01, answers=(ANSWER,))
+    bus = start_bus(node)
+    member, other = bus.join(), bus.join()
+    member.lead()
+    member.sync()
+    for frame in (SYNC, pack_frame(0x123)):
+        other.sock.send(frame)
+    other.status()
+    assert member.go(0.0) == ([SYNC, ANSWER, pack_frame(0x123)], 0.01, math.inf)
+    assert [now for _, now in node.seen] == [0.01] * 3
+    assert member.sync() == ([ANSWER], 0.02, math.inf)
+
+
+def test_nodes_that_answer_each_other_are_done_before_the_time_is_told(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    """A frame goes from node to node; the master has them all in front of the time packet."""
+    nodes = [stub_node(k, accepts=frozenset((0x300 + k,))) for k in range(1, 6)]
+    for k, node in enumerate(nodes, 1):
+        node.receive = lambda frame, now, k=k, out=node.outbox: out.append(pack_frame(0x301 + k))
+    bus = start_bus(*nodes)
+    member = bus.join()
+    member.lead()
+    member.send(0x301)
+    answers = [pack_frame(0x300 + k) for k in range(2, 7)]
+    assert member.go(1.0)[0] == answers
+    # and what begins with a timer
+    nodes[0].accepts = frozenset((0x701,))
+    nodes[4].node_id = 1
+    nodes[4].timers.append(0.5)
+    assert member.go(1.0) == ([beat(1), *answers], 0.5, math.inf)
+
+
+def test_a_ring_of_nodes_does_not_keep_the_master_waiting(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    nodes = [stub_node(k, accepts=frozenset((0x300 + k,))) for k in (0, 1)]
+    for k, node in enumerate(nodes):
+        node.receive = lambda frame, now, k=k, out=node.outbox: out.append(pack_frame(0x301 - k))
+    bus = start_bus(*nodes)
+    member = bus.join()
+    member.filters()
+    member.lead()
+    member.send(0x300)
+    assert member.go(0.0)[1] == 0.0
+
+
+def test_one_leads_at_a_time(start_bus: StartBus, stub_node: type) -> None:
+    bus = start_bus(stub_node(1))
+    member, other = bus.join(), bus.join()
+    assert member.lead() == member.lead() == (0.0, math.inf)
+    assert other.ask({"lead": True}) == {"error": "lead: another client leads this bus"}
+    other.sock.send(GO.pack(b"bus-go\0\0", 1.0, 0.0))
+    refused = json.loads(other.recv())
+    assert refused == {"error": "go: only the client that leads the bus moves its time"}
+    member.go(2.0)
+    member.sock.send(b'{"lead": false}  ')
+    assert not member.status()["led"]
+    assert other.lead() == (2.0, math.inf)
+    assert member.ask({"lead": True}) == {"error": "lead: another client leads this bus"}
+
+
+def test_a_bus_given_back_stands_until_somebody_speaks(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    bus = start_bus(stub_node(1, timers=(3.05,)))
+    member, other = bus.join(), bus.join()
+    member.lead()
+    member.go(3.0)
+    member.sock.send(b'{"lead": false}  ')
+    member.sock.close()
+    time.sleep(0.1)
+    assert other.status()["bus_time_s"] == 3.0
+    other.send(0x123)
+    assert other.recv() == beat(1)
+
+
+def test_a_paced_bus_is_led_by_nobody(start_bus: StartBus) -> None:
+    member = start_bus(mode=ClockMode.PACED).join()
+    answer = member.ask({"lead": True})
+    assert answer == {"error": "lead: this bus is paced, its time is the clock's"}
+
+
+def test_the_wall_takes_over_from_a_leader_that_has_gone(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    timers = tuple(2.0 + 0.01 * k for k in range(1, 30))
+    bus = start_bus(node := stub_node(1, timers=timers))
+    member, other = bus.join(), bus.join()
+    member.lead()
+    member.go(2.0)
+    member.sock.close()
+    started = time.monotonic()
+    for _ in timers:
+        assert other.recv() == beat(1)
+    assert time.monotonic() - started > 0.25
+    # each timer had its own time, whenever the loop looked
+    assert node.advanced == [0.0, 2.0, *timers]
+    now_s, _ = other.lead()
+    assert now_s >= timers[-1]
+    time.sleep(0.05)
+    assert other.status()["bus_time_s"] == now_s
+
+
+def test_a_leader_that_dies_during_its_go_is_noticed(start_bus: StartBus, stub_node: type) -> None:
+    endless = stub_node(1)
+    endless.next_event = lambda: endless.advanced[-1] + 1e-3 if endless.advanced else 0.0
+    bus = start_bus(endless)
+    member, other = bus.join(), bus.join()
+    member.filters()
+    member.lead()
+    member.sock.send(GO.pack(b"bus-go\0\0", 1e9, 0.0))
+    # others are served while it runs
+    other.send(0x123)
+    while (first := other.status()["bus_time_s"]) < 1.0:
+        pass
+    assert other.status()["led"]
+    member.sock.close()
+    while (status := other.status())["led"]:
+        pass
+    assert first < status["bus_time_s"] < 1e9
+    begin = other.status()["bus_time_s"], time.monotonic()
+    time.sleep(0.2)
+    passed_s = other.status()["bus_time_s"] - begin[0]
+    assert passed_s == pytest.approx(time.monotonic() - begin[1], abs=0.05)
+
+
+def test_the_time_is_told_as_soon_as_the_master_reads_again(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    """Its socket is full of another's frames when the packet is due."""
+    bus = start_bus(stub_node(1))
+    member, other = bus.join(), bus.join()
+    member.lead()
+    started = time.monotonic()
+    while not other.status()["dropped"]:
+        for _ in range(1000):
+            other.send(0x123)
+        assert time.monotonic() - started < 20.0
+    member.sock.send(GO.pack(b"bus-go\0\0", 1.0, 0.0))
+    while not bus.hub.lead.time_pending:
+        assert time.monotonic() - started < 20.0
+        time.sleep(1e-3)
+    frames, now_s, _ = member.until_time()
+    assert len(frames) > 1000
+    assert now_s == 0.0
+    assert member.go(1.0) == ([], 1.0, math.inf)
+
+
+def test_the_buses_of_a_robot_take_the_syncs_of_a_cycle_in_order(stub_node: type) -> None:
+    """Also those that are sent after the first bus has been looked at, and before the second."""
+    taken: list[int] = []
+    masters: list[socket.socket] = []
+
+    class Node(stub_node):  # type: ignore[misc]
+        def receive(self, frame: bytes, now: float) -> None:
+            if frame == SYNC:
+                taken.append(self.node_id)
+            elif self.node_id == 2:
+                for master in masters:
+                    master.send(SYNC)
+
+    hubs = [Hub([Node(1, sync_period_s=0.01)]), Hub([Node(2, sync_period_s=0.01)])]
+    fleet = Fleet(hubs)
+    for hub in hubs:
+        master, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        hub.attach(its)
+        master.send(b'{"lead":true}')
+        hub.turn(0.0)
+        masters.append(master)
+    masters[1].send(pack_frame(0x201))
+    while len(taken) < 2:
+        fleet._turn()
+    assert taken == [1, 2]
+    fleet.close()
+    for hub, master in zip(hubs, masters, strict=True):
+        hub.close()
+        master.close()

@@ -1,0 +1,60 @@
+"""Who may join a simulated bus.
+
+Run by root, another user is tried as uid 65534. Run by anybody else, nobody else can be played:
+then the bus is told that the user who runs it is another one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from cdpr_drivers.bus.adapters import simbus_socket
+from cdpr_drivers.errors import BusError
+
+NOBODY = 65534
+
+
+def join_as_nobody(name: str) -> str:
+    """Return what an unprivileged user is told who joins."""
+    reader, writer = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        told = "joined"
+        try:
+            if os.geteuid() == 0:
+                os.setresuid(NOBODY, NOBODY, NOBODY)
+            simbus_socket.query_status(name)
+        except BusError as error:
+            told = str(error)
+        finally:
+            os.write(writer, told.encode())
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as pipe:
+        answer = pipe.read()
+    os.waitpid(pid, 0)
+    return answer
+
+
+def test_another_user_may_not_join_and_that_is_said_once(
+    start_bus: Callable[..., Any],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    own = os.geteuid()
+    if own != 0:
+        monkeypatch.setattr(os, "geteuid", lambda: NOBODY)
+    bus = start_bus()
+    for _ in range(2):
+        assert "the user who runs it, and root" in join_as_nobody(bus.name)
+    told = capsys.readouterr().err
+    assert told.count("may not join") == 1
+    assert f"user {own or NOBODY} may not join; allowed: the user who runs the bus" in told
+    if own == 0:
+        member = bus.join()
+        member.send(0x123)
+        assert member.quiet()

@@ -1,0 +1,12 @@
+"""Fixtures of the drive's tests."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.sim_bus.cia402.drive_rig import Rig
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()

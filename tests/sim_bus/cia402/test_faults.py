@@ -1,0 +1,192 @@
+"""Faults: their causes, codes, reactions and resets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from cdpr_sim_bus.robot.plant import Plant
+from tests.sim_bus.cia402.drive_rig import Rig, SdoRefusedError
+
+FAULT, FRA, OE, SOD = 0x08, 0x0F, 0x27, 0x40
+
+
+def rig_with(**sections: Any) -> Rig:
+    return Rig(Plant.model_validate(sections))
+
+
+def reset(rig: Rig) -> int:
+    rig.word = 0x00
+    rig.cycles(2)
+    rig.word = 0x80
+    rig.cycles(2)
+    return rig.status & 0x4F
+
+
+def test_following_error() -> None:
+    rig = rig_with(load={"inertia_kg_m2": 0.01})
+    rig.write(0x6065, 500)
+    rig.write(0x6066, 20)
+    rig.enable(8)
+    rig.write(0x607A, 200_000)
+    rig.until(lambda: rig.status & 0x4F == FAULT, 3.0)
+    assert rig.read(0x603F) == 0x8611
+    assert rig.emergencies[-1] == (0x8611, 0x21)
+    assert rig.read(0x1001) == 0x21
+    assert any(status & 0x202F == 0x2027 or status & 0x4F == FRA for status in rig.seen)
+    rig.run(0.5)
+    assert reset(rig) == SOD
+    assert rig.emergencies[-1] == (0, 0)
+    assert rig.read(0x603F) == 0
+
+
+def test_overcurrent_takes_the_power_off_at_once() -> None:
+    rig = rig_with(drive={"overcurrent_Arms": 4.0})
+    rig.enable(10)
+    rig.torque = 900  # 4.8 A
+    rig.until(lambda: rig.status & 0x4F == FAULT, 0.1)
+    assert not any(status & 0x4F == FRA for status in rig.seen)
+    assert rig.read(0x603F) == 0x2310
+    assert rig.emergencies[-1] == (0x2310, 0x03)
+    rig.cycles(20)
+    assert reset(rig) == SOD
+
+
+def test_overspeed() -> None:
+    rig = rig_with(friction={"coulomb_Nm": 0.0, "breakaway_Nm": 0.0, "viscous_Nms_rad": 0.0})
+    rig.write(0x6080, 600)
+    rig.enable(10)
+    rig.torque = 300
+    rig.cycles(400)
+    # The speed limit holds the torque back ...
+    assert rig.truth[1] == pytest.approx(600 * 0.10472, rel=0.05)
+    assert rig.status & 0x0800
+    # ... until it is lowered below what the motor does already.
+    rig.write(0x6080, 300)
+    rig.until(lambda: rig.status & 0x4F == FAULT, 0.1)
+    assert rig.read(0x603F) == 0x8400
+    assert any(status & 0x4F == FRA for status in rig.seen)
+    assert abs(rig.truth[1]) < 0.1
+
+
+def test_i2t_warns_then_trips_and_cools_before_a_reset() -> None:
+    rig = rig_with(
+        drive={"i2t_time_constant_s": 0.5},
+        friction={"coulomb_Nm": 5.0},
+        motor={"torque_constant_error": 0.0},
+    )
+    rig.enable(10)
+    rig.torque = 1400  # 4.2 Nm: 1.34 times the rated current, 1.79 the rated heat
+    rig.until(lambda: bool(rig.status & 0x80), 2.0)
+    assert rig.status & 0x6F == OE
+    rig.until(lambda: rig.status & 0x4F == FAULT, 2.0)
+    assert rig.read(0x603F) == 0x2350
+    rig.cycles(20)
+    assert reset(rig) == FAULT
+    rig.cycles(300)
+    assert reset(rig) == SOD
+
+
+def test_rated_torque_is_carried_for_ever() -> None:
+    rig = rig_with(drive={"i2t_time_constant_s": 0.05}, friction={"coulomb_Nm": 5.0})
+    rig.enable(10)
+    rig.torque = 1000
+    rig.cycles(1000)
+    assert rig.status & 0x6F == OE
+
+
+@pytest.mark.parametrize("option", [0, 1, 2, 3])
+def test_fault_reaction_options(option: int) -> None:
+    rig = Rig()
+    rig.write(0x605E, option)
+    rig.enable(3)
+    rig.write(0x60FF, 40_000)
+    rig.cycles(300)
+    start = rig.truth[0]
+    rig.write(0x2F00, 0xFF10, 1)
+    rig.cycle()
+    assert rig.status & 0x4F == (FAULT if option == 0 else FRA)
+    rig.cycles(500)
+    assert rig.status & 0x4F == FAULT
+    assert rig.read(0x603F) == 0xFF10
+    way = rig.truth[0] - start
+    assert (way > 0.3) if option == 0 else abs(rig.truth[1]) < 0.05
+    if option == 1:
+        assert way == pytest.approx(30.7**2 / 2 / 628.3, rel=0.15)
+
+
+def test_reset_needs_a_rising_edge_of_bit_7() -> None:
+    rig = Rig()
+    rig.map_pdos()
+    rig.word = 0x80
+    rig.cycles(5)
+    rig.write(0x2F00, 0xFF01, 1)
+    rig.cycles(20)
+    assert rig.status & 0x4F == FAULT
+    rig.word = 0x84
+    rig.cycles(5)
+    assert rig.status & 0x4F == FAULT
+    rig.word = 0x00
+    rig.cycles(5)
+    assert rig.status & 0x4F == FAULT
+    rig.word = 0x80
+    rig.cycle()
+    assert rig.status & 0x4F == SOD
+
+
+def test_reset_does_not_enable() -> None:
+    rig = Rig()
+    rig.enable(10)
+    rig.write(0x2F00, 0xFF01, 1)
+    rig.until(lambda: rig.status & 0x4F == FAULT, 1.0)
+    rig.word = 0x8F
+    rig.cycles(20)
+    assert rig.status & 0x4F == SOD
+
+
+def test_second_fault_does_not_hide_the_first() -> None:
+    rig = Rig()
+    rig.write(0x2F00, 0xFF01, 1)
+    rig.write(0x2F00, 0xFF02, 1)
+    assert rig.read(0x603F) == 0xFF01
+
+
+def test_power_is_off_in_fault() -> None:
+    rig = Rig()
+    rig.enable(10)
+    rig.torque = 300
+    rig.cycles(50)
+    rig.write(0x2F00, 0xFF01, 1)
+    rig.cycles(800)
+    assert rig.actual_torque == 0
+    assert abs(rig.truth[1]) < 1e-3
+
+
+def test_an_encoder_that_jumps_miscounts_from_then_on() -> None:
+    rig = Rig()
+    rig.enable(10)
+    rig.cycles(50)
+    before = rig.position
+    rig.write(0x2F00, 700, 11)
+    rig.cycles(50)
+    assert rig.position - before == pytest.approx(700, abs=3)
+    rig.write(0x2F00, -700, 11)
+    rig.cycles(50)
+    assert rig.position == pytest.approx(before, abs=3)
+
+
+def test_a_cable_is_cut_or_slips_only_where_there_is_one() -> None:
+    bare = Rig()
+    for sub in (12, 13):
+        with pytest.raises(SdoRefusedError, match="06060000h"):
+            bare.write(0x2F00, 1, sub)
+    for sub, value in ((12, 1), (13, 100)):
+        pulled = rig_with(
+            load={"kind": "fixed_anchor", "pretension_N": 30.0, "winch_friction_Nm": 2.0}
+        )
+        motor = pulled.drive.axis.motor
+        assert motor["tension"][0] > 15.0
+        pulled.write(0x2F00, value, sub)
+        pulled.run(0.02)
+        assert motor["tension"][0] == 0.0

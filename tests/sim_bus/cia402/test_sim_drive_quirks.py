@@ -1,0 +1,211 @@
+"""What the simulated drives beside the generic one do on the wire, drive by drive."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from tests.sim_bus.cia402.drive_rig import EDS, NODE, SMOOTH, Rig, SdoRefusedError
+
+MNM, COMPAX3 = (EDS.with_name(f"{n}.eds") for n in ("mnm-profile-torque", "parker-compax3-canopen"))
+NO_OBJECT, DEVICE_STATE, INVALID, NOT_MAPPABLE, TOO_HIGH = (
+    0x06020000, 0x08000022, 0x06090030, 0x06040041, 0x06090031,
+)  # fmt: skip
+PT, HM, CST = 4, 6, 10
+HALT = 0x100
+
+
+@pytest.fixture
+def mnm() -> Rig:
+    rig = Rig(SMOOTH, eds=MNM)
+    rig.write(0x6087, 4_000_000)
+    return rig
+
+
+@pytest.fixture
+def compax3() -> Rig:
+    rig = Rig(SMOOTH, eds=COMPAX3)
+    rig.write(0x6087, 1_000_000)
+    return rig
+
+
+def refusal(rig: Rig, index: int, value: int, sub: int = 0) -> int:
+    with pytest.raises(SdoRefusedError) as caught:
+        rig.write(index, value, sub)
+    return caught.value.code
+
+
+def enable(rig: Rig, mode: int) -> None:
+    """By SDO alone, with halt set while the mode changes."""
+    rig.write(0x6040, HALT)
+    rig.write(0x6060, mode)
+    rig.write(0x6040, 0)
+    rig.run(0.05)
+    for word in (6, 7, 15):
+        rig.write(0x6040, word)
+        rig.run(0.1)
+    assert rig.read(0x6041) & 0x6F == 0x27
+
+
+def turn(rig: Rig, units: int, seconds: float = 0.012) -> tuple[float, float]:
+    """Return true torque and speed after `units` in 6071h."""
+    rig.write(0x6071, units)
+    rig.run(seconds)
+    sample = rig.drive.axis.sample
+    return sample[6], sample[5]
+
+
+def test_one_unit_of_torque_is_a_millinewtonmetre(mnm: Rig) -> None:
+    enable(mnm, PT)
+    torque, speed = turn(mnm, 600)
+    assert torque == pytest.approx(0.6 * 1.04, rel=0.005)
+    assert speed > 10.0
+    assert mnm.read(0x6077, signed=True) == pytest.approx(600, abs=3)
+    assert turn(mnm, -600)[0] == pytest.approx(-0.6 * 1.04, rel=0.005)
+
+
+def test_one_unit_of_torque_is_a_per_mille_of_rated(compax3: Rig) -> None:
+    enable(compax3, PT)
+    assert turn(compax3, 200)[0] == pytest.approx(0.6 * 1.04, rel=0.005)
+
+
+def test_max_torque_and_slope_are_in_the_same_unit(mnm: Rig) -> None:
+    assert mnm.read(0x6072) == 11_550
+    mnm.write(0x6072, 400)
+    enable(mnm, PT)
+    assert turn(mnm, 900)[0] == pytest.approx(0.4 * 1.04, rel=0.005)
+    mnm.write(0x6087, 20_000)
+    turn(mnm, 0, 0.2)
+    assert turn(mnm, 300, 0.008)[0] == pytest.approx(0.16 * 1.04, rel=0.1)
+
+
+def test_velocities_are_in_rpm(mnm: Rig) -> None:
+    enable(mnm, 3)
+    mnm.write(0x60FF, 60)
+    mnm.run(0.5)
+    begin = mnm.truth[0]
+    mnm.run(1.0)
+    assert mnm.truth[0] - begin == pytest.approx(math.tau, rel=0.02)
+    assert mnm.read(0x606C, signed=True) == pytest.approx(60 * mnm.truth[1] / math.tau, abs=2)
+
+
+@pytest.mark.parametrize("eds", [MNM, COMPAX3])
+def test_only_its_own_modes_are_taken(eds: Path) -> None:
+    rig = Rig(SMOOTH, eds=eds)
+    for mode in (2, 5, 7, 8, 9, CST, -1):
+        assert refusal(rig, 0x6060, mode) == INVALID
+
+
+def test_a_mode_is_passed_over_without_halt(mnm: Rig) -> None:
+    mnm.write(0x6060, PT)
+    mnm.run(0.2)
+    assert mnm.read(0x6061) == 0
+    mnm.write(0x6040, HALT)
+    mnm.write(0x6060, PT)
+    mnm.run(0.02)
+    assert mnm.read(0x6061) == 0, "it takes its time"
+    mnm.run(0.01)
+    assert mnm.read(0x6061) == PT
+
+
+@pytest.mark.parametrize("eds", [MNM, COMPAX3])
+def test_no_mode_change_while_enabled(eds: Path) -> None:
+    rig = Rig(SMOOTH, eds=eds)
+    enable(rig, PT)
+    assert refusal(rig, 0x6060, HM) == DEVICE_STATE
+    rig.write(0x6040, 0x10F)
+    assert refusal(rig, 0x6060, HM) == DEVICE_STATE
+
+
+@pytest.mark.parametrize(("method", "way"), [(34, -1), (33, 1)])
+def test_homing_goes_the_other_way_round(mnm: Rig, method: int, way: int) -> None:
+    enable(mnm, HM)
+    mnm.write(0x6098, method)
+    begin = mnm.truth[0]
+    mnm.write(0x6040, 0x1F)
+    words = set()
+    for _ in range(9000):
+        mnm.run(0.001)
+        words.add(mnm.read(0x6041) & 0x3400)
+        if 0x1000 in words:
+            break
+    assert words == {0x0000, 0x1000}, "bit 12 comes alone, and at rest"
+    assert abs(mnm.truth[1]) < 0.2
+    assert way * (mnm.truth[0] - begin) > 0.1
+    error = math.degrees(mnm.truth[0]) - mnm.read(0x6064, signed=True) * 360 / 8192 - 123.4
+    assert (error + 180) % 360 - 180 == pytest.approx(0.0, abs=0.2)
+
+
+@pytest.mark.parametrize("method", [17, 37, 3])
+def test_homing_methods_it_does_not_have(mnm: Rig, method: int) -> None:
+    assert refusal(mnm, 0x6098, method) == INVALID
+
+
+@pytest.mark.parametrize(
+    ("eds", "lacking"),
+    [
+        (MNM, (0x6076, 0x608F, 0x60B2, 0x60B8, 0x60BA, 0x60C1, 0x2F00, 0x60E0, 0x605B)),
+        (COMPAX3, (0x6502, 0x60B2, 0x60B8, 0x60B9, 0x60C1, 0x2F00, 0x60E0)),
+    ],
+)
+def test_objects_it_lacks_cannot_be_reached(eds: Path, lacking: tuple[int, ...]) -> None:
+    rig = Rig(SMOOTH, eds=eds)
+    for index in lacking:
+        with pytest.raises(SdoRefusedError) as caught:
+            rig.read(index)
+        assert caught.value.code == NO_OBJECT, f"{index:04X}h"
+
+
+def test_pdos_are_small_and_the_mode_cannot_be_mapped(mnm: Rig) -> None:
+    mnm.write(0x1800, 0x80000180 | NODE, 1)
+    mnm.write(0x1A00, 0)
+    assert refusal(mnm, 0x1A00, 0x60610008, 1) == NOT_MAPPABLE
+    for sub, entry in enumerate((0x60410010, 0x60640020), 1):
+        mnm.write(0x1A00, entry, sub)
+    with pytest.raises(SdoRefusedError):
+        mnm.read(0x1A00, 3)
+    assert refusal(mnm, 0x1A00, 3) == TOO_HIGH
+    mnm.write(0x1A00, 2)
+    assert mnm.read(0x1A00) == 2
+
+
+def test_its_statusword_has_bits_of_its_own(mnm: Rig) -> None:
+    word = mnm.read(0x6041)
+    assert word & 0x4100 == 0x4100
+    enable(mnm, PT)
+    assert mnm.read(0x6041) & 0x4110 == 0x4100, "voltage enabled is not told"
+
+
+def test_a_drive_that_nobody_described_is_a_standard_one(tmp_path: Path) -> None:
+    """With the objects of its EDS: torque in per mille, all modes, no peculiarity."""
+    eds = tmp_path / "my-own.eds"
+    eds.write_text(COMPAX3.read_text().replace("0x0000C321", "0x00000001"))
+    rig = Rig(SMOOTH, eds=eds)
+    enable(rig, CST)
+    assert turn(rig, 200)[0] == pytest.approx(0.6 * 1.04, rel=0.005)
+    rig.write(0x6060, PT)
+    rig.run(0.02)
+    assert rig.read(0x6061) == PT
+    assert rig.read(0x6041) & 0x10
+    with pytest.raises(SdoRefusedError):
+        rig.read(0x6502)
+
+
+def test_objects_a_master_cannot_see_keep_it_safe(mnm: Rig) -> None:
+    """What the firmware needs and the EDS lacks is there for itself: a lost master stops it."""
+    mnm.write(0x1016, 127 << 16 | 200, 1)
+    mnm.write(0x6007, 3)
+    mnm.send(0x700 + 127, bytes([5]))
+    mnm.write(0x6040, HALT)
+    mnm.write(0x6060, PT)
+    mnm.run(0.03)
+    for word in (6, 7, 15):
+        mnm.send(0x700 + 127, bytes([5]))
+        mnm.write(0x6040, word)
+        mnm.run(0.1)
+    assert mnm.read(0x6041) & 0x6F == 0x27
+    mnm.run(0.5)
+    assert mnm.read(0x6041) & 0x4F == 0x40
+    assert 0x8130 in [code for code, _ in mnm.emergencies]

@@ -1,0 +1,324 @@
+"""State machine: every command in every state, option codes, mode changes, lost connections."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.sim_bus.cia402.drive_rig import NODE, Rig, SdoRefusedError
+
+SOD, RTSO, SO, OE, QSA, FRA, FAULT = 0x40, 0x21, 0x23, 0x27, 0x07, 0x0F, 0x08
+PATH = {SOD: (), RTSO: (6,), SO: (6, 7), OE: (6, 7, 15), QSA: (6, 7, 15, 2)}
+COMMANDS = {
+    "disable voltage": 0x00,
+    "quick stop": 0x02,
+    "shutdown": 0x06,
+    "switch on": 0x07,
+    "enable": 0x0F,
+}
+# Rows: state; columns in the order of COMMANDS (IEC 61800-7-201, figure of the state machine).
+TABLE = {
+    SOD: (SOD, SOD, RTSO, SOD, SOD),
+    RTSO: (SOD, SOD, RTSO, SO, OE),
+    SO: (SOD, SOD, RTSO, SO, OE),
+    OE: (SOD, QSA, RTSO, SO, OE),
+    QSA: (SOD, QSA, QSA, QSA, OE),
+    FAULT: (FAULT, FAULT, FAULT, FAULT, FAULT),
+}
+
+
+def bring_to(rig: Rig, state: int) -> None:
+    rig.write(0x605A, 6)  # quick stop stays in QUICK STOP ACTIVE
+    if state == FAULT:
+        rig.write(0x2F00, 0xFF01, 1)
+    else:
+        for word in PATH[state]:
+            rig.write(0x6040, word)
+            rig.run(0.02)
+    assert rig.state == state
+
+
+@pytest.mark.parametrize("state", TABLE)
+@pytest.mark.parametrize("column", range(len(COMMANDS)))
+def test_every_command_in_every_state(rig: Rig, state: int, column: int) -> None:
+    bring_to(rig, state)
+    rig.write(0x6040, list(COMMANDS.values())[column])
+    rig.run(0.05)
+    assert rig.state == TABLE[state][column]
+
+
+def test_boots_by_itself_into_switch_on_disabled() -> None:
+    rig = Rig()
+    assert rig.state == SOD
+    status = rig.read(0x6041)
+    assert status & 0x0210 == 0x0210  # remote, voltage enabled
+
+
+def test_enabling_takes_its_time(rig: Rig) -> None:
+    rig.write(0x6040, 6)
+    rig.write(0x6040, 7)
+    rig.write(0x6040, 15)
+    assert rig.state == SO
+    rig.run(0.003)
+    assert rig.state == OE
+
+
+def test_enable_command_taken_back_in_time(rig: Rig) -> None:
+    rig.write(0x6040, 6)
+    rig.write(0x6040, 15)
+    rig.write(0x6040, 6)
+    rig.run(0.05)
+    assert rig.state == RTSO
+
+
+@pytest.mark.parametrize("option", range(9))
+def test_quick_stop_options(rig: Rig, option: int) -> None:
+    rig.write(0x605A, option)
+    rig.enable(3)
+    rig.write(0x60FF, 40_000)
+    rig.cycles(300)
+    assert rig.truth[1] == pytest.approx(30.7, rel=0.05)
+    rig.word = 0x02
+    start = rig.truth[0]
+    rig.cycle()
+    assert rig.status & 0x6F == (SOD if option == 0 else QSA)
+    rig.cycles(400)
+    assert rig.status & 0x6F == (QSA if option >= 5 else SOD)
+    way = rig.truth[0] - start
+    if option == 0:  # coasts: half of v² J / friction
+        assert way > 0.3
+    elif option in (1, 5):  # 6084h: 819200 counts/s² = 628 rad/s²
+        assert way == pytest.approx(30.7**2 / 2 / 628.3, rel=0.15)
+    else:
+        assert way < 0.35
+    assert abs(rig.truth[1]) < 0.05
+    rig.word = 0x0F
+    rig.cycles(5)
+    assert rig.status & 0x6F == (OE if option >= 5 else SOD)
+
+
+@pytest.mark.parametrize(("index", "word", "end"), [(0x605B, 6, RTSO), (0x605C, 7, SO)])
+def test_leaving_operation_along_the_ramp_or_at_once(
+    rig: Rig, index: int, word: int, end: int
+) -> None:
+    ways = []
+    for option in (0, 1):
+        rig.write(index, option)
+        rig.enable(3)
+        rig.write(0x60FF, 40_000)
+        rig.cycles(300)
+        start = rig.truth[0]
+        rig.word = word
+        rig.cycle()
+        assert rig.status & 0x6F == (OE if option else end)
+        rig.cycles(600)
+        assert rig.status & 0x6F == end
+        assert abs(rig.truth[1]) < 0.05
+        ways.append(rig.truth[0] - start)
+    assert ways[1] < 0.9 < 1.2 * ways[0]
+
+
+def test_order_to_leave_can_be_taken_back(rig: Rig) -> None:
+    rig.enable(3)
+    rig.write(0x60FF, 40_000)
+    rig.cycles(300)
+    rig.word = 7
+    rig.cycles(10)
+    rig.word = 15
+    rig.cycles(300)
+    assert rig.status & 0x6F == OE
+    assert rig.truth[1] == pytest.approx(30.7, rel=0.05)
+
+
+@pytest.mark.parametrize("option", [1, 2, 3, 4])
+def test_halt_in_every_way(rig: Rig, option: int) -> None:
+    rig.write(0x605D, option)
+    rig.enable(3)
+    rig.write(0x60FF, 40_000)
+    rig.cycles(300)
+    rig.word = 0x10F
+    rig.cycle()
+    assert rig.status & 0x046F == OE
+    rig.cycles(300)
+    assert rig.status & 0x046F == OE | 0x0400
+    assert abs(rig.truth[1]) < 0.05
+    rig.word = 0x00F
+    rig.cycles(300)
+    assert rig.truth[1] == pytest.approx(30.7, rel=0.05)
+
+
+def test_halt_in_a_torque_mode_takes_the_torque_back_along_its_slope(rig: Rig) -> None:
+    rig.write(0x6087, 2000)
+    rig.enable(10)
+    rig.torque = 100
+    rig.cycles(20)
+    rig.word = 0x10F
+    rig.cycles(26)
+    assert rig.actual_torque == pytest.approx(50, abs=4)
+    rig.cycles(50)
+    assert rig.actual_torque == 0
+    rig.word = 0x0F
+    rig.cycles(20)
+    assert rig.actual_torque == 100
+
+
+class TestModes:
+    def test_supported_modes_are_those_accepted(self, rig: Rig) -> None:
+        supported = rig.read(0x6502)
+        for mode in range(-10, 20):
+            if mode == 0 or (mode > 0 and supported >> (mode - 1) & 1):
+                rig.set_mode(mode)
+            else:
+                with pytest.raises(SdoRefusedError) as refused:
+                    rig.write(0x6060, mode)
+                assert refused.value.code == 0x06090030
+                before = rig.read(0x6061)
+                rig.run(0.02)
+                assert rig.read(0x6061) == before
+
+    def test_display_follows_after_a_delay(self, rig: Rig) -> None:
+        rig.write(0x6060, 10)
+        assert rig.read(0x6061) == 0
+        rig.run(0.004)
+        assert rig.read(0x6061) == 0
+        rig.run(0.002)
+        assert rig.read(0x6061) == 10
+
+    def test_mode_does_not_act_before_it_is_displayed(self, rig: Rig) -> None:
+        rig.enable(10)
+        rig.torque = 200
+        rig.cycles(10)
+        rig.write(0x6060, 3)
+        rig.cycles(3)
+        assert rig.actual_torque == 200
+        rig.cycles(300)
+        assert rig.read(0x6061) == 3
+        assert abs(rig.truth[1]) < 0.1
+
+
+class TestMisbehaviour:
+    def test_refuses_or_ignores_modes(self, rig: Rig) -> None:
+        rig.write(0x2F00, 1, 3)
+        with pytest.raises(SdoRefusedError):
+            rig.write(0x6060, 10)
+        rig.write(0x2F00, 2, 3)
+        rig.write(0x6060, 10)
+        rig.run(0.1)
+        assert rig.read(0x6061) == 0
+        rig.write(0x2F00, 0, 3)
+        rig.write(0x6060, 10)
+        rig.run(0.1)
+        assert rig.read(0x6061) == 10
+
+    def test_shows_another_mode(self, rig: Rig) -> None:
+        rig.write(0x2F00, 8, 4)
+        rig.write(0x6060, 10)
+        rig.run(0.1)
+        assert rig.read(0x6061) == 8
+
+    def test_drops_tpdos(self, rig: Rig) -> None:
+        rig.enable(10)
+        rig.write(0x2F00, 3, 2)
+        answers = [any(cob == 0x180 + NODE for cob, _ in rig.cycle()) for _ in range(6)]
+        assert answers == [False, False, False, True, True, True]
+        assert rig.read(0x2F00, 2) == 0
+
+    def test_mutes_the_heartbeat(self, rig: Rig) -> None:
+        def beats() -> int:
+            heard = 0
+            for _ in range(50):
+                rig.now += 1e-3
+                rig.drive.advance(rig.now)
+                heard += sum(cob == 0x700 + NODE for cob, _ in rig.collect())
+            return heard
+
+        rig.write(0x1017, 10)
+        assert beats() == 5
+        rig.write(0x2F00, 1, 5)
+        assert beats() == 0
+        rig.write(0x2F00, 0, 5)
+        assert beats() == 5
+
+    def test_node_reset_ends_it(self, rig: Rig) -> None:
+        rig.write(0x2F00, 8, 4)
+        rig.write(0x2F00, 2, 3)
+        rig.nmt(129)
+        rig.run(0.02)
+        rig.write(0x6060, 10)
+        rig.run(0.02)
+        assert rig.read(0x6061) == 10
+
+
+class TestConnection:
+    @pytest.mark.parametrize(
+        ("option", "end", "code"), [(0, OE, 0), (1, FAULT, 0x8130), (2, SOD, 0), (3, SOD, 0)]
+    )
+    def test_lost_heartbeat(self, rig: Rig, option: int, end: int, code: int) -> None:
+        rig.write(0x6007, option)
+        rig.write(0x1016, 127 << 16 | 50, 1)
+        rig.enable(10)
+        for _ in range(5):
+            rig.send(0x77F, b"\x05")
+            rig.cycles(40)
+        assert rig.status & 0x6F == OE
+        rig.run(0.2)
+        assert rig.state == end
+        assert rig.read(0x603F) == code
+        assert (0x8130, 0x11) in rig.emergencies
+
+    def test_nothing_happens_while_not_enabled(self, rig: Rig) -> None:
+        rig.write(0x1016, 127 << 16 | 50, 1)
+        rig.write(0x6040, 6)
+        rig.send(0x77F, b"\x05")
+        rig.run(0.2)
+        assert rig.state == RTSO
+
+    def test_nmt_stop(self, rig: Rig) -> None:
+        rig.enable(10)
+        rig.nmt(2)
+        rig.run(0.05)
+        rig.nmt(128)
+        assert rig.state == FAULT
+
+    def test_missed_rpdo_deadline(self, rig: Rig) -> None:
+        rig.map_pdos()
+        rig.nmt(128)
+        rig.write(0x1400, 0x80000200 + NODE, 1)
+        rig.write(0x1400, 255, 2)
+        rig.write(0x1400, 20, 5)
+        rig.write(0x1400, 0x200 + NODE, 1)
+        rig.nmt(1)
+        rig.enable(10)
+        rig.cycles(50)
+        assert rig.status & 0x6F == OE
+        rig.run(0.1)
+        assert rig.state == FAULT
+        assert rig.read(0x603F) == 0x8250
+
+    def test_node_reset_forgets_position_and_state(self, rig: Rig) -> None:
+        rig.enable(10)
+        rig.torque = 200
+        rig.cycles(100)
+        assert rig.position > 100
+        rig.nmt(129)
+        rig.run(0.5)
+        assert rig.state == SOD
+        assert rig.read(0x6061) == 0
+        moved = rig.truth[0]
+        assert abs(moved) > 0.1
+        assert abs(rig.read(0x6064, signed=True)) < 8192 * 8
+
+
+class TestFixedObjects:
+    @pytest.mark.parametrize(("index", "sub"), [(0x608F, 1), (0x6091, 1), (0x607E, 0)])
+    def test_scaling_cannot_be_changed(self, rig: Rig, index: int, sub: int) -> None:
+        value = rig.read(index, sub)
+        rig.write(index, value, sub)
+        with pytest.raises(SdoRefusedError):
+            rig.write(index, value + 1, sub)
+
+    def test_unknown_homing_method_is_refused(self, rig: Rig) -> None:
+        with pytest.raises(SdoRefusedError):
+            rig.write(0x6098, 17)
+        listed = [rig.read(0x60E3, sub) for sub in range(1, rig.read(0x60E3, 0) + 1)]
+        for method in listed:
+            rig.write(0x6098, method)

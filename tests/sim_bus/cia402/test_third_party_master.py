@@ -1,0 +1,165 @@
+"""A third party at the drive: `BaseNode402` of the `canopen` package, across processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import canopen
+import pytest
+from canopen.profiles.p402 import BaseNode402
+
+from tests.sim_bus.cia402.drive_rig import EDS, NODE
+
+SIMULATOR = f"""
+import pathlib, sys
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.cia402.drive import SimDrive
+from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.bus.server import serve
+
+drive = SimDrive(pathlib.Path({str(EDS)!r}), {NODE}, Plant())
+serve([drive], "simbus:" + sys.argv[1], mode=ClockMode(sys.argv[2]), until_stdin_ends=True)
+"""
+
+
+@pytest.fixture(params=["paced", "lockstep"])
+def node(request: pytest.FixtureRequest) -> Iterator[BaseNode402]:
+    name = f"third-party-{request.param}-{os.getpid()}"
+    process = subprocess.Popen(
+        [sys.executable, "-c", SIMULATOR, name, request.param],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    assert "ready" in json.loads(process.stdout.readline())
+    network = canopen.Network()
+    try:
+        network.connect(interface="simbus", channel=name)
+        node = BaseNode402(NODE, str(EDS))
+        network.add_node(node)
+        start(node)
+        yield node
+    finally:
+        network.sync.stop()
+        network.disconnect()
+        process.communicate()
+
+
+def start(node: BaseNode402) -> None:
+    """Map the words as the package's documentation does, then go operational with a SYNC."""
+    states: list[int] = []
+    node.nmt.add_heartbeat_callback(states.append)
+    node.nmt.send_command(129)
+    assert wait_for(lambda: 0 in states), "no boot-up message"
+    node.sdo[0x1017].raw = 50
+    node.nmt.wait_for_heartbeat(timeout=5)
+    node.rpdo.read()
+    node.tpdo.read()
+    for pdo, kind, objects in (
+        (node.rpdo[1], 255, (0x6040, 0x6071)),
+        (node.tpdo[1], 1, (0x6041, 0x6061, 0x6064)),
+    ):
+        pdo.clear()
+        for index in objects:
+            pdo.add_variable(index)
+        pdo.trans_type = kind
+        pdo.enabled = True
+        pdo.save()
+    node.tpdo[2].enabled = False
+    node.tpdo[2].save()
+    node.sdo[0x1006].raw = 10_000
+    node.setup_402_state_machine()
+    node.nmt.state = "OPERATIONAL"
+    node.network.sync.start(0.01)
+
+
+def wait_for(condition: Callable[[], bool], timeout_s: float = 5.0) -> bool:
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.01)
+    return condition()
+
+
+def test_boots_enables_homes_faults_and_resets(node: BaseNode402) -> None:
+    assert wait_for(lambda: node.state == "SWITCH ON DISABLED")
+    for name in ("PROFILED TORQUE", "CYCLIC SYNCHRONOUS TORQUE", "PROFILED POSITION"):
+        assert node.is_op_mode_supported(name)
+        node.op_mode = name
+        assert node.op_mode == name
+    assert not node.is_op_mode_supported("INTERPOLATED POSITION")
+
+    node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
+    node.state = "OPERATION ENABLED"
+    assert node.state == "OPERATION ENABLED"
+    node.state = "SWITCHED ON"
+    node.state = "READY TO SWITCH ON"
+    node.state = "SWITCH ON DISABLED"
+
+    node.op_mode = "HOMING"
+    assert not node.is_homed()
+    node.sdo[0x6098].raw = 34
+    node.sdo[0x6099][2].raw = 8192
+    assert node.homing(timeout=10)
+    assert node.is_homed()
+    # The zero is where the index is: 123.4° from where the rotor stood.
+    # The two are read one after the other, so the rotor must have come to rest.
+    stood = -round(123.4 / 360 * 8192)
+    assert wait_for(lambda: abs(node.sdo[0x6064].raw - node.sdo[0x6063].raw - stood) <= 10)
+
+    emergencies: list[int] = []
+    node.emcy.add_callback(lambda error: emergencies.append(error.code))
+    node.sdo[0x2F00][1].raw = 0xFF01
+    assert wait_for(node.is_faulted)
+    assert wait_for(lambda: emergencies == [0xFF01])
+    assert node.sdo[0x603F].raw == 0xFF01
+    node.reset_from_fault()
+    assert node.state == "OPERATION ENABLED"
+    assert wait_for(lambda: emergencies == [0xFF01, 0x0000])
+    node.state = "SWITCH ON DISABLED"
+
+
+def test_moves_a_profile_position(node: BaseNode402) -> None:
+    node.op_mode = "PROFILED POSITION"
+    node.state = "OPERATION ENABLED"
+    node.sdo[0x607A].raw = 4096
+    node.controlword = 0x1F
+    assert wait_for(lambda: bool(node.statusword & 0x1000))
+    node.controlword = 0x0F
+    assert wait_for(lambda: bool(node.statusword & 0x0400))
+    assert abs(node.tpdo[1][0x6064].raw - 4096) <= 20
+
+
+def test_lost_heartbeat_is_a_fault(node: BaseNode402) -> None:
+    node.sdo[0x1016][1].raw = 127 << 16 | 500  # ten times the gap: a busy machine is no fault
+    node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
+    node.state = "OPERATION ENABLED"
+    for _ in range(10):
+        node.network.send_message(0x77F, b"\x05")
+        time.sleep(0.05)
+    assert node.sdo[0x6041].raw & 0x6F == 0x27
+    assert wait_for(lambda: node.sdo[0x6041].raw & 0x4F == 0x08)
+    assert node.sdo[0x603F].raw == 0x8130
+
+
+def test_serves_a_master_that_changes_no_mapping(node: BaseNode402) -> None:
+    """As it is shipped: no PDO is remapped, the library's own set-up is all there is."""
+    node.network.sync.stop()
+    boot_ups: list[int] = []
+    node.nmt.add_heartbeat_callback(boot_ups.append)
+    node.nmt.send_command(129)
+    assert wait_for(lambda: 0 in boot_ups)
+    node.setup_402_state_machine()
+    node.nmt.state = "OPERATIONAL"
+    node.network.sync.start(0.01)
+    node.op_mode = "CYCLIC SYNCHRONOUS TORQUE"
+    assert node.op_mode == "CYCLIC SYNCHRONOUS TORQUE"
+    node.state = "OPERATION ENABLED"
+    assert node.state == "OPERATION ENABLED"
+    node.state = "SWITCH ON DISABLED"

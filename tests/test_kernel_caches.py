@@ -1,0 +1,50 @@
+"""Machine code kept on disk is not used any more once a kernel that it calls has changed."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import cdpr_sim_bus
+
+CALLEE = "from cdpr_rt.jit import jit\n\n@jit\ndef inner(x):\n    return x + {added}\n"
+CALLER = """
+from cdpr_rt.jit import jit
+from kernels_callee import inner
+
+@jit
+def outer(x):
+    return 10.0 * inner(x)
+
+print(outer(1.0), sum(outer.stats.cache_hits.values()))
+"""
+KERNEL_CACHE = "from cdpr_sim_bus import jit; print(jit._CACHE)"
+
+
+def told(folder: Path, *words: str) -> list[str]:
+    done = subprocess.run(
+        [sys.executable, *words], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()
+
+
+def test_a_controllers_kernel_is_compiled_anew_when_its_callee_has_changed(tmp_path: Path) -> None:
+    (tmp_path / "caller.py").write_text(CALLER)
+    callee = tmp_path / "kernels_callee.py"
+    callee.write_text(CALLEE.format(added=1.0))
+    assert told(tmp_path, "caller.py") == ["20.0", "0"]
+    assert told(tmp_path, "caller.py") == ["20.0", "1"]
+    callee.write_text(CALLEE.format(added=2.0))
+    assert told(tmp_path, "caller.py") == ["30.0", "0"]
+
+
+def test_the_simulators_kernels_have_a_cache_for_each_state_of_them(tmp_path: Path) -> None:
+    package = tmp_path / "cdpr_sim_bus"
+    shutil.copytree(Path(cdpr_sim_bus.__file__).resolve().parent, package)
+    before = told(tmp_path, "-c", KERNEL_CACHE)
+    assert told(tmp_path, "-c", KERNEL_CACHE) == before
+    kernel = package / "robot" / "rotor.py"
+    kernel.write_text(kernel.read_text() + "# changed\n")
+    assert told(tmp_path, "-c", KERNEL_CACHE) != before

@@ -1,0 +1,68 @@
+"""`cdpr bench loop` runs what it says it runs; how fast is for a machine that is not busy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_tools.bench.daemon import loop as loop_bench
+from cdpr_tools.commands.bench.bench_loop import _table
+from cdpr_tools.output import Output
+
+SECONDS, PERIOD_S = 1.0, 4e-3
+
+
+@pytest.fixture(scope="module")
+def figures(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """One round at a quarter of the speed, which a machine that is busy with tests can follow."""
+    shipped = load_robot(loop_bench.ROBOT).path
+    slower = tmp_path_factory.mktemp("bench") / shipped.name
+    slower.write_text(
+        shipped.read_text().replace("sync_period_s = 0.001", f"sync_period_s = {PERIOD_S}")
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop_bench, "ROUNDS", 1)
+        patch.setattr(loop_bench, "ROBOT", str(slower))
+        patch.setattr(loop_bench, "SLOW_PERIOD_S", 2 * PERIOD_S)
+        return loop_bench.measure(SECONDS, Output(as_json=True))
+
+
+@pytest.mark.parametrize(
+    ("way", "rate_Hz"),
+    [("ours", 250), ("without_service", 250), ("obvious", 250), ("obvious_slow", 125)],
+)
+def test_each_way_runs_its_cycles(figures: dict[str, Any], way: str, rate_Hz: int) -> None:
+    told = figures[way]
+    assert told["cycles"] > 0.5 * SECONDS * rate_Hz
+    # eight axes each; a machine that is busy costs some
+    assert told["missed"] < 8 * told["cycles"]
+    for figure in ("compute_us", "exchange_us", "lateness_us"):
+        spread = told[figure]
+        assert 0.0 < spread["p50"] <= spread["p99.9"] <= spread["worst"]
+    assert 20.0 < told["host_us"] < 5000.0
+
+
+def test_the_obvious_loop_costs_more(figures: dict[str, Any]) -> None:
+    shares = figures["shares"]
+    assert shares["obvious_over_ours"] > 1.5
+    expected = figures["obvious_slow"]["host_us"] / figures["ours"]["host_us"]
+    assert shares["obvious_over_ours"] == pytest.approx(expected, rel=0.01)
+    cost = figures["ours"]["host_us"] / figures["without_service"]["host_us"] - 1.0
+    assert shares["recording_share"] == pytest.approx(cost, abs=1e-3)
+
+
+def test_one_bus_runs_at_nearly_all_it_carries(figures: dict[str, Any]) -> None:
+    full = figures["one_bus"]
+    assert (full["rate_Hz"], full["limit_Hz"]) == (500.0, 524)
+    assert 0.94 < full["share"] < 0.96
+    assert full["cycles"] > 0.5 * SECONDS * 500
+    assert figures["reached"]["one_bus"] == (full["overruns"] == 0)
+
+
+def test_figures_are_told_for_people(figures: dict[str, Any]) -> None:
+    text = "\n".join(_table(figures))
+    for words in ("ours, recorded and watched", "at 250 Hz", "95 % of the 524 Hz"):
+        assert words in text
+    assert text.count("reached") + text.count("MISSED") == len(figures["reached"])

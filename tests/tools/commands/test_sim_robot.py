@@ -1,0 +1,171 @@
+"""A simulated cable robot as its commands show it: its true pose, its faults, its bare motors."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import can
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cdpr_sim_bus.record_file import HEADER_BYTES
+from cdpr_tools.commands.sim.sim_fault import Fault, fault
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from tests.tools.robot_rig import Simulator, simulated, unique
+
+ROBOTS = Path(__file__).parents[3] / "profiles" / "robots"
+PLANT = """
+[start]
+slack_m = 0.0
+[scanner]
+position_sigma_m = 0.004
+rate_Hz = 50.0
+"""
+
+
+def whole_records(path: Path) -> np.ndarray:
+    """Return what stands in a log by now."""
+    data = path.read_bytes()
+    header = json.loads(data[:HEADER_BYTES])
+    fields = [(name, kind, *map(tuple, shape)) for name, kind, *shape in header["fields"]]
+    record = np.dtype(fields)
+    assert record.itemsize == header["record_bytes"]
+    assert (len(data) - HEADER_BYTES) % record.itemsize == 0, "no record is ever half there"
+    return np.frombuffer(data[HEADER_BYTES:], record)
+
+
+def records(path: Path) -> np.ndarray:
+    """Return those of the SYNCs."""
+    all_of_them = whole_records(path)
+    return all_of_them[all_of_them["sync_index"] != 0xFFFFFFFF]
+
+
+class Robot:
+    """planar-3 on a bus, its log and a stranger who sends SYNC."""
+
+    def __init__(self, folder: Path) -> None:
+        self.name = unique()
+        self.log, self.scanner = folder / "pose.bin", folder / "scanner.bin"
+        plant = folder / "plant.toml"
+        plant.write_text(PLANT)
+        self.simulator = Simulator(
+            *("planar-3", "--bus", f"simbus:{self.name}"),
+            *("--plant", str(plant), "--truth-log", str(self.log)),
+            *("--scanner", str(self.scanner)),
+        )
+        self.bus = can.Bus(interface="simbus", channel=f"{self.name}-can0")
+
+    def sync(self, seconds: float) -> np.ndarray:
+        """Let the robot go on, a SYNC every 10 ms; return the record of the last one, read live."""
+        before = len(records(self.log))
+        count = round(seconds / 0.01)
+        for _ in range(count):
+            self.bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+            time.sleep(0.01)
+        until = time.monotonic() + 20.0
+        while len(seen := records(self.log)) < before + count:
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        assert len(seen) == before + count
+        return seen[-1]
+
+    def fault(self, what: Fault, value: str | None = None, axis: str = "1") -> None:
+        fault("planar-3", what, value, bus=[f"simbus:{self.name}"], axis=axis)
+
+    def close(self) -> None:
+        self.bus.shutdown()
+        self.simulator.close()
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+    robot = Robot(tmp_path_factory.mktemp("robot"))
+    yield robot
+    robot.close()
+
+
+def test_the_pose_is_in_the_log_at_once(robot: Robot):
+    before = robot.sync(0.1)
+    assert before["rotation"].ravel() == pytest.approx(np.eye(3).ravel(), abs=0.02)
+    assert before["tension_N"][:2].min() > 1e-3  # the weight of cables that sag
+    assert len(before["torque_Nm"]) == 3
+    again = robot.sync(0.05)
+    assert again["time_s"] > before["time_s"]
+    assert again["sync_index"] == before["sync_index"] + 5
+
+
+def test_a_scanner_measures_the_pose_with_errors(robot: Robot) -> None:
+    true = robot.sync(0.5)
+    seen = whole_records(robot.scanner)
+    assert len(seen) > 10
+    every_s = np.diff(seen["time_s"])
+    assert every_s.mean() > 0.0199, "at most 50 Hz"
+    off = seen["position_m"] - true["position_m"]
+    assert (off[:, 2] == 0.0).all()
+    assert 0.001 < np.std(off[:, :2]) < 0.007
+
+
+def test_a_cable_is_cut_while_the_robot_runs(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert robot.sync(0.05)["tension_N"][:2].min() > 1e-3
+    robot.fault(Fault.CUT_CABLE, axis="upper right")
+    assert capsys.readouterr().out == "upper right: cut-cable\n"
+    assert (robot.sync(0.05)["tension_N"][:2] > 1e-3).tolist() == [True, False]
+    # by its number, more cable than was taut
+    robot.fault(Fault.SLIP, "500", axis="1")
+    assert robot.sync(0.05)["tension_N"][0] < 0.5
+
+
+@pytest.mark.parametrize(
+    ("what", "reason"),
+    [
+        ((Fault.SLIP, None, "upper"), "--axis upper: allowed: 1 to 3, or upper left, upper right"),
+        ((Fault.SLIP, "0"), "slip 0: allowed: whole numbers 1 to 65535"),
+        ((Fault.ENCODER_JUMP, "far"), "encoder-jump far: allowed: whole numbers"),
+    ],
+)
+def test_a_fault_that_cannot_be_is_refused(robot: Robot, what: tuple[Any, ...], reason: str):
+    with pytest.raises(BadInputError, match=reason):
+        robot.fault(*what)
+
+
+def test_detached_motors_have_no_cable_to_cut() -> None:
+    with (
+        simulated("planar-3", "--detached") as bus,
+        pytest.raises(WorkFailedError, match=r"axis 'lower'.*06060000h"),
+    ):
+        fault("planar-3", Fault.CUT_CABLE, bus=[bus], axis="lower")
+
+
+def test_a_robots_file_says_how_its_platform_stands_in_space(tmp_path: Path) -> None:
+    text = (ROBOTS / "suspended-8.toml").read_text()
+    said = "mass_kg = 100.0\nhome_rotation_rad = [0.0, 0.1, 0.5]\n"
+    text = text.replace("mass_kg = 100.0\n", said).replace(
+        "anchor_point_m", "pulley_radius_m = 0.05\nanchor_point_m"
+    )
+    file, log, name = tmp_path / "robot.toml", tmp_path / "pose.bin", unique()
+    file.write_text(text)
+    turned = Rotation.from_rotvec((0.0, 0.1, 0.5)).as_matrix()
+    with (
+        contextlib.closing(
+            Simulator(str(file), "--bus", f"simbus:{name}", "--truth-log", str(log))
+        ),
+        can.Bus(interface="simbus", channel=f"{name}-can0") as bus,
+    ):
+        for _ in range(5):
+            bus.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+            time.sleep(0.01)
+        until = time.monotonic() + 20.0
+        while not len(seen := records(log)):
+            assert time.monotonic() < until
+            time.sleep(0.01)
+    assert np.allclose(seen[0]["rotation"], turned, atol=2e-3)
+    assert np.allclose(seen[0]["position_m"], (0.0, 0.0, 0.5), atol=2e-3)
+    assert seen.dtype["tension_N"].shape == (8,)

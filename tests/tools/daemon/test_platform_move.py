@@ -1,0 +1,291 @@
+"""`cdpr move` of a platform: what is typed in mm and deg, and how it is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+from cdpr_tools.client.platform_move import Frame, PlatformMove
+from cdpr_tools.client.status_text import platform_text
+from cdpr_tools.commands.daemon import daemon_motion, with_daemon
+from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+
+PLANE = {
+    "home_m": [0.0, 1.3],
+    "workspace_min_m": [-0.6, 1.4],
+    "workspace_max_m": [0.6, 2.4],
+    "speed_m_s": 0.5,
+    "controlled": ["x", "y"],
+    "home_rotation_rad": [0.0],
+    "workspace_angle_rad": 0.0,
+}
+TURNING = PLANE | {"controlled": ["x", "y", "angle"], "workspace_angle_rad": math.radians(15.0)}
+ROOM = {
+    "home_m": [0.0, 0.0, 0.5],
+    "workspace_min_m": [-1.0, -1.0, 0.5],
+    "workspace_max_m": [1.0, 1.0, 1.5],
+    "speed_m_s": 0.5,
+    "controlled": ["x", "y", "z", "rx", "ry", "rz"],
+    "home_rotation_rad": [0.0, 0.0, 0.4],
+    "workspace_angle_rad": math.radians(20.0),
+}
+HERE = {"target_m": [0.1, 0.2, 1.0], "target_rotation_rad": [0.1, -0.05, 0.2]}
+
+
+class Told:
+    """A daemon as far as `cdpr move` asks it."""
+
+    def __init__(
+        self, platform: dict[str, Any], progress: dict[str, Any] | None = None, refusal: str = ""
+    ) -> None:
+        self.platform, self.progress, self.refusal = platform, progress or {}, refusal
+        self.posted: list[dict[str, Any]] = []
+        self.ways: list[dict[str, Any]] = []
+        """What the progress says before the motion is done."""
+
+    def get(self, path: str) -> dict[str, Any]:
+        if path == "/description":
+            return {"platform": self.platform, "programs": ["hold", "pose"]}
+        done = {**self.progress, "done": 1.0, "trouble": ""}
+        if self.posted and self.ways:
+            done |= {"done": 0.0, **self.ways.pop(0)}
+        return {
+            "state": "active",
+            "program": "pose",
+            "reason": "",
+            "axes": [],
+            "program_progress": done if self.posted else self.progress,
+        }
+
+    @contextmanager
+    def control(self) -> Iterator[Told]:
+        yield self
+
+    @property
+    def daemon(self) -> Told:
+        return self
+
+    def post(self, _path: str, body: dict[str, Any]) -> None:
+        if self.refusal:
+            raise WorkFailedError(self.refusal)
+        self.posted.append(body)
+
+    def renew(self) -> None: ...
+    def hold(self) -> None: ...
+
+
+def wanted(
+    told: Told,
+    to: str | None = None,
+    rotate: str | None = None,
+    relative: bool = False,
+    frame: Frame = Frame.ROOM,
+    speed: float | None = None,
+) -> dict[str, Any]:
+    return PlatformMove(to, rotate, relative, frame, speed).wanted(told)  # type: ignore[arg-type]
+
+
+def test_millimetres_and_degrees_become_si() -> None:
+    asked = wanted(Told(PLANE), "300 2000", speed=50.0)
+    assert asked == {"position_m": [0.3, 2.0], "speed_m_s": 0.05}
+    asked = wanted(Told(TURNING), rotate="-10")
+    assert asked == {"rotation_rad": [pytest.approx(math.radians(-10.0))]}
+    asked = wanted(Told(ROOM), "100 -200 700", "5 0 -10")
+    assert asked["position_m"] == pytest.approx([0.1, -0.2, 0.7])
+    assert asked["rotation_rad"] == pytest.approx([math.radians(5.0), 0.0, math.radians(-10.0)])
+
+
+def test_a_relative_motion_is_along_the_room_s_axes_or_the_platform_s() -> None:
+    from_home = Rotation.from_rotvec(HERE["target_rotation_rad"])
+    orientation = from_home * Rotation.from_rotvec(ROOM["home_rotation_rad"])
+    step_m, turn = np.array([0.05, 0.02, -0.03]), Rotation.from_rotvec([3, -2, 4], degrees=True)
+    typed = {"to": "50 20 -30", "rotate": "3 -2 4", "relative": True}
+    asked = wanted(Told(ROOM, HERE), **typed)  # type: ignore[arg-type]
+    assert asked["position_m"] == pytest.approx(HERE["target_m"] + step_m)
+    assert asked["rotation_rad"] == pytest.approx((turn * from_home).as_rotvec())
+
+    asked = wanted(Told(ROOM, HERE), **typed, frame=Frame.PLATFORM)  # type: ignore[arg-type]
+    assert asked["position_m"] == pytest.approx(HERE["target_m"] + orientation.apply(step_m))
+    at_home = Rotation.from_rotvec(ROOM["home_rotation_rad"])
+    got = Rotation.from_rotvec(asked["rotation_rad"]) * at_home
+    assert ((orientation * turn).inv() * got).magnitude() < 1e-9
+
+
+def test_in_a_plane_a_relative_motion_turns_about_its_normal() -> None:
+    here = {"target_m": [0.0, 2.0], "target_rotation_rad": [0.1]}
+    told = Told(TURNING | {"home_rotation_rad": [math.pi / 2 - 0.1]}, here)
+    asked = wanted(told, "100 0", "2", relative=True, frame=Frame.PLATFORM)
+    assert asked["position_m"] == pytest.approx([0.0, 2.1])
+    assert asked["rotation_rad"] == pytest.approx([0.1 + math.radians(2.0)])
+
+
+@pytest.mark.parametrize(
+    ("platform", "typed", "told"),
+    [
+        (PLANE, {"to": "700 2000"}, "--to 700 2000: x 700 mm; allowed: -600 to 600 mm, the work"),
+        (PLANE, {"to": "0.3 2.0"}, "--to 0.3 2.0: y 2 mm; allowed: 1400 to 2400 mm"),
+        (PLANE, {"to": "0 2000 5"}, "--to 0 2000 5: 3 numbers; allowed: X Y in mm"),
+        (ROOM, {"to": "0 2000"}, "--to 0 2000: 2 numbers; allowed: X Y Z in mm"),
+        (PLANE, {"to": "nan 2000"}, "--to nan 2000: allowed: finite numbers, X Y in mm"),
+        (PLANE, {"rotate": "5"}, "--rotate 5: no angle of this platform is controlled"),
+        (TURNING, {"rotate": "1 2 3"}, "--rotate 1 2 3: 3 numbers; allowed: ANGLE in deg"),
+        (TURNING, {"rotate": "20"}, "--rotate 20: 20 deg from the orientation at home; "
+         "allowed: up to 15 deg"),
+        (ROOM, {"rotate": "15 15 0"}, "--rotate 15 15 0: 21.21 deg from .*: up to 20 deg"),
+        (ROOM, {"rotate": "1"}, "--rotate 1: 1 numbers; allowed: RX RY RZ in deg"),
+        (PLANE, {"to": "0 2000", "speed": 900.0}, "--speed 900: allowed: up to 500 mm/s"),
+        (PLANE, {"to": "5 0", "relative": True}, "--relative: it is not known where"),
+        (PLANE, {"to": "5 0", "frame": Frame.PLATFORM}, "--frame platform: allowed: together"),
+    ],
+)  # fmt: skip
+def test_what_is_not_allowed_is_refused_as_it_was_typed(
+    platform: dict[str, Any], typed: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(BadInputError, match=told):
+        wanted(Told(platform), **typed)
+
+
+def test_where_a_relative_motion_leads_is_told() -> None:
+    with pytest.raises(BadInputError, match="--to 1000 0 0: leads to x 1100 mm; allowed: -1000"):
+        wanted(Told(ROOM, HERE), "1000 0 0", relative=True)
+
+
+@pytest.mark.parametrize(
+    ("message", "told"),
+    [
+        (
+            "pose: position_m: value [0.3, 2.0]: cable 1 would need 170.0 N, 20 to 150 N allowed",
+            "--to 300 2000: cable 1 would need 170.0 N, 20 to 150 N allowed",
+        ),
+        (
+            "pose: position_m: value [0.3, 2.0], rotation_rad: value [0.1]: on the way, at "
+            "0.250, -1.500 m turned by 0.100 rad: cable 1",
+            "--to 300 2000: on the way, at 250.0, -1500.0 mm turned by 5.7 deg: cable 1",
+        ),
+    ],
+)
+def test_a_refusal_by_the_daemon_is_told_in_the_units_that_were_typed(
+    message: str, told: str
+) -> None:
+    assert PlatformMove("300 2000", None, False, Frame.ROOM, None).refusal(message) == told
+
+
+def test_the_status_tells_where_a_platform_is_and_how_it_is_turned() -> None:
+    progress = {
+        "position_m": [0.1, 0.2, 0.3],
+        "rotation_rad": [0.0, 0.0, math.radians(5.0)],
+        "target_m": [0.0, 0.0, 0.0],
+        "target_rotation_rad": [0.0, 0.0, 0.0],
+        "trouble": "no way on, at 0.500, 1.000, 2.000 m: cable 1",
+    }
+    assert platform_text({"program_progress": progress}) == (
+        "platform at 100.0, 200.0, 300.0 mm, turned by 0.00, 0.00, 5.00 deg; "
+        "target 0.0, 0.0, 0.0 mm, turned by 0.00, 0.00, 0.00 deg; "
+        "no way on, at 500.0, 1000.0, 2000.0 mm: cable 1"
+    )
+
+
+# -- as it is typed
+
+
+def typed(monkeypatch: pytest.MonkeyPatch, told: Told, *words: str) -> Any:
+    """Run `cdpr move` with these words against a made-up daemon."""
+
+    @contextmanager
+    def opened(*_where: Any) -> Iterator[Told]:
+        yield told
+
+    monkeypatch.setattr(with_daemon, "open_daemon", opened)
+    app = typer.Typer()
+    app.add_typer(daemon_motion.app)
+    return CliRunner().invoke(app, ["move", *words])
+
+
+@pytest.mark.parametrize(
+    ("words", "asked"),
+    [
+        (["--to", "-50", "-200", "700"], {"position_m": [-0.05, -0.2, 0.7]}),
+        (["--to=-50 -200 700"], {"position_m": [-0.05, -0.2, 0.7]}),
+        (["--rotate", "0", "0", "-0.0", "--speed", "50"],
+         {"rotation_rad": [0.0, 0.0, 0.0], "speed_m_s": 0.05}),
+        (["--speed", "50", "--to", "1", "2", "700", "--rotate", "0", "-0", "0"],
+         {"position_m": [0.001, 0.002, 0.7], "rotation_rad": [0.0, 0.0, 0.0], "speed_m_s": 0.05}),
+    ],
+)  # fmt: skip
+def test_options_take_all_numbers_that_follow(
+    monkeypatch: pytest.MonkeyPatch, words: list[str], asked: dict[str, Any]
+) -> None:
+    told = Told(ROOM, HERE)
+    result = typed(monkeypatch, told, *words, "--json")
+    assert result.exit_code == 0, result.output
+    assert told.posted[0]["wanted"] == {
+        key: pytest.approx(value, abs=1e-12) for key, value in asked.items()
+    }
+    assert json.loads(result.stdout.splitlines()[-1])["arrived"] is True
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--to"], "requires an argument"),
+        (["--to", "1", "2", "left=3"], "not together with axes"),
+        (["--frame", "platform", "left=3"], "--frame platform: allowed: together with"),
+        (["--to", "1", "2"], "2 numbers; allowed: X Y Z in mm"),
+    ],
+)
+def test_mistakes_end_with_a_message(
+    monkeypatch: pytest.MonkeyPatch, words: list[str], message: str
+) -> None:
+    told = Told(ROOM, HERE)
+    result = typed(monkeypatch, told, *words)
+    assert result.exit_code != 0
+    text = str(result.exception) if isinstance(result.exception, CommandError) else result.output
+    assert message in text
+    assert not told.posted
+
+
+def test_the_daemon_s_refusal_names_what_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = Told(ROOM, HERE, "pose: position_m: value [0.0, 0.0, 0.7]: cable 1 would need 9 N")
+    result = typed(monkeypatch, told, "--to", "0", "0", "700")
+    assert isinstance(result.exception, WorkFailedError)
+    assert str(result.exception) == "--to 0 0 700: cable 1 would need 9 N"
+
+
+def test_what_holds_a_platform_back_is_told_once_while_it_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told = Told(ROOM, HERE)
+    told.ways = [{"held_back": f"the platform is {k} mm behind"} for k in (50, 51)]
+    result = typed(monkeypatch, told, "--to", "0", "0", "700")
+    assert result.exit_code == 0
+    assert "50 mm behind" in result.output and "51 mm" not in result.output
+
+
+def test_a_way_that_is_blocked_ends_it_with_the_reason_in_millimetres(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told = Told(ROOM, HERE)
+    told.ways = [{}, {"trouble": "no way on, at 0.100, 0.000, 0.700 m: cable 1 would need 9 N"}]
+    result = typed(monkeypatch, told, "--to", "0", "0", "700")
+    assert isinstance(result.exception, WorkFailedError)
+    assert "no way on, at 100.0, 0.0, 700.0 mm: cable 1" in str(result.exception)
+
+
+def test_a_platform_that_friction_keeps_away_is_told_and_there_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told = Told(ROOM, HERE)
+    told.ways = [{"done": 1.0, "trouble": "the platform stands 1.2 mm from its target"}]
+    result = typed(monkeypatch, told, "--to", "0", "0", "700", "--json")
+    assert result.exit_code == 0
+    figures = json.loads(result.stdout.splitlines()[-1])
+    assert figures["trouble"] == "the platform stands 1.2 mm from its target"

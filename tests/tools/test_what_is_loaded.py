@@ -1,0 +1,51 @@
+"""A command's process loads the libraries it needs and no others: each costs its start."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from cdpr_tools import cli
+from cdpr_tools.command_group import load
+from cdpr_tools.commands.sim import sim
+
+
+def _loaded(code: str) -> set[str]:
+    """Return the modules that are loaded after `code` in a process of its own."""
+    told = subprocess.run(
+        [sys.executable, "-c", f"{code}\nimport sys\nprint(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(told.stdout.split("\n")[-2].split())
+
+
+@pytest.mark.parametrize("modules", [cli.MODULES, sim.MODULES], ids=["cdpr", "sim"])
+def test_the_lines_of_help_are_those_of_the_commands(modules: dict[str, dict[str, str]]) -> None:
+    for module, lines in modules.items():
+        for name, line in lines.items():
+            told = load(module, name).help
+            assert " ".join(told.split("\n\n")[0].split()) == line
+
+
+def test_help_loads_no_command() -> None:
+    asked = "from cdpr_tools import cli; import sys; sys.argv = ['cdpr', '--help']\n"
+    loaded = _loaded(asked + "try: cli.main()\nexcept SystemExit: pass")
+    assert "cdpr_tools.cli" in loaded
+    assert not {"numpy", "pydantic", "numba", "can", "cdpr_tools.commands.daemon.run"} & loaded
+
+
+def test_a_command_that_is_not_asked_for_is_not_loaded() -> None:
+    loaded = _loaded("from cdpr_tools.command_group import load; load('sim.sim_up', 'up')")
+    assert not {"pymodbus", "matplotlib", "fastapi", "httpx"} & loaded
+
+
+@pytest.mark.parametrize("module", ["cdpr_rt.jit", "cdpr_sim_bus.jit"])
+def test_kernels_do_not_load_scipys_linear_algebra_nor_spoil_it(module: str) -> None:
+    call = "import numba; assert numba.njit(lambda x: 2.0 * x)(2.0) == 4.0"
+    loaded = _loaded(f"import {module}; {call}")
+    assert "scipy.linalg" not in loaded
+    assert "scipy.linalg.cython_blas" in _loaded(f"import {module}, scipy.optimize")

@@ -1,0 +1,164 @@
+"""What `cdpr move` asks of a platform: from millimetres and degrees to what the daemon takes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+from cdpr_tools.client.client import Daemon
+from cdpr_tools.client.status_text import in_millimetres
+from cdpr_tools.errors import BadInputError
+
+_COORDINATES: Final = {2: ("x", "y"), 3: ("x", "y", "z")}
+_ANGLES: Final = {"angle": 2, "rx": 0, "ry": 1, "rz": 2}
+"""About which of the room's axes the platform turns, by the name in its robot's file."""
+_ROUNDING: Final = 1e-9
+_REFUSED: Final = re.compile(
+    r"pose: (?:(?:position_m|rotation_rad): value \[[^\]]*\](?:, (?=rotation_rad))?)+"
+)
+
+
+class Frame(StrEnum):
+    """Along and about which axes a relative motion is."""
+
+    ROOM = "room"
+    PLATFORM = "platform"
+
+
+@dataclass(frozen=True)
+class PlatformMove:
+    """A motion of a platform as it was typed: mm, deg, mm/s."""
+
+    to: str | None
+    rotate: str | None
+    relative: bool
+    frame: Frame
+    speed: float | None
+
+    @property
+    def typed(self) -> str:
+        """Return the options that say where to."""
+        words = [f"--to {self.to}"] if self.to is not None else []
+        words += [f"--rotate {self.rotate}"] if self.rotate is not None else []
+        return " ".join(words)
+
+    def wanted(self, daemon: Daemon) -> dict[str, Any]:
+        """Return what the program `pose` is to do; raises BadInputError."""
+        platform = daemon.get("/description").get("platform")
+        if platform is None:
+            raise BadInputError(f"{self.typed}: the robot has no platform; allowed: AXIS=ANGLE...")
+        names = _COORDINATES[len(platform["home_m"])]
+        turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
+        to = None if self.to is None else _numbers("--to", self.to, names, "mm", 1e-3)
+        rotate = None
+        if self.rotate is not None:
+            if not turns:
+                raise BadInputError(
+                    f"--rotate {self.rotate}: no angle of this platform is controlled; allowed: "
+                    f"--to {' '.join(names).upper()}"
+                )
+            rotate = _numbers("--rotate", self.rotate, turns, "deg", math.radians(1.0))
+        if self.relative:
+            to, rotate = self._from_here(daemon, platform, to, rotate, turns)
+        elif self.frame is not Frame.ROOM:
+            raise BadInputError(f"--frame {self.frame}: allowed: together with --relative")
+        wanted: dict[str, Any] = {}
+        if to is not None:
+            self._check_box(to, names, platform)
+            wanted["position_m"] = to
+        if rotate is not None:
+            self._check_angle(rotate, platform)
+            wanted["rotation_rad"] = rotate
+        if self.speed is not None:
+            wanted["speed_m_s"] = self._checked_speed(self.speed, platform)
+        return wanted
+
+    def refusal(self, message: str) -> str:
+        """Return a refusal by the daemon in the words that were typed."""
+        return in_millimetres(_REFUSED.sub(self.typed, message))
+
+    def _from_here(
+        self,
+        daemon: Daemon,
+        platform: dict[str, Any],
+        to: list[float] | None,
+        rotate: list[float] | None,
+        turns: Sequence[str],
+    ) -> tuple[list[float] | None, list[float] | None]:
+        """Return where a relative motion leads to."""
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to load
+
+        told = daemon.get("/status").get("program_progress") or {}
+        here = told.get("target_m") or told.get("position_m")
+        if not here:
+            raise BadInputError("--relative: it is not known where the platform is; tighten first")
+        about = [_ANGLES[name] for name in turns]
+        turned = told.get("target_rotation_rad") or told.get("rotation_rad") or []
+        from_home = Rotation.from_rotvec(_in_space(turned, about))
+        at_home = platform.get("home_rotation_rad") or (0.0,)
+        axes = from_home * Rotation.from_rotvec(
+            at_home if len(at_home) == len(_COORDINATES[3]) else (0.0, 0.0, *at_home)
+        )
+        if self.frame is Frame.ROOM:
+            axes = Rotation.identity()
+        if to is not None:
+            way = axes.apply([*to, 0.0][: len(_COORDINATES[3])])
+            to = [x + step for x, step in zip(here, way, strict=False)]
+        if rotate is not None:
+            step = Rotation.from_rotvec(axes.apply(_in_space(rotate, about)))
+            vector = (step * from_home).as_rotvec()
+            rotate = [float(vector[axis]) for axis in about]
+        return to, rotate
+
+    def _check_box(
+        self, to: Sequence[float], names: Sequence[str], platform: dict[str, Any]
+    ) -> None:
+        box = zip(names, to, platform["workspace_min_m"], platform["workspace_max_m"], strict=True)
+        for name, value, low, high in box:
+            if not low - _ROUNDING <= value <= high + _ROUNDING:
+                leads = "leads to " if self.relative else ""
+                raise BadInputError(
+                    f"--to {self.to}: {leads}{name} {1e3 * value:.6g} mm; allowed: "
+                    f"{1e3 * low:g} to {1e3 * high:g} mm, the workspace"
+                )
+
+    def _check_angle(self, rotate: Sequence[float], platform: dict[str, Any]) -> None:
+        angle, most = math.hypot(*rotate), float(platform.get("workspace_angle_rad", 0.0))
+        if angle > most + _ROUNDING:
+            leads = "leads to " if self.relative else ""
+            raise BadInputError(
+                f"--rotate {self.rotate}: {leads}{math.degrees(angle):.4g} deg from the "
+                f"orientation at home; allowed: up to {math.degrees(most):.4g} deg"
+            )
+
+    def _checked_speed(self, speed: float, platform: dict[str, Any]) -> float:
+        most = 1e3 * float(platform["speed_m_s"])
+        if not speed <= most:
+            raise BadInputError(f"--speed {speed:g}: allowed: up to {most:g} mm/s")
+        return 1e-3 * speed
+
+
+def _numbers(option: str, text: str, names: Sequence[str], unit: str, factor: float) -> list[float]:
+    """Return the numbers of an option in SI; raises BadInputError."""
+    allowed = f"{' '.join(names).upper()} in {unit}"
+    words = text.split()
+    if len(words) != len(names):
+        raise BadInputError(f"{option} {text}: {len(words)} numbers; allowed: {allowed}")
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        raise BadInputError(f"{option} {text}: allowed: {allowed}") from None
+    if not all(map(math.isfinite, values)):
+        raise BadInputError(f"{option} {text}: allowed: finite numbers, {allowed}")
+    return [factor * value for value in values]
+
+
+def _in_space(values: Sequence[float], about: Sequence[int]) -> list[float]:
+    vector = [0.0] * len(_COORDINATES[3])
+    for axis, value in zip(about, values, strict=False):
+        vector[axis] = value
+    return vector

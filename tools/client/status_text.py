@@ -1,0 +1,158 @@
+"""A daemon's status for people."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+_OPTIONS = {"live_view": "--live", "stream": "--stream"}
+_PLACE = re.compile(r"\bat ((?:-?\d+\.\d+, )+-?\d+\.\d+) m\b")
+_TURN = re.compile(r"\bturned by ((?:-?\d+\.\d+(?:, )?)+) rad\b")
+_COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
+
+
+def status_text(status: dict[str, Any]) -> Group:
+    """Return what `cdpr status` shows."""
+    return Group(*_lines(status), _axes(status))
+
+
+def _lines(status: dict[str, Any]) -> list[Text]:
+    state = status["state"]
+    how = ["read-only"] * bool(status["read_only"]) + ["lockstep"] * bool(status["lockstep"])
+    first = Text.assemble(
+        f"{status['robot']}: ",
+        (state, f"bold {_COLOURS.get(state, 'yellow')}"),
+        f", program {status['program']}" if status["program"] else "",
+        "".join(f", {word}" for word in how),
+    )
+    lines = [first]
+    if status["reason"]:
+        lines.append(Text(f"reason: {status['reason']}", style="yellow"))
+    if text := platform_text(status):
+        lines.append(Text(text))
+    if text := compensation_text(status["axes"]):
+        lines.append(Text(text))
+    control = status["control"]
+    if control["held"]:
+        lines.append(Text(f"moved by {control['client']}"))
+    cycle = status["cycle"]
+    if cycle:
+        lines.append(
+            Text(
+                f"cycle {cycle['cycle']}, {cycle['time_s']:.1f} s: answers after "
+                f"{_us(cycle['exchange_s'])}, computed in {_us(cycle['compute_s'])}; "
+                f"{cycle['missed']} answers missed, {cycle['late_cycles']} cycles late"
+            )
+        )
+    if status["loop"]["silent_s"] > 1.0:
+        silent_s = status["loop"]["silent_s"]
+        lines.append(Text(f"the loop has not turned for {silent_s:.1f} s", style="red"))
+    for part, option in _OPTIONS.items():
+        if error := status["parts"].get(part, {}).get("error"):
+            lines.append(Text(f"{option} does not work: {error}", style="red"))
+    recording = status["parts"].get("recording")
+    if recording:
+        lines.append(Text(_recording(recording)))
+    lines += [Text(f"note: {notice}", style="dim") for notice in status["notices"]]
+    return lines
+
+
+def platform_text(status: dict[str, Any]) -> str:
+    """Return where the platform is and what is in its way, an empty text of robots without."""
+    progress = status.get("program_progress") or {}
+    words = []
+    for place, turn, word in (
+        ("position_m", "rotation_rad", "platform at"),
+        ("target_m", "target_rotation_rad", "target"),
+    ):
+        if progress.get(place):
+            words.append(f"{word} {_listed(progress[place], 1e3, 1)} mm")
+        if progress.get(turn):
+            words[-1] += f", turned by {_listed(progress[turn], math.degrees(1.0), 2)} deg"
+    if progress.get("stage"):
+        words.append(str(progress["stage"]))
+    found = (progress.get(key) for key in ("missing", "held_back", "trouble"))
+    words += [in_millimetres(text) for text in found if text]
+    return "; ".join(words)
+
+
+def in_millimetres(text: str) -> str:
+    """Return a text of the loop with the places and rotations in it in mm and deg."""
+    text = _PLACE.sub(lambda found: f"at {_converted(found[1], 1e3, 1)} mm", text)
+    return _TURN.sub(
+        lambda found: f"turned by {_converted(found[1], math.degrees(1.0), 1)} deg", text
+    )
+
+
+def _converted(numbers: str, factor: float, digits: int) -> str:
+    return _listed(map(float, numbers.split(", ")), factor, digits)
+
+
+def _listed(values: Iterable[float], factor: float, digits: int) -> str:
+    return ", ".join(f"{factor * value:z.{digits}f}" for value in values)
+
+
+def _recording(told: dict[str, Any]) -> str:
+    if not told.get("recording"):
+        return f"nothing is recorded: {told.get('error') or 'ended'}"
+    lost = f", {told['lost_rows']} cycles lost" if told.get("lost_rows") else ""
+    return f"recording {told['file']}, {told['bytes'] / 1e6:.1f} MB{lost}"
+
+
+def _axes(status: dict[str, Any]) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    table.add_column("axis")
+    for title in ("angle deg", "set deg", "speed deg/s", "torque Nm", "tension N", "cable m"):
+        table.add_column(title, justify="right")
+    table.add_column("")
+    for axis in status["axes"]:
+        tension = _figure(axis.get("tension_N"), 1)
+        measured = "" if axis.get("tension_measured") or tension == "-" else "~"
+        table.add_row(
+            str(axis.get("name")),
+            _figure(axis.get("position_rad"), 2, math.degrees(1.0)),
+            _figure(axis.get("setpoint_rad"), 2, math.degrees(1.0)),
+            _figure(axis.get("velocity_rad_s"), 2, math.degrees(1.0)),
+            _figure(axis.get("torque_actual_Nm"), 3),
+            f"{measured}{tension}",
+            _figure(axis.get("cable_length_m"), 4),
+            _trouble(axis),
+        )
+    return table
+
+
+def _trouble(axis: dict[str, Any]) -> Text:
+    if axis.get("alive") is None:
+        return Text("")
+    words = ["silent"] * (not axis["alive"]) + ["not valid"] * (not axis["valid"])
+    return Text(", ".join(words), style="red")
+
+
+def compensation_text(axes: list[dict[str, Any]]) -> str:
+    """Return which motors' cogging is compensated, an empty text where none has been learnt."""
+    parts = []
+    for known, words in ((True, "compensated"), (False, "not compensated before its index passes")):
+        names = [
+            str(axis["name"])
+            for axis in axes
+            if axis.get("commissioned") and bool(axis.get("index_known")) is known
+        ]
+        parts += [f"{words}: {', '.join(names)}"] * bool(names)
+    left = [str(axis["name"]) for axis in axes if not axis.get("commissioned")]
+    if parts and left:
+        parts.append(f"not commissioned: {', '.join(left)}")
+    return "; ".join(parts)
+
+
+def _figure(value: float | None, digits: int, factor: float = 1.0) -> str:
+    return "-" if value is None else f"{factor * value:.{digits}f}"
+
+
+def _us(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e6 * seconds:.0f} us"

@@ -1,0 +1,44 @@
+"""Groups of commands that import the module of a command when it is asked for."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+from typing_extensions import override
+
+
+@cache
+def load(module: str, name: str) -> Any:
+    """Return the group or command `name` of a module of cdpr_tools.commands: its `app`."""
+    group = typer.main.get_group(importlib.import_module(f"cdpr_tools.commands.{module}").app)
+    return group if group.name == name else group.commands[name]
+
+
+def group_of(modules: Mapping[str, Mapping[str, str]]) -> type[TyperGroup]:
+    """Return the class of a group of commands.
+
+    `modules` has for each module of cdpr_tools.commands the names and first lines of its commands.
+    The group's own help shows these lines and imports none of the modules: each brings libraries
+    along.
+    """
+    module_of = {name: module for module, lines in modules.items() for name in lines}
+
+    class _Group(TyperGroup):
+        def __init__(self, **settings: Any) -> None:
+            super().__init__(**settings)
+            for lines in modules.values():
+                for name, line in lines.items():
+                    self.add_command(TyperCommand(name, help=line))
+
+        @override
+        def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+            if (name := args[0]) in module_of:
+                self.add_command(load(module_of[name], name))
+            return super().resolve_command(ctx, args)
+
+    return _Group

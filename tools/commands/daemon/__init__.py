@@ -1,0 +1,1 @@
+"""Commands that start a daemon or talk to one."""

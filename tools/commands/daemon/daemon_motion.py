@@ -1,0 +1,209 @@
+"""`cdpr jog|move|controller`: motion by a daemon, for as long as the command runs."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+from typing_extensions import override
+
+from cdpr_tools.client.client import Daemon, axis_values, key_values
+from cdpr_tools.client.motion import RENEW_S, await_end, finish, require_program
+from cdpr_tools.client.platform_move import Frame, PlatformMove
+from cdpr_tools.commands.daemon.with_daemon import with_daemon
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import stop_on_signals
+
+_DEADMAN_S = 0.6
+_NUMBERS = frozenset({"--to", "--rotate"})
+_STANDING = frozenset({"hold", "idle"})
+
+
+class _NumbersCommand(TyperCommand):
+    """A command whose options `--to` and `--rotate` take all the numbers that follow them."""
+
+    @override
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Join each of these options with its numbers, negative ones too."""
+        joined: list[str] = []
+        takes = False
+        for word in args:
+            if takes and _is_number(word):
+                joined[-1] += f" {word}" if "=" in joined[-1] else f"={word}"
+                continue
+            takes = word in _NUMBERS
+            joined.append(word)
+        return super().parse_args(ctx, joined)
+
+
+app = typer.Typer()
+
+
+@app.command()
+@with_daemon
+def jog(
+    daemon: Daemon,
+    out: Output,
+    axes: Annotated[
+        list[str], typer.Argument(help="Speeds in deg/s at the motor.", metavar="AXIS=SPEED...")
+    ],
+    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="How long.")] = 1.0,
+    cable: Annotated[
+        bool, typer.Option("--cable", help="Speeds are mm/s of cable, positive pays out.")
+    ] = False,
+) -> None:
+    """Turn axes at a speed for a while; they stop when this command does, however it ends."""
+    n, speeds = _given(daemon, axes, "mm/s" if cable else "deg/s")
+    factor = 1e-3 if cable else math.radians(1.0)
+    values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
+    key = "cable_velocity_m_s" if cable else "velocity_rad_s"
+    wanted = {key: values, "timeout_s": _DEADMAN_S}
+    deadline = time.monotonic() + seconds
+    with stop_on_signals() as stop_requested, daemon.control() as control:
+        control.post("/program", {"program": "jog", "wanted": wanted})
+        while time.monotonic() < deadline and not stop_requested():
+            time.sleep(RENEW_S)
+            require_program(daemon, "jog")
+            control.post("/set", {"wanted": wanted})
+        control.hold()
+    finish(daemon, out, stop_requested())
+
+
+@app.command(cls=_NumbersCommand)
+@with_daemon
+def move(
+    daemon: Daemon,
+    out: Output,
+    axes: Annotated[
+        list[str] | None,
+        typer.Argument(help="Angles in deg of the motor.", metavar="[AXIS=ANGLE]..."),
+    ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(metavar="X Y [Z]", help="The platform to this position, in mm."),
+    ] = None,
+    rotate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RX RY RZ | ANGLE",
+            help="The platform to this rotation vector from its orientation at home, in deg; an "
+            "angle in a plane.",
+        ),
+    ] = None,
+    relative: Annotated[
+        bool, typer.Option("--relative", help="By so much from here, instead of to there.")
+    ] = False,
+    frame: Annotated[
+        Frame, typer.Option(help="With --relative: along and about whose axes the platform moves.")
+    ] = Frame.ROOM,
+    cable: Annotated[
+        bool, typer.Option("--cable", help="By mm of cable from here, positive pays out.")
+    ] = False,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01,
+            help="Not faster: deg/s at the motor; of a platform mm/s, its turning in the same "
+            "measure.",
+        ),
+    ] = None,
+) -> None:
+    """Take axes or the platform to positions and wait until there; Ctrl-C holds and fails."""
+    if to is not None or rotate is not None:
+        if axes or cable:
+            raise BadInputError("--to, --rotate: not together with axes or --cable")
+        _move_platform(daemon, out, PlatformMove(to, rotate, relative, frame, speed))
+        return
+    if frame is not Frame.ROOM:
+        raise BadInputError(f"--frame {frame}: allowed: together with --to or --rotate")
+    _run_to_end(daemon, out, "pid", _to_angles(daemon, axes or [], relative, cable, speed))
+
+
+def _move_platform(daemon: Daemon, out: Output, move: PlatformMove) -> None:
+    """Have the platform go there; what is refused is told in the words that were typed."""
+    wanted = move.wanted(daemon)
+    try:
+        _run_to_end(daemon, out, "pose", wanted)
+    except (BadInputError, WorkFailedError) as error:
+        raise type(error)(move.refusal(str(error))) from None
+
+
+def _run_to_end(daemon: Daemon, out: Output, program: str, wanted: dict[str, Any]) -> None:
+    with stop_on_signals() as stop_requested, daemon.control() as control:
+        control.post("/program", {"program": program, "wanted": wanted})
+        ended = await_end(control, program, stop_requested, math.inf, out)
+        control.hold()
+    finish(daemon, out, stop_requested(), ended, arrived=ended is not None)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _to_angles(
+    daemon: Daemon, axes: list[str], relative: bool, cable: bool, speed: float | None
+) -> dict[str, Any]:
+    """Return what the program `pid` is to do; raises BadInputError."""
+    if not axes:
+        raise BadInputError(
+            "nothing to move; allowed: AXIS=ANGLE..., or --to and --rotate for a platform"
+        )
+    if "pid" not in daemon.get("/description").get("programs", ["pid"]):
+        raise BadInputError(
+            f"{axes[0]}: the platform is moved as a whole; allowed: --to and --rotate, or "
+            "`cdpr jog` for a single winch"
+        )
+    n, goals = _given(daemon, axes, "mm" if cable else "deg")
+    factor = 1e-3 if cable else math.radians(1.0)
+    key = "cable_m" if cable else "distance_rad" if relative else "position_rad"
+    wanted: dict[str, Any] = {
+        key: [factor * goals[axis] if axis in goals else None for axis in range(n)]
+    }
+    if speed is not None:
+        wanted["speed_rad_s"] = math.radians(speed)
+    return wanted
+
+
+@app.command()
+@with_daemon
+def controller(
+    daemon: Daemon,
+    out: Output,
+    name: Annotated[str, typer.Argument(help="Program: hold, idle, sweep, pid, ...")],
+    values: Annotated[
+        list[str] | None,
+        typer.Argument(help="What it is to do, in JSON.", metavar="[KEY=VALUE]..."),
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(min=0.1, help="No longer than this; until its end otherwise.")
+    ] = None,
+) -> None:
+    """Change over to a program and stay with it until it is done; hold follows then.
+
+    `hold` and `idle` run on when the command has ended.
+    """
+    wanted, ended = key_values(values or []), None
+    with stop_on_signals() as stop_requested, daemon.control() as control:
+        control.post("/program", {"program": name, "wanted": wanted})
+        if name not in _STANDING:
+            ended = await_end(control, name, stop_requested, seconds or math.inf, out)
+            control.hold()
+    finish(daemon, out, stop_requested(), ended)
+
+
+def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, float]]:
+    """Return how many axes there are and the numbers given for some; raises BadInputError."""
+    axes = daemon.get("/status")["axes"]
+    values = axis_values(texts, axes, unit)
+    for axis, value in values.items():
+        if not math.isfinite(value):
+            raise BadInputError(f"{axes[axis]['name']}={value:g}: allowed: a finite number")
+    return len(axes), values

@@ -1,0 +1,134 @@
+"""`cdpr status|check|enable|disable|hold|ack|stop`: a daemon's state, and changes of it."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated, Any
+
+import typer
+from rich.live import Live
+from rich.text import Text
+
+from cdpr_tools.client.client import Daemon, NoDaemonError
+from cdpr_tools.client.status_text import status_text
+from cdpr_tools.commands.daemon.with_daemon import with_daemon
+from cdpr_tools.commands.options import YesOption
+from cdpr_tools.consent import require_consent
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import stop_on_signals
+
+_WATCH_S = 0.2
+_END_S = 90.0
+
+
+app = typer.Typer()
+
+
+@app.command()
+@with_daemon
+def status(
+    daemon: Daemon,
+    out: Output,
+    watch: Annotated[bool, typer.Option("--watch", help="Go on showing it until Ctrl-C.")] = False,
+) -> None:
+    """Say how a daemon and its robot are; changes nothing."""
+    state = daemon.get("/status")
+    if watch:
+        state = _watch(daemon, out, state)
+    else:
+        for part in status_text(state).renderables:
+            out.text.print(part, soft_wrap=True)
+    out.result({"ok": state["state"] not in ("fault", "dead"), **state})
+
+
+def _watch(daemon: Daemon, out: Output, state: dict[str, Any]) -> dict[str, Any]:
+    """Show the status over and over; a service that is started anew meanwhile is waited for."""
+    with (
+        stop_on_signals() as stop_requested,
+        Live(status_text(state), console=out.text, auto_refresh=False) as view,
+    ):
+        while not stop_requested():
+            time.sleep(_WATCH_S)
+            try:
+                state = daemon.get("/status")
+            except NoDaemonError as error:
+                view.update(Text(str(error), style="red"), refresh=True)
+            else:
+                view.update(status_text(state), refresh=True)
+    return state
+
+
+@app.command()
+@with_daemon
+def check(daemon: Daemon, out: Output) -> None:
+    """Boot the drives anew and check the bus without power; ready afterwards."""
+    if daemon.get("/status")["state"] in ("unconfigured", "inactive"):
+        daemon.post("/configure")
+    _show(out, daemon.post("/check"))
+
+
+@app.command()
+@with_daemon
+def enable(
+    daemon: Daemon,
+    out: Output,
+    program: Annotated[str, typer.Option(help="What runs from the first moment on.")] = "hold",
+    yes: YesOption = False,
+) -> None:
+    """Give the drives power; they hold where they are."""
+    _confirm(daemon.get("/status"), yes)
+    with daemon.control() as control:
+        _show(out, control.post("/enable", {"program": program}))
+
+
+@app.command()
+@with_daemon
+def disable(daemon: Daemon, out: Output) -> None:
+    """Stop the motion under control, then take the power off."""
+    _show(out, daemon.post("/disable"))
+
+
+@app.command()
+@with_daemon
+def hold(daemon: Daemon, out: Output) -> None:
+    """Stop the motion and stay there, whoever moves; the power stays on."""
+    _show(out, daemon.post("/hold"))
+
+
+@app.command()
+@with_daemon
+def ack(daemon: Daemon, out: Output) -> None:
+    """Acknowledge a fault whose cause is gone; nothing gets power by it."""
+    _show(out, daemon.post("/acknowledge"))
+
+
+@app.command()
+@with_daemon
+def stop(daemon: Daemon, out: Output) -> None:
+    """End the daemon: the motion stops under control, the power goes off."""
+    daemon.post("/shutdown")
+    deadline = time.monotonic() + _END_S
+    while time.monotonic() < deadline:
+        try:
+            daemon.get("/status")
+        except NoDaemonError:
+            out.say("stopped")
+            out.result({"ok": True})
+            return
+        time.sleep(_WATCH_S)
+    raise WorkFailedError(f"the daemon still runs {_END_S:g} s after it was asked to end")
+
+
+def _show(out: Output, answer: dict[str, Any]) -> None:
+    out.say(answer["state"] + (f": {answer['text']}" if answer["text"] else ""))
+    out.result({"ok": True, **answer})
+
+
+def _confirm(state: dict[str, Any], yes: bool) -> None:
+    """Ask before motors on a real bus get power."""
+    urls = [str(bus.get("url", "")) for bus in state.get("buses", {}).values()]
+    real = [url for url in urls if not url.startswith("simbus:")]
+    if real or not urls:
+        where = " and ".join(real) or "its buses"
+        require_consent(f"{state['robot']} on {where}: the drives get power.", yes)

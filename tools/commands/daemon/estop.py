@@ -1,0 +1,82 @@
+"""`cdpr estop`: takes the power from a robot at once."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdpr_tools.commands.options import JsonOption, SocketOption
+from cdpr_tools.daemon.estop import EmergencyStop
+from cdpr_tools.daemon.loop_file import LoopFile
+from cdpr_tools.daemon.paths import find_loop_files, unsearched_folders
+from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+
+_Robot = Annotated[
+    str | None,
+    typer.Argument(metavar="[ROBOT]", help="Which robot, where several daemons run."),
+]
+_All = Annotated[bool, typer.Option("--all", help="Every robot whose daemon is found.")]
+
+
+app = typer.Typer()
+
+
+@app.command()
+def estop(
+    robot: _Robot = None,
+    every: _All = False,
+    socket: SocketOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Take the power from a robot's drives at once: no braking, no lowering; brakes are applied.
+
+    Goes to the process of the control loop, whatever the daemon's other processes do, and waits
+    until the drives say that they have no power. What cannot be confirmed is said, with exit
+    status 1. It is no emergency stop in the sense of a safety standard: the button is.
+    """
+    out = Output(as_json)
+    stops = [EmergencyStop(path) for path in _chosen(robot, every, socket)]  # all, then wait
+    outcomes = []
+    for one in stops:
+        with closing(one):
+            outcome = one.outcome()
+        outcomes.append(asdict(outcome))
+        doubt = "" if outcome.confirmed else "NOT CONFIRMED: "
+        out.say(f"{outcome.robot}: {doubt}{outcome.text}")
+    confirmed = all(outcome["confirmed"] for outcome in outcomes)
+    out.result({"ok": confirmed, "robots": outcomes})
+    if not confirmed:
+        raise typer.Exit(FAILED)
+
+
+def _chosen(robot: str | None, every: bool, socket: Path | None) -> list[Path]:
+    """Return the files of the loops that are meant; raises BadInputError, WorkFailedError."""
+    if sum((robot is not None, every, socket is not None)) > 1:
+        raise BadInputError("ROBOT, --all and --socket: one of them")
+    if socket is not None:
+        return [LoopFile.beside(socket)]
+    found = find_loop_files(robot)
+    if not found:
+        whose = "" if robot is None else f" for {robot}"
+        hint = f"; {where}" if (where := unsearched_folders()) else ""
+        raise WorkFailedError(f"no daemon's loop was found{whose}: nothing was stopped{hint}")
+    if every or robot is not None or len(found) == 1:
+        return found
+    live = [path for path in found if _lives(path)]
+    if len(live) > 1:
+        names = ", ".join(path.stem for path in live)
+        raise BadInputError(f"{len(live)} daemons run: name one of {names}, or give --all")
+    return live or found
+
+
+def _lives(path: Path) -> bool:
+    """Whether the loop that is named there runs; one of which nothing can be known counts."""
+    try:
+        return LoopFile.read(path).runs()
+    except WorkFailedError:
+        return True

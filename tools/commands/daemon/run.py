@@ -1,0 +1,294 @@
+"""`cdpr run`: the control loop of a robot as a daemon."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import time
+from contextlib import ExitStack
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cdpr_drivers.bus.master_lock import refuse_second_master
+from cdpr_drivers.errors import BusError
+from cdpr_drivers.robot.bus_fit import require_fit
+from cdpr_drivers.robot.commissioned import load_profiles, uncommissioned_text, with_commissioned
+from cdpr_drivers.robot.robot_buses import asks_for_own_simulator, robot_urls
+from cdpr_profiles import Robot, load_robot
+from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
+from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption
+from cdpr_tools.composition.simulator import OwnSimulator
+from cdpr_tools.consent import require_consent
+from cdpr_tools.daemon.launcher import Launcher
+from cdpr_tools.daemon.loop_file import LoopFile
+from cdpr_tools.daemon.notify import ServiceManager
+from cdpr_tools.daemon.paths import SOCKET_SUFFIX, default_recordings, default_socket
+from cdpr_tools.daemon.settings import Address, RunSettings
+from cdpr_tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
+from cdpr_tools.output import Output, to_json
+
+_RING_S = 15.0  # longer than a service that hangs is waited for and started again
+
+_Robot = Annotated[
+    str,
+    typer.Argument(
+        help="Robot or winch profile: a name or the path of a file.", metavar="ROBOT|WINCH"
+    ),
+]
+_Plant = Annotated[
+    Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")
+]
+_Http = Annotated[
+    str | None,
+    typer.Option(metavar="HOST:PORT", help="Listen there too, besides the Unix socket."),
+]
+_Socket = Annotated[
+    Path | None,
+    typer.Option("--socket", help="Unix socket of the control interface, if not this user's."),
+]
+_KeyFile = Annotated[
+    Path | None,
+    typer.Option(help="Secret of those who may move the robot over --http or --stream."),
+]
+_Record = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Record into this folder instead of the user's.")
+]
+_NoRecord = Annotated[bool, typer.Option("--no-record", help="Record nothing.")]
+_Live = Annotated[
+    int | None,
+    typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
+]
+_LiveOrigin = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="ORIGIN",
+        help="A web page that may look at the live view, such as https://app.foxglove.dev.",
+    ),
+]
+_Stream = Annotated[
+    str | None,
+    typer.Option(metavar="HOST:PORT", help="Receive a set-point stream (UDP) there."),
+]
+_TensionPort = Annotated[
+    str | None,
+    typer.Option(metavar="PORT", help="Serial port of the robot's tension sensors."),
+]
+_Commissioned = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR", help="What `cdpr commission ROBOT` has left: motors to compensate."
+    ),
+]
+_ReadOnly = Annotated[
+    bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
+]
+
+
+app = typer.Typer()
+
+
+@app.command()
+def run(
+    robot: _Robot,
+    bus: RobotBusOption = None,
+    plant: _Plant = None,
+    http: _Http = None,
+    unix: _Socket = None,
+    key_file: _KeyFile = None,
+    record: _Record = None,
+    no_record: _NoRecord = False,
+    live: _Live = None,
+    live_origin: _LiveOrigin = None,
+    stream: _Stream = None,
+    read_only: _ReadOnly = False,
+    safety_io: SafetyIoOption = None,
+    tension_port: _TensionPort = None,
+    commissioned: _Commissioned = None,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a robot's control loop as a daemon; it stands ready, without power, until enabled.
+
+    Tells on standard output when it is up. Ctrl-C and SIGTERM end it with a controlled stop.
+    """
+    out = Output(as_json)
+    if find_spec("uvicorn") is None:  # said here, before a child fails for want of it
+        raise ModuleNotFoundError(name="uvicorn")
+    profile = load_robot(robot)
+    for doubt in refuse_impossible(profile):
+        out.note(doubt)
+    settings = settings_for(
+        profile,
+        bus=bus,
+        plant=plant,
+        http=http,
+        unix=unix,
+        key_file=key_file,
+        record=record,
+        no_record=no_record,
+        live=live,
+        live_origin=live_origin,
+        stream=stream,
+        read_only=read_only,
+        safety_io=safety_io,
+        tension_port=tension_port,
+        commissioned=commissioned,
+    )
+    _require_free(settings.socket)
+    _require_no_master(profile, settings)
+    _ask(profile, settings, yes)
+    settings = settings.with_key_loaded().with_ports_bound()
+    manager = ServiceManager()  # before any child is started: none of them speaks for the daemon
+    with ExitStack() as stack:
+        if text := uncommissioned_text(with_commissioned(profile, commissioned)):
+            out.note(text)
+        simulator = None
+        if asks_for_own_simulator(bus or ()):
+            out.note(f"starting simulated drives: {len(profile.axes)} ...")
+            simulator = OwnSimulator(profile.reference, settings.buses[0], plant)
+            stack.callback(simulator.stop)
+        _launch(profile, settings, out, manager, simulator)
+
+
+def settings_for(
+    robot: Robot,
+    *,
+    bus: list[str] | None,
+    plant: Path | None,
+    http: str | None,
+    unix: Path | None,
+    key_file: Path | None,
+    record: Path | None,
+    no_record: bool,
+    live: int | None,
+    live_origin: list[str] | None = None,
+    stream: str | None,
+    read_only: bool,
+    safety_io: str | None,
+    tension_port: str | None = None,
+    commissioned: Path | None = None,
+) -> RunSettings:
+    """Return what the options of `cdpr run` ask for; raises BadInputError."""
+    if len(robot.axes) > MOST_AXES:
+        raise BadInputError(f"{robot.path}: {len(robot.axes)} axes; allowed: 1 to {MOST_AXES}")
+    require_fit(robot)
+    load_profiles(with_commissioned(robot, commissioned))
+    if record is not None and no_record:
+        raise BadInputError("--record and --no-record: one of them")
+    own = asks_for_own_simulator(bus or ())
+    if plant is not None and not own:
+        raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
+    if read_only and own:
+        raise BadInputError(
+            "--read-only: no other master is on a simulator that the command starts; "
+            "give --bus simbus:NAME of one that runs"
+        )
+    return RunSettings(
+        robot=robot.reference,
+        name=robot.profile,
+        buses=(f"simbus:own-{os.getpid()}",) if own else tuple(bus or ()),
+        read_only=read_only,
+        safety_io=safety_io,
+        tension_port=tension_port,
+        commissioned=commissioned,
+        socket=unix or default_socket(robot.profile),
+        http=None if http is None else Address.parse("--http", http),
+        key_file=key_file,
+        record=None if no_record else record or default_recordings(),
+        live=live,
+        live_origins=tuple(live_origin or ()),
+        stream=None if stream is None else Address.parse("--stream", stream),
+        launcher_pid=os.getpid(),
+    )
+
+
+def _launch(
+    robot: Robot,
+    settings: RunSettings,
+    out: Output,
+    manager: ServiceManager,
+    simulator: OwnSimulator | None,
+) -> None:
+    block = SharedBlock.create(len(robot.axes), _RING_S, 1.0 / robot.sync_period_s)
+    block.counters["start_monotonic_ns"] = time.monotonic_ns()
+    block.counters["start_realtime_ns"] = time.time_ns()
+    settings = settings.model_copy(update={"block_fd": block.fd})
+
+    def ready(status: dict[str, Any]) -> None:
+        report = {"robot": robot.name, "state": status["state"], "reason": status.get("reason", "")}
+        _report_ready({**report, "socket": str(settings.socket), "pid": os.getpid()}, out)
+
+    launcher = Launcher(settings, block, out.note, ready, manager, simulator)
+    status = launcher.run()
+    if status != DONE:
+        raise _ended(launcher.reason, status)
+    out.result({"ok": True})
+
+
+def _report_ready(report: dict[str, Any], out: Output) -> None:
+    """Say on standard output that the daemon is up: as JSON unless a person reads it."""
+    if out.as_json or not sys.stdout.isatty():
+        print(to_json({"ready": report}), flush=True)
+        return
+    out.say(
+        f"{report['robot']}: {report['state']}"
+        + (f": {report['reason']}" if report["reason"] else "")
+    )
+    out.say(f"socket {report['socket']}; Ctrl-C ends it")
+
+
+def _ended(reason: str, status: int) -> CommandError:
+    return BadInputError(reason) if status == BAD_INPUT else WorkFailedError(reason)
+
+
+def _require_free(control: Path) -> None:
+    """Raise BadInputError where a daemon listens at `control` already, or none ever could."""
+    if control.suffix != SOCKET_SUFFIX:  # the loop's file beside it has this name but for that
+        raise BadInputError(f"--socket {control}: allowed: a name that ends in {SOCKET_SUFFIX}")
+    if not os.access(control.parent, os.W_OK | os.X_OK):
+        raise BadInputError(f"--socket {control}: {control.parent} is no folder to write into")
+    if _answers(control) or _loop_runs_beside(control):
+        raise BadInputError(f"--socket {control}: a daemon runs there already; `cdpr stop` ends it")
+
+
+def _answers(control: Path) -> bool:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as caller:
+        try:
+            caller.connect(str(control))
+        except (FileNotFoundError, ConnectionRefusedError):
+            return False
+        except OSError as error:
+            raise BadInputError(f"--socket {control}: {error}") from None
+    return True
+
+
+def _loop_runs_beside(control: Path) -> bool:
+    """Whether a loop runs whose service does not answer at present."""
+    try:
+        return LoopFile.read(LoopFile.beside(control)).runs()
+    except WorkFailedError:  # there is none, or it is not to be believed
+        return False
+
+
+def _require_no_master(robot: Robot, settings: RunSettings) -> None:
+    """Raise WorkFailedError where another process runs drives on one of the buses, for now."""
+    if settings.read_only:
+        return
+    for url in robot_urls(robot, settings.buses).values():
+        try:
+            refuse_second_master(url)
+        except BusError as error:
+            raise WorkFailedError(f"{error}, or give --read-only to listen") from None
+
+
+def _ask(robot: Robot, settings: RunSettings, yes: bool) -> None:
+    urls = robot_urls(robot, settings.buses).values()
+    real = [str(url) for url in urls if not url.is_simulated]
+    if real and not settings.read_only:
+        where = " and ".join(real)
+        require_consent(f"{robot.name} on {where}: its motors will turn when told to.", yes)

@@ -1,0 +1,169 @@
+"""`cdpr teleop experiment`: the thesis' teleoperation experiment with a modelled operator."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cdpr_drivers.errors import ConfigurationError
+from cdpr_profiles import load_robot
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.output import Output
+from cdpr_tools.teleop.input_device import parse_scale
+
+if TYPE_CHECKING:
+    from cdpr_tools.experiment.model.parameters import OperatorParameters
+    from cdpr_tools.experiment.session import ExperimentSettings
+
+_LONGEST_ROUND_TRIP_ms = 10_000
+
+
+app = typer.Typer()
+
+
+@app.command()
+def experiment(
+    robot: Annotated[
+        str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
+    ] = "planar-3",
+    plant: Annotated[
+        Path | None, typer.Option(help="Plant file: the truth about robot, cables and motors.")
+    ] = None,
+    commissioned: Annotated[
+        Path | None,
+        typer.Option(help="Folder that `cdpr commission ROBOT` has left.", metavar="DIR"),
+    ] = None,
+    without_compensation: Annotated[
+        bool, typer.Option("--without-compensation", help="Use nothing learnt of the motors.")
+    ] = False,
+    places: Annotated[str, typer.Option(help="Of the pattern, with commas between.")] = "A,B,C",
+    scales: Annotated[str, typer.Option(help="Robot to hand.")] = "8:1,4:1,2:1",
+    round_trips: Annotated[str, typer.Option(help="Delays there and back, ms.")] = "0,350,730",
+    repeats: Annotated[int, typer.Option(min=1, max=100, help="Runs of each condition.")] = 2,
+    without_clutch: Annotated[
+        bool, typer.Option("--without-clutch", help="As in the thesis: the hand always leads.")
+    ] = False,
+    unsteadied: Annotated[
+        bool, typer.Option("--unsteadied", help="As in the thesis: send the hand as it trembles.")
+    ] = False,
+    operator: Annotated[
+        list[str] | None,
+        typer.Option(help="Another number of the operator model; may be repeated.",
+                     metavar="NAME=VALUE"),
+    ] = None,
+    perfect_robot: Annotated[
+        bool, typer.Option("--perfect-robot", help="Only what the operator does with such a one.")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of all that is left to chance.")] = 1,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Sessions side by side; one for each core.")
+    ] = None,
+    out_dir: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder for all that is measured; goes on with one that was "
+                     "broken off.", metavar="DIR"),
+    ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Judge what --out holds once more; nothing moves.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:  # fmt: skip
+    """Lead a simulated robot along the thesis' path by a modelled operator, and judge the errors.
+
+    10 targets, three places, scales and delays, all repeated: 54 runs as it stands. Every cycle
+    crosses the simulated bus, every packet the daemon's stream; all is recorded. Prints tables 2.1
+    and 2.2 beside the thesis' and draws figures 2.10 to 2.12.
+    """
+    from cdpr_tools.experiment import experiment as experiments  # noqa: PLC0415  # slow to load
+    from cdpr_tools.experiment.model.parameters import OperatorParameters, Station  # noqa: PLC0415
+    from cdpr_tools.experiment.session import ExperimentSettings  # noqa: PLC0415
+
+    out = Output(as_json)
+    cores = jobs or len(os.sched_getaffinity(0))
+    if again and out_dir is None:
+        raise BadInputError("--again: needs --out, the folder of an experiment")
+    if again and out_dir is not None:
+        _show(out, experiments.judge(out_dir, cores), out_dir)
+        return
+    for path, name in ((plant, "--plant"), (commissioned, "--commissioned")):
+        if path is not None and not path.exists():
+            raise BadInputError(f"{name} {path}: there is no such file or folder")
+    settings = ExperimentSettings(
+        robot=load_robot(robot).reference,
+        plant=None if plant is None else str(plant.resolve()),
+        commissioned=None if commissioned is None else str(commissioned.resolve()),
+        compensated=not without_compensation,
+        seed=seed,
+        operator=_operator(OperatorParameters(), operator or []),
+        station=Station(clutch=not without_clutch, steady=not unsteadied),
+        places=tuple(places.split(",")),
+        scales=tuple(parse_scale(scale) for scale in scales.split(",")),
+        round_trips_s=tuple(_round_trip_s(text) for text in round_trips.split(",")),
+        repeats=repeats,
+    )
+    if perfect_robot:
+        _show(out, experiments.operator_alone(settings), None)
+        return
+    _run(out, settings, out_dir or _new_folder(settings), cores)
+
+
+def _run(out: Output, settings: ExperimentSettings, folder: Path, jobs: int) -> None:
+    from cdpr_tools.experiment import experiment as experiments  # noqa: PLC0415  # slow to load
+
+    experiments.begin(settings, folder)
+    try:
+        experiments.perform(settings, folder, jobs, out)
+    except KeyboardInterrupt:
+        out.note(f"broken off; the same command with --out {folder} goes on")
+        raise
+    except (CommandError, ConfigurationError) as error:
+        raise type(error)(f"{error}; the same command with --out {folder} goes on") from error
+    _show(out, experiments.judge(folder, jobs), folder)
+
+
+def _show(out: Output, result: dict[str, Any], folder: Path | None) -> None:
+    out.say(*result.pop("lines"))
+    if folder is not None:
+        out.say("")
+        out.say(f"recordings, result.json and pictures: {folder}")
+    out.result(result)
+
+
+def _new_folder(settings: ExperimentSettings) -> Path:
+    moment = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+    return Path("out") / f"experiment-{Path(settings.robot).stem}-{moment}"
+
+
+def _round_trip_s(text: str) -> float:
+    try:
+        milliseconds = float(text)
+    except ValueError:
+        milliseconds = -1.0
+    if not 0.0 <= milliseconds <= _LONGEST_ROUND_TRIP_ms:
+        raise BadInputError(
+            f"--round-trips {text}: allowed: 0 to {_LONGEST_ROUND_TRIP_ms} ms, commas between"
+        )
+    return milliseconds / 1e3
+
+
+def _operator(parameters: OperatorParameters, changes: list[str]) -> OperatorParameters:
+    names = [field.name for field in fields(parameters)]
+    for change in changes:
+        name, _, text = change.partition("=")
+        if name not in names:
+            raise BadInputError(f"--operator {change}: allowed: NAME=VALUE, {', '.join(names)}")
+        try:
+            value = float(text)
+        except ValueError:
+            value = -1.0
+        if not 0.0 < value < float("inf"):
+            raise BadInputError(f"--operator {change}: allowed: a number above 0")
+        present = getattr(parameters, name)
+        parameters = replace(parameters, **{name: type(present)(value)})
+    return parameters

@@ -1,0 +1,44 @@
+"""`cdpr sim`: what is simulated, on buses of its own or on real ones."""
+
+from __future__ import annotations
+
+import typer
+
+from cdpr_tools.command_group import group_of
+
+MODULES = {
+    "sim.sim_up": {
+        "up": "Run simulated drives until Ctrl-C; tells on standard output when they are up.",
+    },
+    "sim.sim_safety_io": {
+        "safety-io": "Run a simulated safety I/O until Ctrl-C; tells on standard output when it is "
+        "up.",
+        "panel": "Press the emergency stop of a simulated safety I/O, release it, break or mend "
+        "something.",
+    },
+    "sim.sim_rail": {
+        "rail": "Run a simulated rail until Ctrl-C; tells on standard output when it is up.",
+    },
+    "sim.sim_fault": {
+        "fault": "Break something on a simulated robot that runs: cut-cable, slip, encoder-jump, "
+        "...",
+    },
+    "sim.sim_tension": {
+        "tension": "Run simulated load cells on a pseudo-terminal until Ctrl-C; tells its path "
+        "when it is up.",
+        "hang": 'Hang a mass on a simulated cable whose plant has load.kind = "hung_mass".',
+    },
+    "sim.sim_verify": {
+        "verify": "Run a command on simulated drives several times; exit status 1 where files "
+        "differ.",
+    },
+}
+
+app = typer.Typer(
+    name="sim", cls=group_of(MODULES), help="Simulated winches on a CAN bus.", no_args_is_help=True
+)
+
+
+@app.callback()
+def _group() -> None:
+    """Simulated winches on a CAN bus."""

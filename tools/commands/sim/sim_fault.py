@@ -1,0 +1,117 @@
+"""`cdpr sim fault`: what goes wrong on a simulated robot while it runs."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, NamedTuple
+
+import typer
+
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.errors import BusError, SdoError
+from cdpr_drivers.robot.robot_buses import robot_urls
+from cdpr_profiles import Robot, RobotAxis, Winch, load_machine
+from cdpr_profiles.eds.dictionary import load_dictionary
+from cdpr_profiles.robot import robot_of_winch
+from cdpr_rt.core.clock import PacedClock
+from cdpr_tools.errors import BadInputError, WorkFailedError
+
+_OBJECT = 0x2F00
+
+
+class Fault(StrEnum):
+    """What can be brought about in any axis."""
+
+    CUT_CABLE = "cut-cable"
+    SLIP = "slip"
+    ENCODER_JUMP = "encoder-jump"
+    DRIVE_FAULT = "drive-fault"
+    SILENCE = "silence"
+
+
+class _How(NamedTuple):
+    sub: int
+    usual: int
+    least: int
+    most: int
+    unit: str
+
+
+_HOW = {
+    Fault.CUT_CABLE: _How(12, 1, 1, 1, ""),
+    Fault.SLIP: _How(13, 100, 1, 0xFFFF, "mm"),
+    Fault.ENCODER_JUMP: _How(11, 500, -(2**31), 2**31 - 1, "counts"),
+    Fault.DRIVE_FAULT: _How(1, 0x7305, 1, 0xFFFF, ""),
+    Fault.SILENCE: _How(6, 0xFFFF, 1, 0xFFFF, "ms"),
+}
+
+
+app = typer.Typer()
+
+
+@app.command()
+def fault(
+    machine: Annotated[
+        str, typer.Argument(help="Winch or robot that is simulated.", metavar="WINCH|ROBOT")
+    ],
+    what: Annotated[Fault, typer.Argument(help="What goes wrong, at once.", metavar="FAULT")],
+    value: Annotated[
+        str | None,
+        typer.Argument(
+            help="How much: counts to jump, mm to slip, error code, ms of silence (65535: for good)"
+        ),
+    ] = None,
+    *,
+    bus: Annotated[list[str], typer.Option(help="The simulator's buses, as given to `sim up`.")],
+    axis: Annotated[str, typer.Option(help="Axis by its name, or by its number from 1.")] = "1",
+) -> None:
+    """Break something on a simulated robot that runs: cut-cable, slip, encoder-jump, ...
+
+    It writes object 2F00h, which no real drive has, beside whoever runs the robot.
+    """
+    profile = load_machine(machine)
+    robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
+    chosen = _axis(robot, axis)
+    how = _HOW[what]
+    amount = _amount(what, how, value)
+    url = robot_urls(robot, bus)[chosen.bus]
+    winch = chosen.winch
+    try:
+        network = CanNetwork(
+            url, PacedClock(), [winch.node_id], robot.master_node_id, robot.master_heartbeat_s
+        )
+    except BusError as error:
+        raise BadInputError(str(error)) from error
+    try:
+        network.add_node(winch.node_id, load_dictionary(winch.drive.eds, winch.node_id))
+        network.write(winch.node_id, _OBJECT, how.sub, amount)
+    except SdoError as error:
+        raise WorkFailedError(f"axis {chosen.name!r}: {error}") from error
+    finally:
+        network.close()
+    typer.echo(f"{chosen.name}: {what}{_amount_text(what, amount, how)}")
+
+
+def _amount_text(what: Fault, amount: int, how: _How) -> str:
+    if what is Fault.CUT_CABLE:
+        return ""
+    return f" {amount:#06x}" if what is Fault.DRIVE_FAULT else f" {amount} {how.unit}"
+
+
+def _amount(what: Fault, how: _How, text: str | None) -> int:
+    try:
+        amount = how.usual if text is None else int(text, 0)
+    except ValueError:
+        amount = how.least - 1
+    if not how.least <= amount <= how.most:
+        raise BadInputError(f"{what} {text}: allowed: whole numbers {how.least} to {how.most}")
+    return amount
+
+
+def _axis(robot: Robot, text: str) -> RobotAxis:
+    names = [axis.name for axis in robot.axes]
+    if text in names:
+        return robot.axes[names.index(text)]
+    if text.isdecimal() and 0 < int(text) <= len(names):
+        return robot.axes[int(text) - 1]
+    raise BadInputError(f"--axis {text}: allowed: 1 to {len(names)}, or {', '.join(names)}")

@@ -1,0 +1,157 @@
+"""`cdpr sim up ROBOT`: the drives of every bus of a robot, in one process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from cdpr_drivers.robot.bus_fit import require_fit
+from cdpr_drivers.robot.robot_buses import robot_urls
+from cdpr_profiles import Robot
+from cdpr_profiles.platform import Platform
+from cdpr_sim_bus.canopen.dictionary.store import StoreError
+from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
+from cdpr_sim_bus.clock import ClockMode
+from cdpr_sim_bus.fleet import FleetBus, serve_fleet
+from cdpr_sim_bus.frame_log import FrameLog
+from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_sim_bus.robot.cable_robot import CableRobot
+from cdpr_sim_bus.robot.motor_state import Transmission
+from cdpr_sim_bus.robot.plant import Plant
+from cdpr_sim_bus.robot.platform_record import RobotShape
+from cdpr_sim_bus.robot.pose_log import PoseLog
+from cdpr_sim_bus.robot.pose_scanner import PoseScanner
+from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from cdpr_tools.errors import BadInputError
+
+
+def up(
+    robot: Robot,
+    buses: Sequence[str],
+    plant: Path | None,
+    mode: ClockMode,
+    store_file: Callable[[int], Path | None],
+    board: Path | None,
+    until_stdin_ends: bool,
+    truth_log: Path | None = None,
+    detached: bool = False,
+    frame_log: FrameLog | None = None,
+    scanner: Path | None = None,
+) -> None:
+    """Run the simulated drives of `robot` until Ctrl-C; serial numbers count the axes from 1.
+
+    `plant` is a plant file: of the whole robot where it has a platform, whose true pose goes into
+    `truth_log`; otherwise that of each motor, which differ in their noise only. `detached` leaves
+    the cables off the drums: the same motors turn freely. What is measured of the pose from outside
+    goes into `scanner`. `board` is a file to make, through which
+    other simulated devices share the axes' physics. All frames go to `frame_log`. Raises
+    BadInputError for a robot that does not fit its buses, and BusSetupError.
+    """
+    require_fit(robot)
+    urls = robot_urls(robot, buses)
+    for name, url in urls.items():
+        if url.interface not in ("simbus", "socketcan"):
+            raise BadInputError(
+                f"--bus {name}={url}: simulated drives run on simbus:NAME or socketcan:IFACE"
+            )
+    with ExitStack() as stack:
+        body, plants = _physics(robot, plant, detached)
+        members = [None] * len(plants) if body is None else body.members()
+        drives = []
+        for i, (axis, own, member) in enumerate(zip(robot.axes, plants, members, strict=True)):
+            try:
+                drive = SimDrive.for_winch(
+                    axis.winch, own, store=store_file(i + 1), serial=i + 1, robot=member
+                )
+            except StoreError as error:
+                raise BadInputError(str(error)) from error
+            stack.callback(drive.close)
+            drives.append(drive)
+        if truth_log is not None:
+            drives[0].record_with(_pose_log(truth_log, body))
+        if scanner is not None:
+            # each drive keeps one log: the last one's is this, the first one's is the truth's
+            drives[-1].record_with(_pose_scanner(scanner, body, plant))
+        if board is not None:
+            lockstep = mode is ClockMode.LOCKSTEP
+            made = PhysicsBoard.create(board, len(drives), lockstep=lockstep)
+            shared = stack.enter_context(made)
+            for i, drive in enumerate(drives):
+                drive.connect(shared.axis(i))
+        fleet = [
+            FleetBus(
+                bus.name,
+                str(urls[bus.name]),
+                bus.bitrate_bit_s,
+                [drives[i] for i in robot.axes_on(bus.name)],
+            )
+            for bus in robot.buses
+        ]
+        serve_fleet(
+            *(robot.reference, fleet),
+            mode=mode,
+            until_stdin_ends=until_stdin_ends,
+            frame_log=frame_log,
+        )
+
+
+def _physics(
+    robot: Robot, plant: Path | None, detached: bool
+) -> tuple[CableRobot | None, Sequence[Plant]]:
+    """Return what the axes move together, None where nothing, and the plant of each motor."""
+    n, platform = len(robot.axes), robot.platform
+    if platform is None:
+        one = Plant() if plant is None else Plant.load_file(plant)
+        return None, [one.model_copy(update={"seed": (one.seed + i) % 2**32}) for i in range(n)]
+    whole = _robot_plant(plant)
+    try:
+        whole.require_fit(n, len(platform.home_m))
+        motors = whole.motor_plants(n, [axis.winch for axis in robot.axes])
+        if detached:
+            return None, motors
+        return CableRobot(_shape(robot, platform), whole, _transmissions(robot)), motors
+    except ValueError as error:
+        raise BadInputError(f"--plant {plant}: {error}") from error
+
+
+def _shape(robot: Robot, platform: Platform) -> RobotShape:
+    return RobotShape(
+        exit_points_m=platform.exit_points_m,
+        anchor_points_m=platform.anchor_points_m,
+        mass_kg=platform.mass_kg,
+        home_m=platform.home_m,
+        weights_N_m=[axis.winch.cable.weight_per_length_N_m for axis in robot.axes],
+        home_rotation_rad=platform.home_rotation_rad,
+        inertia_kg_m2=platform.inertia_kg_m2,
+        centre_of_mass_m=platform.centre_of_mass_m,
+        pulley_radii_m=platform.pulley_radius_m,
+        pulley_axes=platform.pulley_axes,
+    )
+
+
+def _pose_scanner(path: Path, body: CableRobot | None, plant: Path | None) -> PoseScanner:
+    if body is None:
+        raise BadInputError("--scanner: for a robot with its platform on the cables")
+    whole = _robot_plant(plant)
+    try:
+        return PoseScanner(path, body, whole.scanner, whole.seed)
+    except OSError as error:
+        raise BadInputError(f"--scanner {path}: {error.strerror}") from error
+
+
+def _robot_plant(path: Path | None) -> RobotPlant:
+    return RobotPlant() if path is None else RobotPlant.load_file(path)
+
+
+def _transmissions(robot: Robot) -> list[Transmission]:
+    return [transmission_of(axis.winch) for axis in robot.axes]
+
+
+def _pose_log(path: Path, body: CableRobot | None) -> PoseLog:
+    if body is None:
+        raise BadInputError("--truth-log: for a winch, or a robot with its platform on the cables")
+    try:
+        return PoseLog(path, body)
+    except OSError as error:
+        raise BadInputError(f"--truth-log {path}: {error.strerror}") from error

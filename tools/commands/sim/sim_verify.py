@@ -1,0 +1,135 @@
+"""`cdpr sim verify`: run a command several times and see whether it writes the same."""
+
+from __future__ import annotations
+
+import os
+import random
+import tempfile
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import BAD_INPUT, BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.repeat.compare import Verdict, compare
+from cdpr_tools.repeat.disturbance import Stops
+from cdpr_tools.repeat.run import Run, run_once
+from cdpr_tools.signals import stop_on_signals
+
+_SEEDS = 2**31
+_BOX_END, _BOX_SIDE = "\N{BOX DRAWINGS LIGHT ARC UP AND RIGHT}", "\N{BOX DRAWINGS LIGHT VERTICAL} "
+
+
+app = typer.Typer()
+
+
+@app.command()
+def verify(
+    command: Annotated[
+        list[str],
+        typer.Argument(
+            help="After --: what would stand after `cdpr`, or a program by its path, with a /.",
+            metavar="-- COMMAND...",
+        ),
+    ],
+    runs: Annotated[int, typer.Option(min=2, max=1000, help="How often it is run.")] = 2,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of the disturbances; any where left out.")
+    ] = None,
+    busy: Annotated[
+        int | None,
+        typer.Option(min=0, help="Busy processes beside; one more than cores where left out."),
+    ] = None,
+    keep: Annotated[
+        Path | None, typer.Option(help="New folder for all that is written.", metavar="DIR")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a command on simulated drives several times; exit status 1 where files differ.
+
+    The first run is left alone. The others run beside busy processes, and one of their own
+    processes after the other is stopped for 0.1 to 5 s. Each has an empty working folder.
+    """
+    out = Output(as_json)
+    chosen = random.randrange(_SEEDS) if seed is None else seed
+    besides = (os.cpu_count() or 1) + 1 if busy is None else busy
+    out.say(f"seed of the disturbances: {chosen}")
+    with ExitStack() as stack:
+        folder = _new(keep) if keep is not None else Path(stack.enter_context(_passing()))
+        stop_requested = stack.enter_context(stop_on_signals())
+        done: list[Run] = []
+        for number in range(1, runs + 1):
+            stops = Stops(random.Random(f"{chosen} {number}")) if done else None
+            beside = besides if done else 0
+            done.append(run_once(command, folder, number, stops, beside, stop_requested))
+            out.note(_run_line(done[-1], beside))
+            _check(done[-1])
+        verdicts = compare(done)
+    same = _show(out, done, verdicts)
+    out.result(
+        {
+            "ok": same,
+            "command": command,
+            "seed": chosen,
+            "busy": besides,
+            "folder": None if keep is None else str(folder),
+            "runs": [
+                {"seconds": run.seconds, "stops": run.stops, "held_s": run.held_s} for run in done
+            ],
+            "files": [verdict.as_dict() for verdict in verdicts],
+        }
+    )
+    if not same:
+        raise typer.Exit(WorkFailedError.exit_status)
+
+
+def _show(out: Output, runs: Sequence[Run], verdicts: Sequence[Verdict]) -> bool:
+    """Write the verdicts; return whether all is the same. Raises WorkFailedError without any."""
+    if not any(verdict.same is not None for verdict in verdicts):
+        raise WorkFailedError("the command wrote no file that is compared")
+    for verdict in verdicts:
+        out.say(verdict.line())
+    same = all(verdict.same is not False for verdict in verdicts)
+    out.say(f"{len(runs)} runs: {'the same' if same else 'NOT the same'}")
+    return same
+
+
+def _passing() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="cdpr-verify-")
+
+
+def _run_line(run: Run, busy: int) -> str:
+    how = "undisturbed"
+    if run.number > 1:
+        how = f"beside {busy} busy processes, stopped {run.stops} times for {run.held_s:.1f} s"
+    return f"run {run.number}: {run.seconds:.1f} s, {how}"
+
+
+def _check(run: Run) -> None:
+    """Raise an error where a run failed, what it said; BadInputError where it did not begin."""
+    if not run.exit_status:
+        return
+    said = _last_words(run.output.read_text(errors="replace"))
+    problem = f"run {run.number} ended with exit status {run.exit_status}: {said}"
+    raise BadInputError(problem) if run.exit_status == BAD_INPUT else WorkFailedError(problem)
+
+
+def _last_words(output: str) -> str:
+    """Return the last line of an output, or what stands in the box that it ends with."""
+    lines = output.strip().splitlines() or ["(no output)"]
+    if not lines[-1].startswith(_BOX_END):
+        return lines[-1]
+    boxed = [line.strip(_BOX_SIDE) for line in lines if line.startswith(_BOX_SIDE[0])]
+    return " ".join(" ".join(boxed).split())
+
+
+def _new(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise BadInputError(f"--keep {folder}: cannot be made: {error.strerror}") from error
+    return folder.absolute()

@@ -1,0 +1,88 @@
+"""The options of all commands about one winch on a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from cdpr_drivers.bus import BusUrl
+from cdpr_drivers.canopen.network import CanNetwork
+from cdpr_drivers.robot.session import Session
+from cdpr_drivers.robot.session_watch import Watching, no_watches, tension_watch
+from cdpr_profiles import Winch, load_winch
+from cdpr_rt.procedures.winch_operator import Tolerance
+from cdpr_tools.commands.options import (
+    BusOption,
+    JsonOption,
+    PlantOption,
+    SafetyIoOption,
+    SensorsOption,
+    SensorsPortOption,
+    WinchArgument,
+    YesOption,
+)
+from cdpr_tools.commands.shared_options import shares
+from cdpr_tools.composition.session import confirm_motion, open_bus, open_network, open_winch
+from cdpr_tools.output import Output
+
+
+@dataclass(frozen=True)
+class WinchOnBus:
+    """What the options of a command about a winch name."""
+
+    profile: Winch
+    url: BusUrl
+    plant: Path | None
+    """Of a simulator that the command starts."""
+    out: Output
+    yes: bool = False
+    safety_io: str | None = None
+    watching: Watching = no_watches
+
+    def network(self) -> AbstractContextManager[CanNetwork]:
+        """Join the bus for acyclic work; see `open_network`."""
+        return open_network(self.profile, self.url, self.out, self.plant)
+
+    def powered(
+        self, what: str, tolerance: Tolerance | None = None
+    ) -> AbstractContextManager[Session]:
+        """Ask whether `what` may happen, then boot the drive; see `open_winch`."""
+        confirm_motion(self.url, self.yes, what)
+        return open_winch(
+            self.profile,
+            self.url,
+            self.out,
+            self.plant,
+            safety_io=self.safety_io,
+            watching=self.watching,
+            tolerance=tolerance,
+        )
+
+
+@shares
+@contextmanager
+def with_winch(
+    winch: WinchArgument, bus: BusOption, plant: PlantOption = None, as_json: JsonOption = False
+) -> Iterator[tuple[WinchOnBus, Output]]:
+    """Give a command the winch that these options name, and where to write to."""
+    out = Output(as_json)
+    yield WinchOnBus(load_winch(winch), open_bus(bus), plant, out), out
+
+
+@shares
+@contextmanager
+def with_powered_winch(
+    winch: WinchArgument,
+    bus: BusOption,
+    plant: PlantOption = None,
+    safety_io: SafetyIoOption = None,
+    sensors: SensorsOption = None,
+    port: SensorsPortOption = None,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> Iterator[tuple[WinchOnBus, Output]]:
+    """Give a command the winch that it energises, and where to write to."""
+    out, watching = Output(as_json), tension_watch(sensors, port)
+    yield WinchOnBus(load_winch(winch), open_bus(bus), plant, out, yes, safety_io, watching), out

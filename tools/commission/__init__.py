@@ -1,0 +1,1 @@
+"""Commissioning of winches: procedure, files, results."""

@@ -1,0 +1,84 @@
+"""The table with which a commissioning ends on the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.table import Table
+
+from cdpr_rt.procedures.commissioning.evaluation import METHODS
+from cdpr_tools.output import Output
+
+_NAMES = {"none": "no compensation", "thesis": "thesis' method", "better": "harmonic model"}
+
+
+def show(out: Output, results: dict[str, Any]) -> None:
+    """Print what was identified and how the methods compare."""
+    show_identified(out, results["identification"])
+    show_validation(out, results["validation"], results["bandwidth_Hz"])
+    _show_shortfall(out, results["validation"])
+    bus = results["bus"]
+    seconds = bus["cycles"] * bus["period_s"]
+    out.say(
+        f"{bus['cycles']} cycles, {seconds / 60.0:.1f} min of bus time in {bus['wall_s']:.0f} s "
+        f"({seconds / bus['wall_s']:.1f} times real time), "
+        f"{bus.get('overruns', 'unknown')} bus overruns"
+    )
+    out.say(f"report:  {results['files']['report']}")
+    out.say(f"profile: {results['files']['profile']}")
+
+
+def show_identified(out: Output, found: dict[str, Any]) -> None:
+    """Print what was identified."""
+    table = Table(title="identified cogging", title_justify="left")
+    for name in ("order", "amplitude", "95 %", "likely cause"):
+        table.add_column(name, justify="left" if name == "likely cause" else "right")
+    rows = zip(
+        found["orders"], found["amplitudes_Nm"], found["confidence_Nm"], found["hints"], strict=True
+    )
+    for order, amplitude, width, hint in rows:
+        cells = (f"{1e3 * amplitude:.2f} mNm", f"± {1e3 * width:.2f} mNm", hint)
+        table.add_row(str(order), *cells)
+    out.text.print(table)
+    out.say(
+        f"friction {1e3 * found['coulomb_forward_Nm']:.1f} / "
+        f"{1e3 * found['coulomb_backward_Nm']:.1f} mNm forward / backward, "
+        f"inertia {found['inertia_kg_m2']:.3e} kg m2, "
+        f"unexplained {1e3 * found['residual_rms_Nm']:.2f} mNm RMS, "
+        f"{100 * found['repaired_fraction']:.1f} % of the thesis' curves repaired"
+    )
+
+
+def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float) -> None:
+    """Print how the methods compare on the ramps of one bandwidth."""
+    title = (
+        f"ramp of 22 deg/s under one PID of {bandwidth_Hz:g} Hz closed-loop bandwidth, "
+        f"judged on the {validation['judged_on']} (times smaller than without)"
+    )
+    table = Table(title=title, title_justify="left")
+    for name in ("", "RMS position error", "peak PID effort", "peak velocity error"):
+        table.add_column(name, justify="right" if name else "left")
+    for method in METHODS:
+        figures, ratios = validation[method], validation[method]["ratios"]
+        cells = (
+            f"{figures['rms_position_error_deg']:.4f} deg",
+            f"{1e3 * figures['peak_pid_effort_Nm']:.2f} mNm",
+            f"{figures['peak_velocity_error_deg_s']:.2f} deg/s",
+        )
+        gains = [f" ({ratio:.1f}x)" if method != "none" else "" for ratio in ratios.values()]
+        table.add_row(_NAMES[method], *(c + g for c, g in zip(cells, gains, strict=True)))
+    out.text.print(table)
+
+
+def _show_shortfall(out: Output, validation: dict[str, Any]) -> None:
+    for method in ("thesis", "better"):
+        ratios, wanted = validation[method]["ratios"], validation["targets"][method]
+        missed = [
+            f"{key.replace('_', ' ')} {ratios[key]:.1f} of {wanted[key]:g}"
+            for key in wanted
+            if ratios[key] < wanted[key]
+        ]
+        if missed:
+            out.say(
+                f"{_NAMES[method]}: below its target in {', '.join(missed)}; the report says why"
+            )

@@ -1,0 +1,1 @@
+"""Puts a robot together from its file: buses, drives, devices, loop."""

@@ -1,0 +1,72 @@
+"""Reads the simulator's log of the true motion; the report alone uses it."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import open_regular, parse_json
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.rawlog import RawLog
+from cdpr_rt.procedures.commissioning.evaluation import AngleOf
+from cdpr_rt.procedures.measurement import Recording
+from cdpr_tools.errors import BadInputError
+
+_HEADER_BYTES = 1024
+_FORMAT = "cdpr-rt truth log 1"
+NO_SYNC = 0xFFFFFFFF
+"""Number of a record that was made where no SYNC came."""
+
+
+class Truth:
+    """The log of the true motion, read where it is asked for, since it may be long.
+
+    Raises BadInputError when `path` is no such log.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            with os.fdopen(open_regular(path), "rb") as file:
+                header = parse_json(file.read(_HEADER_BYTES), path)
+            self._dtype: np.dtype[Any] = np.dtype([(n, kind) for n, kind in header["fields"]])
+            if header["format"] != _FORMAT or header["record_bytes"] != self._dtype.itemsize:
+                raise ValueError(header["format"])
+        except (ProfileError, OSError, ValueError, KeyError, TypeError) as error:
+            raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
+
+    def angle_of(self, log: RawLog, run: Recording) -> FloatArray:
+        """Return the true angle of a recorded pass, (samples,); raises as `angle_at`."""
+        return self.angle_at(run.cycle + log.header["sync_offset"] - 1, run.sweep.angle_rad)
+
+    def angle_at(self, sync_index: FloatArray, measured_rad: FloatArray) -> FloatArray:
+        """Return the true angle from the index at given SYNCs, rising, (k,).
+
+        The index comes once a turn, and the drive may have latched another one than the simulator
+        counts from: whole turns are chosen so that the angle lies at the measured one, (k,).
+        Raises BadInputError where a SYNC is missing.
+        """
+        first, last = int(sync_index[0]), int(sync_index[-1])
+        records = np.fromfile(self._path, self._dtype, offset=_HEADER_BYTES)
+        # one record a SYNC, counted from zero
+        records = records[records["sync_index"] != NO_SYNC][max(first, 0) : last + 1]
+        place = sync_index.astype(np.int64) - first
+        if records.size != last - first + 1 or not np.array_equal(
+            records["sync_index"][place], sync_index
+        ):
+            raise BadInputError(
+                f"{self._path}: does not hold the SYNCs {first} to {last} of a recording"
+            )
+        angle = np.asarray(records["angle_from_index_rad"][place], float)
+        turns = round(float(np.median(measured_rad - angle)) / math.tau)
+        return angle + turns * math.tau
+
+
+def true_angle(path: Path) -> AngleOf | None:
+    """Return what gives the true angle of a pass by the log at `path`, None where there is none."""
+    return Truth(path).angle_of if path.exists() else None

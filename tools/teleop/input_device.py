@@ -1,0 +1,120 @@
+"""Input devices of a teleoperation: their samples, and how they end."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from cdpr_rt.service.streams.stream_packet import LARGEST_SCALE, REACH_M
+from cdpr_tools.errors import BadInputError
+
+SMALLEST_SCALE: Final = 1e-3
+_REACH_USED: Final = 0.9
+TURN_RAD_PER_m: Final = math.radians(100.0)
+"""How far a hand turns by what would move it a metre: a tenth of a degree for a millimetre."""
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Directions = tuple[int, tuple[int, ...]]
+"""How many coordinates a platform has, and which of the room's axes it is turned about."""
+
+
+@dataclass(frozen=True)
+class End:
+    """Why a teleoperation ends."""
+
+    text: str
+    failed: bool = False
+    """Whether it ends by a failure."""
+    arrive: bool = False
+    """Whether the robot is to reach its last target first; it brakes at once otherwise."""
+
+
+@dataclass(frozen=True)
+class InputSample:
+    """One sample of an input device."""
+
+    position_m: Vector = (0.0, 0.0, 0.0)
+    """Displacement since the start, unscaled; in a plane the last one counts for nothing."""
+    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    """Rotation since the start, w x y z, about the room's axes."""
+    clutch: bool = True
+    """Whether the clutch is open: the robot does not follow."""
+    confirmed: int = 0
+    """Number of targets confirmed so far."""
+    trouble: str = ""
+    """Why the device gives no position just now; the robot holds meanwhile."""
+    end: End | None = None
+
+
+class InputDevice(Protocol):
+    """A device that is polled for samples; never waits."""
+
+    @property
+    def hint(self) -> str:
+        """Return how to use it, in a line."""
+
+    def read(self, now_s: float) -> InputSample:
+        """Return the sample at `now_s`, which only grows."""
+
+    def close(self) -> None:
+        """Restore terminal or device."""
+
+
+class Hand:
+    """A position that is moved within what packets may carry at a scale, and a rotation."""
+
+    def __init__(self, scale: float) -> None:
+        self._reach_m = _REACH_USED * REACH_M / max(scale, 1.0)
+        self.position_m: Vector = (0.0, 0.0, 0.0)
+        self.quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+    def move(self, way_m: Vector) -> None:
+        """Move it by so much."""
+        reach_m = self._reach_m
+        x, y, z = (
+            min(max(at + by, -reach_m), reach_m)
+            for at, by in zip(self.position_m, way_m, strict=True)
+        )
+        self.position_m = (x, y, z)
+
+    def turn(self, vector_rad: Vector) -> None:
+        """Turn it on by a rotation vector along the room's axes."""
+        self.quaternion = product(from_vector(vector_rad), self.quaternion)
+
+
+def from_vector(vector_rad: Vector) -> Quaternion:
+    """Return the quaternion w x y z of a rotation vector."""
+    angle = math.hypot(*vector_rad)
+    share = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.0
+    x, y, z = vector_rad
+    return math.cos(0.5 * angle), share * x, share * y, share * z
+
+
+def product(p: Quaternion, q: Quaternion) -> Quaternion:
+    """Return the rotation by `q`, then `p`, of length 1."""
+    w = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
+    x = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
+    y = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
+    z = p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]
+    size = math.hypot(w, x, y, z)
+    return w / size, x / size, y / size, z / size
+
+
+def parse_scale(text: str) -> float:
+    """Return how many metres the robot moves for a metre of the hand: 8 for "8:1", or a number.
+
+    Raises BadInputError.
+    """
+    robot, colon, hand = text.partition(":")
+    try:
+        scale = float(robot) / (float(hand) if colon else 1.0)
+    except (ValueError, ZeroDivisionError):
+        scale = math.nan
+    if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
+        raise BadInputError(
+            f"--scale {text}: allowed: {SMALLEST_SCALE:g} to {LARGEST_SCALE:g}, as a number or as "
+            "ROBOT:HAND such as 8:1"
+        )
+    return scale

@@ -1,0 +1,130 @@
+"""The directions in which a robot's platform is controlled, and true poses as coordinates in them.
+
+A place is (d,): k coordinates of the platform's origin, m, and then the controlled entries of the
+rotation vector from the orientation at home, rad. A pose is a position (3,) and a rotation (3, 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cdpr_profiles import Robot
+from cdpr_profiles.platform import Platform
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.errors import BadInputError
+
+_ABOUT = {"rx": 0, "ry": 1, "rz": 2, "angle": 2}
+
+
+@dataclass(frozen=True)
+class Directions:
+    """What a platform's places are made of, and within which bounds they lie."""
+
+    names: tuple[str, ...]
+    """A name for each direction, positions first."""
+    home_rotation: FloatArray
+    """(3, 3)"""
+    low_m: FloatArray
+    """(k,)"""
+    high_m: FloatArray
+    angle_rad: float
+    """The largest angle from the orientation at home."""
+    speed: FloatArray
+    """(d,)"""
+    acceleration: FloatArray
+
+    @classmethod
+    def of(cls, platform: Platform) -> Directions:
+        """Return those of a platform."""
+        k, turns = len(platform.home_m), len(platform.controlled) - len(platform.home_m)
+        home = np.array(platform.home_rotation_rad)
+        return cls(
+            platform.controlled,
+            Rotation.from_rotvec(np.pad(home, (3 - home.size, 0))).as_matrix(),
+            np.array(platform.workspace_min_m),
+            np.array(platform.workspace_max_m),
+            platform.workspace_angle_rad,
+            np.repeat([platform.speed_m_s, platform.angular_speed_rad_s], [k, turns]),
+            np.repeat(
+                [platform.acceleration_m_s2, platform.angular_acceleration_rad_s2], [k, turns]
+            ),
+        )
+
+    @property
+    def k(self) -> int:
+        """How many coordinates the origin has."""
+        return len(self.low_m)
+
+    @property
+    def d(self) -> int:
+        """How many directions are controlled."""
+        return len(self.names)
+
+    @property
+    def turns(self) -> tuple[int, ...]:
+        """Which directions are angles; none where the platform's angles are not controlled."""
+        return tuple(range(self.k, self.d))
+
+    @property
+    def middle(self) -> FloatArray:
+        """The middle of the workspace, at the orientation at home, (d,)."""
+        return np.pad(0.5 * (self.low_m + self.high_m), (0, self.d - self.k))
+
+    def arguments(self, place: FloatArray, speed_m_s: float | None = None) -> dict[str, Any]:
+        """Return what the program `pose` is told to go to a place."""
+        told: dict[str, Any] = {"position_m": place[: self.k].tolist()}
+        if self.angle_rad > 0.0:
+            told["rotation_rad"] = place[self.k :].tolist()
+        if speed_m_s is not None:
+            told["speed_m_s"] = speed_m_s
+        return told
+
+    def marked(self, place: FloatArray, prefix: str) -> dict[str, list[float]]:
+        """Return a place as a recording's mark holds it."""
+        told = {f"{prefix}_m": place[: self.k].tolist()}
+        if self.turns:
+            told[f"{prefix}_rotation_rad"] = place[self.k :].tolist()
+        return told
+
+    def place(self, mark: Mapping[str, Any], prefix: str) -> FloatArray:
+        """Return a place out of a mark, (d,)."""
+        return np.array([*mark[f"{prefix}_m"], *mark.get(f"{prefix}_rotation_rad", ())], float)
+
+    def rotations(self, places: FloatArray) -> FloatArray:
+        """Return the rotations (m, 3, 3) of places (m, d): exp(φ) Q_home."""
+        vectors = np.zeros((len(places), 3))
+        vectors[:, self.about] = places[:, self.k :]
+        return np.asarray(Rotation.from_rotvec(vectors).as_matrix() @ self.home_rotation)
+
+    def places(self, position_m: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return poses (m, 3), (m, 3, 3) as places, (m, d)."""
+        turned = self.turn_between(self.home_rotation, rotation) if self.turns else None
+        angles = np.zeros((len(position_m), 0)) if turned is None else turned[:, self.about]
+        return np.hstack([position_m[:, : self.k], angles])
+
+    def turn_between(self, from_rotation: FloatArray, to_rotation: FloatArray) -> FloatArray:
+        """Return the rotation vectors of R_to R_from^T, (m, 3), in rad along the room's axes."""
+        turn = to_rotation @ np.swapaxes(from_rotation, -1, -2)
+        return np.asarray(Rotation.from_matrix(turn).as_rotvec())
+
+    @property
+    def about(self) -> list[int]:
+        """Which entries of a rotation vector are controlled."""
+        return [_ABOUT[name] for name in self.names[self.k :]]
+
+
+def platform_of(robot: Robot) -> Platform:
+    """Return a robot's platform; raises BadInputError for a robot that has none."""
+    if robot.platform is None:
+        raise BadInputError(f"{robot.path}: has no platform; allowed: robots with a [platform]")
+    return robot.platform
+
+
+def rotations_of(quaternion: FloatArray) -> FloatArray:
+    """Return the rotations (m, 3, 3) of quaternions w x y z, (m, 4)."""
+    return np.asarray(Rotation.from_quat(quaternion[:, [1, 2, 3, 0]]).as_matrix())

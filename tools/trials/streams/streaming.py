@@ -1,0 +1,153 @@
+"""The trial of a hand that leads through a bad network: no step in the commanded velocity."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.motion.stream_buttons import stream_buttons
+from cdpr_tools.trials.directions import Directions
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.run import TrialRun
+from cdpr_tools.trials.streams.channel import Channel, Network
+
+RATE_Hz: Final = 50.0
+SCALE: Final = 4.0
+ROUNDING: Final = 0.5e-9
+"""Of a recorded position in m, or an entry of a quaternion, which is half as much of an angle."""
+_SENDER_AHEAD_s: Final = 1234.5
+"""The hand's clock is its own."""
+_PHASE_S: Final = (2.0, 6.0)
+_SILENCE_S: Final = 1.2
+_CLUTCH_S: Final = 0.4
+
+
+class RandomHandMotion:
+    """A random motion of a hand: waves of some seconds, with flicks, pauses and the clutch.
+
+    Place and phases are drawn from `chance`; it goes as far as `reach` (d,), m or rad, in the
+    hand's own space, and at times faster than any robot.
+    """
+
+    def __init__(self, chance: np.random.Generator, reach: FloatArray) -> None:
+        self._chance = chance
+        self._reach = reach
+        self._rates = chance.uniform(0.3, 1.6, (3, reach.size))
+        self._phases = chance.uniform(0.0, math.tau, (3, reach.size))
+        self._shift = np.zeros(reach.size)
+        self._until_s = 0.0
+        self.mood = "waves"
+
+    def at(self, time_s: float) -> FloatArray:
+        """Return where the hand is, (d,), and choose what it is about to do."""
+        if time_s >= self._until_s:
+            self._change(time_s)
+        waves = np.sin(self._rates * time_s + self._phases).mean(axis=0)
+        return np.asarray(self._reach * (waves + self._shift))
+
+    def _change(self, time_s: float) -> None:
+        chance = self._chance
+        self.mood = str(chance.choice(["waves", "flick", "clutch", "silence"]))
+        lasts = {"clutch": _CLUTCH_S, "silence": _SILENCE_S}
+        self._until_s = time_s + lasts.get(self.mood, chance.uniform(*_PHASE_S))
+        if self.mood == "flick":
+            self._shift = chance.uniform(-0.5, 0.5, self._shift.size)
+
+
+def drive(run: TrialRun, seconds: float) -> None:
+    """Lead the platform by a hand at 50 Hz, through the network."""
+    rig, chance = run.rig, run.chance
+    channel, directions = Channel(Network(), chance), run.directions
+    reach = 0.5 * (directions.high_m - directions.low_m) / SCALE
+    turned = np.full(len(directions.turns), directions.angle_rad)
+    way = RandomHandMotion(chance, np.append(reach, turned))
+    hand = rig.stream.sender()
+    rig.program("pose", stream=True)
+    between = round(1.0 / (RATE_Hz * rig.period_s))
+    cycles = round(seconds / rig.period_s)
+    for cycle in range(cycles):
+        if cycle % between == 0:
+            place = way.at(rig.now_s)
+            if way.mood != "silence":
+                buttons = stream_buttons(way.mood == "clutch", 0)
+                sent_s = rig.now_s + _SENDER_AHEAD_s
+                position_m, quaternion = hand_pose(directions, place)
+                packet = hand.packet(sent_s, position_m, SCALE, buttons, quaternion)
+                channel.send(packet, rig.now_s)
+        for packet in channel.arrived(rig.now_s):
+            rig.stream.take(packet)
+        rig.turn()
+        if cycle % 1000 == 0:
+            run.stay(0.0)
+    counts = {key: int(value) for key, value in rig.stream.sessions.counts.items() if value}
+    run.mark(
+        "network",
+        sent=channel.sent,
+        lost=channel.lost,
+        doubled=channel.doubled,
+        overtaken=channel.overtaken,
+        taken=counts,
+    )
+
+
+def hand_pose(directions: Directions, place: FloatArray) -> tuple[list[float], list[float]]:
+    """Return position (3) and quaternion (4) of a hand at a place, which begins without a turn."""
+    rotation = directions.rotations(place[None])[0] @ directions.home_rotation.T
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat().tolist()
+    position_m = place[: directions.k].tolist() + [0.0] * (3 - directions.k)
+    return position_m, [w, x, y, z]
+
+
+def velocity_steps(recorded: Recorded) -> FloatArray:
+    """Return by how much the commanded velocity changes from each cycle to the next, (c, d)."""
+    velocity = np.diff(recorded.setpoint_places, axis=0) / recorded.period_s
+    return np.asarray(np.diff(velocity, axis=0))
+
+
+def judge(recorded: Recorded) -> list[Figure]:
+    """Return the network's figures and the greatest step of the commanded velocity."""
+    directions, k = recorded.directions, recorded.directions.k
+    (network,) = recorded.marked("network")
+    steps = np.abs(velocity_steps(recorded)).max(axis=0)
+    velocity = np.abs(np.diff(recorded.setpoint_m, axis=0)) / recorded.period_s
+    # a step is made of three positions, the middle one counted twice
+    rounding = 4.0 * ROUNDING / recorded.period_s
+    allowed = directions.acceleration * recorded.period_s + rounding
+    way = float(np.linalg.norm(np.diff(recorded.setpoint_m, axis=0), axis=1).sum())
+    off = np.linalg.norm(recorded.true_m - recorded.setpoint_m, axis=1)
+    sent = network["sent"]
+    figures = [
+        Figure("sent", "set-points sent", sent),
+        Figure("lost", "of them lost", 100.0 * network["lost"] / sent, "%"),
+        Figure("doubled", "came twice", 100.0 * network["doubled"] / sent, "%"),
+        Figure("overtaken", "overtaken by later ones", 100.0 * network["overtaken"] / sent, "%"),
+        Figure("way_m", "way of the set-point", way, "m"),
+        Figure("speed_m_s", "fastest set-point along a direction", float(velocity.max()), "m/s"),
+        Figure(
+            "step_mm_s",
+            "greatest step of velocity in a cycle",
+            1e3 * float(steps[:k].max()),
+            "mm/s",
+            1e3 * float(allowed[:k].min()),
+        ),
+        Figure("off_rms_mm", "RMS distance from the set-point", 1e3 * _rms(off), "mm"),
+        Figure("off_mm", "worst distance from the set-point", 1e3 * float(off.max()), "mm"),
+    ]
+    if directions.angle_rad > 0.0:
+        angle = np.degrees(np.linalg.norm(recorded.turned_off_rad, axis=1))
+        text, step = "greatest step of angular velocity in a cycle", float(steps[k:].max())
+        limit = float(np.degrees(allowed[k:].min() + rounding))
+        figures += [
+            Figure("step_deg_s", text, math.degrees(step), "deg/s", limit),
+            Figure("turned_off_rms_deg", "RMS angle from the set-point", _rms(angle), "deg"),
+        ]
+    return figures
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,85 @@
+"""The trial of a robot whose geometry was taken with a tape measure (Tremblay, section 3.6).
+
+A robot has to be taken to the poses of its calibration before it is calibrated. Errors of its
+geometry must then cost accuracy only: no cable may be torn or hang slack.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cdpr_profiles import Robot
+from cdpr_profiles.reading.bounded_input import read_toml
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.trials.directions import platform_of
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.limits import held_figures
+from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.run import TrialRun
+
+OFF_M: Final = (0.02, 0.05)
+"""How far each exit point truly is from where the robot's file has it, at least and at most."""
+POSES: Final = 100
+SPEED_SHARE: Final = 0.25
+"""Of the speed of the robot's file: a robot that nobody has calibrated yet is not hurried."""
+STAY_S: Final = 1.0
+
+
+def plant_text(robot: Robot, plant: Path | None, seed: int) -> str:
+    """Return the plant file of the trial: a given one with exit points moved by chance.
+
+    One that has a table [geometry] of its own is taken as it is. Raises ProfileError.
+    """
+    known = {} if plant is None else read_toml(plant)
+    text = "" if plant is None else plant.read_text(encoding="utf-8")
+    if "geometry" in known:
+        return text
+    platform, chance = platform_of(robot), np.random.default_rng(seed)
+    directions = chance.standard_normal(np.shape(platform.exit_points_m))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    errors = chance.uniform(*OFF_M, (len(directions), 1)) * directions
+    return f"{text}\n[geometry]\nexit_errors_m = {json.dumps(errors.round(4).tolist())}\n"
+
+
+def drive(run: TrialRun, seconds: float) -> None:
+    """Go out to random poses and back to the middle, unhurried."""
+    speed_m_s = SPEED_SHARE * float(run.directions.speed[0])
+    for _ in range(POSES):
+        if run.elapsed_s >= seconds:
+            break
+        target = run.directions.marked(run.start_random_move(speed_m_s), "target")
+        run.arrive()
+        run.stay(STAY_S)
+        run.mark("pose", **target)
+        run.go(run.directions.middle, speed_m_s)
+        run.stay(STAY_S)
+
+
+def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
+    """Return the extremes of tension and torque, and how far off the poses were."""
+    directions, marks = recorded.directions, recorded.marked("pose")
+    rows = [recorded.row(mark["cycle"]) for mark in marks]
+    wanted = np.array([directions.place(mark, "target") for mark in marks])
+    wanted = wanted.reshape(-1, directions.d)
+    off = np.linalg.norm(recorded.true_m[rows] - wanted[:, : directions.k], axis=1)
+    figures = [
+        Figure("poses", "poses, out and back", len(marks), "", POSES, True),
+        Figure("minutes", "bus time", float(recorded.time_s[-1]) / 60.0, "min"),
+        *held_figures(recorded, robot),
+        Figure("off_rms_mm", "RMS distance from a pose", 1e3 * _rms(off), "mm"),
+        Figure("off_mm", "worst distance from a pose", 1e3 * float(off.max(initial=0)), "mm"),
+    ]
+    if directions.turns:
+        true = recorded.truth["rotation"][rows]
+        turned = directions.turn_between(directions.rotations(wanted), true)
+        angle = float(np.degrees(np.linalg.norm(turned, axis=1).max(initial=0.0)))
+        figures.append(Figure("orientation_off_deg", "worst angle from a pose", angle, "deg"))
+    return figures
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
