@@ -58,7 +58,7 @@ class PretensionProgram(PlatformProgram):
 
     def __init__(self, parts: PlatformParts, torque_Nm: FloatArray, cable_m: FloatArray) -> None:
         super().__init__(parts, torque_Nm)
-        self._arrival = Arrival(parts.period_s, near_s=_SETTLING_S)
+        self._arrival = Arrival(parts.period_s, parts.near_m, _SETTLING_S)
         self._cable = np.array(cable_m)
         self._pretension_N = np.minimum(
             home_pretension_N(parts), torque_Nm / np.abs(cable_m) / OVERSHOOT
