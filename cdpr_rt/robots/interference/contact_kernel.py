@@ -52,6 +52,8 @@ from cdpr_rt.robots.kinematics.pose import exponential
 START, STEP, TURNED, TURN, BASE, WAY_ROWS = 0, 1, 2, 3, 4, 7
 TOUCH_m: Final = 1e-6
 """What is nearer than this above the clearance is in contact."""
+_LEAVING: Final = 0.9
+"""Share of its distance that a pair which is in contact at the start has to keep."""
 _SPEED, _ACCELERATION, _EXIT, _FAR, _FREE, _HOLDS, _RATES = range(7)
 _TOGETHER = 0.02
 """Share of the way by which pairs are looked at early, since others are looked at anyway."""
@@ -70,8 +72,9 @@ def first_contact(
 ) -> tuple[float, int, float]:
     """Return the share of the way at which a pair comes into contact, which pair, and its distance.
 
-    Returns 2.0 and -1 where none does. What is in contact at the start may not come nearer, and
-    has to be clear at the end. A pair that _MOST_LOOKS do not prove clear counts as in contact.
+    Returns 2.0 and -1 where none does. What is in contact at the start has to stay about as far
+    apart, but for what touches altogether, and to be clear at the end. A pair that _MOST_LOOKS do
+    not prove clear counts as in contact.
     """
     n, count = geometry.shape[1], pairs.shape[0]
     cables, ends, rates = np.empty((CABLE_ROWS, n)), np.empty((2, n, 3)), np.empty((_RATES, n))
@@ -91,7 +94,7 @@ def first_contact(
                 continue
             apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
             if looks == 0:
-                allowed[k] = min(clearance, apart - 2.0 * TOUCH_m)
+                allowed[k] = min(clearance, _LEAVING * apart - TOUCH_m)
             if allowed[k] < 0.0:
                 until[k] = math.inf
             elif apart - allowed[k] >= TOUCH_m and looks < _MOST_LOOKS:

@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 
 from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.jit import bound
 from cdpr_rt.robots.interference import clearance_kernel as kernel
-from cdpr_rt.robots.interference.contact_kernel import WAY_ROWS, first_contact
+from cdpr_rt.robots.interference.contact_kernel import START, TURNED, WAY_ROWS, first_contact
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 
@@ -24,7 +25,8 @@ class Contact:
     """The first place of a way where two things are nearer to each other than the clearance."""
 
     position: FloatArray
-    """Of the platform, (d,)."""
+    """Of the platform, (d,): coordinates, then rotation vector."""
+    coordinates: int
     leg: int
     """Which straight part of the way, from 0."""
     share: float
@@ -33,8 +35,12 @@ class Contact:
     distance_m: float
 
     def __str__(self) -> str:
-        place = ", ".join(f"{x:.3f}" for x in self.position)
-        return f"{in_words(self.things, self.distance_m)} at {place}"
+        place, turned = (
+            ", ".join(f"{x:.3f}" for x in part)
+            for part in (self.position[: self.coordinates], self.position[self.coordinates :])
+        )
+        about = f" turned by {turned} rad" if self.position[self.coordinates :].any() else ""
+        return f"at {place} m{about}: {in_words(self.things, self.distance_m)}"
 
 
 class Interference:
@@ -45,7 +51,7 @@ class Interference:
     share, one that is nearer than the clearance, cables do not count: ten times the clearance of
     their length is left out there. Cables in a plane run in layers, beside each other and the body;
     only boxes of the room count for them. Straight cables are meant: what they sag, the clearance
-    has to cover.
+    has to cover. One object serves one thread.
     """
 
     def __init__(
@@ -60,6 +66,7 @@ class Interference:
         """Take the pose at home (4, 3), and boxes (2, c): least and greatest coordinates."""
         self.clearance_m, self._trim = clearance_m, kernel.TRIM_TIMES * clearance_m
         self._geometry, self._directions = kinematics.geometry, np.array(kinematics.directions)
+        self._coordinates = sum(direction < 3 for direction in kinematics.directions)
         self._home = np.array(home, float)
         boxes = [np.zeros((2, 3)) if body is None else _in_space(body)]
         boxes += [_in_space(box) for box in obstacles]
@@ -68,6 +75,12 @@ class Interference:
             list(self._found_pairs(body is not None, planar)), np.int64
         ).reshape(-1, 4)
         """What is compared: rows of `clearance_kernel`."""
+        self._way = np.zeros((WAY_ROWS, 3))
+        self._way[0], self._way[4:] = self._home[0], self._home[1:]
+        self._first_contact = bound(
+            first_contact, self._geometry, self._boxes, self.pairs, clearance_m, self._trim,
+            self._way,
+        )  # fmt: skip
 
     def clearances(self, poses: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the least distances (m,), m, and which pair has it, at poses (m, 4, 3).
@@ -93,27 +106,23 @@ class Interference:
 
         Straight in the coordinates of `PlatformModel`, coordinates and rotation vector from home's
         orientation, and proved for all places between, not only looked at in some. What is in
-        contact where a straight part begins may not come nearer, and has to be clear at its end.
+        contact where a straight part begins may not come much nearer, and has to be clear at its
+        end.
         """
         for leg in range(len(positions) - 1):
             start, end = positions[leg], positions[leg + 1]
-            share, pair, distance = first_contact(
-                self._geometry, self._boxes, self.pairs, self.clearance_m, self._trim,
-                self.way(start, end),
-            )  # fmt: skip
+            self._lead(start, end)
+            share, pair, distance = self._first_contact()
             if pair >= 0:
                 there = start + share * (end - start)
-                return Contact(there, leg, share, self.things(pair), distance)
+                return Contact(there, self._coordinates, leg, share, self.things(pair), distance)
         return None
 
-    def way(self, start: FloatArray, end: FloatArray) -> FloatArray:
-        """Return the way (7, 3) of `contact_kernel`, straight from position to position (d,)."""
-        way, step = np.zeros((WAY_ROWS, 3)), np.asarray(end, float) - start
-        way[0], way[4:] = self._home[0], self._home[1:]
+    def _lead(self, start: FloatArray, end: FloatArray) -> None:
+        """Write the way straight from one position (d,) to another."""
         for k, direction in enumerate(self._directions):
-            row, column = (0, direction) if direction < 3 else (2, direction - 3)
-            way[row, column], way[row + 1, column] = start[k], step[k]
-        return way
+            row, column = (START, direction) if direction < 3 else (TURNED, direction - 3)
+            self._way[row, column], self._way[row + 1, column] = start[k], end[k] - start[k]
 
     def things(self, pair: int) -> tuple[str, str]:
         """Return what a pair consists of, in words."""

@@ -67,12 +67,12 @@ def test_no_place_before_the_first_contact_is_in_contact(seed: int, parts: str) 
     until = 1.0 if found is None else found.share
     before = robot.apart(np.linspace(0.0, until, PLACES))
     allowed = {
-        pair: min(robot.interference.clearance_m, float(d[0]) - 2e-6) for pair, d in before.items()
+        pair: min(robot.interference.clearance_m, 0.9 * float(d[0]) - 1e-6)
+        for pair, d in before.items()
     }
     for pair, distance in before.items():
-        if pair[0] == "platform" or (found is not None and pair == found.things):
-            distance = distance[:-1]
-        assert distance.min(initial=np.inf) >= allowed[pair] - 1e-8, pair
+        it_is = found is not None and pair == found.things
+        assert distance[: -1 if it_is else None].min() >= allowed[pair] - 1e-8, pair
     if found is None:
         return
     assert np.allclose(found.position, robot.way[0, :d] + until * np.diff(robot.way, axis=0)[0, :d])
@@ -100,29 +100,33 @@ def test_the_clearance_of_a_pose_is_that_of_brute_force(seed: int, parts: str) -
             assert clearance[j] == pytest.approx(least, abs=1e-8) == float(apart[things][j])
 
 
-def test_two_cables_that_pass_between_samples_are_seen() -> None:
-    # 1 mm of clearance, crossed within 2 mm of a way of 2 m: no 33 places of it are near
-    a = np.array([[-2.0, -2.0, 1.0], [2.0, -2.0, 1.003]])
-    b = np.array([[0.5, 0.2, 0.0], [-0.5, 0.2, 0.003]])
-    kinematics = CableKinematics(a, b, (0, 1))
-    interference = Interference(kinematics, Pose(np.array([0.0, 0.0, 1.0])).array, 0.002)
+def test_a_wire_that_lies_between_samples_is_seen() -> None:
+    exits, anchors = np.array([[0.0, 0.0, 2.0], [3.0, 0.0, 2.0]]), np.zeros((2, 3))
+    wire = np.array([[-0.5, 0.0130, 0.99], [0.5, 0.0132, 1.01]])
+    home = Pose(np.zeros(3)).array
+    interference = Interference(
+        CableKinematics(exits, anchors, (0, 1)), home, 0.001, obstacles=[wire]
+    )
     way = np.array([[0.0, -1.0], [0.0, 1.0]])
-    assert interference.first_contact(way) is None  # they cross 3 mm above each other
-    b[1, 2] = -0.003  # now they change sides on the way
-    crossing = Interference(CableKinematics(a, b, (0, 1)), interference._home, 0.002)
-    found = crossing.first_contact(way)
-    assert found is None or found.things == ("cable 0", "cable 1")
+    sampled = np.repeat(home[None], 33, axis=0)
+    sampled[:, 0, 1] = np.linspace(-1.0, 1.0, 33)
+    assert interference.clearances(sampled)[0].min() > 0.002
+    found = interference.first_contact(way)
+    assert found is not None and found.things == ("cable 0", "obstacle 0")
+    assert found.position == pytest.approx([0.0, 0.024], abs=5e-4)
 
 
 def test_the_words_name_both_things_the_distance_and_the_place() -> None:
     model = model_of("spatial-8")
-    there = np.array([0.9, -0.9, 2.3, 0.0, 0.0, 1.2])
+    there = np.array([-0.15, 0.1, 1.5, 0.0, 0.0, 2.0])
     found = model.interference.first_contact(np.array([model.home, there]))
     assert found is not None
-    words = str(found)
-    assert words.startswith("cables ") and " come within 10 mm of each other at " in words
-    assert words.endswith(", ".join(f"{x:.3f}" for x in found.position))
-    assert model.interference.contact(model.poses(there[None])[0])
+    words = f"{found.things[0].replace('cable', 'cables')} and {found.things[1][6:]} come within "
+    place, turned = (", ".join(f"{x:.3f}" for x in part) for part in np.split(found.position, 2))
+    told = f"at {place} m turned by {turned} rad: {words}10 mm of each other"
+    assert str(found) == told
+    further = found.position + 1e-3 * (there - model.home)
+    assert model.interference.contact(model.poses(further[None])[0]).startswith(words)
     assert model.interference.contact(model.home_pose.array) == ""
 
 
@@ -149,17 +153,16 @@ def test_shipped_robots_are_clear_in_their_box_of_targets(name: str) -> None:
 
 
 def test_what_is_too_near_at_the_start_may_leave_but_not_come_nearer() -> None:
-    kinematics = CableKinematics(
-        np.array([[0.0, 0.0, 2.0], [1.0, 0.0, 2.0]]), np.zeros((2, 3)) + [[0.0], [0.03]], (0, 2)
-    )
-    low = np.array([-0.2, -1.0, -0.5])
-    stand = np.array([low, low + [0.4, 2.0, 0.49]])
+    exits = np.array([[-1.0, 0.0, 2.0], [1.0, 0.0, 2.0]])
+    anchors = np.array([[-0.1, 0.0, 0.1], [0.1, 0.0, 0.1]])
+    kinematics = CableKinematics(exits, anchors, (0, 2))
+    stand = np.array([[-0.2, -1.0, -0.5], [0.2, 1.0, -0.01]])
     body = np.array([[-0.1, -0.1, 0.0], [0.1, 0.1, 0.1]])
     home = Pose(np.array([0.0, 0.0, 0.0]))
     interference = Interference(kinematics, home.array, 0.02, body, [stand])
     assert "platform and obstacle 0 come within 10 mm" in interference.contact(home.array)
     assert interference.first_contact(np.array([[0.0, 0.0], [0.0, 0.5]])) is None
     down = interference.first_contact(np.array([[0.0, 0.0], [0.0, -0.1]]))
-    assert down is not None and down.share < 0.01
+    assert down is not None and down.position[1] > -0.0011
     aside = interference.first_contact(np.array([[0.0, 0.0], [0.05, 0.0]]))
     assert aside is not None and aside.share == 1.0  # it is no nearer, but not clear either
