@@ -48,8 +48,8 @@ class BruteRobot:
             for i in range(n):
                 inside = _outside(self.anchors[i], self.body) < c
                 one = self._counted(starts[:, i], ends[:, i], False, bool(inside))
-                within = [np.einsum("mji,mj->mi", Q, x - p) for x in one]
-                found[f"cable {i}", "platform"] = to_box(*within, self.body)
+                start, end = (np.einsum("mji,mj->mi", Q, x - p) for x in one)
+                found[f"cable {i}", "platform"] = to_box(start, end, self.body)
         for k, box in enumerate(self.obstacles):
             for i in range(n):
                 reach = c + (0.0 if self.radius is None else 2.0 * self.radius[i])
@@ -113,7 +113,7 @@ def to_box(p: Floats, q: Floats, box: Floats) -> Floats:
         x = p + middle[:, None] * step
         rising = np.einsum("mi,mi->m", step, x - np.clip(x, *box)) > 0.0
         low, high = np.where(rising, low, middle), np.where(rising, middle, high)
-    return _outside(p + low[:, None] * step, box)
+    return np.asarray(_outside(p + low[:, None] * step, box))
 
 
 def _outside(x: Floats, box: Floats) -> Any:

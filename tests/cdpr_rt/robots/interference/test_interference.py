@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_profiles import load_robot
-from cdpr_rt.robots.interference.interference import Interference
+from cdpr_rt.robots.interference.interference import Interference, in_words
 from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
@@ -121,13 +121,20 @@ def test_the_words_name_both_things_the_distance_and_the_place() -> None:
     there = np.array([-0.15, 0.1, 1.5, 0.0, 0.0, 2.0])
     found = model.interference.first_contact(np.array([model.home, there]))
     assert found is not None
-    words = f"{found.things[0].replace('cable', 'cables')} and {found.things[1][6:]} come within "
+    words = "cable 2 and platform come within "
     place, turned = (", ".join(f"{x:.3f}" for x in part) for part in np.split(found.position, 2))
     told = f"at {place} m turned by {turned} rad: {words}10 mm of each other"
     assert str(found) == told
     further = found.position + 1e-3 * (there - model.home)
     assert model.interference.contact(model.poses(further[None])[0]).startswith(words)
     assert model.interference.contact(model.home_pose.array) == ""
+
+
+def test_cables_that_meet_are_named_together() -> None:
+    assert (
+        in_words(("cable 2", "cable 5"), 0.003) == "cables 2 and 5 come within 3 mm of each other"
+    )
+    assert in_words(("cable 2", "obstacle 0"), 0.0) == "cable 2 and obstacle 0 touch"
 
 
 @pytest.mark.parametrize("name", ["planar-3", "planar-4"])
