@@ -77,10 +77,11 @@ class Interference:
         """What is compared: rows of `clearance_kernel`."""
         self._way = np.zeros((WAY_ROWS, 3))
         self._way[0], self._way[4:] = self._home[0], self._home[1:]
-        self._first_contact = bound(
-            first_contact, self._geometry, self._boxes, self.pairs, clearance_m, self._trim,
-            self._way,
-        )  # fmt: skip
+        if len(self.pairs):
+            self._first_contact = bound(
+                first_contact, self._geometry, self._boxes, self.pairs, clearance_m, self._trim,
+                self._way,
+            )  # fmt: skip
 
     def clearances(self, poses: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the least distances (m,), m, and which pair has it, at poses (m, 4, 3).
@@ -109,7 +110,7 @@ class Interference:
         contact where a straight part begins may not come much nearer, and has to be clear at its
         end.
         """
-        for leg in range(len(positions) - 1):
+        for leg in range(len(positions) - 1 if len(self.pairs) else 0):
             start, end = positions[leg], positions[leg + 1]
             self._lead(start, end)
             share, pair, distance = self._first_contact()
