@@ -10,8 +10,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import pytest
-
 from cdpr_sim_bus.bus.hub import Hub
 from cdpr_sim_bus.clock import HOLD_S, ClockMode
 from cdpr_sim_bus.fleet import Fleet
