@@ -20,7 +20,7 @@ _DONE = 1e-4
 _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-9, 1e8
 _HUBER = 2.5
 """Standard deviations beyond which a length counts less (Huber's loss)."""
-_WEAK = 1e-6
+_WEAK, _SINGULAR = 1e-6, 1e-10
 _JUMP_STD_m = 1.0
 
 
@@ -46,9 +46,15 @@ class Fit:
     converged: bool
 
     @property
+    def cost(self) -> float:
+        """Sum of squared residuals, as far as the robust loss has them count."""
+        n, squares = self.geometry.n, self.at.residual**2
+        return float(np.sum(squares[:, :n] * self.weights) + np.sum(squares[:, n:]))
+
+    @property
     def std(self) -> FloatArray:
         """Standard deviations of the geometry's parameters, (P,)."""
-        return np.sqrt(np.diag(self.covariance)[: self.geometry.size])
+        return np.asarray(np.sqrt(np.diag(self.covariance)[: self.geometry.size]))
 
     @property
     def length_residual_m(self) -> FloatArray:
@@ -177,8 +183,11 @@ class _Normal:
     def _reduced(self, damping: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         d = self._C.shape[1]
         C = self._C.copy()
-        C[:, range(d), range(d)] += max(damping, 1e-12) * self._level
-        inverse = np.linalg.inv(C)
+        if damping > 0.0:
+            C[:, range(d), range(d)] += damping * self._level
+            inverse = np.asarray(np.linalg.inv(C))
+        else:  # a pose of which not all is known takes nothing in that direction
+            inverse = np.asarray(np.linalg.pinv(C, rcond=_SINGULAR, hermitian=True))
         EC = self._E @ inverse
         P = self._size
         S = self._H - (EC @ np.swapaxes(self._E, 1, 2)).sum(axis=0)

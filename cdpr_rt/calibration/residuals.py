@@ -1,8 +1,8 @@
 """One residual model of all that was observed, with its derivatives: closure, poses, balance.
 
 For cable i at pose j, with what the encoder says of its length without tension l_ij, offset o_i,
-drum error s_i about the length l_i0 at the start, and stretch S_ij = straight length / length without tension
-under the tension t_ij, loop closure (Tremblay, eqs. (3.16) to (3.18)) is
+drum error s_i about the length l_i0 at the start, and stretch S_ij = straight length over length
+without tension under the tension t_ij, loop closure (Tremblay, eqs. (3.16) to (3.18)) is
 
     f_ij = (l_ij + o_i + s_i (l_ij - l_i0)) S_ij - ρ(a_i, b_i, r_i, x_j)
 
@@ -13,8 +13,8 @@ vector u from exit to anchor, angle θ on the pulley and compliance c_i (1 + κ)
     ∂f/∂κ = l c t    ∂f/∂x = -(u, Q b × u)
 
 Measured positions are p + Q c - p~, rotations log(Q Q~^T); a platform that turns freely in its
-plane stands where Σ t_i (Q b_i × u_i) and its weight's moment are in balance. Each row is divided by its
-standard deviation.
+plane stands where Σ t_i (Q b_i × u_i) and its weight's moment are in balance. Each row is divided
+by its standard deviation.
 """
 
 from __future__ import annotations
@@ -75,6 +75,21 @@ def linearise(
     return out
 
 
+def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
+    """Return the standard deviation of each length, the tension's included, (N, n)."""
+    known = geometry.knowledge
+    yielding = seen.length_m * geometry.compliance_1_N * known.tension_N
+    return np.asarray(np.hypot(known.length_m, yielding))
+
+
+def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray) -> FloatArray:
+    """Return what encoders would say at poses (N, 4, 3) but for drum errors, (N, n)."""
+    cables = np.empty((len(poses), KERNEL_ROWS, geometry.n))
+    run_poses(geometry.kernel_geometry(), poses, cables)
+    straight = cables[:, FREE] + cables[:, ARC]
+    return np.asarray(straight / _stretch(geometry, tension_N, cables) - geometry.cable[:, OFFSET])
+
+
 def _stretch(geometry: CableGeometry, tension_N: FloatArray, cables: FloatArray) -> FloatArray:
     """Return straight length over length without tension, (N, n)."""
     soft = geometry.compliance()
@@ -111,10 +126,7 @@ def _closure(
     length = seen.length_m + geometry.cable[:, OFFSET] + geometry.cable[:, DRUM] * paid_out + extra
     stretch = _stretch(geometry, seen.tension_N, cables)
     u = np.swapaxes(cables[:, :3], 1, 2)
-    known = geometry.knowledge
-    yielding = seen.length_m * geometry.compliance_1_N
-    std = np.sqrt(known.length_m**2 + (yielding * known.tension_N) ** 2)
-    weight = seen.used / std
+    weight = seen.used / length_std_m(geometry, seen)
     out.residual[:, :n] = weight * (length * stretch - cables[:, FREE] - cables[:, ARC])
     each = np.empty((*length.shape, CABLE_ROWS))
     each[..., EXIT] = u

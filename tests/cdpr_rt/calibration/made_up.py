@@ -11,8 +11,8 @@ from cdpr_profiles import load_robot
 from cdpr_rt.calibration.observations import Observations
 from cdpr_rt.calibration.parameters import USUAL, CableGeometry
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.cable_model import CableModel
+from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 
 
