@@ -1,1 +1,1 @@
-"""Calibration of a robot's geometry: observations, fit, how good it is, what stays open."""
+"""Calibration of a robot's geometry: what it observes, the fit, and how good it is."""

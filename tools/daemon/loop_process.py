@@ -16,6 +16,7 @@ from cdpr_drivers.robot.commissioned import compensation_of, load_profiles, with
 from cdpr_drivers.robot.listening_machine import ListeningMachine
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.limits import Limits
@@ -24,11 +25,13 @@ from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
+from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.registry import (
     build_programs,
     platform_parts,
     warm_up_programs,
 )
+from cdpr_rt.robots.calibration_state import distrust
 from cdpr_rt.robots.robot_arrays import described, limits_of, supervised, winches_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
@@ -47,7 +50,8 @@ def main() -> int:
     settings = RunSettings.from_argv()
     block = SharedBlock.attach(settings.block_fd)
     try:
-        robot = with_commissioned(load_robot(settings.robot), settings.commissioned)
+        robot = calibrated(load_robot(settings.robot))
+        robot = with_commissioned(robot, settings.commissioned)
         require_fit(robot)
         machine: Machine
         if settings.read_only:
@@ -101,11 +105,17 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
         lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
         lowering=lowering,
         last=None if platform is None else platform.last,
+        before_power=lambda: _look_at_calibration(robot, platform),
         enable_realtime=enable_realtime,
     )
     warm_up_programs(programs, n, platform)
     warm_up_supervision(estimator, parts.supervisor, n)
     return parts
+
+
+def _look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
+    if platform is not None:
+        platform.distrust = distrust(robot.profile)
 
 
 def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:
@@ -133,6 +143,7 @@ def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any
         "programs": list(parts.programs),
         "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
         "platform": None if robot.platform is None else asdict(robot.platform),
+        "calibration": None if robot.calibration is None else robot.calibration.summary(),
         "notes": list(robot.notes),
     }
 
