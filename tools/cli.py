@@ -64,6 +64,9 @@ MODULES = {
     "bus.bus": {
         "bus": "Look at a CAN bus.",
     },
+    "calibrate": {
+        "calibrate": "Calibrate a robot's geometry, drums and elongation; take over, undo.",
+    },
     "cogging": {
         "cogging": "Cogging: sweep, fit, validate, report.",
     },

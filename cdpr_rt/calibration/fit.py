@@ -49,7 +49,8 @@ class Fit:
     def cost(self) -> float:
         """Sum of squared residuals, as far as the robust loss has them count."""
         n, squares = self.geometry.n, self.at.residual**2
-        return float(np.sum(squares[:, :n] * self.weights) + np.sum(squares[:, n:]))
+        weighted = float(np.sum(squares[:, :n] * self.weights))
+        return weighted + float(np.sum(squares[:, n:]))
 
     @property
     def std(self) -> FloatArray:
@@ -97,7 +98,7 @@ class _Search:
         self._cost = self._cost_of(self._at, geometry, self.jumps)
 
     def _prior(self, geometry: CableGeometry, jumps: FloatArray) -> FloatArray:
-        return np.append(geometry.values() - self._first, jumps) / self._known
+        return np.asarray(np.append(geometry.values() - self._first, jumps) / self._known)
 
     def _cost_of(self, at: Linearised, geometry: CableGeometry, jumps: FloatArray) -> float:
         squares = at.residual**2
