@@ -25,7 +25,7 @@ def draw(path: Path, outcome: Outcome) -> None:
             at, 1e3 * geometry.cable[:, place], width, yerr=2e3 * std[:, column], capsize=2,
             label="xyz"[place], color=(FORWARD, BACKWARD, "#8a8f98")[place],
         )  # fmt: skip
-    above.set(ylabel="exit point moved (mm, ± 2 sigma)", xlabel="cable")
+    above.set(ylabel="moved (mm, ± 2 sigma)", xlabel="cable")
     above.set_xticks(range(n), [str(i + 1) for i in range(n)])
     off_mm = 1e3 * found.length_residual_m * length_std_m(geometry, found.seen)
     poses = np.arange(1, found.seen.poses + 1)
@@ -37,6 +37,6 @@ def draw(path: Path, outcome: Outcome) -> None:
         label = f"cable {cable + 1} jumped by {1e3 * size:+.1f} mm"
         below.axvline(pose + 0.5, color=BACKWARD, lw=0.9, label=label)
     below.axhline(0.0, color="#777777", lw=0.8)
-    below.set(xlabel="pose", ylabel="length less than fitted (mm)")
+    below.set(xlabel="pose", ylabel="length off (mm)")
     legend_above(figure, above, below)
     figure.savefig(path, format="png")

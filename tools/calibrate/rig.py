@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -42,7 +41,7 @@ class ScannerTail:
 
     def count(self) -> int:
         """Return how many readings there are."""
-        return (os.path.getsize(self._path) - _HEADER_BYTES) // self._dtype.itemsize
+        return (self._path.stat().st_size - _HEADER_BYTES) // self._dtype.itemsize
 
     def since(self, first: int) -> tuple[FloatArray, FloatArray]:
         """Return positions (k, 3) and rotations (k, 3, 3) from a reading on."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +16,7 @@ from cdpr_profiles.calibration.in_force import undo as take_back
 from cdpr_rt.calibration.data import CalibrationData, load_data, load_points, with_points
 from cdpr_rt.calibration.outcome import Method, Outcome, calibrate, calibration_of
 from cdpr_rt.calibration.parameters import USUAL, CableGeometry
+from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.procedures.calibration.measure_poses import measure_poses, read_pose
 from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_rt.robots.checks import refuse_impossible
@@ -104,13 +106,12 @@ def run(
     if sum((redundancy, scanner, points is not None)) != 1:
         raise BadInputError("give one of --redundancy, --scanner and --points")
     refuse_impossible(profile)
-    geometry = _geometry(profile, identify)
+    _geometry(profile, identify)
     if points is not None:
         load_points(points)
     folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
     if (folder / _DATA).exists() and not overwrite:
         raise BadInputError(f"{folder / _DATA}: is there already; allowed: --overwrite")
-    del geometry
     with interrupted_by_sigterm():
         measured = _measure(out, profile, plant, scanner, poses, seed)
     measured.save(folder / _DATA)
@@ -134,6 +135,34 @@ def undo(robot: _Robot, as_json: JsonOption = False) -> None:
             f"({before.identity}) counts from the next start on"
         )
     out.result({"ok": True, "in_force": None if before is None else before.summary()})
+
+
+@app.command()
+def study(
+    robot: Annotated[
+        str, typer.Argument(help="A robot whose platform has six directions.", metavar="ROBOT")
+    ] = "spatial-8",
+    draws: Annotated[int, typer.Option(min=10, max=100_000, help="Trials of each case.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of poses and noise.")] = 1,
+    png: Annotated[Path | None, typer.Option("--png", help="Draw it into this file.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell how errors of measurement become errors of the geometry: by a model and by trial.
+
+    Table 3.1 and figures 3.7 and 3.8 of the thesis for a robot of ours, on all cores.
+    """
+    from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    with out.progress("cases", float(len(studies.cases()))) as advance:
+        rows = studies.study(robot, draws, seed, advance)
+    out.say(*studies.lines(rows))
+    if png is not None:
+        try:
+            studies.draw(png, rows)
+        except OSError as error:
+            raise BadInputError(f"--png {png}: cannot be written: {error.strerror}") from error
+    out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, "cases": rows})
 
 
 def _measure(
@@ -162,7 +191,7 @@ def _measure(
     )
 
 
-def _told(places, advance):  # type: ignore[no-untyped-def]
+def _told(places: Iterator[FloatArray], advance: Callable[[float], None]) -> Iterator[FloatArray]:
     for k, place in enumerate(places):
         advance(float(k))
         yield place

@@ -10,6 +10,7 @@ from cdpr_tools.bench import cycle as cycle_bench
 from cdpr_tools.bench import profile_loading
 from cdpr_tools.commands.bench import (
     bench_bus,
+    bench_calibration,
     bench_control,
     bench_kinematics,
     bench_latency,
@@ -34,6 +35,7 @@ _VARIANTS = {
 
 for _part in (
     bench_bus,
+    bench_calibration,
     bench_control,
     bench_kinematics,
     bench_latency,
