@@ -18,7 +18,8 @@ _OUTLIER, _JUMP = 25.0, 40.0
 """By how much leaving it out should lower the sum of squared residuals, to first order."""
 _LEAST_GAIN = 16.0
 """By how much it has to, over the variance of what is left (F-test)."""
-_MOST_FAULTS = 24
+_MOST_FAULTS = 16
+_ALIKE, _MAYBE = 0.8, 0.2
 _ENDS = 2
 """Poses at both ends where a jump cannot be told from an outlier."""
 _FAR = 3.0
@@ -36,12 +37,15 @@ class Fault:
     size: float
     """In m, of a drum and elongation relative."""
     text: str
+    alike: tuple[int, ...] = ()
+    """Other cables of which it might as well be, by lengths alone."""
 
     def told(self) -> dict[str, object]:
         """Return it for JSON, cables and poses counted from 1."""
         return {
             "kind": self.kind,
             "cable": self.cable + 1 or None,
+            "or_cables": [cable + 1 for cable in self.alike],
             "pose": self.pose + 1 or None,
             "size": self.size,
             "text": self.text,
@@ -75,7 +79,7 @@ def fit_without_faults(
     gains: list[float] = []
     left_out: list[Fault] = []
     while len(left_out) < _MOST_FAULTS and (fault := _worst(found)) is not None:
-        without = fit(geometry, replace(_without(found.seen, fault), start=found.poses))
+        fault, without = _left_out(geometry, found, fault)
         gains.append(found.cost - without.cost)
         left_out.append(fault)
         found = without
@@ -86,9 +90,27 @@ def fit_without_faults(
         kept = replace(seen, start=found.poses)
         for fault in sure:
             kept = _without(kept, fault)
-        found = fit(geometry, kept)
+        found = fit(geometry, kept, start=found.geometry)
     faults += [_with_size(fault, found) for fault in sure]
     return found, faults + _parameter_faults(found)
+
+
+def _left_out(geometry: CableGeometry, found: Fit, fault: Fault) -> tuple[Fault, Fit]:
+    """Return the fit without a fault; of a jump that cable's which then leaves least.
+
+    Poses can take much of a jump: which cable it is, shows only once they are fitted anew.
+    """
+    seen = replace(found.seen, start=found.poses)
+    cables = (fault.cable, *fault.alike) if fault.kind == "jump" else (fault.cable,)
+    tried = [replace(fault, cable=cable) for cable in cables]
+    fits = [fit(geometry, _without(seen, one), start=found.geometry) for one in tried]
+    costs = np.array([one.cost for one in fits])
+    best = int(costs.argmin())
+    if fault.kind != "jump":
+        return fault, fits[0]
+    near = costs < costs[best] + _LEAST_GAIN * max(fits[best].variance_factor, 1.0)
+    alike = tuple(cables[k] for k in np.flatnonzero(near) if k != best)
+    return replace(tried[best], alike=alike), fits[best]
 
 
 def _without(seen: Observations, fault: Fault) -> Observations:
@@ -105,7 +127,8 @@ def _with_size(fault: Fault, found: Fit) -> Fault:
         return fault
     size = float(found.jumps_m[found.seen.jumps.index((fault.cable, fault.pose))])
     text = (
-        f"cable {fault.cable + 1} is {1e3 * size:+.1f} mm off from pose {fault.pose + 1} on: "
+        f"{_cables(fault.cable, fault.alike)} is {1e3 * size:+.1f} mm off from pose "
+        f"{fault.pose + 1} on: "
         "its encoder, coupling or drum slipped between that pose and the one before"
     )
     return replace(fault, size=size, text=text)
@@ -121,23 +144,32 @@ def _worst(found: Fit) -> Fault | None:
         return None
     single = np.where(told, residual**2 / np.where(told, redundancy, 1.0), 0.0)
     j, i = np.unravel_index(int(single.argmax()), single.shape)
-    jump, cable, pose = 0.0, 0, 0
-    for c in range(n):
-        gains = _jump_gains(residual[:, c], hat[c], weight[:, c])
-        k = int(gains.argmax())
-        if gains[k] > jump:
-            jump, cable, pose = float(gains[k]), c, k
+    gains = np.array([_jump_gains(residual[:, c], hat[c], weight[:, c]) for c in range(n)])
+    cable, pose = (int(x) for x in np.unravel_index(int(gains.argmax()), gains.shape))
+    jump = float(gains[cable, pose])
     if jump > max(_JUMP, float(single[j, i])) and (cable, pose) not in seen.jumps:
-        return Fault("jump", cable, pose, 0.0, "")
+        return Fault("jump", cable, pose, 0.0, "", _alike(gains[:, pose], cable, _MAYBE))
     if single[j, i] < _OUTLIER:
         return None
     size = float(residual[j, i] / weight[j, i] / redundancy[j, i])
     what = "slack or caught somewhere" if size > 0.0 else "longer than it was paid out"
+    alike = _alike(single[j], int(i))
     text = (
-        f"cable {i + 1} at pose {j + 1} is {1e3 * size:+.1f} mm off what all others say: {what}; "
-        "its length there is left out"
+        f"{_cables(int(i), alike)} at pose {j + 1} is {1e3 * size:+.1f} mm off what all "
+        f"others say: {what}; its length there is left out"
     )
-    return Fault("outlier", int(i), int(j), size, text)
+    return Fault("outlier", int(i), int(j), size, text, alike)
+
+
+def _alike(gains: FloatArray, best: int, share: float = _ALIKE) -> tuple[int, ...]:
+    """Return the cables that explain it nearly as well as the best one."""
+    near = np.flatnonzero(gains > share * gains[best])
+    return tuple(int(cable) for cable in near if cable != best)
+
+
+def _cables(cable: int, alike: tuple[int, ...]) -> str:
+    others = ", ".join(str(other + 1) for other in alike)
+    return f"cable {cable + 1}" + (f" (or {others}: lengths alone do not tell)" if others else "")
 
 
 def _hats(found: Fit) -> tuple[FloatArray, list[FloatArray], FloatArray]:

@@ -63,17 +63,23 @@ class Fit:
         return self.at.residual[:, : self.geometry.n]
 
 
-def fit(geometry: CableGeometry, seen: Observations, robust: bool = True) -> Fit:
+def fit(
+    geometry: CableGeometry,
+    seen: Observations,
+    robust: bool = True,
+    start: CableGeometry | None = None,
+) -> Fit:
     """Return the geometry and poses that minimise the squared residuals of all observations.
 
     Levenberg and Marquardt; what is known of parameters before counts as observed, so that there
     always is one minimum and what no observation tells stays as the file has it. That fixes the
     gauge: without measured poses the frame is that in which the exit points, taken together, are
-    moved least. `robust` has Huber's loss on lengths. Raises InvalidRequestError for no poses.
+    moved least. `robust` has Huber's loss on lengths; `start` is where to begin, `geometry` itself
+    where left out. Raises InvalidRequestError for no poses.
     """
     if seen.poses == 0:
         raise InvalidRequestError("no poses; allowed: at least one")
-    search = _Search(geometry, seen, robust)
+    search = _Search(geometry, seen, robust, start or geometry)
     steps = 0
     while steps < _MOST_STEPS and not search.done:
         search.step()
@@ -84,9 +90,11 @@ def fit(geometry: CableGeometry, seen: Observations, robust: bool = True) -> Fit
 class _Search:
     """The state of the search."""
 
-    def __init__(self, geometry: CableGeometry, seen: Observations, robust: bool) -> None:
+    def __init__(
+        self, geometry: CableGeometry, seen: Observations, robust: bool, start: CableGeometry
+    ) -> None:
         self._seen, self._robust = seen, robust
-        self.geometry, self.poses = geometry, seen.start
+        self.geometry, self.poses = start, seen.start
         self.jumps = np.zeros(len(seen.jumps))
         self._first = geometry.values()
         known = np.append(geometry.known_std(), np.full(self.jumps.size, _JUMP_STD_m))
@@ -94,8 +102,8 @@ class _Search:
         self._damping = _DAMPING
         self.done = False
         self._weights = np.ones_like(seen.length_m)
-        self._at = linearise(geometry, seen, self.poses, self.jumps)
-        self._cost = self._cost_of(self._at, geometry, self.jumps)
+        self._at = linearise(start, seen, self.poses, self.jumps)
+        self._cost = self._cost_of(self._at, start, self.jumps)
 
     def _prior(self, geometry: CableGeometry, jumps: FloatArray) -> FloatArray:
         return np.asarray(np.append(geometry.values() - self._first, jumps) / self._known)

@@ -174,15 +174,22 @@ def _balance(
     by_angle = (by_place * turned).sum(axis=(1, 2)) - (t * (arm * u).sum(axis=-1)).sum(axis=1)
     by_angle -= weight_N * centre[:, 1]
     # a cable misses the middle by a share of its arm, and its tension is not known better
-    held = geometry.knowledge.tension_N * _MISSED * np.sqrt((arm**2).sum(axis=(1, 2)))
-    weight = seen.used.all(axis=1) / held
+    arms = geometry.model.kinematics.geometry[ANCHOR : ANCHOR + 2]
+    held = geometry.knowledge.tension_N * _MISSED * float(np.linalg.norm(arms))
+    weight = np.asarray(seen.used.all(axis=1) / held)
     out.residual[:, n] = weight * moment
     by_pose = {0: by_place[..., 0].sum(axis=1), 1: by_place[..., 1].sum(axis=1), 5: by_angle}
     for k, direction in enumerate(chosen):
         out.by_pose[:, n, k] = weight * by_pose[direction]
+    direct = t[..., None] * np.stack([u[..., 1], -u[..., 0]], axis=-1)
+    by_anchor = np.einsum("jab,jia->jib", Q, by_place + direct)
     for place, row in enumerate(geometry.rows):
+        columns = slice(place, n * q, q)
         if row < 2:
-            out.by_parameter[:, n, place : n * q : q] = -weight[:, None] * by_place[..., row]
+            out.by_parameter[:, n, columns] = -weight[:, None] * by_place[..., row]
+        elif row - ANCHORS.start in (0, 1):
+            by_this = by_anchor[..., row - ANCHORS.start]
+            out.by_parameter[:, n, columns] = weight[:, None] * by_this
 
 
 def _measured_poses(
