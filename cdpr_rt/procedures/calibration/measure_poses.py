@@ -14,7 +14,7 @@ from cdpr_rt.errors import TripError
 
 LOOK_S, SETTLE_S = 0.5, 1.0
 """How long a reading is the mean of, and how long the platform stands before."""
-_STILL_m = 5e-5
+_STILL_m = 1.5e-4
 """Change of a length within a reading beyond which the platform does not stand still."""
 _MOST_LOOKS = 10
 _MOST_FAILURES = 5
