@@ -17,7 +17,7 @@ from cdpr_rt.calibration.data import CalibrationData, load_data, load_points, wi
 from cdpr_rt.calibration.outcome import Method, Outcome, calibrate, calibration_of
 from cdpr_rt.calibration.parameters import USUAL, CableGeometry
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.procedures.calibration.measure_poses import measure_poses, read_pose
+from cdpr_rt.procedures.calibration.measure_poses import Measured, measure_poses, read_pose
 from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_tools.commands.options import JsonOption, OverwriteOption
@@ -46,7 +46,7 @@ _Identify = Annotated[
     ),
 ]
 _DryRun = Annotated[bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")]
-_DATA, _RESULT, _PICTURE = "data.json", "geometry.calibration", "calibration.png"
+_DATA, _PICTURE = "data.json", "calibration.png"
 
 
 @app.callback()
@@ -113,8 +113,7 @@ def run(
     if (folder / _DATA).exists() and not overwrite:
         raise BadInputError(f"{folder / _DATA}: is there already; allowed: --overwrite")
     with interrupted_by_sigterm():
-        measured = _measure(out, profile, plant, scanner, poses, seed)
-    measured.save(folder / _DATA)
+        measured = _measure(out, profile, plant, scanner, poses, seed, folder / _DATA)
     _finish(out, profile, measured, points, identify, folder, dry_run)
 
 
@@ -166,34 +165,43 @@ def study(
 
 
 def _measure(
-    out: Output, robot: Robot, plant: Path | None, scanner: bool, poses: int, seed: int
+    out: Output, robot: Robot, plant: Path | None, scanner: bool, poses: int, seed: int, path: Path
 ) -> CalibrationData:
-    """Return the readings of a robot on a simulator of its own."""
+    """Return the readings of a robot on a simulator of its own; they are kept whatever ends it."""
     from cdpr_tools.calibrate.rig import simulated_rig  # noqa: PLC0415  # slow to load
 
     out.note(f"{robot.profile}: starting the simulated robot ...")
-    with (
-        out.progress("poses", float(poses)) as advance,
-        simulated_rig(
-            str(robot.path), plant=plant, scanner=scanner, advance=lambda _: None
-        ) as operator,
-    ):
-        home = read_pose(operator, operator.tighten())
-        places = operator.random_places(seed)
-        readings, refused = measure_poses(operator, _told(places, advance), poses - 1, out)
-    date = datetime.now(UTC).isoformat(timespec="seconds")
-    return CalibrationData(
-        robot=robot.profile,
-        robot_sha256=file_sha256(robot.path),
-        date=date,
-        left_out=tuple(refused),
-        poses=(home, *readings),
-    )
+    measured = Measured()
+    try:
+        with (
+            out.progress("poses", float(poses)) as advance,
+            simulated_rig(
+                str(robot.path), plant=plant, scanner=scanner, advance=lambda _: None
+            ) as operator,
+        ):
+            measured.readings.append(read_pose(operator, operator.tighten()))
+            places = _told(operator.random_places(seed), measured, advance)
+            measure_poses(operator, places, poses, measured, out)
+    finally:
+        data = CalibrationData(
+            robot=robot.profile,
+            robot_sha256=file_sha256(robot.path),
+            date=datetime.now(UTC).isoformat(timespec="seconds"),
+            left_out=tuple(measured.refused),
+            poses=tuple(measured.readings),
+        )
+        if measured.readings:
+            data.save(path)
+            if len(measured.readings) < poses:
+                out.note(f"{len(measured.readings)} of {poses} poses are kept: {path}")
+    return data
 
 
-def _told(places: Iterator[FloatArray], advance: Callable[[float], None]) -> Iterator[FloatArray]:
-    for k, place in enumerate(places):
-        advance(float(k))
+def _told(
+    places: Iterator[FloatArray], measured: Measured, advance: Callable[[float], None]
+) -> Iterator[FloatArray]:
+    for place in places:
+        advance(float(len(measured.readings)))
         yield place
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -75,16 +75,27 @@ def read_pose(operator: PlatformOperator, target: FloatArray) -> PoseReading:
     )
 
 
-def measure_poses(
-    operator: PlatformOperator, places: Iterable[FloatArray], count: int, notifier: PoseNotifier
-) -> tuple[list[PoseReading], list[str]]:
-    """Go to places (d,) until `count` of them are read; return readings, and what was refused.
+@dataclass
+class Measured:
+    """What a procedure has read so far; it is kept whatever ends it."""
 
-    Ends sooner where there are no more places. Raises TripError where the motion is ended, or
-    where five places in turn do not come to rest.
+    readings: list[PoseReading] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    """Places that were not read, and why."""
+
+
+def measure_poses(
+    operator: PlatformOperator,
+    places: Iterable[FloatArray],
+    count: int,
+    measured: Measured,
+    notifier: PoseNotifier,
+) -> None:
+    """Go to places (d,) until there are `count` readings in `measured`, or no more places.
+
+    Raises TripError where the motion is ended, or where five places in turn do not come to rest.
     """
-    readings: list[PoseReading] = []
-    refused: list[str] = []
+    readings, refused = measured.readings, measured.refused
     failures = 0
     for place in places:
         if len(readings) >= count:
@@ -103,7 +114,6 @@ def measure_poses(
             notifier.note(f"pose left out: {error}")
             if failures >= _MOST_FAILURES:
                 raise TripError(f"{failures} poses in turn: {error}") from None
-    return readings, refused
 
 
 def _reading(look: Look, target: FloatArray) -> PoseReading:
