@@ -28,7 +28,7 @@ def calibration(
     told = bench.measure(poses, repeats, out)
     verdict = "reached" if told["reached"] else "MISSED"
     out.say(
-        f"{poses} poses x 8 cables, exit points and offsets:",
+        f"{poses} poses x 8 cables, exit points and offsets, processor time:",
         *(
             f"  {text:34}{told[name]['ms']:10.1f} ms, exit points {told[name]['off_mm']:.2f} mm off"
             for name, text in (
