@@ -52,6 +52,7 @@ def main() -> int:
     block.counters["service_pid"] = os.getpid()
     service = Service(block, settings.name)
     service.background.append(bounded.watch)
+    service.end_daemon = partial(os.kill, settings.launcher_pid or os.getpid(), signal.SIGTERM)
     try:
         asyncio.run(_serve(settings, service))
     except (ControlError, CommandError) as error:
