@@ -66,7 +66,8 @@ def interrupted_by_sigterm() -> Iterator[None]:
 def stop_on_signals(told: str = "") -> Iterator[StopRequest]:
     """Yield what tells whether the user wants an end; asked a second time it is an interrupt.
 
-    `told` is said at the first request. After a Ctrl-C in the block further ones change nothing: the command ends already.
+    `told` is said at the first request. After a Ctrl-C in the block further ones change nothing:
+    the command ends already.
     """
     wanted = StopRequest(told)
     numbers = (signal.SIGINT, signal.SIGTERM)

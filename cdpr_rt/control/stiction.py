@@ -68,7 +68,7 @@ def step_integral(
     if abs(position - state[_MEAN]) > _MOVES_RAD:
         state[_STANDS_S] = 0.0
         back, state[_PUSHED_Nm] = _GIVEN_BACK * state[_PUSHED_Nm], 0.0
-        return usual - back
+        return float(usual - back)
     state[_STANDS_S] += period
     if state[_STANDS_S] < _WAIT_S or abs(kp * error + integral) > _MOST_OF_LIMIT * limit:
         return usual
@@ -78,4 +78,4 @@ def step_integral(
     state[_SIDE] = side
     more = max(ki, state[_SHARE] * kp / _PUSH_S) * period * error
     state[_PUSHED_Nm] += more
-    return integral + more
+    return float(integral + more)

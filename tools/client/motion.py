@@ -8,7 +8,14 @@ from collections.abc import Callable
 from typing import Any
 
 from cdpr_tools.client.client import Daemon, HeldRight
-from cdpr_tools.client.status_text import in_millimetres, platform_text, stage_text, tightness_text
+from cdpr_tools.client.status_text import (
+    in_millimetres,
+    place_text,
+    platform_text,
+    stage_text,
+    target_text,
+    tightness_text,
+)
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 
@@ -76,7 +83,7 @@ class Told:
         """Take in the progress of a program."""
         if self._out is None:
             return
-        stage = stage_text(program, progress)
+        stage = stage_text(program, progress) or target_text(progress)
         if stage and stage != self._stage:
             self._out.note(f"{stage} ...")
             self._next_s = time.monotonic() + TELL_S
@@ -84,11 +91,20 @@ class Told:
         if held_back and not self._held_back:
             self._out.note(held_back)
         self._stage, self._held_back = stage, held_back
-        done = progress.get("done")
-        if not is_done(progress) and done and time.monotonic() >= self._next_s:
-            leg = f"leg {progress['leg']} of {progress['legs']}, " if "legs" in progress else ""
-            self._out.note(f"{leg}{100.0 * done:.0f} %")
+        if not is_done(progress) and time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + TELL_S
+            if text := _so_far(progress):
+                self._out.note(text)
+
+
+def _so_far(progress: dict[str, Any]) -> str:
+    """Return how far a motion has come: where the platform is, else the share that is done."""
+    if place := place_text(progress):
+        return place
+    if not (done := progress.get("done")):
+        return ""
+    leg = f"leg {progress['leg']} of {progress['legs']}, " if "legs" in progress else ""
+    return f"{leg}{100.0 * done:.0f} %"
 
 
 def _at_rest(axis: dict[str, Any]) -> bool:
@@ -109,8 +125,8 @@ def finish(
 ) -> None:
     """Say where the platform or the axes are once they have settled, or have not for a while.
 
-    `ended` is the progress of what came to its end, `where` the words for that. Raises WorkFailedError where the user has
-    stopped it, or a fault has ended it or is about to.
+    `ended` is the progress of what came to its end, `where` the words for that. Raises
+    WorkFailedError where the user has stopped it, or a fault has ended it or is about to.
     """
     deadline = time.monotonic() + _SETTLE_S
     status = daemon.get("/status")

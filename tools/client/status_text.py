@@ -79,20 +79,36 @@ def _lines(status: dict[str, Any]) -> list[Text]:
 def platform_text(status: dict[str, Any]) -> str:
     """Return where the platform is and what is in its way, an empty text of robots without."""
     progress = status.get("program_progress") or {}
-    words = []
-    for place, turn, word in (
-        ("position_m", "rotation_rad", "platform at"),
-        ("target_m", "target_rotation_rad", "target"),
-    ):
-        if progress.get(place):
-            words.append(f"{word} {_listed(progress[place], 1e3, 1)} mm")
-        if progress.get(turn):
-            words[-1] += f", turned by {_listed(progress[turn], math.degrees(1.0), 2)} deg"
+    target = _place(progress, "target_")
+    words = [text for text in (place_text(progress), target and f"target {target}") if text]
     if stage := stage_text(status.get("program", ""), progress):
         words.append(stage)
     found = (progress.get(key) for key in ("missing", "held_back", "trouble"))
     words += [in_millimetres(text) for text in found if text]
     return "; ".join(words)
+
+
+def place_text(progress: dict[str, Any]) -> str:
+    """Return where the platform is, an empty text where that is not known."""
+    place = _place(progress)
+    return place and f"platform at {place}"
+
+
+def target_text(progress: dict[str, Any]) -> str:
+    """Return where the platform or the axes go, an empty text where nowhere."""
+    target = _place(progress, "target_")
+    if not target and progress.get("target_rad"):
+        target = f"{_listed(progress['target_rad'], math.degrees(1.0), 1)} deg"
+    return target and f"moving to {target}"
+
+
+def _place(progress: dict[str, Any], of: str = "") -> str:
+    """Return a place and the rotation there in mm and deg, an empty text where there is none."""
+    place, turned = progress.get(f"{of or 'position_'}m"), progress.get(f"{of}rotation_rad")
+    text = f"{_listed(place, 1e3, 1)} mm" if place else ""
+    if text and turned:
+        text += f", turned by {_listed(turned, math.degrees(1.0), 2)} deg"
+    return text
 
 
 def stage_text(program: str, progress: dict[str, Any]) -> str:

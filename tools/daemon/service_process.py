@@ -74,7 +74,9 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     block, lease = service.block, service.lease
     if settings.record is not None:
         ended = partial(service.note_failure, Recorder.name)
-        recorder = Recorder(block, settings.record, settings.name, ended=ended)
+        recorder = Recorder(
+            block, settings.record, settings.name, ended=ended, retention=settings.keep
+        )
         service.events.listeners.append(partial(_note, recorder))
         parts.append(recorder)
     if settings.live is not None:
