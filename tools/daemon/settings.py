@@ -14,8 +14,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import open_regular
-from cdpr_rt.service.recordings.retention import Retention
 from cdpr_rt.service.listening import ListenError, listen_tcp
+from cdpr_rt.service.recordings.retention import Retention
 from cdpr_rt.service.streams.setpoint_stream import StreamError, listen_udp
 from cdpr_tools.errors import BadInputError, WorkFailedError
 

@@ -232,9 +232,7 @@ def settings_for(
 def _kept(record: Path | None, days: float | None, gb: float | None) -> Retention:
     """Return which recordings are kept: all in a folder of the user's own, unless he says."""
     usual_days, usual_gb = (_KEPT_DAYS, _KEPT_GB) if record is None else (math.inf, math.inf)
-    return Retention(
-        usual_days if days is None else days, 1e9 * (usual_gb if gb is None else gb)
-    )
+    return Retention(usual_days if days is None else days, 1e9 * (usual_gb if gb is None else gb))
 
 
 def _recording_text(robot: Robot, settings: RunSettings) -> str:
