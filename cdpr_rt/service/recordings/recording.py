@@ -41,7 +41,8 @@ class Recorder:
     """Writes rows, status, description and events of a block into MCAP files in `folder`.
 
     A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, the next file begins where one
-    has `most_bytes`. Before each, what `retention` does not keep is removed. A disk that takes no more, or has less than `reserve_bytes` left (without:
+    has `most_bytes`. Before each, what `retention` does not keep is removed.
+    A disk that takes no more, or has less than `reserve_bytes` left (without:
     64 MB, or a twentieth of a small disk), ends the recording for good: `told` says why, `ended` is
     called with it, and nobody else is concerned.
     A recorder that follows on another one of the same block goes on at the first row that was not
