@@ -171,7 +171,8 @@ def next_words(results: Mapping[str, Any]) -> list[str]:
     folder, winch = results["files"]["report"].rpartition("/")[0] or ".", results["winch"]
     words = [
         f"To run the motor compensated: cdpr run {winch} --commissioned {folder}, or "
-        "`commissioned` under [[axes]] in the file of its robot. Its loops are tuned by the same margins.",
+        "`commissioned` under [[axes]] in the file of its robot. Its loops are tuned by the same "
+        "margins.",
         "Commission it again after a change of motor, drive or encoder, and when the error grows: "
         "friction ages, cogging does not.",
     ]
