@@ -163,7 +163,7 @@ def jog(
     fastest = 0.1 * math.degrees(winch.profile.motor.rated_speed_rad_s)
     if not 0.0 < abs(speed_deg_s) <= fastest:
         raise BadInputError(
-            f"--speed-deg-s {speed_deg_s:g}: allowed are up to {fastest:.0f} deg/s, not 0"
+            f"--speed-deg-s {speed_deg_s:g}: allowed: up to {fastest:.0f} deg/s, not 0"
         )
     speed = math.radians(speed_deg_s)
     tolerance = Tolerance(_JOG_ERROR_RAD, max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S))
