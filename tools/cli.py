@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer import BadParameter
+from typing_extensions import override
 
 from cdpr_drivers.errors import ConfigurationError, DriverError
 from cdpr_profiles.errors import ProfileError
@@ -101,8 +104,31 @@ MODULES = {
 _INTERRUPTED = 130
 _BAD_INPUTS = (ProfileError, BusSetupError, ConfigurationError, InvalidRequestError)
 
+_WORDS = (
+    (r"Input should be less than or equal to (\S+)", r"allowed: up to \1"),
+    (r"Input should be greater than or equal to (\S+)", r"allowed: \1 or more"),
+    (r"Input should be a valid integer.*", "allowed: a whole number"),
+    (r"Input should be a valid number.*", "allowed: a number"),
+    (r"Value error, (.*) is not one of (.*)\.", r"\1; allowed: \2"),
+)
+"""What the library says of a value that is not allowed, and how it is said here."""
+
+
+class _Commands(group_of(MODULES)):  # type: ignore[misc]
+    """All commands; what is wrong with their arguments is told as everything else is."""
+
+    @override
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BadParameter as error:
+            for pattern, words in _WORDS:
+                error.message = re.sub(pattern, words, error.message)
+            raise
+
+
 app = typer.Typer(
-    cls=group_of(MODULES),
+    cls=_Commands,
     name="cdpr",
     help="Commission, run and simulate the winches of cable-driven parallel robots.",
     no_args_is_help=True,
