@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import diags_array
 
+from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray
 from cdpr_rt.calibration.markers.observations import Observations
 from cdpr_rt.calibration.markers.reprojection import (
     LENS_PARAMETERS,
@@ -20,7 +21,6 @@ from cdpr_rt.calibration.markers.reprojection import (
     residuals,
     residuals_and_jacobian,
 )
-from cdpr_rt.calibration.markers.rotations import FloatArray, IntArray
 from cdpr_rt.errors import ControlError
 
 _STEPS = 60

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray, angles
+from cdpr_rt.calibration.markers.geometry.square_pose import SquarePoses
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
 from cdpr_rt.calibration.markers.observations import Observations
-from cdpr_rt.calibration.markers.rotations import FloatArray, IntArray, angles
-from cdpr_rt.calibration.markers.square_pose import SquarePoses
 
 _MOST_IMAGES = 24
 """Of a pair of markers, so many are compared."""
@@ -36,7 +36,13 @@ class Pair:
     rotation: FloatArray
     position_m: FloatArray
     images: int
-    error: float
+    of: int
+    """How many show both."""
+
+    @property
+    def cost(self) -> float:
+        """What a step along it costs: little where many images agree, and few do not."""
+        return _EDGE_COST + (self.of / self.images) ** 2 / self.images
 
 
 def marker_pairs(seen: Observations, poses: SquarePoses) -> list[Pair]:
@@ -73,7 +79,7 @@ def _consent(a: int, b: int, rows: IntArray, poses: SquarePoses) -> Pair:
     best = int(np.argmax(worth))
     with_it = np.flatnonzero(agrees[best])
     left, _, right = np.linalg.svd(R[with_it].sum(axis=0))
-    return Pair(a, b, left @ right, t[with_it].mean(axis=0), int(votes[best]), float(error[best]))
+    return Pair(a, b, left @ right, t[with_it].mean(axis=0), int(votes[best]), len(rows))
 
 
 def placed_along_tree(pairs: list[Pair], count: int, start: int) -> tuple[FloatArray, FloatArray]:
@@ -88,7 +94,7 @@ def placed_along_tree(pairs: list[Pair], count: int, start: int) -> tuple[FloatA
         return position, rotation
     graph: Any = csr_array(
         (
-            [_EDGE_COST + 1.0 / one.images for one in pairs],
+            [one.cost for one in pairs],
             ([one.a for one in pairs], [one.b for one in pairs]),
         ),
         shape=(count, count),
@@ -144,10 +150,23 @@ def located_cameras(
     return places, turns
 
 
-def first_map(seen: Observations, poses: SquarePoses, reference: int) -> MarkerMap:
-    """Return a map of all that hangs together with the marker `reference`, an id."""
+def most_agreed(pairs: list[Pair], seen: Observations) -> int:
+    """Return the id of the marker that most images place alike against the others."""
+    votes = np.zeros(len(seen.ids))
+    for pair in pairs:
+        votes[[pair.a, pair.b]] += 2.0 * pair.images - pair.of
+    return seen.ids[int(votes.argmax())]
+
+
+def first_map(seen: Observations, poses: SquarePoses, reference: int | None = None) -> MarkerMap:
+    """Return a map of all that hangs together with the marker `reference`, an id.
+
+    Where left out it is the one that the images agree on most.
+    """
+    pairs = marker_pairs(seen, poses)
+    reference = most_agreed(pairs, seen) if reference is None else reference
     start = seen.ids.index(reference)
-    position, rotation = placed_along_tree(marker_pairs(seen, poses), len(seen.ids), start)
+    position, rotation = placed_along_tree(pairs, len(seen.ids), start)
     places, turns = located_cameras(seen, poses, position, rotation)
     return MarkerMap(
         seen.ids, reference, seen.size_m, position, rotation, seen.names, places, turns

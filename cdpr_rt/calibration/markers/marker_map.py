@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, logarithms
 from cdpr_rt.calibration.markers.observations import CORNERS
-from cdpr_rt.calibration.markers.rotations import FloatArray, logarithms
 from cdpr_rt.errors import InvalidRequestError
 
 

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from cdpr_rt.calibration.markers.rotations import FloatArray, IntArray
+from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray
 from cdpr_rt.errors import InvalidRequestError
 
 CORNERS = np.array([(-0.5, 0.5, 0.0), (0.5, 0.5, 0.0), (0.5, -0.5, 0.0), (-0.5, -0.5, 0.0)])

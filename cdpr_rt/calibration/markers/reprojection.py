@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from cdpr_rt.calibration.markers.lens import project, project_with_derivatives
+from cdpr_rt.calibration.markers.geometry.lens import project, project_with_derivatives
+from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, cross_matrices, exponentials
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
 from cdpr_rt.calibration.markers.observations import Observations
-from cdpr_rt.calibration.markers.rotations import FloatArray, cross_matrices, exponentials
 
 LENS_PARAMETERS = 9
 _NEAR_m = 1e-3

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.calibration.markers.lens import directions
+from cdpr_rt.calibration.markers.geometry.lens import directions
+from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, cross_matrices, exponentials
 from cdpr_rt.calibration.markers.observations import Observations
-from cdpr_rt.calibration.markers.rotations import FloatArray, cross_matrices, exponentials
 
 _STEPS = 8
 _DAMPING = 1e-9
