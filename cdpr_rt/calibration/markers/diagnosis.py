@@ -58,13 +58,18 @@ class LensSuspicion:
 def suspects(bundle: Bundle, seen: Observations) -> list[Suspect]:
     """Return the markers of which many images do not agree with the map."""
     limit = max(_BAD_SIGMAS * bundle.sigma_px, _LEAST_BAD_px)
-    off = np.sqrt(np.nanmean(bundle.off_px**2, axis=1, where=np.isfinite(bundle.off_px)))
+    off = _off(bundle.off_px)
     found = []
     for number, marker in enumerate(bundle.estimate.map.ids):
         rows = np.flatnonzero((seen.marker == number) & np.isfinite(bundle.off_px[:, 0]))
         if len(rows) and (off[rows] > limit).mean() > _BAD_SHARE:
             found.append(_judged(marker, rows, bundle, seen, limit))
     return found
+
+
+def _off(corners_px: FloatArray) -> FloatArray:
+    """Return by how much three of a marker's corners are off at least: one may be hidden."""
+    return np.asarray(np.sort(corners_px, axis=-1)[..., 1])
 
 
 def _judged(
@@ -85,7 +90,7 @@ def _judged(
             "it printed at another scale?",
         )
     split, apart = _two_places(place)
-    if apart < 4.0 * max(scale, 1e-6) or min(split.sum(), (~split).sum()) == 0:
+    if apart < 4.0 * max(scale, _looseness(place, split)):
         return Suspect(
             marker,
             "bad",
@@ -141,6 +146,13 @@ def _two_places(place: FloatArray) -> tuple[np.ndarray[tuple[int], np.dtype[np.b
     return group, float(np.linalg.norm(first - second))
 
 
+def _looseness(place: FloatArray, split: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
+    """Return how far the places of two groups typically are from their middles, m."""
+    groups = [one for one in (place[split], place[~split]) if len(one)]
+    off = [np.linalg.norm(one - np.median(one, axis=0), axis=1) for one in groups]
+    return float(np.median(np.concatenate(off)))
+
+
 def _best_cut(split: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, int]:
     """Return where to cut a row of two kinds, and how many stand on the wrong side then."""
     cuts = range(1, len(split))
@@ -185,7 +197,7 @@ def _fits_with(
         step[start : start + 6] = np.linalg.lstsq(by_pose, -off, rcond=None)[0]
         estimate = estimate.changed(step)
     off, _ = residuals_and_jacobian(estimate, own)
-    distance = np.sqrt((off.reshape(-1, 8) ** 2).sum(axis=1) / 4.0)
+    distance = _off(np.linalg.norm(off.reshape(-1, 4, 2), axis=2))
     return bool((distance > limit).mean() < _BAD_SHARE)
 
 

@@ -270,7 +270,8 @@ def verdict(fit: MapFit) -> str:
     typical = float(np.sqrt((free**2).mean())) if free.size else 0.0
     without = f", without {listed([one.marker for one in fit.dropped])}" if fit.dropped else ""
     return (
-        f"{how}{without}: {int(fit.map.placed.sum())} markers from {int(fit.map.located.sum())} images, "
-        f"corners fit to {rms:.3f} px; places are known to {typical:.2f} mm (1 sigma), worst "
-        f"marker {ids[worst]} to {sigma[worst]:.2f} mm"
+        f"{how}{without}: {int(fit.map.placed.sum())} markers from "
+        f"{int(fit.map.located.sum())} images, corners fit to "
+        f"{rms:.3f} px; places are known to {typical:.2f} mm (1 sigma), worst marker "
+        f"{ids[worst]} to {sigma[worst]:.2f} mm"
     )
