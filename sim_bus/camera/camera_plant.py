@@ -125,9 +125,9 @@ class BoardPlant(Profile):
     """A ChArUco board for intrinsics, before a camera that has no robot."""
 
     columns: Annotated[int, Field(ge=3, le=40)] = 9
-    rows: Annotated[int, Field(ge=3, le=40)] = 7
-    square_m: _Size_m = 0.03
-    marker_m: _Size_m = 0.022
+    rows: Annotated[int, Field(ge=3, le=40)] = 6
+    square_m: _Size_m = 0.028
+    marker_m: _Size_m = 0.02
     dictionary: str = "5X5_100"
     position_m: Vector = (0.0, 0.0, 0.0)
     rotation_deg: Turn = (0.0, 0.0, 0.0)

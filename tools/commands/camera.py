@@ -75,8 +75,8 @@ def calibrate(
     target: Annotated[Path, typer.Option("--out", help="File for the intrinsics.")],
     columns: Annotated[int, typer.Option(min=3, max=40, help="Squares of the board.")] = 9,
     rows: Annotated[int, typer.Option(min=3, max=40, help="Squares of the board.")] = 6,
-    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="As measured.")] = 30.0,
-    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="As measured.")] = 22.0,
+    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="As measured.")] = 28.0,
+    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="As measured.")] = 20.0,
     dictionary: Annotated[str, typer.Option(help="Set of the board's markers.")] = "5X5_100",
     count: Annotated[
         int, typer.Option(min=5, max=500, help="Images to take with a camera, one a second.")

@@ -27,7 +27,7 @@ def draw_map(fit: MapFit, path: Path) -> None:
     placed = map_.placed
     sigma_mm = 1e3 * fit.bundle.marker_sigma_m
     corners = map_.corners_m()[placed][..., :2]
-    shades = PolyCollection(list(corners), cmap="YlGnBu_r", edgecolors="#222222", linewidths=0.6)
+    shades = PolyCollection(list(corners), cmap="YlOrBr", edgecolors="#222222", linewidths=0.6)
     shades.set_array(np.linalg.norm(sigma_mm[placed], axis=1))
     top.add_collection(shades)
     for marker, position in zip(np.array(map_.ids)[placed], map_.position_m[placed], strict=True):

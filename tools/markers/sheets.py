@@ -33,13 +33,8 @@ _BAR_mm = 100.0
 _INCH_mm = 25.4
 
 
-def write_marker_sheets(
-    path: Path, sheets: MarkerSheets, ids: Sequence[int], page: str, offset_mm: float = 0.0
-) -> None:
-    """Write a PDF with a page for each id; raises BadInputError where one does not fit, OSError.
-
-    `offset_mm` moves the marker upward on its page.
-    """
+def write_marker_sheets(path: Path, sheets: MarkerSheets, ids: Sequence[int], page: str) -> None:
+    """Write a PDF with a page for each id; raises BadInputError where one does not fit, OSError."""
     dictionary: Any = _dictionary(sheets.dictionary)
     count = len(dictionary.bytesList)
     squares = dictionary.markerSize + 2
@@ -51,26 +46,41 @@ def write_marker_sheets(
         _require_fit(1e3 * sheets.size_of(marker), squares, page)
     with PdfPages(path) as pdf:
         for marker in ids:
-            size_mm = 1e3 * sheets.size_of(marker)
-            bits = cv2.aruco.generateImageMarker(dictionary, marker, squares)
-            figure, ax = _page(page)
-            width, height = PAGES_mm[page]
-            left, low = 0.5 * (width - size_mm), 0.5 * (height - size_mm) + _TEXT_mm / 2.0
-            _draw_bits(ax, bits, left, low + offset_mm, size_mm)
-            _draw_bar(ax, width, low - size_mm / squares - 4.0)
-            ax.text(
-                width / 2.0,
-                low - size_mm / squares - 15.0,
-                f"{sheets.dictionary}  id {marker}  {size_mm:g} mm over the black square   "
-                "\N{UPWARDS ARROW} top",
-                ha="center",
-                fontsize=10,
-            )
-            pdf.savefig(figure)
+            pdf.savefig(marker_page(sheets, marker, page))
+
+
+def marker_page(sheets: MarkerSheets, marker: int, page: str) -> Figure:
+    """Return the page of one marker."""
+    dictionary = _dictionary(sheets.dictionary)
+    squares = dictionary.markerSize + 2
+    size_mm = 1e3 * sheets.size_of(marker)
+    bits = cv2.aruco.generateImageMarker(dictionary, marker, squares)
+    figure, ax = _page(page)
+    width, height = PAGES_mm[page]
+    left, low = 0.5 * (width - size_mm), 0.5 * (height - size_mm + _TEXT_mm)
+    under = low - size_mm / squares
+    _draw_bits(ax, bits, left, low, size_mm)
+    _draw_bar(ax, width, under - 4.0)
+    ax.text(
+        width / 2.0,
+        under - 15.0,
+        f"{sheets.dictionary}  id {marker}  {size_mm:g} mm over the black square   "
+        "\N{UPWARDS ARROW} top",
+        ha="center",
+        fontsize=10,
+    )
+    return figure
 
 
 def write_board_sheet(path: Path, board: Board, page: str) -> None:
     """Write a PDF with a ChArUco board; raises BadInputError where it does not fit, OSError."""
+    figure = board_page(board, page)
+    with PdfPages(path) as pdf:
+        pdf.savefig(figure)
+
+
+def board_page(board: Board, page: str) -> Figure:
+    """Return the page of a ChArUco board; raises BadInputError where it does not fit."""
     width, height = PAGES_mm[page]
     wide, high = 1e3 * board.square_m * board.columns, 1e3 * board.square_m * board.rows
     turned = wide > high and height > width
@@ -91,7 +101,7 @@ def write_board_sheet(path: Path, board: Board, page: str) -> None:
     for i in range(board.rows):
         for j in range(board.columns):
             if (j, i) not in taken:
-                ax.add_patch(_black(left + j * square, top - (i + 1) * square, square, square))
+                ax.add_patch(_filled(left + j * square, top - (i + 1) * square, square, square))
     size = 1e3 * board.marker_m
     for marker, (x, y) in zip(ids, corners, strict=True):
         bits = cv2.aruco.generateImageMarker(dictionary, int(marker), dictionary.markerSize + 2)
@@ -105,8 +115,7 @@ def write_board_sheet(path: Path, board: Board, page: str) -> None:
         ha="center",
         fontsize=9,
     )
-    with PdfPages(path) as pdf:
-        pdf.savefig(figure)
+    return figure
 
 
 def _dictionary(name: str) -> Any:
@@ -135,22 +144,20 @@ def _page(page: str, turned: bool = False) -> tuple[Figure, Axes]:
     return figure, ax
 
 
-def _black(x: float, y: float, width: float, height: float) -> Rectangle:
-    return Rectangle((x, y), width, height, facecolor="black", edgecolor="none", linewidth=0.0)
+def _filled(x: float, y: float, width: float, height: float, colour: str = "black") -> Rectangle:
+    """Return a rectangle that is exactly so large: not moved to some pixel grid."""
+    return Rectangle(
+        (x, y), width, height, facecolor=colour, edgecolor="none", linewidth=0.0, snap=False
+    )
 
 
 def _draw_bits(ax: Axes, bits: Any, left: float, low: float, size_mm: float) -> None:
-    """Draw a marker: each black part of a row as one rectangle, which overlaps the next row's."""
+    """Draw a marker: a black square, and white ones on it."""
     n = len(bits)
     one = size_mm / n
-    for i, row in enumerate(bits):
-        for j in range(n):
-            if row[j] == 0:
-                # black under black hides the seams that viewers draw between neighbours
-                wider = 0.02 * one if j + 1 < n and row[j + 1] == 0 else 0.0
-                higher = 0.02 * one if i > 0 and bits[i - 1][j] == 0 else 0.0
-                y = low + (n - 1 - i) * one
-                ax.add_patch(_black(left + j * one, y, one + wider, one + higher))
+    ax.add_patch(_filled(left, low, size_mm, size_mm))
+    for i, j in np.argwhere(bits):
+        ax.add_patch(_filled(left + j * one, low + (n - 1 - i) * one, one, one, "white"))
 
 
 def _draw_bar(ax: Axes, width: float, y: float) -> None:
@@ -159,7 +166,15 @@ def _draw_bar(ax: Axes, width: float, y: float) -> None:
     for k in range(10):
         face = "black" if k % 2 == 0 else "white"
         ax.add_patch(
-            Rectangle((start + 10.0 * k, y), 10.0, 2.0, facecolor=face, edgecolor="black", lw=0.3)
+            Rectangle(
+                (start + 10.0 * k, y),
+                10.0,
+                2.0,
+                facecolor=face,
+                edgecolor="black",
+                lw=0.3,
+                snap=False,
+            )
         )
     ax.text(
         start + _BAR_mm / 2.0,

@@ -21,7 +21,8 @@ _ENOUGH_CELLS = 0.8
 _TILT_deg, _TILTED_VIEWS = 25.0, 5
 _DISTANCE_RATIO = 1.5
 _BAD_VIEW = 3.0
-"""Root mean square of a view over the median of all, from which on it is left out."""
+"""Root mean square of a view over the median of all, from which on it is left out
+where it is above _GOOD_rms_px as well."""
 _GOOD_FOCAL_SIGMA = 1e-3
 _GOOD_rms_px = 0.5
 
@@ -35,9 +36,9 @@ class Board:
     """A ChArUco board: squares counted along its width and height."""
 
     columns: int = 9
-    rows: int = 7
-    square_m: float = 0.03
-    marker_m: float = 0.022
+    rows: int = 6
+    square_m: float = 0.028
+    marker_m: float = 0.02
     dictionary: str = "5X5_100"
 
     def made(self) -> Any:
@@ -94,7 +95,7 @@ def fit_intrinsics(images: Sequence[tuple[str, NDArray[np.uint8]]], board: Board
     height, width = images[0][1].shape
     found = _solved(views, (width, height))
     rms = found[-1].ravel()
-    good = rms <= _BAD_VIEW * np.median(rms)
+    good = rms <= max(_BAD_VIEW * float(np.median(rms)), _GOOD_rms_px)
     if not good.all() and good.sum() >= _LEAST_VIEWS:
         left_out += [
             f"{name}: fits to {error:.2f} px only, others to {np.median(rms):.2f}"

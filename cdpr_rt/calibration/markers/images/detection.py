@@ -106,8 +106,6 @@ def _exposure_problem(pixels: NDArray[np.uint8]) -> str | None:
     low, high = np.percentile(pixels, (1.0, 99.5))
     if high < _DARK:
         return f"black: hardly a pixel is brighter than {high:.0f} of 255"
-    if (pixels >= _BRIGHT).mean() > _BURNT_SHARE:
-        return "overexposed: most of it is white"
     if high - low < _FLAT:
         return f"without contrast: grey levels from {low:.0f} to {high:.0f} of 255"
     return None
@@ -118,6 +116,8 @@ def _sharpness_problem(pixels: NDArray[np.uint8], found: int, width_px: float) -
         if width_px > _BLURRED_px:
             return f"blurred: edges are {width_px:.0f} px wide; allowed: {_BLURRED_px:.0f}"
         return None
+    if (pixels >= _BRIGHT).mean() > _BURNT_SHARE:
+        return "overexposed: most of it is white"
     smooth = cv2.GaussianBlur(pixels.astype(np.float32), (0, 0), 1.0)  # noise is no edge
     slope = np.hypot(np.diff(smooth, axis=0)[:, :-1], np.diff(smooth, axis=1)[:-1])
     low, high = np.percentile(pixels, (1.0, 99.5))
