@@ -7,6 +7,9 @@ import cv2
 from cdpr_drivers.camera.camera import Camera, CameraError, Image, grey
 from cdpr_rt.core.clock import Clock
 
+# what is wrong is told by the errors here, not by lines of the library's own on standard error
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+
 _STALE = 4
 """Images that a V4L2 device may have waiting from before."""
 

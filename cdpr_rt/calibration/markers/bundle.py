@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import diags_array
 
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray
+from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray, cross_matrices
 from cdpr_rt.calibration.markers.observations import Observations
 from cdpr_rt.calibration.markers.reprojection import (
     LENS_PARAMETERS,
@@ -78,6 +78,27 @@ class Bundle:
         start = 6 * len(self.estimate.map.names)
         variance = np.diag(self.covariance)[start : start + 6 * len(self.estimate.map.ids)]
         return np.sqrt(variance.reshape(-1, 6)[:, :3])
+
+    @property
+    def shape_sigma_m(self) -> FloatArray:
+        """Standard deviations of the markers' positions, (m, 3), in the frame that fits all best.
+
+        What is left of their covariance C once the map may move and turn as a whole: P C P with
+        P = 1 - G (G^T G)^-1 G^T, G the positions' derivatives by the six rigid motions. That of
+        one marker's frame has in it how badly one sheet tells its own tilt, times the distance.
+        """
+        placed = np.flatnonzero(self.estimate.map.placed)
+        at = self.estimate.map.position_m[placed]
+        start = 6 * len(self.estimate.map.names)
+        rows = (start + 6 * placed[:, None] + np.arange(3)).ravel()
+        unit = np.broadcast_to(np.eye(3), (len(at), 3, 3))
+        G = np.concatenate([unit, -cross_matrices(at - at.mean(axis=0))], axis=2).reshape(-1, 6)
+        Q, _ = np.linalg.qr(G)
+        P = np.eye(len(rows)) - Q @ Q.T
+        sigma = np.full((len(self.estimate.map.ids), 3), np.nan)
+        left = P @ self.covariance[np.ix_(rows, rows)] @ P
+        sigma[placed] = np.sqrt(np.maximum(np.diag(left), 0.0)).reshape(-1, 3)
+        return sigma
 
 
 def adjust(

@@ -26,7 +26,7 @@ _MISFITS = 0.15
 """Share of images on the wrong side of an instant that are allowed."""
 _SIZE_OFF = 0.004
 _SIZE_SIGMAS = 5.0
-_LENS_OFF = 0.003
+_LENS_OFF, _LENS_SIGMAS = 0.003, 6.0
 _LENS_GAIN = 0.9
 _CHANCE = 1e-4
 
@@ -204,8 +204,9 @@ def _fits_with(
 def lens_suspicion(bundle: Bundle, seen: Observations, fixed: tuple[int, ...]) -> LensSuspicion:
     """Return whether the images fit significantly better with another lens.
 
-    The change of fx, fy, cx, cy, k1, k2, p1, p2, k3 is weighed with its covariance, and the fit
-    must become visibly better: sheets that are not flat ask for a little of another lens, too.
+    The change of fx, fy, cx, cy, k1, k2, p1, p2, k3 is weighed with its covariance. The fit must
+    become visibly better as well, or the focal length change by much more than images can be wrong
+    about it: sheets that are not flat ask for a little of another lens, too.
     """
     given = bundle.estimate.lens
     try:
@@ -218,6 +219,6 @@ def lens_suspicion(bundle: Bundle, seen: Observations, fixed: tuple[int, ...]) -
     focal = float(change[:2].mean() / given[:2].mean())
     sigma = float(np.sqrt(covariance[:2, :2].mean()) / given[:2].mean())
     better = free.sigma_px < _LENS_GAIN * bundle.sigma_px
-    telling = abs(focal) > max(_LENS_OFF, 4.0 * sigma) or better
-    wrong = weighed > chi2.isf(_CHANCE, 9) and better and telling
+    telling = abs(focal) > max(_LENS_OFF, _LENS_SIGMAS * sigma)
+    wrong = weighed > chi2.isf(_CHANCE, 9) and (better or telling)
     return LensSuspicion(wrong, focal, sigma, free.rms_px, free.estimate.lens)

@@ -24,6 +24,7 @@ from cdpr_rt.errors import InvalidRequestError
 _MOST_ROUNDS = 4
 _GOOD_px, _POOR_px = 0.35, 1.5
 _SCALE_OFF = 0.004
+_FRAME_RATIO = 2.0
 _MIRRORED_IMAGES = 2
 _MISFIT_WEIGHT, _MISFIT_SHARE = 0.05, 0.05
 """A corner has so little weight from 13 standard deviations on."""
@@ -239,39 +240,40 @@ def _notes(
     fixed: Sequence[int],
 ) -> list[str]:
     notes = list(cover.advice)
-    map_ = bundle.estimate.map
     if known is None:
         notes.append(
             f"the map's scale is that of the size told ({1e3 * sheets.size_m:g} mm): images alone "
             "cannot see it wrong; two markers at known places, or the robot's cables, can"
         )
-    sigma = np.sqrt((bundle.marker_sigma_m[map_.placed] ** 2).mean(axis=0))
-    normal = map_.rotation[map_.ids.index(fixed[0])][:, 2]
-    heights = (map_.position_m[map_.placed] - map_.position_m[map_.placed].mean(axis=0)) @ normal
-    extent = np.ptp(map_.position_m[map_.placed], axis=0).max()
-    if extent > 0.0 and np.std(heights) < 0.02 * extent:
+    in_frame, shape = (_typical_mm(one) for one in (bundle.marker_sigma_m, bundle.shape_sigma_m))
+    if len(fixed) == 1 and in_frame > _FRAME_RATIO * shape:
         notes.append(
-            f"all markers lie in one plane: across it they are known to {1e3 * sigma[2]:.2f} mm, "
-            f"along it to {1e3 * max(sigma[:2]):.2f} mm; a few 0.2 m higher, or on a wall, help"
+            f"places are known to {shape:.2f} mm against each other, to {in_frame:.2f} mm in the "
+            f"frame of marker {fixed[0]}: one sheet tells little of its own tilt; a larger one, or "
+            "known places, give a better frame"
         )
     return notes
 
 
+def _typical_mm(sigma_m: FloatArray) -> float:
+    """Return the root of the mean square of the lengths of deviations (m, 3)."""
+    return 1e3 * float(np.sqrt(np.nanmean((sigma_m**2).sum(axis=1))))
+
+
 def verdict(fit: MapFit) -> str:
     """Return one sentence on how good a map is."""
-    sigma = 1e3 * np.sqrt((fit.bundle.marker_sigma_m[fit.map.placed] ** 2).sum(axis=1))
+    sigma = 1e3 * np.linalg.norm(fit.bundle.shape_sigma_m[fit.map.placed], axis=1)
     worst = int(np.argmax(sigma))
     ids = np.array(fit.map.ids)[fit.map.placed]
     rms = fit.bundle.rms_px
     how = "good" if rms < _GOOD_px else "usable" if rms < _POOR_px else "poor"
     if fit.faults:
         how = "not to be trusted"
-    free = sigma[sigma > 0.0]
-    typical = float(np.sqrt((free**2).mean())) if free.size else 0.0
     without = f", without {listed([one.marker for one in fit.dropped])}" if fit.dropped else ""
     return (
         f"{how}{without}: {int(fit.map.placed.sum())} markers from "
         f"{int(fit.map.located.sum())} images, corners fit to "
-        f"{rms:.3f} px; places are known to {typical:.2f} mm (1 sigma), worst marker "
+        f"{rms:.3f} px; places are known to {_typical_mm(fit.bundle.shape_sigma_m):.2f} mm against "
+        f"each other (1 sigma), worst marker "
         f"{ids[worst]} to {sigma[worst]:.2f} mm"
     )

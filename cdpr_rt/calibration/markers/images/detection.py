@@ -18,7 +18,7 @@ from cdpr_rt.errors import InvalidRequestError
 _DARK, _FLAT = 30.0, 12.0
 """Grey levels: the brightest of an image, and its contrast, below which nothing can be seen."""
 _BRIGHT, _BURNT_SHARE = 250, 0.6
-_SOFT_SHARE = 0.06
+_SOFT_SHARE = 0.12
 """Of its contrast, by which the steepest edges of an image must rise from pixel to pixel."""
 _BLURRED_px = 6.0
 
