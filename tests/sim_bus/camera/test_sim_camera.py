@@ -86,7 +86,7 @@ def test_motion_blurs_and_a_rolling_shutter_shears() -> None:
     state = above(velocity=(0.4, 0.0, 0.0))
     still, moving, rolling = (
         SimCamera(plant(sensor=SensorPlant(exposure_s=0.03, noise=0.0, shot_noise=0.0, **more)))
-        for more in ({}, {}, {"shutter": "rolling", "readout_s": 0.05})
+        for more in ({}, {}, {"shutter": "rolling", "readout_s": 0.15})
     )
     sharp, blurred = still.grab(above()), moving.grab(state)
     slope = [np.abs(np.diff(image.astype(float), axis=1)).max() for image in (sharp, blurred)]
@@ -94,10 +94,10 @@ def test_motion_blurs_and_a_rolling_shutter_shears() -> None:
     # in the middle of the exposure it is where it would be at rest
     assert np.abs(corners_of(moving, blurred) - expected(moving, state)).max() < 0.5
     seen, rest = corners_of(rolling, rolling.grab(state)), expected(rolling, above())
-    rate = -0.4 * 280.0 / 1.2 * 0.05 / 256.0  # px to the right for each row further down
+    rate = -0.4 * 280.0 / 1.2 * 0.15 / 256.0  # px to the right for each row further down
     sheared = rest[:, 0] + rate * (rest[:, 1] - 128.0)
     assert np.abs(seen[:, 0] - sheared).max() < 0.5
-    assert np.abs(seen[:, 0] - rest[:, 0]).max() > 0.7
+    assert np.abs(seen[:, 0] - rest[:, 0]).max() > 1.0
 
 
 def test_noise_belongs_to_the_number_of_the_image_alone() -> None:
