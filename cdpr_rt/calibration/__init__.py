@@ -1,1 +1,1 @@
-"""Calibration of a robot's geometry: what it observes, the fit, how good it is, what it leaves open."""
+"""Calibration of a robot's geometry: what it observes, the fit, and how good it is."""
