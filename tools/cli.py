@@ -70,6 +70,9 @@ MODULES = {
     "calibrate": {
         "calibrate": "Calibrate a robot's geometry, drums and elongation; take over, undo.",
     },
+    "camera": {
+        "camera": "Cameras: images, and intrinsics.",
+    },
     "cogging": {
         "cogging": "Cogging: sweep, fit, validate, report.",
     },
@@ -81,6 +84,9 @@ MODULES = {
     },
     "log": {
         "log": "The daemon's recordings: what is in them, as tables and pictures.",
+    },
+    "markers": {
+        "markers": "Printed markers: sheets, and maps of them.",
     },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
@@ -172,7 +178,8 @@ def main() -> None:
     except ModuleNotFoundError as error:
         if not error.name or error.name.startswith("cdpr_"):
             raise
-        _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[daemon]'", FAILED)
+        extra = "camera" if error.name == "cv2" else "daemon"
+        _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[{extra}]'", FAILED)
     except KeyboardInterrupt:  # while libraries are loaded
         _end("interrupted", FAILED)
     except SystemExit as end:
