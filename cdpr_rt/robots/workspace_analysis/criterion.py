@@ -21,8 +21,8 @@ class Criterion:
     """The cables hold the platform at a place, at every one of some orientations.
 
     All tensions carry the weight, with accelerations up to `acceleration_m_s2` and as much of the
-    angular one of the robot's file, and keep at least `least_N` from their bounds: at 0 m/s2 that is
-    the static workspace, else the wrench-feasible one. At one orientation it is the workspace of
+    angular one of the robot's file, and keep at least `least_N` from their bounds. At 0 m/s2 that
+    is the static workspace, else the wrench-feasible one; at one orientation the workspace of
     constant orientation, at several the total orientation workspace of these. Other processes can
     be given it.
     """

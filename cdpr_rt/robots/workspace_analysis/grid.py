@@ -41,7 +41,8 @@ class Grid:
     @property
     def spacing_m(self) -> FloatArray:
         """How far neighbours are apart along each coordinate, (k,)."""
-        return np.subtract(self.box.high_m, self.box.low_m) / (np.array(self.depths.shape) - 1)
+        sides = np.subtract(self.box.high_m, self.box.low_m)
+        return np.asarray(sides / (np.array(self.depths.shape) - 1))
 
     @property
     def points(self) -> FloatArray:

@@ -90,8 +90,8 @@ class Rays:
         Those nearest to a direction are as many as there are coordinates.
         """
         ways = points - self.centre_m
-        ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
-        _, nearest = cKDTree(self.directions).query(ways, k=len(self.centre_m))
+        away = np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
+        _, nearest = cKDTree(self.directions).query(ways / away, k=len(self.centre_m))
         return np.asarray(self.lengths_m[nearest].max(axis=1))
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import trimesh
 
 from cdpr_rt.core.exchange import FloatArray
@@ -25,4 +28,5 @@ def section(
 ) -> FloatArray:
     """Return the lines (s, 2, 3) in which a plane across a coordinate axis cuts a surface."""
     normal = [float(k == axis) for k in range(3)]
-    return trimesh.intersections.mesh_plane(mesh(vertices, triangles), normal, centre_m)
+    cut: Callable[..., Any] = trimesh.intersections.mesh_plane
+    return np.asarray(cut(mesh(vertices, triangles), normal, centre_m))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,12 +18,13 @@ import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.statics import Box
+from cdpr_rt.robots.workspace_analysis.rays import Rays
 from cdpr_tools.robots.workspace.mesh import section
 from cdpr_tools.robots.workspace.search import Found, Search, in_mm
 
 _RAYS, _GRID, _MACHINE = "#d1581a", "#1b4f8a", "#444444"
 _WIDE_in = 9.6
-_FINE = 90
+_FINE, _KNOTS = 90, 700
 _OUTSIDE_N = -1e6
 _SECTIONS = ((0, 2), (1, 2), (0, 1))
 _NAMES = "xyz"
@@ -60,20 +62,20 @@ def _title(wanted: Search) -> str:
     return kind + (f", all of {turns} orientations" if turns > 1 else "")
 
 
-def _draw_surfaces(ax: Axes, wanted: Search, found: Found) -> None:
+def _draw_surfaces(ax: Any, wanted: Search, found: Found) -> None:
+    """Draw the grid's surface, and over it a net whose knots are ends of rays."""
     vertices, triangles = found.grid.surface
-    ax.plot_trisurf(
-        *vertices.T, triangles=triangles, color=_GRID, alpha=0.25, linewidth=0.0, antialiased=False
-    )
-    ends = found.rays.ends_m[found.rays.triangles]
-    edges = ends[:: max(1, len(ends) // 1500), [0, 1, 2, 0]]
-    ax.add_collection3d(Line3DCollection(edges, colors=_RAYS, linewidths=0.3))
-    exits = np.array(wanted.criterion.platform.exit_points_m)
-    ax.plot(*exits.T, "s", ms=4, color=_MACHINE)
+    ax.plot_trisurf(*vertices.T, triangles=triangles, color=_GRID, alpha=0.3, linewidth=0.0)
+    rays = found.rays
+    each = max(1, len(rays.lengths_m) // _KNOTS)
+    net = Rays(rays.centre_m, rays.directions[::each], rays.lengths_m[::each])
+    edges = np.concatenate([net.triangles[:, [0, 1]], net.triangles[:, [1, 2]]])
+    ax.add_collection3d(Line3DCollection(list(net.ends_m[edges]), colors=_RAYS, linewidths=0.5))
+    ax.plot(*np.array(wanted.criterion.platform.exit_points_m).T, "s", ms=4, color=_MACHINE)
     low, high = np.array([wanted.box.low_m, wanted.box.high_m])
     ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(tuple(high - low))
+    ax.set_box_aspect(tuple(high - low), zoom=1.2)
 
 
 def _draw_section(
@@ -89,10 +91,10 @@ def _draw_section(
     points[:, view] = cells.reshape(-1, 2)
     least = wanted.criterion.least_N
     margins = wanted.criterion.depths(points).reshape(cells.shape[:2]) + least
-    levels = MaxNLocator(8).tick_values(least, max(float(margins.max()), least + 1e-3))
+    levels = MaxNLocator(8).tick_values(least, max(found.grid.deepest[1] + least, least + 1e-3))
     filled = ax.contourf(
         cells[0, :, 0], cells[:, 0, 1], np.maximum(margins, _OUTSIDE_N),
-        np.unique(levels.clip(least)), cmap="YlGnBu", alpha=0.8,
+        np.unique(np.clip(levels, least, None)), cmap="YlGnBu", alpha=0.8,
     )  # fmt: skip
     bar = figure.colorbar(filled, ax=ax, shrink=0.85, format="%.0f")
     bar.set_label("margin (N)")
