@@ -6,6 +6,7 @@ import importlib
 import multiprocessing
 import os
 import signal
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.pool import Pool
@@ -13,6 +14,9 @@ from typing import Any, Protocol
 
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.errors import BadInputError, WorkFailedError
+
+
+_ANSWER_S = 5.0
 
 
 class Job(Protocol):
@@ -59,6 +63,7 @@ def _ray(address: str) -> Iterator[Runner]:
             f"--cluster {address}: needs ray, which comes with: pip install 'cdpr-rt[cluster]'"
         ) from None
     try:
+        _knock(address)
         ray.init(address=address, log_to_driver=False, logging_level="error")
     except (ConnectionError, OSError, RuntimeError, ValueError) as error:
         raise WorkFailedError(f"--cluster {address}: {str(error).splitlines()[0]}") from error
@@ -76,6 +81,13 @@ def _ray(address: str) -> Iterator[Runner]:
         yield run
     finally:
         ray.shutdown()
+
+
+def _knock(address: str) -> None:
+    """Raise OSError where nobody listens at HOST:PORT, which Ray itself notices after minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if colon and port.isdecimal():
+        socket.create_connection((host, int(port)), timeout=_ANSWER_S).close()
 
 
 def _run(job: Job) -> FloatArray:

@@ -97,7 +97,7 @@ class Rays:
 
 def directions(count: int, dimensions: int) -> FloatArray:
     """Return unit vectors (count, k) spread evenly: in space a Fibonacci lattice."""
-    k = np.arange(count)
+    k = np.arange(count, dtype=np.float64)
     if dimensions == 2:
         angle = 2.0 * math.pi * k / count
         return np.stack([np.cos(angle), np.sin(angle)], axis=1)
