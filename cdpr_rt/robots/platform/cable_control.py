@@ -69,7 +69,7 @@ class CableControl:
         self.model, self._period_s = model, period_s
         self.workspace = model.workspace()
         """Where targets may lie."""
-        self._held = model.workspace(0.0)
+        self._held, self._interference = model.workspace(0.0), model.interference
         self.low_N, self.high_N = self.workspace.low, self.workspace.high
         """Between which the tensions are planned, (n,)."""
         self.least_N = model.low_N
@@ -286,7 +286,8 @@ class CableControl:
         poses = self.model.poses((1.0 - share) * self.position + share * np.asarray(position))
         obstacle = self.workspace.first_obstacle(poses)
         if obstacle is None:
-            return ""
+            contact = self._interference.first_contact(np.array([self.position, position]))
+            return "" if contact is None else str(contact)
         there, why = obstacle
         place = ", ".join(f"{x:.3f}" for x in there.p[: self.model.positions])
         return f"at {place} m {why}"
