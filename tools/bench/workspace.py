@@ -24,6 +24,7 @@ from cdpr_tools.robots.workspace.search import Search, search
 TARGET_s, TARGET_SHARE = 30.0, 0.02
 """For a million poses; of the volume."""
 ROBOT = "spatial-8"
+CELLS, RAYS = 60, 5000
 _SEED = 14
 _BLOCK = 50_000
 _NEAR_N = 0.5
@@ -145,7 +146,7 @@ def _volume(model: PlatformModel, poses: int, out: Any) -> dict[str, float]:
     robot = load_robot(ROBOT)
     criterion = criterion_of(robot, model.platform.acceleration_m_s2, np.zeros((1, 3)), 0.0)
     box = view_of(model.platform)
-    found = search(Search(criterion, box, 60, 5000, None, 1, None), out)
+    found = search(Search(criterion, box, CELLS, RAYS, None, 1, None), out)
     rng, held = np.random.default_rng(_SEED), 0
     for k in range(0, poses, _BLOCK):
         points = rng.uniform(box.low_m, box.high_m, (min(_BLOCK, poses - k), 3))

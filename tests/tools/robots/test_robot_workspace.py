@@ -63,6 +63,16 @@ def test_of_less_there_is_more() -> None:
     assert with_margin["greatest_margin_N"] > 60.0 and with_margin["margin_at_least_N"] == 22.0
 
 
+def test_contact_can_be_left_out() -> None:
+    turned = ("spatial-8", "--static", "--rotate", "0", "0", "30", *COARSE)
+    free = searched(*turned, "--contact-free")
+    assert free["contact_free"] is True
+    volume = free["grid"]["volume_m3"]
+    assert 0.0 < volume < 0.9 * searched(*turned)["grid"]["volume_m3"]
+    told = refused("spatial-8", "--rotate", "0", "0", "60", *COARSE, "--contact-free")
+    assert "something is in contact where the rays start" in told
+
+
 @pytest.mark.parametrize("suffix", [".ply", ".obj"])
 def test_other_formats_of_meshes_are_closed_too(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"mesh{suffix}"

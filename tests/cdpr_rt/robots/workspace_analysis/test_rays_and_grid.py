@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.robots.platform_model import platform_model
+from cdpr_rt.robots.platform_model import platform_model, platform_model_of
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.criterion import Criterion, criterion_of, turns_within
-from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, grid_points, shape_of
+from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, WayJob, grid_points, shape_of
 from cdpr_rt.robots.workspace_analysis.rays import RayJob, Rays, directions
 
 
@@ -96,6 +96,29 @@ def test_the_total_orientation_workspace_is_within_that_of_each_orientation() ->
     assert_allclose(all_of_them, np.min(each, axis=0))
     kept = criterion_of(robot, 1.0, turns, 15.0).depths(points)
     assert_allclose(kept, all_of_them - 15.0)
+
+
+def test_places_behind_a_contact_can_be_left_out() -> None:
+    robot = load_robot("spatial-8")
+    turn, centre = np.array([[0.0, 0.0, 0.55]]), np.array([-0.15, 0.1, 1.575])
+    criterion = criterion_of(robot, 0.0, turn, 0.0, contact_free=True)
+    model = platform_model_of(robot)
+    box = Box((-1.5, -1.8, 0.8), (1.2, 1.9, 2.6))
+    ways = directions(60, 3)
+    lengths = RayJob(criterion, centre, ways, box).run()
+    held = RayJob(replace(criterion, contact_free=False), centre, ways, box).run()
+    short = lengths < held - 1e-6
+    assert 5 < short.sum() < 55
+    for way, length, further in zip(ways, lengths, held, strict=True):
+        steps = np.arange(0.0, length, 2e-3)
+        places = np.hstack([centre + steps[:, None] * way, np.tile(turn[0], (len(steps), 1))])
+        clearances, _ = model.interference.clearances(model.poses(places))
+        assert (clearances > model.interference.clearance_m - 1e-6).all()
+        just = np.concatenate([centre + min(further, length + 2e-3) * way, turn[0]])
+        assert (further > length + 2e-3) <= bool(model.interference.contact(model.pose(just).array))
+    points = np.array([centre + 0.5 * (lengths + held)[:, None] * ways])[0]
+    reached = WayJob(criterion, centre, points).run()
+    assert ((reached < 0.0) == short).all()
 
 
 @dataclass(frozen=True)
