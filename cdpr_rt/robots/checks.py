@@ -178,7 +178,8 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
         if bool(statics.is_target(position_m, share * turn_rad)):
             angle = share * platform.workspace_angle_rad
             return f"workspace_angle_rad up to {angle:.3g} is possible there"
-    for share in _SHARES:
+    least = replace(platform, acceleration_m_s2=_SHARES[-1] * most)
+    for share in _SHARES if helps(least, low_N) else ():
         if helps(replace(platform, acceleration_m_s2=share * most), low_N):
             return f"acceleration_m_s2 up to {share * most:.3g} is possible there"
     for share in _SHARES:

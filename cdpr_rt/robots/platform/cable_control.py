@@ -67,9 +67,9 @@ class CableControl:
         if len(axes) != n:
             raise GeometryError(f"{len(axes)} axes; allowed: {n}, one for each cable")
         self.model, self._period_s = model, period_s
-        self.workspace = model.workspace()
+        self.workspace = model.workspace().prepared()
         """Where targets may lie."""
-        self._held, self._interference = model.workspace(0.0), model.interference
+        self._held, self._interference = model.workspace(0.0).prepared(), model.interference
         self.low_N, self.high_N = self.workspace.low, self.workspace.high
         """Between which the tensions are planned, (n,)."""
         self.least_N = model.low_N

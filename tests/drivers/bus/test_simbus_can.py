@@ -32,7 +32,7 @@ def test_frames_go_both_ways(simulator: Any) -> None:
         for entry in sent:
             one.send(entry)
         for entry in sent:
-            got = two.recv(5.0)
+            got = two.recv(60.0)
             assert got is not None
             assert got.equals(
                 entry, timestamp_delta=None, check_channel=False, check_direction=False
@@ -52,14 +52,14 @@ def test_filters_are_applied_and_can_change(simulator: Any) -> None:
         time.sleep(0.05)
         for can_id in (0x180, 0x181, 0x10000181):
             other.send(message(can_id))
-        got = bus.recv(5.0)
+        got = bus.recv(60.0)
         assert got is not None
         assert (got.arbitration_id, got.is_extended_id) == (0x181, False)
         assert bus.recv(0.02) is None
         bus.set_filters(None)
         time.sleep(0.05)
         other.send(message(0x10000181))
-        got = bus.recv(5.0)
+        got = bus.recv(60.0)
         assert got is not None
         assert got.is_extended_id
 
@@ -92,8 +92,8 @@ def test_the_stock_logger_in_another_process(simulator: Any, tmp_path: Path) -> 
         with can.Bus(interface="simbus", channel=simulator.name) as bus:
             for _ in range(50):
                 bus.send(message(0x80))
-                assert bus.recv(5.0) is not None
-                assert bus.recv(5.0) is not None
+                assert bus.recv(60.0) is not None
+                assert bus.recv(60.0) is not None
             deadline = time.monotonic() + 5.0
             while logger.poll() is None and time.monotonic() < deadline:
                 time.sleep(0.2)
@@ -110,7 +110,7 @@ def test_a_killed_simulator_ends_with_a_can_error(simulator: Any) -> None:
     bus = can.Bus(interface="simbus", channel=simulator.name)
     simulator.kill()
     with pytest.raises(can.CanOperationError, match="gone away"):
-        bus.recv(5.0)
+        bus.recv(60.0)
     with pytest.raises(can.CanOperationError, match="gone away"):
         bus.send(message(0x80))
     bus.shutdown()
@@ -144,7 +144,7 @@ def test_opened_by_url_with_filters(simulator: Any) -> None:
     with open_python_can(url) as other:
         time.sleep(0.05)
         other.send(message(0x80))
-        got = bus.recv(5.0)
+        got = bus.recv(60.0)
         assert got is not None
         assert got.arbitration_id == 0x281
     bus.shutdown()

@@ -71,7 +71,7 @@ def test_third_party_resets_starts_and_stops_the_node(site: Site) -> None:
     for state in ("OPERATIONAL", "STOPPED", "PRE-OPERATIONAL"):
         nmt.state = state
         assert wait_for(lambda state=state: nmt.state == state)
-        nmt.wait_for_heartbeat(timeout=3)
+        nmt.wait_for_heartbeat(timeout=60)
         assert nmt.state == state
 
 
