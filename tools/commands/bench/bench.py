@@ -19,6 +19,7 @@ from cdpr_tools.commands.bench import (
     bench_soak,
     bench_stop,
     bench_tension,
+    bench_workspace,
 )
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.output import Output
@@ -45,6 +46,7 @@ for _part in (
     bench_soak,
     bench_stop,
     bench_tension,
+    bench_workspace,
 ):
     app.add_typer(_part.app)
 
