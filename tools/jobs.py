@@ -15,7 +15,6 @@ from typing import Any, Protocol
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
-
 _ANSWER_S = 5.0
 
 
