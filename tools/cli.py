@@ -76,6 +76,9 @@ MODULES = {
     "log": {
         "log": "The daemon's recordings: what is in them, as tables and pictures.",
     },
+    "poses": {
+        "poses": "Draw poses that a robot reaches, held and without contact all the way.",
+    },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
     },

@@ -101,7 +101,7 @@ class Reach:
             there = self.start + gone[:, None] * (ends - self.start)
             inside = self._is_target(there)
             drawn, found = drawn + len(ends), found + int(inside.sum())
-            outside += int((~inside).sum())
+            outside += len(ends) - int(inside.sum())
             cut += np.bincount(why, minlength=3)
             parts.append((there[inside], gone[inside]))
         positions, gone = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
