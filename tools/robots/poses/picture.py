@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -15,7 +16,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.reach.reachable import Reach
 from cdpr_tools.robots.poses.choice import Chosen
 
-_WAY, _START, _BOX = "#999999", "#d1581a", "#7a3fa0"
+_WAY, _START, _BOX, _OBSTACLE = "#999999", "#d1581a", "#7a3fa0", "#cccccc"
 _NAMES = "xyz"
 
 
@@ -52,19 +53,14 @@ def _draw_view(
         "--", color=_BOX, lw=1.0, label="box of targets",
     )  # fmt: skip
     ax.plot(start[i], start[j], "s", color=_START, ms=7, zorder=4, label="start")
-    for one, box in enumerate(platform.obstacles):
+    for box in platform.obstacles:
         size = np.subtract(box.max_m, box.min_m)
-        label = "_" if one else "obstacle"
         corner = (box.min_m[i], box.min_m[j])
-        ax.add_patch(
-            Rectangle(
-                corner, float(size[i]), float(size[j]), fc="#bbbbbb", ec="#666666", label=label
-            )
-        )
+        ax.add_patch(Rectangle(corner, float(size[i]), float(size[j]), fc=_OBSTACLE, ec=_WAY))
     x, y = chosen.positions[:, i], chosen.positions[:, j]
     if angle_deg is None:
         ax.scatter(x, y, s=16, color="#2f6fb0", zorder=3, label="pose")
     else:
-        top = max(float(angle_deg.max()), math.degrees(1e-3))
-        ax.scatter(x, y, s=16, c=angle_deg, cmap="viridis", vmin=0.0, vmax=top, zorder=3)
+        shown = Normalize(0.0, max(float(angle_deg.max()), math.degrees(1e-3)))
+        ax.scatter(x, y, s=16, c=angle_deg, cmap="viridis", norm=shown, zorder=3, label="pose")
     ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
