@@ -88,6 +88,9 @@ MODULES = {
     "markers": {
         "markers": "Printed markers: sheets, and maps of them.",
     },
+    "poses": {
+        "poses": "Draw poses that a robot reaches, held and without contact all the way.",
+    },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
     },

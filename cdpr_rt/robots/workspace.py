@@ -119,6 +119,11 @@ class CableWorkspace:
         self.kinematics.wrench_matrices(centred, matrices)
         return matrices
 
+    @property
+    def arrays(self) -> tuple[FloatArray, FloatArray, int, FloatArray, FloatArray]:
+        """The `centre` (3,), wrenches (k, d), how many of them are generators, scale, bounds."""
+        return self._centre, self._sets, self._generators, self._scale, self._bounds
+
     def stands(self, pose: Pose) -> bool:
         """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
         self._one.poses[0] = pose.array

@@ -59,11 +59,11 @@ def write_circuit_margins(
         carrying[0] = space[0]
         for k in range(1, wrenches.shape[0]):
             other_wrench(wrenches[k], scale, scaled, room, carrying[k])
-        margins[j] = _margin(space, n - d, bounds, carrying, generators, least)
+        margins[j] = circuit_margin(space, n - d, bounds, carrying, generators, least)
 
 
 @jit
-def _margin(
+def circuit_margin(
     space: FloatArray,
     r: int,
     bounds: FloatArray,
