@@ -24,6 +24,7 @@ from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
+from cdpr_rt.programs.platform.path_store import PathStore, paths_folder
 from cdpr_rt.programs.registry import (
     build_programs,
     platform_parts,
@@ -65,6 +66,8 @@ def main() -> int:
     if parts.last is not None and robot.platform is not None:
         parts.last.path = state_path("lengths", robot.profile)
         parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
+    if parts.paths is not None:
+        _open_paths(parts.paths, robot)
     loop = ControlLoop(block, machine, parts)
     loop.engine.notices += freeze_memory()
     _obey_signals(loop)
@@ -79,6 +82,14 @@ def main() -> int:
         print(f"cdpr: {unconfirmed}", file=sys.stderr)
         return FAILED
     return DONE
+
+
+def _open_paths(paths: PathStore, robot: Robot) -> None:
+    """Have planned paths from their folder; a robot without one runs all the same."""
+    try:
+        paths.open(paths_folder(robot.profile))
+    except ControlError as error:
+        print(f"cdpr: paths cannot be followed: {error}", file=sys.stderr)
 
 
 def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
@@ -101,6 +112,7 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
         lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
         lowering=lowering,
         last=None if platform is None else platform.last,
+        paths=None if platform is None else platform.paths,
         enable_realtime=enable_realtime,
     )
     warm_up_programs(programs, n, platform)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.programs.base import Program
+from cdpr_rt.programs.platform.path_store import PathStore
 from cdpr_rt.robots.last_lengths import LastLengths
 
 
@@ -35,5 +36,7 @@ class LoopParts:
     """How the platform is lowered, None for a robot without such a program."""
     last: LastLengths | None = None
     """Stores the cables' lengths of the last stop, where a start can use them."""
+    paths: PathStore | None = None
+    """The planned paths of a robot with a platform."""
     enable_realtime: Callable[[], Sequence[str]] = tuple
     """Called once before the first paced cycle; returns notices of what was not permitted."""
