@@ -76,6 +76,9 @@ MODULES = {
     "log": {
         "log": "The daemon's recordings: what is in them, as tables and pictures.",
     },
+    "path": {
+        "path": "Look at a path before it is followed, follow it, take it up again.",
+    },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
     },
