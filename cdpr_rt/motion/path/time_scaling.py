@@ -22,7 +22,7 @@ from cdpr_rt.motion.path.nodes import PathNodes
 PERIOD_S: Final = 0.01
 """Between the samples of a plan."""
 _TOLERANCE: Final = 1.005
-_ROUNDS: Final = 12
+_ROUNDS: Final = 20
 _SHARE: Final = 0.98
 """Of acceleration and jerk that the first passes use; the rest is for smoothing."""
 _SLOWEST_m_s: Final = 1e-4
@@ -193,9 +193,8 @@ def _scale(
             begin, end, *geometry, nodes.speed, nodes.coordinates.positions, limits.table,
             *wrenches.arrays, *forces, motion, strain, where,
         )  # fmt: skip
-        period_s = duration_s / (len(motion) - 1)
         if rounds == _ROUNDS or not kernel.lower_bounds(
-            begin, end, width_s, period_s, _TOLERANCE, times, motion, strain, bound
+            begin, end, width_s, _TOLERANCE, nodes.s, motion, strain, where, bound
         ):
             break
         np.maximum(bound[begin + 1 : end], _SLOWEST_m_s**2, out=bound[begin + 1 : end])

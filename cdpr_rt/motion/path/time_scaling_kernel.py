@@ -16,6 +16,7 @@ from cdpr_rt.jit import jit
 _NOTHING: Final = 1e-12
 _MOST_CUTS: Final = 60
 _FAR: Final = 1e12
+_REACH: Final = 0.55
 
 
 @jit
@@ -298,36 +299,35 @@ def lower_bounds(
     begin: int,
     end: int,
     width_s: float,
-    period_s: float,
     tolerance: float,
-    times: FloatArray,
+    s: FloatArray,
     motion: FloatArray,
     strain: FloatArray,
+    node: IntArray,
     bound: FloatArray,
 ) -> bool:
     """Lower `bound` (N,) of x where the smoothed motion is too fast; return whether it is anywhere.
 
-    A sample is the average over the last `width_s`: all nodes passed in it are slowed down.
+    A sample is an average over `width_s`: as much of the path is slowed as is passed in that time
+    at the speed that is wanted.
     """
     lowered = False
     for c in range(motion.shape[0]):
         if strain[c] <= tolerance:
             continue
         lowered = True
-        t = c * period_s
-        x = (motion[c, 1] / strain[c]) ** 2
-        low, high = begin, end
-        while low < high:  # the first node not before t - width
-            middle = (low + high) // 2
-            if times[middle] < t - width_s:
-                low = middle + 1
-            else:
-                high = middle
-        low = max(low - 1, begin)
-        while low <= end and (times[low] <= t or low == begin):
-            bound[low] = min(bound[low], x)
-            low += 1
-        bound[min(low, end)] = min(bound[min(low, end)], x)
+        v = motion[c, 1] / strain[c]
+        reach = _REACH * v * width_s
+        i = node[c]
+        while i >= begin and s[i] >= motion[c, 0] - reach:
+            bound[i] = min(bound[i], v * v)
+            i -= 1
+        bound[max(i, begin)] = min(bound[max(i, begin)], v * v)
+        i = node[c] + 1
+        while i <= end and s[i] <= motion[c, 0] + reach:
+            bound[i] = min(bound[i], v * v)
+            i += 1
+        bound[min(i, end)] = min(bound[min(i, end)], v * v)
     return lowered
 
 
