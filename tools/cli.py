@@ -47,7 +47,7 @@ MODULES = {
         "then.",
         "lower": "Let the platform down onto its stand; the power stays on, the cables are loose.",
         "pause": "Stop the platform and hold it there; `resume` goes on.",
-        "resume": "Go on to the position that the platform had not reached when it was paused.",
+        "resume": "Go on to the position, or along the path, that was left when it was paused.",
     },
     "daemon.daemon_state": {
         "status": "Say how a daemon and its robot are; changes nothing.",

@@ -40,7 +40,8 @@ def path(
     blend: Annotated[
         float,
         typer.Option(
-            min=0.0, max=1000.0,
+            min=0.0,
+            max=1000.0,
             help="Within so many mm G-code's corners may be cut, where it has no G61 or G64 P.",
         ),
     ] = 1.0,
@@ -73,8 +74,8 @@ def path(
     Ends with status 2 where the robot cannot follow it, with the first place named. With --run the
     running daemon plans and follows it.
     """  # fmt: skip
-    from cdpr_tools.paths import following  # noqa: PLC0415  # slow to load
-    from cdpr_tools.paths.preview import PathOptions  # noqa: PLC0415
+    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
+    from cdpr_tools.paths.options import PathOptions  # noqa: PLC0415  # slow to load
 
     out, options = Output(as_json), PathOptions(origin, blend, ignore)
     follows = run or resume or back is not None

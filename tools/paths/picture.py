@@ -66,7 +66,9 @@ def _draw_view(
         step = -(-len(plan.timed.samples) // _MOST_POINTS)
         place = plan.timed.samples[::step, 0][:, [i, j]]
         speed = np.linalg.norm(plan.timed.samples[::step, 1, : len(low)], axis=1)
-        parts = LineCollection(np.stack([place[:-1], place[1:]], axis=1), cmap="viridis", lw=1.3)
+        parts = LineCollection(
+            list(np.stack([place[:-1], place[1:]], axis=1)), cmap="viridis", lw=1.3
+        )
         parts.set_array(1e3 * speed[:-1])
         ax.add_collection(parts)
         if not named or len(low) == 2:
@@ -114,4 +116,4 @@ def _draw_tensions(ax: Axes, shown: Preview, robot: Robot) -> None:
 def _times(shown: Preview) -> FloatArray:
     timed = shown.plan.timed
     assert timed is not None  # asked for drawings over time only
-    return np.arange(len(timed.samples)) * timed.period_s
+    return np.asarray(np.arange(len(timed.samples)) * timed.period_s)

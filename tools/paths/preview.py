@@ -5,43 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.motion.path.gcode import GcodeSettings
 from cdpr_rt.motion.path.reading import read_path
 from cdpr_rt.procedures.path.planning import Advance, Obstacle, PathPlan, PathPlanner
 from cdpr_rt.procedures.path.tensions import PathTensions, path_tensions
 from cdpr_rt.procedures.path.unit_slips import size_note
 from cdpr_rt.programs.platform.path_store import paths_folder, write_plan
-from cdpr_tools.errors import BadInputError
-
-_WORDS: Final = 100
-DEFAULT_BLEND_mm: Final = 1.0
-
-
-@dataclass(frozen=True)
-class PathOptions:
-    """What the command line leaves to be said of a path's file."""
-
-    origin_mm: str | None = None
-    blend_mm: float = DEFAULT_BLEND_mm
-    ignore: str = ""
-
-    def settings(self, k: int) -> GcodeSettings:
-        """Return them for a robot whose positions have k coordinates; raises BadInputError."""
-        words = (self.origin_mm or " ".join("0" * k)).split()
-        try:
-            origin = np.array([1e-3 * float(word) for word in words])
-        except ValueError:
-            origin = np.zeros(0)
-        if origin.size != k or not np.isfinite(origin).all():
-            raise BadInputError(f"--origin {self.origin_mm}: allowed: {k} numbers in mm")
-        ignored = self.ignore.replace(",", " ").upper().split()
-        return GcodeSettings(origin, 1e-3 * self.blend_mm, frozenset(ignored[:_WORDS]))
+from cdpr_tools.paths.options import PathOptions
+from cdpr_tools.paths.times import time_text
 
 
 @dataclass(frozen=True)
@@ -169,15 +145,6 @@ def obstacle_text(shown: Preview) -> str:
     if obstacle.position[k:].any():
         place += f", turned by {_listed(obstacle.position[k:], math.degrees(1.0))} deg"
     return f"{shown.plan.path.source}:{obstacle.line}: {place}: {obstacle.text}"
-
-
-def time_text(seconds: float) -> str:
-    """Return a duration as people write it."""
-    if seconds < 60.0:
-        return f"{seconds:.2f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
 
 
 def _listed(values: FloatArray, factor: float) -> str:

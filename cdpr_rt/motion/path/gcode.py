@@ -14,9 +14,9 @@ import numpy as np
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.motion.path.arcs import arc_by_centre, arc_by_radius
 from cdpr_rt.motion.path.description import (
-    LONGEST_DWELL_s,
     Arc,
     Coordinates,
+    LONGEST_DWELL_s,
     Move,
     PathDescription,
     PathError,

@@ -107,8 +107,15 @@ def _along_pieces(pieces: Pieces) -> tuple[FloatArray, ...]:
     at = (cut_before[i] + share * left[i]) / pieces.length[i]
     q, first, second = pieces.at(i, at)
     step = np.where(number == 0, np.nan, left[i] / np.maximum(count[i], 1))
-    return i.astype(float), number.astype(float), q, first, second, step, pieces.speed[i], (
-        pieces.line[i].astype(float)
+    return (
+        i.astype(float),
+        number.astype(float),
+        q,
+        first,
+        second,
+        step,
+        pieces.speed[i],
+        (pieces.line[i].astype(float)),
     )
 
 
@@ -119,12 +126,12 @@ def _corners(pieces: Pieces, scale: FloatArray, positions: int) -> tuple[FloatAr
     start = pieces.at(i, 1.0 - cut / pieces.length[i])
     end = pieces.at(i + 1, cut / pieces.length[i + 1])
     stretch = (_FULLNESS * cut)[:, None]
-    ends = [(q, stretch * first, stretch**2 * second) for q, first, second in (start, end)]
+    ends = tuple((q, stretch * first, stretch**2 * second) for q, first, second in (start, end))
     u = np.arange(1, _IN_CORNER + 1) / _IN_CORNER
-    q, du, ddu = (_hermite(*ends, u, order) for order in range(3))  # (c, 8, d) each
+    q, du, ddu = (_hermite(ends, u, order) for order in range(3))  # (c, 8, d) each
     step = np.zeros(q.shape[:2])
     for share, weight in _GAUSS:
-        speed = _hermite(*ends, u - (1.0 - share) / _IN_CORNER, 1)
+        speed = _hermite(ends, u - (1.0 - share) / _IN_CORNER, 1)
         step += weight / _IN_CORNER * np.linalg.norm(scale * speed, axis=2)
     size = np.linalg.norm(scale * du, axis=2)[..., None]
     first = du / size
@@ -145,14 +152,12 @@ def _corners(pieces: Pieces, scale: FloatArray, positions: int) -> tuple[FloatAr
     return place, number, *flat, step.ravel(), speed.ravel(), line.ravel().astype(float)
 
 
-def _hermite(
-    start: tuple[FloatArray, ...], end: tuple[FloatArray, ...], u: FloatArray, order: int
-) -> FloatArray:
+def _hermite(ends: tuple[tuple[FloatArray, ...], ...], u: FloatArray, order: int) -> FloatArray:
     """Return the curve of fifth order between two ends, or a derivative, (c, k, d).
 
     Each end is position, first and second derivative by u, (c, d) each; `u` (k,) is from 0 to 1.
     """
-    (p0, v0, a0), (p1, v1, a1) = start, end
+    (p0, v0, a0), (p1, v1, a1) = ends
     gap = p1 - p0 - v0 - 0.5 * a0
     slope, bend = v1 - v0 - a0, a1 - a0
     c3 = 10.0 * gap - 4.0 * slope + 0.5 * bend

@@ -148,7 +148,7 @@ def time_path(nodes: PathNodes, limits: PathLimits, wrenches: WrenchBounds) -> T
 
 
 def speed_bounds(nodes: PathNodes, limits: PathLimits) -> FloatArray:
-    """Return the greatest (ds/dt)² of each node, (N,), by velocity, feed, and how the path bends."""
+    """Return the greatest (ds/dt)² of each node, (N,), by velocity, feed and bends."""
     k = nodes.coordinates.positions
     first, second = np.abs(nodes.first), np.abs(nodes.second)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -218,8 +218,6 @@ def _smoothed(
     """Return a run's smoothed motion in whole periods of a plan that is slower by a factor."""
     count = max(int(np.ceil(slower * duration_s / PERIOD_S - _NOTHING)), 1)
     motion = np.zeros((count + 1, 4))
-    kernel.smooth_run(
-        begin, end, width_s, duration_s / count, nodes.s, x, times, swept, motion
-    )
+    kernel.smooth_run(begin, end, width_s, duration_s / count, nodes.s, x, times, swept, motion)
     motion[-1] = nodes.s[end], 0.0, 0.0, 0.0
     return motion

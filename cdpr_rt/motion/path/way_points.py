@@ -15,8 +15,8 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_profiles.reading.reader import Profile, read_toml_model
 from cdpr_rt.motion.path.description import (
-    LONGEST_DWELL_s,
     Coordinates,
+    LONGEST_DWELL_s,
     Move,
     PathDescription,
     PathError,
@@ -96,7 +96,7 @@ def read_csv_points(text: str, source: str, coordinates: Coordinates) -> PathDes
     columns: list[tuple[str, float]] = []
     found: PathDescription | None = None
     d, k = len(coordinates.names), coordinates.positions
-    kept = {name: 0.0 for name in coordinates.names[k:]} | {"speed": math.inf, "blend": 0.0}
+    kept = dict.fromkeys(coordinates.names[k:], 0.0) | {"speed": math.inf, "blend": 0.0}
     for row in rows:
         line = rows.line_num
         if not any(cell.strip() for cell in row) or row[0].lstrip().startswith("#"):
@@ -113,9 +113,7 @@ def read_csv_points(text: str, source: str, coordinates: Coordinates) -> PathDes
         if found is None:
             found = PathDescription(source, coordinates, end, line)
             continue
-        found.add(
-            Move(line, end, kept["speed"], kept["blend"], kept["dwell"], kept["wait"] != 0.0)
-        )
+        found.add(Move(line, end, kept["speed"], kept["blend"], kept["dwell"], kept["wait"] != 0.0))
     if found is None or not found.moves:
         raise PathError(source, 0, "holds less than two way points")
     return found

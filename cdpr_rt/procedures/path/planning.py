@@ -21,6 +21,7 @@ from cdpr_rt.motion.path.time_scaling import (
     time_path,
 )
 from cdpr_rt.procedures.path.unit_slips import size_fault
+from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.wrenches.path_wrenches import InertialWrenches, available_wrenches
@@ -85,11 +86,12 @@ class PathPlanner:
         low, high = np.array(self.platform.workspace_min_m), np.array(self.platform.workspace_max_m)
         size_fault(path, low, high)
         nodes = nodes_of(path, model.wrench_scale)
-        obstacle = self._outside(path, nodes, low, high)
+        obstacle = self._outside(nodes, low, high)
         if obstacle is not None:
             return PathPlan(path, nodes, self.limits, obstacle, None, np.nan, 0)
         advance("tensions", 0.1)
         wrenches, obstacle = self._wrenches(nodes)
+        obstacle = self._first(nodes, obstacle, self._contact(nodes))
         if obstacle is not None:
             return PathPlan(path, nodes, self.limits, obstacle, None, np.nan, 0)
         advance("time", 0.3)
@@ -100,9 +102,7 @@ class PathPlanner:
 
     # -- where it cannot be
 
-    def _outside(
-        self, path: PathDescription, nodes: PathNodes, low: FloatArray, high: FloatArray
-    ) -> Obstacle | None:
+    def _outside(self, nodes: PathNodes, low: FloatArray, high: FloatArray) -> Obstacle | None:
         """Return the first node out of the box of targets, or turned too far."""
         k, names = self.model.positions, self.coordinates.names
         place = nodes.q[:, :k]
@@ -160,6 +160,25 @@ class PathPlanner:
             ),
             None,
         )  # fmt: skip
+
+    def _contact(self, nodes: PathNodes) -> Obstacle | None:
+        """Return the first contact of cables, platform and boxes, between places 20 mm apart."""
+        chosen = self.looked_at(nodes)
+        found = self.model.interference.first_contact(np.ascontiguousarray(nodes.q[chosen]))
+        if found is None:
+            return None
+        line = int(nodes.line[chosen[found.leg]])
+        return Obstacle(line, found.position, in_words(found.things, found.distance_m))
+
+    def _first(
+        self, nodes: PathNodes, one: Obstacle | None, other: Obstacle | None
+    ) -> Obstacle | None:
+        """Return which of two obstacles comes first along the path."""
+        if one is None or other is None:
+            return other if one is None else one
+        k = self.model.size
+        away = [np.abs(nodes.q - each.position[:k]).sum(axis=1).argmin() for each in (one, other)]
+        return one if away[0] <= away[1] else other
 
     def _most_wrench(self, nodes: PathNodes, by_u: FloatArray, by_x: FloatArray) -> FloatArray:
         """Return how large each entry of the wrench can be within the limits, (N, d)."""
@@ -225,4 +244,4 @@ def _left_by_torque(robot: Robot, model: PlatformModel) -> FloatArray:
         arm = float(model.wrench_scale[-1])
         fastest += arm * np.sqrt(model.size - k) * platform.angular_acceleration_rad_s2
     left = (torque_Nm - rotor * fastest / per_rad) / per_rad
-    return np.minimum(model.high_N, left)
+    return np.asarray(np.minimum(model.high_N, left))

@@ -13,6 +13,17 @@ _FLAT: Final = 1e-9
 
 
 @jit
+def _largest(room: FloatArray, r: int) -> tuple[int, int]:
+    """Return row and column of the entry that is farthest from 0, from r on, of (d - 1, d)."""
+    row, column = r, r
+    for i in range(r, room.shape[0] - 1):
+        for k in range(r, room.shape[1]):
+            if abs(room[i, k]) > abs(room[row, column]):
+                row, column = i, k
+    return row, column
+
+
+@jit
 def _normal(W: FloatArray, columns: IntArray, room: FloatArray, normal: FloatArray) -> bool:
     """Write the direction (d,) at right angles to d - 1 columns of W; False where there are more.
 
@@ -24,12 +35,8 @@ def _normal(W: FloatArray, columns: IntArray, room: FloatArray, normal: FloatArr
         for k in range(d):
             room[r, k] = W[k, columns[r]]
     for r in range(d - 1):
-        best, row, column = 0.0, r, r
-        for i in range(r, d - 1):
-            for k in range(r, d):
-                if abs(room[i, k]) > best:
-                    best, row, column = abs(room[i, k]), i, k
-        if best < _FLAT:
+        row, column = _largest(room, r)
+        if abs(room[row, column]) < _FLAT:
             return False
         for k in range(d):
             room[r, k], room[row, k] = room[row, k], room[r, k]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.rigid_body import in_space, inertia_kg_m2
-from cdpr_rt.robots.wrenches.facet_kernel import write_facets
 from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.wrenches.facet_kernel import write_facets
 
 _STEP = 1e-6
 _SMALL_rad = 1e-4

@@ -38,5 +38,7 @@ class LoopParts:
     """Stores the cables' lengths of the last stop, where a start can use them."""
     paths: PathStore | None = None
     """The planned paths of a robot with a platform."""
+    before_power: Callable[[], object] = lambda: None
+    """Called before the drives get power; may wait for files."""
     enable_realtime: Callable[[], Sequence[str]] = tuple
     """Called once before the first paced cycle; returns notices of what was not permitted."""

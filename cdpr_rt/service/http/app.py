@@ -18,6 +18,7 @@ from cdpr_rt.service.http.tickets import VALID_S
 from cdpr_rt.service.http.websocket_routes import WebSocketRoutes
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.link import CommandTooLongError, LoopBusyError, LoopGoneError, Reply
+from cdpr_rt.service.path_planner import PathRefusedError, PlannerBusyError
 from cdpr_rt.service.service import Service
 from cdpr_rt.service.streams.setpoint_stream import StreamError
 
@@ -30,6 +31,8 @@ all who ask at once get one answer. What was asked for before them, and waits st
 """
 _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     LeaseError: HTTPStatus.CONFLICT,
+    PathRefusedError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    PlannerBusyError: HTTPStatus.SERVICE_UNAVAILABLE,
     LoopGoneError: HTTPStatus.SERVICE_UNAVAILABLE,
     LoopBusyError: HTTPStatus.SERVICE_UNAVAILABLE,
     CommandTooLongError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
@@ -278,6 +281,14 @@ def _add_commands(app: FastAPI, service: Service) -> None:
     async def change(body: models.Set, request: Request, token: Token = None) -> models.Done:
         """Tell the running program what it is to do."""
         return await ask("set", body, token, request, wanted=body.wanted)
+
+    @app.post("/path", responses=_REFUSALS)
+    async def path(body: models.PathFile) -> models.Planned:
+        """Plan a path for the robot; the program `path` follows it by the name in `plan`.
+
+        422 with the first place, by line and coordinates, that the robot cannot be at.
+        """
+        return models.Planned.model_validate(await service.planner.plan(body.model_dump()))
 
     @app.post("/lengths", responses=_REFUSALS)
     async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
