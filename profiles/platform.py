@@ -117,8 +117,8 @@ class Platform:
     `exit_points_m` are in the room, `anchor_points_m` in the platform's frame, whose origin is what
     `home_m` and targets speak of. What is left out (empty, or 0 of an angular speed,
     acceleration or jerk) is filled in: angular speed and acceleration are then those with which the
-    furthest anchor point, 0.1 m away at least, moves with `speed_m_s` and `acceleration_m_s2`. Jerks that are left out reach
-    these accelerations in 0.1 s.
+    furthest anchor point, 0.1 m away at least, moves with `speed_m_s` and `acceleration_m_s2`.
+    Jerks that are left out reach these accelerations in 0.1 s.
     """
 
     mass_kg: float

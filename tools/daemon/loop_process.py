@@ -17,6 +17,7 @@ from cdpr_drivers.robot.listening_machine import ListeningMachine
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.shared_block import SharedBlock
@@ -152,9 +153,15 @@ def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any
         "limits": described(limits, len(robot.axes)),
         "programs": list(parts.programs),
         "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
-        "platform": None if robot.platform is None else asdict(robot.platform),
+        "platform": None if robot.platform is None else _told(robot.platform),
         "notes": list(robot.notes),
     }
+
+
+def _told(platform: Platform) -> dict[str, Any]:
+    body = None if platform.body is None else platform.body.model_dump()
+    obstacles = [box.model_dump() for box in platform.obstacles]
+    return {**asdict(platform), "body": body, "obstacles": obstacles}
 
 
 def _obey_signals(loop: ControlLoop) -> None:
