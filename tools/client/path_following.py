@@ -18,7 +18,6 @@ from cdpr_tools.paths.times import time_text
 from cdpr_tools.signals import stop_on_signals
 
 _MOST_BYTES: Final = 1 << 20
-_PLANNED_WITHIN_S: Final = 620.0
 _TOLD_EVERY_S: Final = 5.0
 
 
@@ -41,10 +40,10 @@ def follow(where: Where, out: Output, file: Path, options: PathOptions, feed: fl
         "ignore": options.ignore,
         "origin_mm": options.origin_mm,
     }
-    with open_daemon(*_four(where), _PLANNED_WITHIN_S) as daemon:
+    with open_daemon(*_four(where)) as daemon:
         _require_platform(daemon)
         out.note(f"{file.name}: planning ...")
-        planned = daemon.post("/path", body)
+        planned = _planned(daemon, body)
         out.say(
             f"{file.name}: {planned['length_m']:.3f} m in {time_text(planned['duration_s'])}, "
             f"{planned['gain']:.1f} times as fast as at one speed throughout"
@@ -61,6 +60,24 @@ def take_up(where: Where, out: Output, back_mm: float | None, feed: float) -> No
         if back_mm is not None:
             wanted = {"back_m": 1e-3 * back_mm, "feed": feed}
         _run(daemon, out, wanted)
+
+
+def _planned(daemon: Daemon, body: dict[str, Any]) -> dict[str, Any]:
+    """Return a planned path's figures; raises BadInputError for one that cannot be followed."""
+    number = daemon.post("/path", body)["number"]
+    with stop_on_signals() as stop_requested:
+        while True:
+            job = daemon.get("/path")
+            if job["number"] != number:
+                raise WorkFailedError(f"{body['name']}: somebody else has had a path planned")
+            if not job["planning"]:
+                break
+            if stop_requested():
+                raise WorkFailedError("stopped on request; nothing has moved")
+            time.sleep(RENEW_S)
+    if job["error"]:
+        raise BadInputError(str(job["error"]))
+    return job
 
 
 def go_on(daemon: Daemon, out: Output) -> None:

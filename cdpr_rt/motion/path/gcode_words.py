@@ -33,7 +33,6 @@ def blocks(text: str, source: str, ignored: frozenset[str] = frozenset()) -> Ite
     no word, and for a file that was cut short: one without M2, M30 or its second %.
     """
     percents = 0
-    number = 0
     for number, full in enumerate(text.split("\n"), 1):
         line = _COMMENT.sub(" ", full.partition(";")[0]).strip()
         if line.startswith("%"):
@@ -49,8 +48,9 @@ def blocks(text: str, source: str, ignored: frozenset[str] = frozenset()) -> Ite
         yield block
         if "M2" in block.codes or "M30" in block.codes:
             return
+    last = text.rstrip().count("\n") + 1
     raise PathError(
-        source, number, "ends without M2, M30 or a second %: was it cut short? allowed: end with M2"
+        source, last, "ends without M2, M30 or a second %: was it cut short? allowed: end with M2"
     )
 
 

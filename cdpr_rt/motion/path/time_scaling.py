@@ -23,6 +23,8 @@ PERIOD_S: Final = 0.01
 """Between the samples of a plan."""
 _TOLERANCE: Final = 1.005
 _ROUNDS: Final = 20
+_FINER: Final = 3.0
+"""Places that are looked at for each sample."""
 _SHARE: Final = 0.98
 """Of acceleration and jerk that the first passes use; the rest is for smoothing."""
 _SLOWEST_m_s: Final = 1e-4
@@ -187,7 +189,7 @@ def _scale(
         )  # fmt: skip
         kernel.clock_run(begin, end, nodes.s, x, times, swept)
         duration_s = float(times[end]) + width_s
-        motion = _smoothed(nodes, begin, end, width_s, duration_s, 1.0, x, times, swept)
+        motion = _smoothed(nodes, begin, end, width_s, duration_s, _FINER, x, times, swept)
         strain, where = np.zeros(len(motion)), np.zeros(len(motion), np.int64)
         kernel.strain_run(
             begin, end, *geometry, nodes.speed, nodes.coordinates.positions, limits.table,
@@ -198,7 +200,7 @@ def _scale(
         ):
             break
         np.maximum(bound[begin + 1 : end], _SLOWEST_m_s**2, out=bound[begin + 1 : end])
-    slower = max(1.0, float(strain.max()))
+    slower = max(1.0, float(strain.max()))  # its count of samples says by how much
     motion = _smoothed(nodes, begin, end, width_s, duration_s, slower, x, times, swept)
     slower = PERIOD_S * (len(motion) - 1) / duration_s
     return motion, slower, rounds
@@ -210,13 +212,13 @@ def _smoothed(
     end: int,
     width_s: float,
     duration_s: float,
-    slower: float,
+    stretch: float,
     x: FloatArray,
     times: FloatArray,
     swept: FloatArray,
 ) -> FloatArray:
-    """Return a run's smoothed motion in whole periods of a plan that is slower by a factor."""
-    count = max(int(np.ceil(slower * duration_s / PERIOD_S - _NOTHING)), 1)
+    """Return a run's smoothed motion, (c, 4): places even in time, as many as if it was stretched."""
+    count = max(int(np.ceil(stretch * duration_s / PERIOD_S - _NOTHING)), 1)
     motion = np.zeros((count + 1, 4))
     kernel.smooth_run(begin, end, width_s, duration_s / count, nodes.s, x, times, swept, motion)
     motion[-1] = nodes.s[end], 0.0, 0.0, 0.0

@@ -215,7 +215,7 @@ def place_between(
         out[0, k] = p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))))
         out[1, k] = (v0 + u * (a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h
         out[2, k] = (a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / h**2
-        out[3, k] = bend / h**3
+        out[3, k] = (6 * c3 + u * (24 * c4 + u * 60 * c5)) / h**3
 
 
 @jit

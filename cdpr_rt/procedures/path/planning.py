@@ -89,6 +89,8 @@ class PathPlanner:
         obstacle = self._outside(nodes, low, high)
         if obstacle is not None:
             return PathPlan(path, nodes, self.limits, obstacle, None, np.nan, 0)
+        if not nodes.length_m and not nodes.s[-1]:
+            raise PathError(path.source, path.start_line, "nothing moves; allowed: a path")
         advance("tensions", 0.1)
         wrenches, obstacle = self._wrenches(nodes)
         obstacle = self._first(nodes, obstacle, self._contact(nodes))

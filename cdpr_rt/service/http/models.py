@@ -159,12 +159,15 @@ class Done(_Answer):
 
 
 class Planned(_Answer):
-    """A path that can be followed."""
+    """A path that is planned, or was."""
 
-    plan: str
+    number: int
+    """One more for each."""
+    planning: bool
+    error: str | None
+    """Where the robot cannot follow it: the first place, by line and coordinates, and why."""
+    plan: str | None
     """What the program `path` knows it by."""
-    duration_s: float
-    length_m: float
 
 
 class Held(_Answer):

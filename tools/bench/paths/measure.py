@@ -91,9 +91,9 @@ def _by_toppra(shown: Preview) -> dict[str, float]:
         constraint.JointVelocityConstraint(limits.velocity),
         constraint.JointAccelerationConstraint(limits.acceleration),
     ]
-    algorithm.TOPPRA(bounds, path, gridpoints=s[chosen], solver_wrapper="seidel").compute_trajectory(
-        0, 0
-    )
+    algorithm.TOPPRA(
+        bounds, path, gridpoints=s[chosen], solver_wrapper="seidel"
+    ).compute_trajectory(0, 0)
     taken_s = time.perf_counter() - begun
     count = int(chosen.sum())
     return {"nodes": count, "plan_s": taken_s, "us_a_node": 1e6 * taken_s / count}
