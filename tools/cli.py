@@ -50,7 +50,7 @@ MODULES = {
         "then.",
         "lower": "Let the platform down onto its stand; the power stays on, the cables are loose.",
         "pause": "Stop the platform and hold it there; `resume` goes on.",
-        "resume": "Go on to the position that the platform had not reached when it was paused.",
+        "resume": "Go on to the position, or along the path, that was left when it was paused.",
     },
     "daemon.daemon_state": {
         "status": "Say how a daemon and its robot are; changes nothing.",
@@ -90,6 +90,9 @@ MODULES = {
     },
     "poses": {
         "poses": "Draw poses that a robot reaches, held and without contact all the way.",
+    },
+    "path": {
+        "path": "Look at a path before it is followed, follow it, take it up again.",
     },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
