@@ -36,14 +36,14 @@ _skip_blas()
 
 
 @cache
-def _kernel_cache(folder: Path) -> str:
-    """Return a cache directory that belongs to this state of the kernels' sources in `folder`.
+def _kernel_cache(folder: Path, folders: frozenset[Path]) -> str:
+    """Return a cache directory of `folder` for this state of the kernels' sources in `folders`.
 
     numba looks only at the file of the function it compiles, not at those of the functions that
     one calls, and would go on using machine code of an older callee.
     """
     digest = hashlib.sha256()
-    for source in sorted(folder.glob("*.py")):
+    for source in sorted(source for one in folders for source in one.glob("*.py")):
         text = source.read_bytes()
         if b"from cdpr_rt.jit import" in text:
             digest.update(text)
@@ -54,14 +54,22 @@ def _kernel_cache(folder: Path) -> str:
 def jit(function: _F, *, nogil: bool = False) -> _F:
     """Return `function` compiled by numba, cached on disk, with its type kept for the checker.
 
-    It may call only kernels of its own folder: the cache sees no change in another one.
+    It may call kernels of its own folder and those that its module imports from others: machine
+    code that is kept belongs to the state of all of these.
     """
+    folder = Path(function.__code__.co_filename).parent
+    called: Any = function.__globals__
+    folders = frozenset({folder}).union(
+        *(getattr(kernel, "folders", ()) for kernel in called.values())
+    )
     cache_of_all = _SETTINGS.CACHE_DIR
-    _SETTINGS.CACHE_DIR = _kernel_cache(Path(function.__code__.co_filename).parent)
+    _SETTINGS.CACHE_DIR = _kernel_cache(folder, folders)
     try:
-        return cast(_F, numba.njit(cache=True, nogil=nogil)(function))
+        compiled: Any = numba.njit(cache=True, nogil=nogil)(function)
     finally:
         _SETTINGS.CACHE_DIR = cache_of_all
+    compiled.folders = folders
+    return cast(_F, compiled)
 
 
 def jit_unlocked(function: _F) -> _F:

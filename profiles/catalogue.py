@@ -14,7 +14,7 @@ from cdpr_profiles.drive import DriveProfile
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.limits.motor_bounds import MOST_SPEED_RATIO
 from cdpr_profiles.motor import Motor, MotorRatings, MotorSeries
-from cdpr_profiles.platform import Platform
+from cdpr_profiles.platform import CLEARANCE_m, Platform
 from cdpr_profiles.reading.bounded_input import is_file, path_of, read_toml, resolved
 from cdpr_profiles.reading.places import (
     KINDS,
@@ -137,15 +137,16 @@ def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
             for key in RobotFile.model_fields
             if key not in ("axes", "safety_io", "tension_sensors", "rails", "platform")
         },
-        platform=_platform(file),
+        platform=_platform(file, axes),
     )
 
 
-def _platform(file: RobotFile) -> Platform | None:
+def _platform(file: RobotFile, axes: Sequence[RobotAxis]) -> Platform | None:
     if file.platform is None:
         return None
     told = {key: value for key, value in file.platform if value is not None}
     up = (*(0.0 for _ in file.platform.home_m[1:]), 1.0)
+    told.setdefault("clearance_m", max(CLEARANCE_m, _thickest_m(axes)))
     return Platform(
         **told,
         exit_points_m=tuple(axis.exit_point_m or () for axis in file.axes),
@@ -153,6 +154,10 @@ def _platform(file: RobotFile) -> Platform | None:
         pulley_radius_m=tuple(axis.pulley_radius_m for axis in file.axes),
         pulley_axes=tuple(axis.pulley_axis or up for axis in file.axes),
     )
+
+
+def _thickest_m(axes: Sequence[RobotAxis]) -> float:
+    return max(axis.winch.cable.diameter_m for axis in axes)
 
 
 def _raise_faults(path: Path, faults: list[tuple[str, str]]) -> None:
@@ -199,7 +204,7 @@ def _calibration(robot: Path, axis: int, name: str | None, winch: Winch) -> Winc
 
 
 def _limit_faults(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[str, str]]:
-    """Yield (key, problem) for limits above the ratings of motors or cables."""
+    """Yield (key, problem) for limits that motors or cables do not bear."""
     for key, ratings, of in (
         ("torque_Nm", [a.winch.motor.peak_torque_Nm for a in axes], "the motor's peak torque"),
         ("speed_rad_s", [_speed_rad_s(a) for a in axes], "twice the motor's rated speed"),
@@ -210,6 +215,10 @@ def _limit_faults(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[
             most = ratings[i] if len(limits) > 1 else min(ratings)
             if value > most:
                 yield f"limits.{key}[{i}]", f"value {value:g}; allowed: up to {of} ({most:.6g})"
+    clearance_m = file.platform and file.platform.clearance_m
+    if clearance_m and clearance_m < _thickest_m(axes):
+        allowed = f"allowed: the cables' diameter ({_thickest_m(axes):g}) and more"
+        yield "platform.clearance_m", f"value {clearance_m:g}; {allowed}"
 
 
 def _speed_rad_s(axis: RobotAxis) -> float:

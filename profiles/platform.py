@@ -54,6 +54,15 @@ DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
 }
 """Directions of a platform by how many coordinates it has: positions, then angles."""
 _LEAST_ARM_m = 0.1
+CLEARANCE_m: Final = 0.01
+"""Between centre lines of cables, where a robot's file says no other and none is thicker."""
+
+
+class BoxFile(Profile):
+    """A box by two opposite corners; edges along the axes of the frame that it is given in."""
+
+    min_m: Point
+    max_m: Point
 
 
 class PlatformFile(Profile):
@@ -88,6 +97,12 @@ class PlatformFile(Profile):
     """Directions that the cables control; what they can if left out."""
     tension_distribution: TensionMethod = "minimum-deviation"
     cable_model: CableModelName = "elastic"
+    clearance_m: float | None = Field(default=None, gt=0, le=1)
+    """Nearer than this, two cables by their centre lines, or a cable and a box, are in contact."""
+    body: BoxFile | None = None
+    """The platform's body, in its own frame."""
+    obstacles: tuple[BoxFile, ...] = Field(default=(), max_length=100)
+    """Boxes of the frame and of what stands about, in the room."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +139,12 @@ class Platform:
     """Names out of DIRECTIONS, in their order."""
     tension_distribution: str = "minimum-deviation"
     cable_model: str = "elastic"
+    clearance_m: float = CLEARANCE_m
+    """Nearer than this, two cables by their centre lines, or a cable and a box, are in contact."""
+    body: BoxFile | None = None
+    """Of the platform, in its own frame."""
+    obstacles: tuple[BoxFile, ...] = ()
+    """Boxes in the room."""
     pulley_radius_m: tuple[float, ...] = ()
     """One for each axis; 0 for an eye."""
     pulley_axes: tuple[tuple[float, ...], ...] = ()

@@ -42,6 +42,7 @@ def platform_faults(
                 problem = f"{len(given)} coordinates; allowed: {size}, as platform.home_m has"
                 yield f"axes[{i}].{name}", problem
     yield from _box_faults(file)
+    yield from _body_faults(file, size)
     yield from _count_faults(file, size)
     if not found:
         yield from _direction_faults(file, [anchor or () for anchor in anchors])
@@ -60,6 +61,21 @@ def _count_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
         if given is not None and len(given) != allowed:
             where = "a plane" if size == 2 else "space"
             yield f"platform.{key}", f"{len(given)} numbers; allowed: {allowed} in {where}"
+
+
+def _body_faults(file: PlatformFile, size: int) -> Iterator[tuple[str, str]]:
+    """Yield faults of the boxes of platform and room."""
+    boxes = [] if file.body is None else [("platform.body", file.body)]
+    boxes += [(f"platform.obstacles[{i}]", box) for i, box in enumerate(file.obstacles)]
+    for key, box in boxes:
+        for name, point in (("min_m", box.min_m), ("max_m", box.max_m)):
+            if len(point) != size:
+                problem = f"{len(point)} coordinates; allowed: {size}, as platform.home_m has"
+                yield f"{key}.{name}", problem
+                return
+        for i, (low, high) in enumerate(zip(box.min_m, box.max_m, strict=True)):
+            if not low < high:
+                yield f"{key}.max_m[{i}]", f"value {high:g}; allowed: above {low:g}"
 
 
 def _size_faults(

@@ -40,6 +40,22 @@ def test_a_controllers_kernel_is_compiled_anew_when_its_callee_has_changed(tmp_p
     assert told(tmp_path, "caller.py") == ["30.0", "0"]
 
 
+def test_so_it_is_when_the_callee_is_in_another_folder(tmp_path: Path) -> None:
+    (tmp_path / "middle").mkdir()
+    (tmp_path / "inner").mkdir()
+    callee = tmp_path / "inner" / "kernels_callee.py"
+    between = "from cdpr_rt.jit import jit\nfrom inner.kernels_callee import inner\n"
+    (tmp_path / "middle" / "kernels_callee.py").write_text(
+        f"{between}\n@jit\ndef middle(x):\n    return 2.0 * inner(x)\n"
+    )
+    text = CALLER.replace("kernels_callee import inner", "middle.kernels_callee import middle")
+    (tmp_path / "caller.py").write_text(text.replace("inner(", "middle("))
+    for added, found in ((1.0, "40.0"), (2.0, "60.0")):
+        callee.write_text(CALLEE.format(added=added))
+        assert told(tmp_path, "caller.py") == [found, "0"]
+        assert told(tmp_path, "caller.py") == [found, "1"]
+
+
 def test_the_simulators_kernels_have_a_cache_for_each_state_of_them(tmp_path: Path) -> None:
     package = tmp_path / "cdpr_sim_bus"
     shutil.copytree(Path(cdpr_sim_bus.__file__).resolve().parent, package)

@@ -6,12 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from cdpr_rt.errors import ControlError
 from cdpr_rt.state_file import StateFileError, read_state, state_path, write_state
-
-
-class NotCalibratedError(ControlError):
-    """What was asked for needs a calibrated robot; says since when and why it is not."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +52,18 @@ def mark_not_calibrated(robot: str, why: str) -> CalibrationState:
     return _mark(robot, False, why)
 
 
-def require_calibrated(robot: str) -> CalibrationState:
-    """Return the state of a calibrated robot; raises NotCalibratedError for any other."""
+def distrust(robot: str) -> str:
+    """Return why the geometry of a robot may not be believed any more; empty where it may.
+
+    A robot that has never been calibrated has the geometry of its file.
+    """
+    if not calibration_file(robot).exists():
+        return ""
     state = calibration_state(robot)
-    if not state.calibrated:
-        since = f" since {state.date}" if state.date else ""
-        raise NotCalibratedError(f"robot {robot!r} is not calibrated{since}: {state.why}")
-    return state
+    if state.calibrated:
+        return ""
+    since = f" since {state.date}" if state.date else ""
+    return f"robot {robot!r} is not calibrated{since}: {state.why}"
 
 
 def _mark(robot: str, calibrated: bool, why: str) -> CalibrationState:

@@ -11,6 +11,8 @@ import numpy as np
 from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.errors import GeometryError
+from cdpr_rt.robots.platform.loop_design import loop_model_of
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.rigid_body import is_point
 from cdpr_rt.robots.robot_arrays import limits_of
@@ -25,6 +27,8 @@ _LONGEST_PERIOD_s = 0.005
 """Of a cycle, with which the platform's control is still stiff enough to overcome friction."""
 _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
+_SLOW_Hz = 0.5
+"""Of a loop's mode: it takes 2.3 s to come within 2 % of where it goes."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
@@ -51,7 +55,7 @@ def findings(robot: Robot) -> list[Finding]:
         found += [*_tensions(statics), *_motors(robot, statics), *_lengths(robot, statics)]
         if statics.turns:
             found += _turning(statics)
-        found += _swinging(robot.platform)
+        found += [*_loop(robot, statics), *_swinging(robot.platform)]
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -262,6 +266,21 @@ def _turning(statics: PlatformStatics) -> Iterator[Finding]:
             "prevent; anchor points that lie towards their exit points let it turn less"
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=False)
+
+
+def _loop(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    try:
+        loop = loop_model_of(statics.model, robot.axes, robot.sync_period_s)
+    except GeometryError:
+        return  # said of the tensions
+    slowest_Hz = min(there.slowest_rad_s for there in loop.margins(loop.design())) / math.tau
+    if slowest_Hz < _SLOW_Hz:
+        text = (
+            f"a stable loop moves the platform's slowest mode at {slowest_Hz:.2g} Hz, so that it "
+            f"takes long to come to rest; {_SLOW_Hz:g} Hz and more wanted: stiffer cables, a "
+            "lighter platform or a shorter sync_period_s help"
+        )
+        yield Finding("platform.mass_kg", text, impossible=False)
 
 
 def _swinging(platform: Platform) -> Iterator[Finding]:

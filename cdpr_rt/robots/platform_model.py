@@ -10,6 +10,7 @@ import numpy as np
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.interference.interference import Interference
 from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.kinematics.pose_setpoint import place_all
@@ -121,6 +122,22 @@ class PlatformModel:
             self.wrench_scale,
             self.reserve_N if reserve_N is None else reserve_N,
             in_space(platform.centre_of_mass_m),
+        )
+
+    @cached_property
+    def interference(self) -> Interference:
+        """Which of cables, platform and obstacles touch, and where."""
+        platform = self.platform
+        body = None
+        if platform.body is not None:
+            body = np.array([platform.body.min_m, platform.body.max_m])
+        return Interference(
+            self.kinematics,
+            self.home_pose.array,
+            platform.clearance_m,
+            body,
+            [np.array([box.min_m, box.max_m]) for box in platform.obstacles],
+            platform.is_planar,
         )
 
     def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionDistribution:

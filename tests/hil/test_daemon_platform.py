@@ -14,6 +14,7 @@ import pytest
 from daemon_rig import RealDaemon, cdpr, until
 
 import cdpr_profiles
+from cdpr_rt.robots.calibration_state import mark_not_calibrated
 
 PERIOD_S = 0.004
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots"
@@ -111,6 +112,26 @@ def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
     lowered = told(daemon, "lower")
     assert lowered["program"] == "hold"
     assert until(lambda: daemon.status()["program_progress"].get("tight") is False)
+
+
+def test_after_a_rail_has_moved_it_goes_nowhere_until_somebody_says_where_it_is(
+    daemon: RealDaemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert daemon.robot is not None
+    monkeypatch.setenv("XDG_STATE_HOME", str(daemon.robot.parent))
+    mark_not_calibrated("planar", "rail 2 was moved from 0.1000 m")
+    # the drives have power: what they stand on has not moved since
+    status, why = refused(daemon, "move", "--to", "0", "1600")
+    assert (status, "run tighten first" in why) == (1, True)
+    for _ in range(2):
+        told(daemon, "disable")
+        told(daemon, "enable")
+        status, why = refused(daemon, "move", "--to", "0", "1600")
+        if "run tighten first" in why:
+            return
+        assert "'planar' is not calibrated since 20" in why and "rail 2 was moved" in why
+        assert cdpr("robot", "mark-calibrated", daemon.robot, "--why", "laser").returncode == 0
+    pytest.fail(why)
 
 
 def test_a_platform_is_turned_as_it_is_typed(turning: RealDaemon) -> None:

@@ -192,3 +192,28 @@ def test_what_was_commissioned_is_found_beside_the_robots_file(tmp_path: Path) -
     path = changed(tmp_path, (name, f'{name}\ncommissioned = "motors/left"'))
     first, second, _ = load_robot(path).axes
     assert (first.commissioned, second.commissioned) == (tmp_path / "motors" / "left", None)
+
+
+def test_body_and_obstacles_are_boxes_of_the_robots_own_dimension(tmp_path: Path) -> None:
+    body = "body = { min_m = [-0.1, -0.1], max_m = [0.1, 0.1] }\nmass_kg"
+    box = "[[platform.obstacles]]\nmin_m = [0.0, 0.0]\nmax_m = [0.1, 0.2]\n[limits]"
+    platform = load_robot(changed(tmp_path, ("mass_kg", body), ("[limits]", box))).platform
+    assert platform is not None and platform.body is not None
+    assert (platform.body.min_m, platform.obstacles[0].max_m) == ((-0.1, -0.1), (0.1, 0.2))
+    assert platform.clearance_m == 0.01
+    for wrong, key, problem in (
+        ("max_m = [0.1, -0.1]", "platform.obstacles[0].max_m[1]", "above 0"),
+        ("max_m = [0.1, 0.2, 0.3]", "platform.obstacles[0].max_m", "3 coordinates; allowed: 2"),
+        ("max_m = [0.1, 2000.0]", "platform.obstacles[0].max_m[1]", "in metres"),
+        ("max = [0.1, 0.2]", "platform.obstacles[0].max", "did you mean 'max_m'?"),
+    ):
+        path = changed(tmp_path, ("[limits]", box.replace("max_m = [0.1, 0.2]", wrong)))
+        with pytest.raises(ProfileError, match=re.escape(key)) as refused:
+            load_robot(path)
+        assert problem in str(refused.value)
+
+
+def test_a_clearance_below_the_cables_diameter_is_refused(tmp_path: Path) -> None:
+    path = changed(tmp_path, ("mass_kg", "clearance_m = 0.002\nmass_kg"))
+    with pytest.raises(ProfileError, match=r"platform.clearance_m: value 0.002; allowed: .*0.0048"):
+        load_robot(path)

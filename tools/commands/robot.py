@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.robots import checks
+from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_tools.commands import robot_trial
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.errors import BAD_INPUT, BadInputError
@@ -66,6 +68,19 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
     out.result({"ok": possible, **figures})
     if not possible:
         raise typer.Exit(BAD_INPUT)
+
+
+@app.command("mark-calibrated")
+def mark_calibrated_(
+    robot: _Robot,
+    why: Annotated[str, typer.Option("--why", help="How the exit points in its file are known.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Say that a robot's geometry is as its file has it, as after its rails were moved."""
+    out = Output(as_json)
+    state = mark_calibrated(load_robot(robot).profile, why)
+    out.say(f"robot {state.robot}: calibrated since {state.date}: {state.why}")
+    out.result({"ok": True, "calibration": asdict(state)})
 
 
 @app.command()

@@ -24,11 +24,13 @@ from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
+from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.registry import (
     build_programs,
     platform_parts,
     warm_up_programs,
 )
+from cdpr_rt.robots.calibration_state import distrust
 from cdpr_rt.robots.robot_arrays import described, limits_of, supervised, winches_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
@@ -101,11 +103,17 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
         lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
         lowering=lowering,
         last=None if platform is None else platform.last,
+        before_power=lambda: _look_at_calibration(robot, platform),
         enable_realtime=enable_realtime,
     )
     warm_up_programs(programs, n, platform)
     warm_up_supervision(estimator, parts.supervisor, n)
     return parts
+
+
+def _look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
+    if platform is not None:
+        platform.distrust = distrust(robot.profile)
 
 
 def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:

@@ -11,12 +11,16 @@ import numpy as np
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.cable_loss import worst_swings
+from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, loop_model_of
+from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import statics_of, view_of
 
 _COLUMNS, _ROWS = 65, 23
+_STIFFNESS_OFF = max(STIFFNESS_SHARES) - 1.0
 
 
 def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
@@ -73,9 +77,31 @@ def _of_tensions(
         "reserve_in_motion_N": _finite(moving.min()),
         "lowest_resonance_Hz": float(lowest_resonance_Hz(robot, points).min()),
     }
+    of_all["loop"] = _of_loop(robot, statics.model)
     if statics.turns:
         of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
     return of_all
+
+
+def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:
+    """Return what the control's loop keeps at the worst of its poses and stiffnesses.
+
+    None where the cables do not hold the platform.
+    """
+    try:
+        loop = loop_model_of(model, robot.axes, robot.sync_period_s)
+    except GeometryError:
+        return None
+    everywhere = loop.margins(loop.design())
+    worst = min(everywhere, key=lambda there: there.modulus)
+    return {
+        "slowest_Hz": min(there.slowest_rad_s for there in everywhere) / math.tau,
+        "fastest_Hz": max(there.fastest_rad_s for there in everywhere) / math.tau,
+        "modulus_margin": worst.modulus,
+        "gain_margin": worst.gain,
+        "phase_margin_rad": worst.phase_rad,
+        "worst_at_Hz": worst.frequency_Hz,
+    }
 
 
 def _finite(value: float) -> float | None:
@@ -144,11 +170,23 @@ def _tension_lines(told: dict[str, Any]) -> list[str]:
     lines.append(
         f"resonance  rotors against the platform over the cables at {lowest:.1f} Hz or more"
     )
+    if told["loop"] is not None:
+        lines += _loop_lines(told["loop"])
     if "turns_at_most_rad" in told:
         turns = told["turns_at_most_rad"]
         turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
         lines.append(f"           it {turning} there, which no cable can prevent")
     return lines
+
+
+def _loop_lines(loop: dict[str, float]) -> list[str]:
+    slowest, fastest = loop["slowest_Hz"], loop["fastest_Hz"]
+    return [
+        f"loop       the platform's modes at {slowest:.1f} to {fastest:.1f} Hz; with cables up to "
+        f"{_STIFFNESS_OFF:.0%} softer or stiffer",
+        f"           its gain may still be {loop['gain_margin']:.1f} times off, or its phase "
+        f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
+    ]
 
 
 def _table(axes: Sequence[dict[str, Any]]) -> list[str]:

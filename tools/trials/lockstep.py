@@ -117,7 +117,9 @@ class LockstepRobot:
         stack.callback(self.machine.close)
         limits = limits_of(robot)
         parts = loop_parts(robot, limits, block)
-        parts = replace(parts, programs={**parts.programs, **self._more_programs})
+        programs = {**parts.programs, **self._more_programs}
+        # whether the user's own robot may be believed is nothing to a trial of a simulated one
+        parts = replace(parts, programs=programs, before_power=lambda: None)
         block.write_description(description(robot, limits, parts))
         self.loop = ControlLoop(block, self.machine, parts, lambda: self.now_ns)
         self.right = RightInBusTime(block, lambda: self.now_ns)

@@ -85,6 +85,8 @@ class PlatformParts:
         """The most along each direction, (d,)."""
         self.scale_m = model.wrench_scale
         """How far an anchor point moves with each direction, (d,): 1, and for angles an arm."""
+        self.distrust = ""
+        """Why the geometry may not be believed, as after a rail has moved; else empty."""
         self.cycle = -2
         """The last cycle in which one of the programs moved the platform."""
         self.tight = False

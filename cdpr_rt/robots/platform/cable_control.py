@@ -26,8 +26,8 @@ from cdpr_rt.robots.platform.body_kernel import body_of
 from cdpr_rt.robots.platform.loop_design import (
     DAMPING_RATIO,
     LoopGains,
-    LoopModel,
     OBSERVER_rad_s,
+    loop_model_of,
 )
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
@@ -69,7 +69,7 @@ class CableControl:
         self.model, self._period_s = model, period_s
         self.workspace = model.workspace().prepared()
         """Where targets may lie."""
-        self._held = model.workspace(0.0).prepared()
+        self._held, self._interference = model.workspace(0.0).prepared(), model.interference
         self.low_N, self.high_N = self.workspace.low, self.workspace.high
         """Between which the tensions are planned, (n,)."""
         self.least_N = model.low_N
@@ -90,10 +90,7 @@ class CableControl:
         """Where the platform is, (d,)."""
         self._compensation = compensation
         self._motors = self._motor_rows(axes)
-        rotors_kg = self.inertia_kg_m2 / self._motors[tracking.M_PER_RAD] ** 2
-        stiffness_N = np.array([axis.winch.cable.stiffness_N for axis in axes])
-        self.loop_model = LoopModel(model, rotors_kg, stiffness_N, period_s)
-        self.gains = self.loop_model.design()
+        self.gains = loop_model_of(model, axes, period_s).design()
         span_N = float((model.high_N - model.low_N).min())
         self._settings = _settings(self.gains, span_N, period_s)
         self._distribution = self._chosen_distribution()
@@ -289,7 +286,8 @@ class CableControl:
         poses = self.model.poses((1.0 - share) * self.position + share * np.asarray(position))
         obstacle = self.workspace.first_obstacle(poses)
         if obstacle is None:
-            return ""
+            contact = self._interference.first_contact(np.array([self.position, position]))
+            return "" if contact is None else str(contact)
         there, why = obstacle
         place = ", ".join(f"{x:.3f}" for x in there.p[: self.model.positions])
         return f"at {place} m {why}"

@@ -20,12 +20,15 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_profiles import RobotAxis
 from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin
 from cdpr_rt.robots.platform_model import PlatformModel
@@ -79,6 +82,16 @@ class LoopMargins:
     fastest_rad_s: float
     """Of the platform's modes in closed loop, without delays."""
 
+    @property
+    def gain(self) -> float:
+        """By how much the gain may at least grow, or shrink to its inverse: 1/(1 - μ)."""
+        return 1.0 / (1.0 - self.modulus)
+
+    @property
+    def phase_rad(self) -> float:
+        """By how much the phase may at least be off: 2 asin(μ/2)."""
+        return 2.0 * math.asin(0.5 * self.modulus)
+
 
 def latency_s(period_s: float) -> float:
     """Return how late the loop acts: drive, transfer, and half a cycle of holding."""
@@ -115,7 +128,10 @@ class LoopModel:
         period_s: float,
         poses: FloatArray | None = None,
     ) -> None:
-        """Take rotors' masses (n,) as the cables feel them, EA (n,), and set-points (m, d)."""
+        """Take rotors' masses (n,) as the cables feel them, EA (n,), and set-points (m, d).
+
+        Raises GeometryError where the cables do not hold the platform at one of them.
+        """
         self.period_s, self.rotor_kg = period_s, float(rotors_kg.mean())
         self._lightest_kg = float(rotors_kg.min())
         self.poses = design_poses(model) if poses is None else poses
@@ -143,6 +159,8 @@ class LoopModel:
         write_mass_matrix(body_of(model.platform), pose.array, room, M)
         M_p = M[np.ix_(kinematics.directions, kinematics.directions)]
         J = kinematics.jacobian(pose)
+        if np.linalg.matrix_rank(J) < J.shape[1]:
+            raise GeometryError("the cables cannot hold one direction, whatever their tensions")
         orthogonal, R = np.linalg.qr(J)
         inverse = np.linalg.inv(R)
         self._mass_kg[i], modes = np.linalg.eigh(inverse.T @ M_p @ inverse)
@@ -250,3 +268,13 @@ class LoopModel:
 
     def _stiffness_N_m(self, gains: LoopGains) -> float:
         return float(np.exp(np.log(self._along_modes(gains)[1]).mean()))
+
+
+def loop_model_of(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> LoopModel:
+    """Return the linear model of a robot with these axes, one for each of the n cables."""
+    winches = [axis.winch for axis in axes]
+    rotors_kg = np.array(
+        [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
+    )
+    stiffness_N = np.array([w.cable.stiffness_N for w in winches])
+    return LoopModel(model, rotors_kg, stiffness_N, period_s)

@@ -35,5 +35,7 @@ class LoopParts:
     """How the platform is lowered, None for a robot without such a program."""
     last: LastLengths | None = None
     """Stores the cables' lengths of the last stop, where a start can use them."""
+    before_power: Callable[[], object] = lambda: None
+    """Called before the drives get power; may wait for files."""
     enable_realtime: Callable[[], Sequence[str]] = tuple
     """Called once before the first paced cycle; returns notices of what was not permitted."""

@@ -183,6 +183,7 @@ class Transitions:
         engine.parts.programs[program].check(arguments)
         self.first_program = program
         life.clear_reason()
+        yield from self._runner.run_blocking(engine.parts.before_power)
         machine.power_on()
         life.enter(LoopState.ACTIVE)
         try:

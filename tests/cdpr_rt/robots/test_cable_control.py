@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from platform_physics import PERIOD_S, Physics, planar, spatial, with_friction
 
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.platform import BoxFile
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.cable_control import CableControl
+from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.bench.control import Motion, controls, run_block
 
@@ -153,6 +156,18 @@ def test_a_place_that_tensions_cannot_hold_is_told() -> None:
         assert not control.stands(np.array(place))
     assert "at " in control.feasible_path(np.array([-1.5, 1.0]))
     assert not control.feasible_path(np.array([0.3, 1.6]))
+
+
+def test_an_obstacle_in_the_way_is_told() -> None:
+    robot = load_robot("spatial-8")
+    assert robot.platform is not None
+    box = BoxFile(min_m=(-0.1, 0.0, 2.12), max_m=(0.0, 0.2, 2.2))
+    blocked = replace(robot.platform, obstacles=(box,))
+    model = platform_model_of(replace(robot, platform=blocked))
+    control = CableControl(model, robot.axes, np.full(8, 6.0), PERIOD_S)
+    told = control.feasible_path(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
+    assert "at -0.050, 0.100, 1.810 m: platform and obstacle 0 come within 10 mm" in told
+    assert not control.feasible_path(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
 
 
 def test_an_orientation_that_tensions_cannot_hold_is_told() -> None:

@@ -87,6 +87,10 @@ def test_a_robot_in_space_is_told_and_drawn(tmp_path: Path) -> None:
     assert told["held_share"] == told["target_share"] == 1.0 and told["findings"] == []
     assert told["reserve_in_motion_N"] > told["kept_for_control_N"] > 90.0  # type: ignore[operator]
     assert 6.0 < told["lowest_resonance_Hz"] < 8.0  # type: ignore[operator]
+    loop = told["loop"]
+    assert 0.45 <= loop["modulus_margin"] < 0.6  # type: ignore[index]
+    assert 1.0 < loop["slowest_Hz"] < loop["fastest_Hz"] < 20.0  # type: ignore[index]
+    assert re.search(r"its gain may still be 1.8 times off, or its phase 26 deg", shown.stderr)
     assert told["controlled"] == ["x", "y", "z", "rx", "ry", "rz"]
     assert "turns_at_most_rad" not in told
     swings = [axis["broken"]["swing_m"] for axis in told["axes"]]  # type: ignore[attr-defined]
@@ -106,6 +110,16 @@ def test_what_a_ceiling_cannot_hold_in_space_is_told_with_what_would_help(tmp_pa
     path.write_text(suspended.replace("tension_max_N = 800.0", "tension_max_N = 1500.0"))
     told = {f.key: f.text for f in findings(load_robot(path)) if f.impossible}
     assert "allowed: up to 1333 N" in told["limits.tension_max_N"]
+
+
+def test_a_loop_that_has_to_be_slow_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "late.toml"
+    text = (SHIPPED / "robots" / "suspended-6.toml").read_text()
+    path.write_text(re.sub(r"^sync_period_s = .*$", "", text, flags=re.M))
+    assert not findings(load_robot(path))
+    path.write_text("sync_period_s = 0.005\n" + path.read_text())
+    (found,) = findings(load_robot(path))
+    assert not found.impossible and "slowest mode at 0.24 Hz" in found.text
 
 
 @pytest.mark.parametrize(

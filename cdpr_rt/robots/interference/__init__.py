@@ -1,0 +1,1 @@
+"""Where cables touch each other, the platform, or boxes of the frame."""

@@ -1,0 +1,296 @@
+"""Kernels that find the first contact on a straight way of a platform, and miss none between.
+
+Tremblay (thesis), eqs. (3.27), (3.36), (3.37), by conservative advancement: at a place of the way
+each pair has a distance d, along the unit vector n between its nearest points. Both its things are
+convex, and stay apart by more than the clearance c for as long as no end has moved further along n
+than d - c and what it stays behind. With the speed g of an end along n and a bound h of its
+acceleration, both by the share s of the way, that is so for
+
+    s up to 2 m / (g + √(g² + 2 h m)),  m = d - c + what it stays behind
+
+    way  (7, 3)   rows START and STEP of the position, TURNED and TURN of the rotation vector,
+                  and a rotation BASE: p = START + s STEP, Q = exp(TURNED + s TURN) BASE
+
+Of points at b in the platform's frame the speed is |STEP| + |TURN| |b| at most, and by Duhamel's
+formula the acceleration |TURN|² |b| at most.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.jit import jit
+from cdpr_rt.robots.interference.clearance_kernel import (
+    ANCHOR,
+    BODY_BOX,
+    CABLE_BODY,
+    CABLES,
+    EXIT,
+    FIRST,
+    KIND,
+    SECOND,
+    TRIMMED,
+    distance,
+    write_ends,
+)
+from cdpr_rt.robots.kinematics.cable_kernel import (
+    ANCHOR as ANCHORS,
+)
+from cdpr_rt.robots.kinematics.cable_kernel import (
+    AXIS,
+    CABLE_ROWS,
+    FREE,
+    RADIUS,
+    TINY,
+)
+from cdpr_rt.robots.kinematics.pose import exponential
+
+START, STEP, TURNED, TURN, BASE, WAY_ROWS = 0, 1, 2, 3, 4, 7
+TOUCH_m: Final = 1e-6
+"""What is nearer than this above the clearance is in contact."""
+_LEAVING: Final = 0.9
+"""Share of its distance that a pair which is in contact at the start has to keep."""
+_SPEED, _ACCELERATION, _EXIT, _FAR, _FREE, _HOLDS, _RATES = range(7)
+_TOGETHER = 0.02
+"""Share of the way by which pairs are looked at early, since others are looked at anyway."""
+_MOST_LOOKS = 20_000
+_SMALL = 1e-4
+
+
+@jit
+def first_contact(
+    geometry: FloatArray,
+    boxes: FloatArray,
+    pairs: IntArray,
+    clearance: float,
+    trim: float,
+    way: FloatArray,
+) -> tuple[float, int, float]:
+    """Return the share of the way at which a pair comes into contact, which pair, and its distance.
+
+    Returns 2.0 and -1 where none does. What is in contact at the start has to stay about as far
+    apart, but for what touches altogether, and to be clear at the end. A pair that _MOST_LOOKS do
+    not prove clear counts as in contact.
+    """
+    n, count = geometry.shape[1], pairs.shape[0]
+    cables, ends, rates = np.empty((CABLE_ROWS, n)), np.empty((2, n, 3)), np.empty((_RATES, n))
+    points, near, corners = np.empty((4, 3)), np.empty((2, 3)), np.empty((8, 3))
+    pose, twist, moves, room = (
+        np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3)), np.empty((4, 3)),
+    )  # fmt: skip
+    until, allowed = np.zeros(count), np.full(count, clearance)
+    body_speed = _write_speeds(geometry, boxes, way, rates)
+    share, looks = 0.0, 0
+    while share < 1.0:
+        place_on(way, share, room, pose, twist)
+        write_ends(geometry, pose, cables, ends)
+        _write_exit_speeds(geometry, pose, way, cables, ends, rates)
+        for k in range(count):
+            if until[k] > share + _TOGETHER:
+                continue
+            apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
+            if looks == 0:
+                allowed[k] = min(clearance, _LEAVING * apart - TOUCH_m)
+            if allowed[k] < 0.0:
+                until[k] = math.inf
+            elif apart - allowed[k] >= TOUCH_m and looks < _MOST_LOOKS:
+                until[k] = share + _clear_for(
+                    pairs[k], apart, allowed[k], trim, pose, twist, way, points, near, rates,
+                    body_speed, moves,
+                )  # fmt: skip
+            elif until[k] <= share:
+                return share, k, apart
+        share = 1.0
+        for k in range(count):
+            share = min(share, until[k])
+        looks += 1
+    place_on(way, 1.0, room, pose, twist)
+    write_ends(geometry, pose, cables, ends)
+    for k in range(count):
+        if allowed[k] < clearance:
+            apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
+            if not apart >= clearance:
+                return 1.0, k, apart
+    return 2.0, -1, math.inf
+
+
+@jit
+def place_on(
+    way: FloatArray, share: float, room: FloatArray, pose: FloatArray, twist: FloatArray
+) -> None:
+    """Write the pose at a share of the way, and its derivative there: twist (2, 3).
+
+    `room` (4, 3) is overwritten.
+
+    For a rotation vector φ with derivative φ' the angular velocity is φ' + (1 - cos θ)/θ² φ × φ' +
+    (θ - sin θ)/θ³ φ × (φ × φ').
+    """
+    phi, turn = room[0], room[1:4]
+    for k in range(3):
+        phi[k] = way[TURNED, k] + share * way[TURN, k]
+        twist[0, k] = way[STEP, k]
+        pose[0, k] = way[START, k] + share * way[STEP, k]
+    exponential(phi, turn)
+    for i in range(3):
+        for j in range(3):
+            entry = 0.0
+            for k in range(3):
+                entry += turn[i, k] * way[BASE + k, j]
+            pose[1 + i, j] = entry
+    x, y, z = phi[0], phi[1], phi[2]
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    first, second = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+    if angle > _SMALL:
+        first, second = (1.0 - math.cos(angle)) / square, (angle - math.sin(angle)) / square / angle
+    tx, ty, tz = way[TURN, 0], way[TURN, 1], way[TURN, 2]
+    cx, cy, cz = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
+    twist[1, 0] = tx + first * cx + second * (y * cz - z * cy)
+    twist[1, 1] = ty + first * cy + second * (z * cx - x * cz)
+    twist[1, 2] = tz + first * cz + second * (x * cy - y * cx)
+
+
+@jit
+def _size(vector: FloatArray) -> float:
+    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+
+
+@jit
+def _write_speeds(
+    geometry: FloatArray, boxes: FloatArray, way: FloatArray, rates: FloatArray
+) -> float:
+    """Write bounds of anchor points' speeds and accelerations; return that of the body's speed."""
+    step, turn = _size(way[STEP]), _size(way[TURN])
+    for i in range(geometry.shape[1]):
+        arm = _size(geometry[ANCHORS : ANCHORS + 3, i])
+        rates[_SPEED, i], rates[_ACCELERATION, i] = step + turn * arm, turn * turn * arm
+    furthest = 0.0
+    for k in range(3):
+        furthest += max(abs(boxes[0, 0, k]), abs(boxes[0, 1, k])) ** 2
+    return step + turn * math.sqrt(furthest)
+
+
+@jit
+def _write_exit_speeds(
+    geometry: FloatArray,
+    pose: FloatArray,
+    way: FloatArray,
+    cables: FloatArray,
+    ends: FloatArray,
+    rates: FloatArray,
+) -> None:
+    """Write bounds of how fast free parts begin elsewhere, and for how far all bounds hold.
+
+    Over a pulley of radius r, an anchor that moves at v beside its swivel axis by e, with a free
+    part l, moves the place where the cable leaves by r (2 v/e + v/l) at most. The bounds hold while
+    e and l are half of what they are. In the platform's frame that place moves as the platform
+    turns as well.
+    """
+    step, turn = _size(way[STEP]), _size(way[TURN])
+    for i in range(geometry.shape[1]):
+        v, r, free = rates[_SPEED, i], geometry[RADIUS, i], cables[FREE, i]
+        speed, least = 0.0, free
+        if r > 0.0:
+            along, square = 0.0, 0.0
+            for k in range(3):
+                apart = ends[1, i, k] - geometry[k, i]
+                along += apart * geometry[AXIS + k, i]
+                square += apart * apart
+            beside = math.sqrt(max(square - along * along, 0.0))
+            if beside > 0.0 and free > 0.0:
+                speed = r * v * (4.0 / beside + 2.0 / free)
+                least = min(beside, free) / (1.0 + 2.0 * r / free)
+            else:
+                least = 0.0
+        rates[_EXIT, i] = speed
+        rates[_HOLDS, i], rates[_FREE, i] = 0.5 * least / (v + speed + TINY), free
+        far = 0.0
+        for k in range(3):
+            far += (ends[0, i, k] - pose[0, k]) ** 2
+        rates[_FAR, i] = speed + step + turn * (math.sqrt(far) + step + speed)
+
+
+@jit
+def _clear_for(
+    pair: IntArray,
+    apart: float,
+    allowed: float,
+    trim: float,
+    pose: FloatArray,
+    twist: FloatArray,
+    way: FloatArray,
+    points: FloatArray,
+    near: FloatArray,
+    rates: FloatArray,
+    body_speed: float,
+    moves: FloatArray,
+) -> float:
+    """Return for which share of the way, from here, a pair stays further apart than allowed.
+
+    `moves` (4, 3) has for both ends of both things by how much they stay behind, their speed along
+    n, and their acceleration.
+    """
+    if pair[KIND] == BODY_BOX:
+        return (apart - allowed) / (body_speed + TINY)
+    moves[:] = 0.0
+    least, others = float(rates[_HOLDS, pair[FIRST]]), 1
+    _write_moves(pair, 0, apart, trim, pose, twist, way, points, near, rates, moves)
+    if pair[KIND] == CABLES:
+        least, others = min(least, rates[_HOLDS, pair[SECOND]]), 2
+        _write_moves(pair, 1, apart, trim, pose, twist, way, points, near, rates, moves)
+    for a in range(2):
+        for b in range(2, 2 + others):
+            room = apart - allowed + moves[a, 0] + moves[b, 0]
+            g, h = moves[a, 1] + moves[b, 1], moves[a, 2] + moves[b, 2]
+            least = min(least, 2.0 * room / (g + math.sqrt(g * g + 2.0 * h * room) + TINY))
+    return least
+
+
+@jit
+def _write_moves(
+    pair: IntArray,
+    row: int,
+    apart: float,
+    trim: float,
+    pose: FloatArray,
+    twist: FloatArray,
+    way: FloatArray,
+    points: FloatArray,
+    near: FloatArray,
+    rates: FloatArray,
+    moves: FloatArray,
+) -> None:
+    """Write how both ends of a pair's first or second (`row` 1) thing, a cable, may move."""
+    i, sign = pair[FIRST + row], (1.0 - 2.0 * row) / apart
+    nx, ny = sign * (near[1, 0] - near[0, 0]), sign * (near[1, 1] - near[0, 1])
+    nz = sign * (near[1, 2] - near[0, 2])
+    own, both = near[row], rates[_SPEED, i] + rates[_EXIT, i]
+    for end in range(2):
+        x = points[2 * row + end]
+        behind = nx * (own[0] - x[0]) + ny * (own[1] - x[1]) + nz * (own[2] - x[2])
+        trimmed = pair[TRIMMED] & (ANCHOR if end else EXIT) != 0
+        speed, bend = 0.0, 0.0
+        if pair[KIND] == CABLE_BODY:
+            if end == 0:
+                speed = rates[_FAR, i]
+            elif trimmed:
+                speed = trim * (_size(way[TURN]) + 2.0 * both / rates[_FREE, i])
+                if 4.0 * trim > rates[_FREE, i]:
+                    speed = rates[_FAR, i]
+        elif trimmed:
+            speed = 2.0 * both
+        elif end == 0:
+            speed = rates[_EXIT, i]
+        else:
+            rx, ry, rz = x[0] - pose[0, 0], x[1] - pose[0, 1], x[2] - pose[0, 2]
+            wx, wy, wz = twist[1, 0], twist[1, 1], twist[1, 2]
+            along = nx * (twist[0, 0] + wy * rz - wz * ry)
+            along += ny * (twist[0, 1] + wz * rx - wx * rz)
+            along += nz * (twist[0, 2] + wx * ry - wy * rx)
+            speed, bend = max(along, 0.0), rates[_ACCELERATION, i]
+        moves[2 * row + end, 0] = max(behind, 0.0)
+        moves[2 * row + end, 1], moves[2 * row + end, 2] = speed, bend

@@ -1,0 +1,177 @@
+"""Clearances of a robot's cables, platform and boxes, and the first contact on a straight way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.jit import bound
+from cdpr_rt.robots.interference import clearance_kernel as kernel
+from cdpr_rt.robots.interference.contact_kernel import START, TURNED, WAY_ROWS, first_contact
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
+from cdpr_rt.robots.kinematics.kinematics import CableKinematics
+
+_EVERYWHERE_m: Final = 1e4
+"""How deep boxes of a plane are."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The first place of a way where two things are nearer to each other than the clearance."""
+
+    position: FloatArray
+    """Of the platform, (d,): coordinates, then rotation vector."""
+    coordinates: int
+    leg: int
+    """Which straight part of the way, from 0."""
+    share: float
+    """Of that part."""
+    things: tuple[str, str]
+    distance_m: float
+
+    def __str__(self) -> str:
+        place, turned = (
+            ", ".join(f"{x:.3f}" for x in part)
+            for part in (self.position[: self.coordinates], self.position[self.coordinates :])
+        )
+        about = f" turned by {turned} rad" if self.position[self.coordinates :].any() else ""
+        return f"at {place} m{about}: {in_words(self.things, self.distance_m)}"
+
+
+class Interference:
+    """Which things of a robot touch: cables, its platform's body, boxes of the room.
+
+    Two cables, by the centre lines of their free parts, or a cable and a box, are in contact where
+    they are nearer to each other than the clearance; boxes likewise. Near a point that two of them
+    share, one that is nearer than the clearance, cables do not count: ten times the clearance of
+    their length is left out there. Cables in a plane run in layers, beside each other and the body;
+    only boxes of the room count for them. Straight cables are meant: what they sag, the clearance
+    has to cover. One object serves one thread.
+    """
+
+    def __init__(
+        self,
+        kinematics: CableKinematics,
+        home: FloatArray,
+        clearance_m: float,
+        body: FloatArray | None = None,
+        obstacles: Sequence[FloatArray] = (),
+        planar: bool = False,
+    ) -> None:
+        """Take the pose at home (4, 3), and boxes (2, c): least and greatest coordinates."""
+        self.clearance_m, self._trim = clearance_m, kernel.TRIM_TIMES * clearance_m
+        self._geometry, self._directions = kinematics.geometry, np.array(kinematics.directions)
+        self._coordinates = sum(direction < 3 for direction in kinematics.directions)
+        self._home = np.array(home, float)
+        boxes = [np.zeros((2, 3)) if body is None else _in_space(body)]
+        boxes += [_in_space(box) for box in obstacles]
+        self._boxes = np.array(boxes)
+        self.pairs: IntArray = np.array(
+            list(self._found_pairs(body is not None, planar)), np.int64
+        ).reshape(-1, 4)
+        """What is compared: rows of `clearance_kernel`."""
+        self._way = np.zeros((WAY_ROWS, 3))
+        self._way[0], self._way[4:] = self._home[0], self._home[1:]
+        if len(self.pairs):
+            self._first_contact = bound(
+                first_contact, self._geometry, self._boxes, self.pairs, clearance_m, self._trim,
+                self._way,
+            )  # fmt: skip
+
+    def clearances(self, poses: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return the least distances (m,), m, and which pair has it, at poses (m, 4, 3).
+
+        inf and -1 for a robot of which nothing can touch.
+        """
+        clearances, nearest = np.empty(len(poses)), np.empty(len(poses), np.int64)
+        kernel.write_clearances(
+            self._geometry, self._boxes, self.pairs, self._trim,
+            np.ascontiguousarray(poses, float), clearances, nearest,
+        )  # fmt: skip
+        return clearances, nearest
+
+    def contact(self, pose: FloatArray) -> str:
+        """Return what is in contact at a pose (4, 3), an empty text where nothing is."""
+        clearance, pair = self.clearances(pose[None])
+        if clearance[0] >= self.clearance_m:
+            return ""
+        return in_words(self.things(int(pair[0])), float(clearance[0]))
+
+    def first_contact(self, positions: FloatArray) -> Contact | None:
+        """Return the first contact on the way straight from position to position, (m, d).
+
+        Straight in the coordinates of `PlatformModel`, coordinates and rotation vector from home's
+        orientation, and proved for all places between, not only looked at in some. What is in
+        contact where a straight part begins may not come much nearer, and has to be clear at its
+        end.
+        """
+        for leg in range(len(positions) - 1 if len(self.pairs) else 0):
+            start, end = positions[leg], positions[leg + 1]
+            self._lead(start, end)
+            share, pair, distance = self._first_contact()
+            if pair >= 0:
+                there = start + share * (end - start)
+                return Contact(there, self._coordinates, leg, share, self.things(pair), distance)
+        return None
+
+    def _lead(self, start: FloatArray, end: FloatArray) -> None:
+        """Write the way straight from one position (d,) to another."""
+        for k, direction in enumerate(self._directions):
+            row, column = (START, direction) if direction < 3 else (TURNED, direction - 3)
+            self._way[row, column], self._way[row + 1, column] = start[k], end[k] - start[k]
+
+    def things(self, pair: int) -> tuple[str, str]:
+        """Return what a pair consists of, in words."""
+        kind, first, second, _ = (int(x) for x in self.pairs[pair])
+        one = "platform" if kind == kernel.BODY_BOX else f"cable {first}"
+        if kind == kernel.CABLES:
+            return one, f"cable {second}"
+        return one, "platform" if kind == kernel.CABLE_BODY else f"obstacle {second - 1}"
+
+    def _found_pairs(self, has_body: bool, planar: bool) -> Iterator[tuple[int, int, int, int]]:
+        exits, anchors = self._geometry[:3].T, self._geometry[ANCHOR:RADIUS].T
+        n, near = len(exits), self.clearance_m
+        if not planar:
+            for i, j in combinations(range(n), 2):
+                shared = kernel.EXIT * bool(np.linalg.norm(exits[i] - exits[j]) < near)
+                shared |= kernel.ANCHOR * bool(np.linalg.norm(anchors[i] - anchors[j]) < near)
+                yield kernel.CABLES, i, j, shared
+        if has_body and not planar:
+            for i in range(n):
+                inside = _outside_m(anchors[i], self._boxes[0]) < near
+                yield kernel.CABLE_BODY, i, 0, kernel.ANCHOR * inside
+        for k in range(1, len(self._boxes)):
+            for i in range(n):
+                pulley_m = 2.0 * float(self._geometry[RADIUS, i])
+                inside = _outside_m(exits[i], self._boxes[k]) < near + pulley_m
+                yield kernel.CABLE_BOX, i, k, kernel.EXIT * inside
+            if has_body:
+                yield kernel.BODY_BOX, 0, k, 0
+
+
+def in_words(things: tuple[str, str], distance_m: float) -> str:
+    """Return that two things come near to each other."""
+    if all(thing.startswith("cable ") for thing in things):
+        who = f"cables {things[0][6:]} and {things[1][6:]}"
+    else:
+        who = " and ".join(things)
+    if not distance_m > 0.0:
+        return f"{who} touch"
+    return f"{who} come within {1e3 * distance_m:.0f} mm of each other"
+
+
+def _in_space(box: FloatArray) -> FloatArray:
+    """Return a box with three coordinates; one in a plane has any depth."""
+    given = np.asarray(box, float)
+    in_space = np.array([[-_EVERYWHERE_m] * 3, [_EVERYWHERE_m] * 3])
+    in_space[:, : given.shape[1]] = given
+    return in_space
+
+
+def _outside_m(point: FloatArray, box: FloatArray) -> float:
+    return float(np.linalg.norm(point - np.clip(point, box[0], box[1])))
