@@ -15,6 +15,7 @@ from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach, stopping_position
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
+from cdpr_rt.programs.platform.path_store import PathStore
 from cdpr_rt.programs.program_base import CommandedProgram
 from cdpr_rt.robots.interface import PlatformControl
 from cdpr_rt.robots.kinematics.pose_setpoint import place, write_quaternion
@@ -81,6 +82,8 @@ class PlatformParts:
         self.compensation = compensation
         self.last = LastLengths()
         """The lengths at which it was stopped."""
+        self.paths = PathStore()
+        """The planned paths."""
         self.control = control
         self.estimator = estimator
         self.period_s = period_s
