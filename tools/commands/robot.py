@@ -14,7 +14,7 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.robots import checks
 from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_tools.calibrate.words import calibration_lines
-from cdpr_tools.commands import robot_trial
+from cdpr_tools.commands import robot_trial, robot_workspace
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.errors import BAD_INPUT, BadInputError
 from cdpr_tools.output import Output
@@ -33,6 +33,7 @@ _Picture = Annotated[Path | None, typer.Option("--png", help="Draw it into this 
 
 
 app.add_typer(robot_trial.app)
+app.add_typer(robot_workspace.app)
 
 
 @app.callback()

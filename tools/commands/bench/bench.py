@@ -15,9 +15,13 @@ from cdpr_tools.commands.bench import (
     bench_kinematics,
     bench_latency,
     bench_loop,
+    bench_markers,
+    bench_path,
+    bench_poses,
     bench_soak,
     bench_stop,
     bench_tension,
+    bench_workspace,
 )
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.output import Output
@@ -40,9 +44,13 @@ for _part in (
     bench_kinematics,
     bench_latency,
     bench_loop,
+    bench_markers,
+    bench_poses,
+    bench_path,
     bench_soak,
     bench_stop,
     bench_tension,
+    bench_workspace,
 ):
     app.add_typer(_part.app)
 
