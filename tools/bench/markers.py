@@ -43,13 +43,15 @@ def measure(count: int, seed: int, out: Output) -> dict[str, Any]:
     )
     sheets = MarkerSheets(size_m=_SIZE_m)
     results: dict[str, Any] = {"images": count, "seed": seed}
+    reference: int | None = None  # the same for both, as errors are told in its frame
     for name, detect in (("ours", _ours), ("opencv", _opencv)):
         out.note(f"map from the corners of {name}")
         start = time.process_time()
         sightings = detect(images)
         seen = time.process_time()
-        fit = fit_map(sightings, intrinsics, sheets)
+        fit = fit_map(sightings, intrinsics, sheets, reference)
         done = time.process_time()
+        reference = fit.map.reference
         results[name] = {
             "detection_s": round(seen - start, 2),
             "fit_s": round(done - seen, 2),
