@@ -90,9 +90,9 @@ def fit_map(
     suspicion = lens_suspicion(bundle, seen, (start,))
     known = _compare(bundle.estimate.map, sheets)
     fixed: tuple[int, ...] = (start,)
-    if known is not None:
+    if numbers := _known_places(bundle.estimate.map, sheets)[0]:
+        fixed = tuple(seen.ids[k] for k in numbers)
         bundle = _held(bundle, seen, sheets)
-        fixed = tuple(one.id for one in sheets.known if one.id in seen.ids)
     faults = _faults(cover, suspicion, known) + _misfits(bundle)
     warnings = _warnings(sightings, dropped)
     notes = _notes(bundle, cover, known, sheets, fixed)

@@ -191,6 +191,10 @@ def test_known_places_give_the_frame_and_are_held(one: Room) -> None:
     assert not fit.faults
     assert fit.fixed == (0, 8, 19)
     assert np.linalg.norm(fit.map.position_m - one.truth.position_m, axis=1).max() < 0.003
+    single = SHEETS.model_copy(update={"known": known_places(one, 8)})
+    fit = fit_map(one.sightings(), intrinsics(), single)
+    assert fit.fixed == (8,) and fit.known is None
+    assert np.linalg.norm(fit.map.position_m - one.truth.position_m, axis=1).max() < 0.02
 
 
 @pytest.mark.parametrize(
