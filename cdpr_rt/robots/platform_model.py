@@ -76,6 +76,11 @@ class PlatformModel:
         return self._each(platform.acceleration_m_s2, platform.angular_acceleration_rad_s2)
 
     @property
+    def jerk(self) -> FloatArray:
+        """The highest jerks of paths, (d,), in m/s3 and rad/s3."""
+        return self._each(self.platform.jerk_m_s3, self.platform.angular_jerk_rad_s3)
+
+    @property
     def angle_rad(self) -> float:
         """Largest angle from home's orientation in which targets may lie."""
         return self.platform.workspace_angle_rad

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -61,8 +62,20 @@ class CableWorkspace:
         self.low, self.high = self._bounds[0], self._bounds[1]
         self._scale = np.array(wrench_scale, float)
         self._centre = np.zeros(3) if centre_m is None else np.array(centre_m, float)
-        self._one, self._way = self._pass(1, 0.0), self._pass(len(SHARES), 0.0)
         self._there = Pose(np.zeros(3))
+
+    def prepared(self) -> CableWorkspace:
+        """Return it with all that is needed in cycles made beforehand."""
+        self._one, self._way  # noqa: B018
+        return self
+
+    @cached_property
+    def _one(self) -> _Pass:
+        return self._pass(1, 0.0)
+
+    @cached_property
+    def _way(self) -> _Pass:
+        return self._pass(len(SHARES), 0.0)
 
     def with_wrenches(self, wrenches: FloatArray) -> CableWorkspace:
         """Return the same for other wrenches (k, d), without a reserve."""
@@ -112,7 +125,7 @@ class CableWorkspace:
         return self._centre, self._sets, self._generators, self._scale, self._bounds
 
     def stands(self, pose: Pose) -> bool:
-        """Return whether the platform is held at a pose; allocates no arrays."""
+        """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
         self._one.poses[0] = pose.array
         self._one.run()
         return bool(self._one.margins[0] >= 0.0)

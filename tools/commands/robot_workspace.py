@@ -112,6 +112,13 @@ def workspace(
             metavar="DEG", help="At all orientations up to so many deg from that at home."
         ),
     ] = None,
+    contact_free: Annotated[
+        bool,
+        typer.Option(
+            "--contact-free",
+            help="Leave out places where cables touch each other, the platform or obstacles.",
+        ),
+    ] = False,
     low: Annotated[
         str | None, typer.Option(metavar="X Y [Z]", help="Where the search begins, in mm.")
     ] = None,
@@ -158,7 +165,7 @@ def workspace(
         )
     typed = _Typed(rotate, within, centre, low, high)
     moving = 0.0 if static else platform.acceleration_m_s2
-    criterion = criterion_of(profile, moving, typed.turns(platform), margin)
+    criterion = criterion_of(profile, moving, typed.turns(platform), margin, contact_free)
     box = typed.box(platform)
     wanted = Search(criterion, box, cells, rays, typed.start(box), workers, cluster)
     _check_file("--png", png, (".png",))

@@ -34,13 +34,17 @@ class Criterion:
     turns_rad: tuple[tuple[float, ...], ...] = ((0.0, 0.0, 0.0),)
     """Rotation vectors from home's orientation."""
     least_N: float = 0.0
+    contact_free: bool = False
+    """Whether a place has to be reached straight from the centre without contact, too: cables,
+    body and obstacles keep the clearance of the robot's file at each of the orientations."""
 
     def depths(self, points: FloatArray) -> FloatArray:
         """Return how far places (m, k) are inside, N, (m,): the margin less `least_N`.
 
         Of the worst orientation; below zero outside, -inf where no tensions hold some direction.
+        Nothing of contact.
         """
-        statics = _statics(self.platform, self.low_N, self.high_N)
+        statics = self._statics
         workspace = statics.model.workspace(self.acceleration_m_s2, 0.0)
         found = [
             workspace.capacity_margins(statics.poses(points, np.array(turn)))
@@ -48,9 +52,40 @@ class Criterion:
         ]
         return np.asarray(np.min(found, axis=0) - self.least_N)
 
+    def clear_shares(self, centre_m: FloatArray, ends_m: FloatArray) -> FloatArray:
+        """Return the shares (m,) of straight ways from a centre to places that are free of contact.
+
+        At constant orientation, of the worst one; 0 where something is in contact at the centre.
+        Two cables that meet pass through each other within millimetres: places alone, however
+        close, would not tell on which side they are.
+        """
+        shares = np.ones(len(ends_m))
+        model = self._statics.model
+        if not self.contact_free or not len(model.interference.pairs):
+            return shares
+        chosen = [i - 3 for i in model.kinematics.directions if i >= 3]
+        for turn in np.array(self.turns_rad):
+            start = np.concatenate([centre_m, turn[chosen]])
+            if model.interference.contact(model.pose(start).array):
+                return np.zeros(len(ends_m))
+            way = np.array([start, start])
+            for k, end in enumerate(ends_m):
+                way[1, : len(end)] = centre_m + shares[k] * (end - centre_m)
+                met = model.interference.first_contact(way)
+                shares[k] *= met.share if met else 1.0
+        return shares
+
+    @property
+    def _statics(self) -> PlatformStatics:
+        return _statics(self.platform, self.low_N, self.high_N)
+
 
 def criterion_of(
-    robot: Robot, acceleration_m_s2: float, turns_rad: FloatArray, least_N: float
+    robot: Robot,
+    acceleration_m_s2: float,
+    turns_rad: FloatArray,
+    least_N: float,
+    contact_free: bool = False,
 ) -> Criterion:
     """Return the criterion of a robot that has a platform, within its limits."""
     assert robot.platform is not None
@@ -60,7 +95,7 @@ def criterion_of(
         for bound in (limits.tension_min_N, limits.tension_max_N)
     )
     turns = tuple(tuple(turn) for turn in np.asarray(turns_rad).tolist())
-    return Criterion(robot.platform, low, high, acceleration_m_s2, turns, least_N)
+    return Criterion(robot.platform, low, high, acceleration_m_s2, turns, least_N, contact_free)
 
 
 def turns_within(platform: Platform, angle_rad: float) -> FloatArray:

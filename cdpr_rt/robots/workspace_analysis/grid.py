@@ -29,6 +29,20 @@ class GridJob:
 
 
 @dataclass(frozen=True)
+class WayJob:
+    """Straight ways from a centre (k,) to some places (m, k) of a grid."""
+
+    criterion: Criterion
+    centre_m: FloatArray
+    points: FloatArray
+
+    def run(self) -> FloatArray:
+        """Return 1 where the way is free of contact, else -1, (m,)."""
+        shares = self.criterion.clear_shares(self.centre_m, self.points)
+        return np.where(shares < 1.0, -1.0, 1.0)
+
+
+@dataclass(frozen=True)
 class Grid:
     """Places that fill a box, its sides among them, and how far each of them is inside.
 

@@ -31,7 +31,8 @@ class RayJob:
     def run(self) -> FloatArray:
         """Return how far each ray goes before it leaves the workspace for the first time, m, (m,).
 
-        Within 0.1 mm, but for gaps narrower than 1/64 of the ray; the centre has to be inside.
+        Within 0.1 mm, but for gaps narrower than 1/64 of the ray, of which contact is none; the
+        centre has to be inside.
         """
         reach = reaches(self.centre_m, self.directions, self.box)
         inside, outside = np.zeros(len(reach)), np.full(len(reach), np.inf)
@@ -46,7 +47,8 @@ class RayJob:
             middle = 0.5 * (inside[ended] + outside[ended])
             held = self._held(ended, middle)
             inside[ended[held]], outside[ended[~held]] = middle[held], middle[~held]
-        return inside
+        ends = self.centre_m + inside[:, None] * self.directions
+        return inside * self.criterion.clear_shares(self.centre_m, ends)
 
     def _held(self, rays: NDArray[np.int64], there: FloatArray) -> NDArray[np.bool_]:
         points = self.centre_m + there[:, None] * self.directions[rays]

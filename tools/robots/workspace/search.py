@@ -11,14 +11,15 @@ import numpy as np
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.criterion import Criterion
-from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, grid_points, shape_of
+from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, WayJob, grid_points, shape_of
 from cdpr_rt.robots.workspace_analysis.rays import RayJob, Rays, directions
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.jobs import Job, runner
+from cdpr_tools.jobs import Job, Runner, runner
 from cdpr_tools.output import Output
 
 _CHECKS_A_JOB = 100_000
 _CHECKS_A_RAY = 80
+_WAYS_A_JOB = 5_000
 _WORTH_PROCESSES = 1_000_000
 """Poses below which other processes take longer to start than they save."""
 _CHECKS_A_SECOND = 100_000.0
@@ -71,6 +72,8 @@ def search(wanted: Search, out: Output) -> Found:
         ]
         grid = Grid(wanted.box, told(grid_jobs, 0, count).reshape(shape))
         centre = _centre(wanted, grid)
+        if wanted.criterion.contact_free:
+            grid = _reached(wanted.criterion, grid, centre, run)
         ways = directions(wanted.rays, len(shape))
         count = max(1, count // _CHECKS_A_RAY)
         ray_jobs = [
@@ -79,6 +82,19 @@ def search(wanted: Search, out: Output) -> Found:
         ]
         lengths = told(ray_jobs, len(points), count * _CHECKS_A_RAY)
     return Found(grid, Rays(centre, ways, lengths))
+
+
+def _reached(criterion: Criterion, grid: Grid, centre: FloatArray, run: Runner) -> Grid:
+    """Return the grid with places that contact keeps away as far outside as they were inside."""
+    depths = grid.depths.ravel().copy()
+    held = np.flatnonzero(depths >= 0.0)
+    count = max(1, _WAYS_A_JOB // len(criterion.turns_rad))
+    jobs = [
+        WayJob(criterion, centre, grid.points[held[k : k + count]])
+        for k in range(0, len(held), count)
+    ]
+    depths[held] *= np.concatenate(list(run(jobs)))
+    return Grid(grid.box, depths.reshape(grid.depths.shape))
 
 
 def _workers(wanted: Search, checks: int) -> int:
@@ -104,11 +120,20 @@ def _centre(wanted: Search, grid: Grid) -> FloatArray:
         centre = np.add(platform.workspace_min_m, platform.workspace_max_m) / 2.0
     low, high = wanted.box.low_m, wanted.box.high_m
     inside = bool((centre > low).all() and (centre < high).all())
-    if inside and wanted.criterion.depths(centre[None])[0] >= 0.0:
-        return centre
-    if wanted.centre_m is None:
-        return deepest
-    raise BadInputError(
+    if not inside or not wanted.criterion.depths(centre[None])[0] >= 0.0:
+        if wanted.centre_m is not None:
+            raise _outside(centre, deepest)
+        centre = deepest
+    if not wanted.criterion.clear_shares(centre, centre[None])[0] > 0.0:
+        raise BadInputError(
+            f"--contact-free: something is in contact where the rays start, at {in_mm(centre)} mm; "
+            "allowed: another --centre, or orientation"
+        )
+    return centre
+
+
+def _outside(centre: FloatArray, deepest: FloatArray) -> BadInputError:
+    return BadInputError(
         f"--centre {in_mm(centre)}: outside the workspace; allowed: a place within it, such as "
         f"{in_mm(deepest)}"
     )

@@ -23,6 +23,7 @@ def figures(robot: Robot, wanted: Search, found: Found) -> dict[str, Any]:
         "acceleration_m_s2": criterion.acceleration_m_s2,
         "margin_at_least_N": criterion.least_N,
         "turns_rad": criterion.turns_rad,
+        "contact_free": criterion.contact_free,
         "searched_m": [wanted.box.low_m, wanted.box.high_m],
         "reaches_sides": grid.cut,
         "grid": {"places": grid.depths.shape, "spacing_m": grid.spacing_m, size: grid.size},
@@ -85,4 +86,13 @@ def _criterion_lines(wanted: Search) -> list[str]:
     elif turns.any():
         vector = " ".join(f"{math.degrees(value):g}" for value in turns[0])
         orientation = f"turned by {vector} deg from home's orientation"
-    return [f"of         {what},", f"           {orientation}"]
+    if criterion.contact_free:
+        orientation += ","
+    lines = [f"of         {what},", f"           {orientation}"]
+    if criterion.contact_free:
+        clearance = 1e3 * platform.clearance_m
+        lines.append(
+            "           reached straight from where the rays start, all things "
+            f"{clearance:g} mm apart or more"
+        )
+    return lines
