@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from cdpr_profiles import load_robot
+from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.reach.reachable import SHARE, Reach
@@ -132,12 +133,18 @@ def _angle_rad(model: PlatformModel, angle_deg: float | None) -> float | None:
     return math.radians(angle_deg)
 
 
-def _start(model: PlatformModel, text: str | None) -> np.ndarray | None:
+def _start(model: PlatformModel, text: str | None) -> FloatArray | None:
     if text is None:
         return None
     position = np.array(model.home)
     position[: model.positions] = numbers("--from", text, "xyz"[: model.positions], "mm", 1e-3)
     return position
+
+
+def _nearest(chosen: Chosen) -> str:
+    if not math.isfinite(chosen.clearance_m):
+        return "of this robot nothing can touch"
+    return f"nearest to contact {1e3 * chosen.clearance_m:.0f} mm"
 
 
 def _say(out: Output, model: PlatformModel, chosen: Chosen, count: int) -> None:
@@ -146,8 +153,8 @@ def _say(out: Output, model: PlatformModel, chosen: Chosen, count: int) -> None:
         f"{count} poses of {drawn.drawn} drawn; ways cut short by contact {drawn.cut_by_contact}, "
         f"by tensions {drawn.cut_by_tensions}; of these {drawn.outside} end outside the box of "
         "targets",
-        f"nearest to contact {1e3 * chosen.clearance_m:.0f} mm, "
-        f"tensions keep {chosen.margin_N:.1f} N and more beyond the control's reserve",
+        f"{_nearest(chosen)}; tensions keep {chosen.margin_N:.1f} N and more beyond the control's "
+        "reserve",
     )
     if chosen.deviation_m is not None:
         out.say(

@@ -16,7 +16,7 @@ from cdpr_rt.robots.tension.circuit_margin import MOST_NULL_DIRECTIONS
 SHARE: Final = 0.95
 """μ of eq. (3.38): how far the platform is sent of a way that ends before its target."""
 _AT_ONCE = 512
-_MOST_DRAWN = 200
+_MOST_DRAWN = 20
 """Times as many draws as poses are wanted, and that many more, before it is given up."""
 
 
@@ -95,7 +95,7 @@ class Reach:
         while found < count:
             if drawn > _MOST_DRAWN * (count + _AT_ONCE):
                 raise GeometryError(f"of {drawn} ways {found} lead to a target; wanted: {count}")
-            ends = self._drawn(rng, min(_AT_ONCE, max(count - found, 1)), most)
+            ends = self._drawn(rng, min(_AT_ONCE, count - found), most)
             shares, why = self.shares(ends)
             gone = np.where(why == WHOLE, 1.0, share * shares)
             there = self.start + gone[:, None] * (ends - self.start)

@@ -1,5 +1,6 @@
-"""Capacity margins by plain NumPy, for as many cables as directions and two: what kernels are held
-against. Kinematics and margins are computed here once more.
+"""Capacity margins by plain NumPy, for two cables more than the six directions.
+
+Kinematics and margins are computed here once more: this is what kernels are held against.
 """
 
 from __future__ import annotations
