@@ -6,9 +6,10 @@ import os
 import signal
 import sys
 import time
-from dataclasses import asdict
 from types import FrameType
 from typing import Any
+
+from pydantic_core import to_jsonable_python
 
 from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.bus_fit import require_fit
@@ -140,7 +141,7 @@ def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any
         "limits": described(limits, len(robot.axes)),
         "programs": list(parts.programs),
         "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
-        "platform": None if robot.platform is None else asdict(robot.platform),
+        "platform": to_jsonable_python(robot.platform),
         "notes": list(robot.notes),
     }
 
