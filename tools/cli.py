@@ -50,7 +50,7 @@ MODULES = {
         "then.",
         "lower": "Let the platform down onto its stand; the power stays on, the cables are loose.",
         "pause": "Stop the platform and hold it there; `resume` goes on.",
-        "resume": "Go on to the position that the platform had not reached when it was paused.",
+        "resume": "Go on to the position, or along the path, that was left when it was paused.",
     },
     "daemon.daemon_state": {
         "status": "Say how a daemon and its robot are; changes nothing.",
@@ -67,6 +67,12 @@ MODULES = {
     "bus.bus": {
         "bus": "Look at a CAN bus.",
     },
+    "calibrate": {
+        "calibrate": "Calibrate a robot's geometry, drums and elongation; take over, undo.",
+    },
+    "camera": {
+        "camera": "Cameras: images, and intrinsics.",
+    },
     "cogging": {
         "cogging": "Cogging: sweep, fit, validate, report.",
     },
@@ -78,6 +84,15 @@ MODULES = {
     },
     "log": {
         "log": "The daemon's recordings: what is in them, as tables and pictures.",
+    },
+    "markers": {
+        "markers": "Printed markers: sheets, and maps of them.",
+    },
+    "poses": {
+        "poses": "Draw poses that a robot reaches, held and without contact all the way.",
+    },
+    "path": {
+        "path": "Look at a path before it is followed, follow it, take it up again.",
     },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
@@ -169,7 +184,8 @@ def main() -> None:
     except ModuleNotFoundError as error:
         if not error.name or error.name.startswith("cdpr_"):
             raise
-        _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[daemon]'", FAILED)
+        extra = "camera" if error.name == "cv2" else "daemon"
+        _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[{extra}]'", FAILED)
     except KeyboardInterrupt:  # while libraries are loaded
         _end("interrupted", FAILED)
     except SystemExit as end:

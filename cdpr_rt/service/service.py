@@ -16,6 +16,7 @@ from cdpr_rt.service.http.tickets import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.link import LoopLink, Reply
 from cdpr_rt.service.part import Part
+from cdpr_rt.service.path_planner import PathPlanner
 from cdpr_rt.service.rows import newest_row, plain, row_table
 from cdpr_rt.service.streams.setpoint_stream import SetpointStream, StreamError
 
@@ -47,6 +48,8 @@ class Service:
         self.events = self.link.events
         self.parts: list[Part] = []
         self._unstarted: dict[str, str] = {}
+        self.planner = PathPlanner()
+        """Plans paths, in a process of its own."""
         self.stream: SetpointStream | None = None
         """That which has started, None where set-points are not received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}

@@ -25,7 +25,7 @@ def beat(node_id: int) -> bytes:
 
 
 def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: type) -> None:
-    bus = start_bus(node := stub_node(7, timers=(0.0, 0.01)))
+    bus = start_bus(node := stub_node(7, timers=(0.0, 0.5)))
     member = bus.join()
     time.sleep(0.1)
     assert member.status()["bus_time_s"] == 0.0
@@ -35,8 +35,8 @@ def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: typ
     assert [member.recv(), member.recv()] == [beat(7), beat(7)]
     assert node.advanced[0] == 0.0
     assert node.seen[0][0] == pack_frame(0x123)
-    assert 0.0 < node.seen[0][1] < 0.01
-    assert 0.01 in node.advanced
+    assert node.seen[0][1] > 0.0
+    assert 0.5 in node.advanced
     assert not member.status()["led"]
 
 

@@ -185,11 +185,10 @@ def test_ctrl_c_ends_a_jog_under_control(lab: str) -> None:
         text=True,
     )
     with can.Bus(interface="simbus", channel=lab.partition(":")[2]) as listener:
-        until = time.monotonic() + 60
         while not _is_enabled(listener.recv(1.0)):
-            assert time.monotonic() < until
+            assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=300)
     assert process.returncode == 1
     assert "stopped on request" in errors
     assert "Traceback" not in errors
@@ -206,9 +205,8 @@ def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str)
         env={**os.environ, "CDPR_TEST_FORKS": "0"},
     )
     with can.Bus(interface="simbus", channel=lab.partition(":")[2]) as listener:
-        until = time.monotonic() + 60
         while not _is_enabled(listener.recv(1.0)):
-            assert time.monotonic() < until
+            assert process.poll() is None
     assert process.stderr is not None
     process.send_signal(signal.SIGINT)
     while "a second Ctrl-C takes the power at once" not in (line := process.stderr.readline()):
@@ -216,7 +214,7 @@ def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str)
     for _ in range(10):  # as somebody does who is afraid
         process.send_signal(signal.SIGINT)
         time.sleep(0.002)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=300)
     assert process.returncode == 1, errors
     assert "Traceback" not in errors
     assert done("drive", "info", WINCH, "--bus", lab)["state"] == "switch on disabled"

@@ -10,12 +10,16 @@ MODULES = {
     "bench.bench_bus": {
         "bus": "Measure frames per second and host cost per frame, beside plain python-can.",
     },
+    "bench.bench_calibration": {
+        "calibration": "Measure the identification of spatial-8: poses measured, unknown, and "
+        "by plain SciPy.",
+    },
     "bench.bench_control": {
         "control": "Measure one update of a platform's control: pose, wrench, tensions, torques.",
     },
     "bench.bench_cycle": {
-        "cycle": "Measure one exchange with 8 axes: ours, the canopen package's PDO path, and the "
-        "floor.",
+        "cycle": "Measure one exchange with 8 axes: ours, the canopen package's PDO path, and "
+        "the floor.",
         "profiles": "Measure loading and validating every shipped profile, against bare TOML "
         "parsing.",
     },
@@ -23,13 +27,24 @@ MODULES = {
         "kinematics": "Measure the pose from cable lengths: along a path, and from bad starts.",
     },
     "bench.bench_latency": {
-        "latency": "Measure how late a loop wakes up, with and without the real-time settings, as "
-        "a "
-        "picture.",
+        "latency": "Measure how late a loop wakes up, with and without the real-time settings, "
+        "as a picture.",
     },
     "bench.bench_loop": {
         "loop": "Measure the control loop of 8 axes on two simulated buses at 1 kHz, and one "
         "full bus.",
+    },
+    "bench.bench_markers": {
+        "markers": "Make a map of 42 markers from rendered images, beside one from OpenCV's "
+        "own corners.",
+    },
+    "bench.bench_path": {
+        "path": "Measure planning a G-code file as CAM writes it, for spatial-8: preview and "
+        "picture too.",
+    },
+    "bench.bench_poses": {
+        "poses": "Measure drawing reachable poses of spatial-8, and look at ways again by "
+        "plain NumPy.",
     },
     "bench.bench_soak": {
         "soak": "Move a simulated robot in lockstep for hours; no memory may leak and no frame "
@@ -40,8 +55,12 @@ MODULES = {
         "interface.",
     },
     "bench.bench_tension": {
-        "tension": "Measure tension distribution on poses of spatial-8 and suspended-8, feasible "
-        "or not.",
+        "tension": "Measure tension distribution on poses of spatial-8 and suspended-8, "
+        "feasible or not.",
+    },
+    "bench.bench_workspace": {
+        "workspace": "Measure whether the cables of spatial-8 hold poses, at full "
+        "acceleration, on one core.",
     },
 }
 

@@ -8,8 +8,6 @@ from functools import partial
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
-from typing_extensions import override
 
 from cdpr_tools.client.axis_words import in_typed_words
 from cdpr_tools.client.client import Daemon, axis_values, key_values
@@ -24,29 +22,12 @@ from cdpr_tools.client.motion import (
 from cdpr_tools.client.platform_move import Frame, PlatformMove
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.number_options import numbers_command
 from cdpr_tools.output import Output
 from cdpr_tools.signals import HELD, stop_on_signals
 
 _DEADMAN_S = 0.6
-_NUMBERS = frozenset({"--to", "--rotate"})
 _STANDING = frozenset({"hold", "idle"})
-
-
-class _NumbersCommand(TyperCommand):
-    """A command whose options `--to` and `--rotate` take all the numbers that follow them."""
-
-    @override
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Join each of these options with its numbers, negative ones too."""
-        joined: list[str] = []
-        takes = False
-        for word in args:
-            if takes and _is_number(word):
-                joined[-1] += f" {word}" if "=" in joined[-1] else f"={word}"
-                continue
-            takes = word in _NUMBERS
-            joined.append(word)
-        return super().parse_args(ctx, joined)
 
 
 app = typer.Typer()
@@ -86,7 +67,7 @@ def jog(
     finish(daemon, out, stop_requested())
 
 
-@app.command(cls=_NumbersCommand)
+@app.command(cls=numbers_command("--to", "--rotate"))
 @with_daemon
 def move(
     daemon: Daemon,
@@ -156,14 +137,6 @@ def _run_to_end(daemon: Daemon, out: Output, program: str, wanted: dict[str, Any
 
 def _names(daemon: Daemon) -> list[str]:
     return [str(axis["name"]) for axis in daemon.get("/status")["axes"]]
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _to_angles(

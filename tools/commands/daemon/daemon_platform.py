@@ -79,7 +79,12 @@ def pause(daemon: Daemon, out: Output) -> None:
 @app.command()
 @with_daemon
 def resume(daemon: Daemon, out: Output) -> None:
-    """Go on to the position that the platform had not reached when it was paused."""
+    """Go on to the position, or along the path, that was left when it was paused."""
+    if (daemon.get("/status").get("program_progress") or {}).get("path"):
+        from cdpr_tools.client.path_following import go_on  # noqa: PLC0415  # slow to load
+
+        go_on(daemon, out)
+        return
     _carry_out(daemon, out, "pose", {"resume": True})
 
 

@@ -256,7 +256,7 @@ def test_wrong_keys_from_the_same_address_do_not_shut_out_the_right_one(rig: Rig
             assert guessing.stdout.readline()
             for _ in range(10):
                 asked = httpx.post(
-                    f"{rig.guarded_url}/control", json={"client": "a"}, headers=RIGHT
+                    f"{rig.guarded_url}/control", json={"client": "a", "ttl_s": 10.0}, headers=RIGHT
                 )
                 token = asked.json()["token"]
                 mine = {**RIGHT, "X-Control-Token": token}
