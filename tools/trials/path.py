@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 import numpy as np
@@ -109,7 +108,6 @@ class PathErrors:
     taken_s: float
 
 
-@cache
 def errors_of(recorded: Recorded, robot: Robot, speed_m_s: float) -> PathErrors:
     """Return the errors of a trial; paths are computed anew, from the file."""
     (mark,), (end,) = recorded.marked("path"), recorded.marked("path end")
