@@ -8,8 +8,11 @@ from collections.abc import Generator
 from typing import Any
 
 import fork_server
+import hypothesis
 import pytest
 import pytest_timeout
+from hypothesis.internal.conjecture.providers import HypothesisProvider
+from hypothesis.internal.constants_ast import Constants
 from xdist.scheduler import LoadScopeScheduling
 
 # before anything loads numpy: threads that spin for work take the cores of the other processes
@@ -21,6 +24,19 @@ os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 fork_server.install()
+
+# Hypothesis also draws the constants of whatever modules are loaded: these depend on which tests a
+# process has run before, and so would the examples. It has no setting for that.
+HypothesisProvider._local_constants = Constants()  # type: ignore[assignment]
+# no examples from an earlier run, and no failure for the sake of a slow machine
+hypothesis.settings.register_profile(
+    "repeatable",
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
+hypothesis.settings.load_profile("repeatable")
 
 
 class _ByFile(LoadScopeScheduling):

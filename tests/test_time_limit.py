@@ -50,7 +50,7 @@ def test_a_test_that_hangs_ends_with_a_traceback_and_leaves_no_process(
 ) -> None:
     file = tmp_path / "test_endless.py"
     file.write_text(TESTS)
-    options = ["-c", ROOT / "pyproject.toml", "-o", "timeout=1", "-p", "no:cacheprovider"]
+    options = ["-c", ROOT / "pyproject.toml", "-o", "timeout=3", "-p", "no:cacheprovider"]
     run = subprocess.run(
         [sys.executable, "-m", "pytest", "-p", "conftest", *options, f"{file}::{name}"],
         env={**os.environ, "PYTHONPATH": str(ROOT / "tests")},

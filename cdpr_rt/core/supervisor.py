@@ -103,8 +103,7 @@ def _watch_answers(
     if past["missed"] > lim["missed_cycles"]:
         _judge(verdict, reactions, _MISSED, i, past["missed"], lim["missed_cycles"])
     if past["in_window"] > lim["missed_in_window"]:
-        allowed = lim["missed_in_window"]
-        _judge(verdict, reactions, _MISSED_IN_WINDOW, i, past["in_window"], allowed)
+        _judge(verdict, reactions, _MISSED_IN_WINDOW, i, past["in_window"], lim["missed_in_window"])
     if past["stale"] > lim["stale_cycles"]:
         _judge(verdict, reactions, _STALE, i, past["stale"], lim["stale_cycles"])
 
@@ -139,15 +138,12 @@ def _watch_motion(
     if not abs(velocity) <= lim["speed_rad_s"]:
         _judge(verdict, reactions, _SPEED, i, velocity, lim["speed_rad_s"])
     if not abs(error) <= lim["following_error_rad"]:
-        allowed = lim["following_error_rad"]
-        _judge(verdict, reactions, _FOLLOWING_ERROR, i, error, allowed)
+        _judge(verdict, reactions, _FOLLOWING_ERROR, i, error, lim["following_error_rad"])
     # beyond a length only the way back is open
     if length > lim["cable_length_max_m"] and paying_out > 0.0:
-        allowed = lim["cable_length_max_m"]
-        _judge(verdict, reactions, _CABLE_LENGTH, i, length, allowed)
+        _judge(verdict, reactions, _CABLE_LENGTH, i, length, lim["cable_length_max_m"])
     if length < lim["cable_length_min_m"] and paying_out < 0.0:
-        allowed = lim["cable_length_min_m"]
-        _judge(verdict, reactions, _CABLE_LENGTH, i, length, allowed)
+        _judge(verdict, reactions, _CABLE_LENGTH, i, length, lim["cable_length_min_m"])
 
 
 @jit
@@ -174,8 +170,7 @@ def _watch_tension(
     cable_m_per_rad: float,
 ) -> None:
     if tension > lim["tension_max_N"]:
-        allowed = lim["tension_max_N"]
-        _judge(verdict, reactions, _TENSION_HIGH, i, tension, allowed)
+        _judge(verdict, reactions, _TENSION_HIGH, i, tension, lim["tension_max_N"])
     if may_be_slack:
         past["may_be_low"] = past["may_be_slack"] = 0.0
         return
@@ -192,15 +187,13 @@ def _watch_tension(
     # each is told once, so that the cable can be tightened, and again when it was tight
     if past["may_be_slack"] and past["slack_s"] > 0.0 and at_once:
         past["may_be_low"] = past["may_be_slack"] = 0.0
-        allowed = lim["tension_min_N"]
-        _judge(verdict, reactions, _BROKEN_CABLE, i, tension, allowed)
+        _judge(verdict, reactions, _BROKEN_CABLE, i, tension, lim["tension_min_N"])
     elif past["may_be_slack"] and past["slack_s"] > lim["slack_s"]:
         past["may_be_low"] = past["may_be_slack"] = 0.0
         _judge(verdict, reactions, _SLACK, i, tension, lim["slack_N"])
     elif past["may_be_low"] and past["low_s"] > lim["slack_s"]:
         past["may_be_low"] = 0.0
-        allowed = lim["tension_min_N"]
-        _judge(verdict, reactions, _TENSION_LOW, i, tension, allowed)
+        _judge(verdict, reactions, _TENSION_LOW, i, tension, lim["tension_min_N"])
 
 
 @jit

@@ -58,6 +58,8 @@ class Service:
         """What else runs while the service does, until cancelled."""
         self.http: tuple[str, int] | None = None
         """Where it listens on TCP, None where it does not."""
+        self.end_daemon: Callable[[], None] = lambda: None
+        """Ends the daemon where its loop has died, and no command can reach it."""
         self._held_by = ""
         self._noted: Reply | None = None
 
@@ -134,7 +136,15 @@ class Service:
                 await asyncio.sleep(_TURN_S)
 
     async def command(self, do: str, client: str, **fields: Any) -> Reply:
-        """Send a command that anybody may give; raises what `LoopLink.command` raises."""
+        """Send a command that anybody may give; raises what `LoopLink.command` raises.
+
+        A daemon whose loop has died is ended by `shutdown` as well: its drives have stopped by
+        themselves.
+        """
+        if do == "shutdown" and self.link.dead:
+            self.events.add("command", f"{do} by {client}")
+            self.end_daemon()
+            return Reply(True, self.link.ended_how, self.link.state())
         reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
         if reply is self._noted:
             return reply  # many have asked for the same at once

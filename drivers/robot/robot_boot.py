@@ -64,12 +64,14 @@ def boot_robot(
     boot.
     """
 
+    bitrates = {bus.name: bus.bitrate_bit_s for bus in robot.buses}
+
     def boot_bus(name: str, network: CanNetwork) -> Callable[[], BootReports]:
         wanted = {
             axis.node_id: (axis.winch.drive, _settings(robot, axis, most_Nm))
             for axis, most_Nm in ((robot.axes[i], torque_Nm[i]) for i in robot.axes_on(name))
         }
-        return lambda: boot_all(network, wanted)
+        return lambda: boot_all(network, wanted, bitrate_bit_s=bitrates[name])
 
     clock = next(iter(networks.values())).clock
     tasks = clock.gather([boot_bus(*bus) for bus in networks.items()])

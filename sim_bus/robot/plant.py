@@ -130,15 +130,13 @@ class DrivePlant(Profile):
 
 
 class ThermalPlant(Profile):
-    """Warming of an energised drive and what it does to cogging and friction."""
+    """Warming of an energised drive from power-up, where the other sections' figures hold."""
 
     cogging_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.001
     friction_per_K: Annotated[float, Field(ge=-0.01, le=0.01)] = -0.004
     time_constant_s: Annotated[float, Field(ge=1.0, le=1e6)] = 600.0
     rise_K: Annotated[float, Field(ge=0.0, le=80.0)] = 10.0
     """Temperature rise that an energised drive settles at."""
-    ambient_C: Annotated[float, Field(ge=-40.0, le=85.0)] = 25.0
-    """Temperature at power-up, where the figures of the other sections hold."""
 
 
 class LoadPlant(Profile):

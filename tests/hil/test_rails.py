@@ -105,7 +105,7 @@ class Rails:
 
     def speed_at_braking(self) -> float:
         """Wait for the brake of the CiA 402 rail; return the last speed before it closed."""
-        speed, deadline = math.inf, time.monotonic() + 10.0
+        speed, deadline = math.inf, time.monotonic() + 60.0
         while self.rail.brake_released:
             speed = self.rail.state().motor_rad_s * M_PER_RAD
             assert time.monotonic() < deadline

@@ -37,7 +37,7 @@ PROFILE = load_winch(WINCH)
 EDS = str(PROFILE.drive.eds)
 
 
-def wait_for(condition: Callable[[], bool], timeout_s: float = 8.0) -> bool:
+def wait_for(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
     end = time.monotonic() + timeout_s
     while time.monotonic() < end:
         if condition():

@@ -251,7 +251,7 @@ def test_the_kernels_own_driver_takes_the_simulated_adapter_for_a_real_one() -> 
         assert terminal.read(2) == b"\r\r"
         url = BusUrl.parse(f"socketcan:{kernel_slcan(terminal.fileno())}")
         port = open_port(url, [(0x181, 0x7FF)])
-        port.settimeout(5.0)
+        port.settimeout(60.0)
         buffer = bytearray(16)
         for k in range(100):
             port.send(FRAME.pack(0x201, 8, bytes([k, 1, 2, 3, 4, 5, 6, 255])))

@@ -101,7 +101,7 @@ def test_the_stock_master_enables_a_drive_while_the_stock_logger_writes(tmp_path
                 stream.write(content)
             assert node.sdo.upload(0x2F10, 0) == content
             node.sdo[0x1017].raw = 100
-            node.nmt.wait_for_heartbeat(timeout=5)
+            node.nmt.wait_for_heartbeat(timeout=60)
             node.setup_402_state_machine()
             node.nmt.state = "OPERATIONAL"
             network.sync.start(0.05)

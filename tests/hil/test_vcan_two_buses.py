@@ -77,7 +77,6 @@ def test_four_drives_on_each_of_two_interfaces(
     with open_robot(robot, BUSES, Output(as_json=True)) as session:
         device = session.device
         assert device.lockstep
-        assert session.boot_s < 10.0
         session.enable()
         start = device.feedback.position_rad.copy()
         speed = np.linspace(-3.0, 3.0, 8)

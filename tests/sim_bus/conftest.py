@@ -65,7 +65,7 @@ class Member:
 
     def __init__(self, name: str) -> None:
         self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self.sock.settimeout(5.0)
+        self.sock.settimeout(60.0)
         self.sock.connect(f"\0cdpr-rt/simbus/{name}")
         self.status()
 
@@ -144,7 +144,7 @@ class RunningBus:
 
     def close(self) -> None:
         self.hub.stop()
-        self.thread.join(5.0)
+        self.thread.join(60.0)
         assert not self.thread.is_alive()
         self.hub.close()
         for member in self.members:

@@ -49,7 +49,7 @@ def test_every_frame_is_there_at_bus_time_in_the_order_of_the_bus(
     status = member.status()
     assert status["nodes"] == [1]
     bus.hub.stop()
-    bus.thread.join(5.0)
+    bus.thread.join(60.0)
     log.close()
     cycle = [(0x080, b""), (0x181, b""), (0x182, b"\xab\x01")]
     wanted = [(0.0, 0x701, b"\x05")]

@@ -92,6 +92,8 @@ def trial(
         profile = load_robot(robot)
         name = f"trial-{profile.profile}-{kind}-{time.strftime('%Y%m%d-%H%M%S')}"
         folder = out_dir or Path("out") / name
+        if folder.exists() and any(folder.iterdir()):
+            raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
         usual = trials.KINDS[kind]
         if minutes is not None and usual.compares:
             raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")

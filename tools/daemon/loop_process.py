@@ -16,6 +16,7 @@ from cdpr_drivers.robot.commissioned import compensation_of, load_profiles, with
 from cdpr_drivers.robot.listening_machine import ListeningMachine
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
@@ -51,7 +52,8 @@ def main() -> int:
     settings = RunSettings.from_argv()
     block = SharedBlock.attach(settings.block_fd)
     try:
-        robot = with_commissioned(load_robot(settings.robot), settings.commissioned)
+        robot = calibrated(load_robot(settings.robot))
+        robot = with_commissioned(robot, settings.commissioned)
         require_fit(robot)
         machine: Machine
         if settings.read_only:
@@ -154,6 +156,7 @@ def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any
         "programs": list(parts.programs),
         "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
         "platform": None if robot.platform is None else _told(robot.platform),
+        "calibration": None if robot.calibration is None else robot.calibration.summary(),
         "notes": list(robot.notes),
     }
 

@@ -53,6 +53,7 @@ def main() -> int:
     block.counters["service_pid"] = os.getpid()
     service = Service(block, settings.name)
     service.background.append(bounded.watch)
+    service.end_daemon = partial(os.kill, settings.launcher_pid or os.getpid(), signal.SIGTERM)
     service.planner.work = partial(plan_in_process, settings.robot)
     try:
         asyncio.run(_serve(settings, service))
@@ -75,7 +76,9 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     block, lease = service.block, service.lease
     if settings.record is not None:
         ended = partial(service.note_failure, Recorder.name)
-        recorder = Recorder(block, settings.record, settings.name, ended=ended)
+        recorder = Recorder(
+            block, settings.record, settings.name, ended=ended, retention=settings.keep
+        )
         service.events.listeners.append(partial(_note, recorder))
         parts.append(recorder)
     if settings.live is not None:

@@ -37,7 +37,7 @@ from cdpr_rt.robots.workspace import SHARES
 _REGULATOR_SHARE = 0.25
 _INTEGRAL_SHARE = 0.3
 _DEAD_m = 6e-5
-_BREAKING = 6.0
+_BREAKING = 20.0
 _STUCK_m_s = 0.002
 _SETTLING_STEPS = 60
 _LIFT_S = 0.05
@@ -67,9 +67,9 @@ class CableControl:
         if len(axes) != n:
             raise GeometryError(f"{len(axes)} axes; allowed: {n}, one for each cable")
         self.model, self._period_s = model, period_s
-        self.workspace = model.workspace()
+        self.workspace = model.workspace().prepared()
         """Where targets may lie."""
-        self._held, self._interference = model.workspace(0.0), model.interference
+        self._held, self._interference = model.workspace(0.0).prepared(), model.interference
         self.low_N, self.high_N = self.workspace.low, self.workspace.high
         """Between which the tensions are planned, (n,)."""
         self.least_N = model.low_N

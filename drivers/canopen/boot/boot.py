@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from cdpr_drivers.canopen import sdo_abort
-from cdpr_drivers.canopen.boot.bus_traffic import flood_text
+from cdpr_drivers.canopen.boot.bus_traffic import USUAL_BITRATE_bit_s, flood_text
 from cdpr_drivers.canopen.boot.configuration import BootSettings, make_configuration
 from cdpr_drivers.canopen.boot.download import configure, store
 from cdpr_drivers.canopen.network import CanNetwork
@@ -76,6 +76,7 @@ def boot_all(
     drives: Mapping[int, tuple[DriveProfile, BootSettings]],
     *,
     store_configuration: bool = False,
+    bitrate_bit_s: int = USUAL_BITRATE_bit_s,
 ) -> BootReports:
     """Boot several drives at the same time, by node id.
 
@@ -84,7 +85,7 @@ def boot_all(
     heartbeat awaited. They are started together once no mandatory one has failed; one that is not
     mandatory and fails stays in pre-operational and stands in `missing`. With
     `store_configuration` a drive whose stored configuration is another one is commanded to keep it
-    (1010h).
+    (1010h). `bitrate_bit_s` is that of the bus, by which its load is reckoned.
 
     Raises the BootError of the lowest node id that failed, with the others' as notes (and who
     floods the bus, should that be why), once all have come to an end, and BusError.
@@ -105,7 +106,7 @@ def boot_all(
     fatal = [error for node, error in errors.items() if drives[node][1].mandatory]
     if fatal:
         may_be_flood = any(error.letter in _STEPS_FAILED_BY_FLOOD for error in fatal)
-        flood = flood_text(network.url, network.clock) if may_be_flood else ""
+        flood = flood_text(network.url, network.clock, bitrate_bit_s) if may_be_flood else ""
         for other in (*fatal[1:], flood):
             if other:
                 fatal[0].add_note(str(other))

@@ -12,7 +12,7 @@ from cdpr_drivers.bus.frames import FRAME
 from cdpr_drivers.errors import BusError
 from cdpr_rt.core.clock import Clock
 
-_BITRATE = 1_000_000
+USUAL_BITRATE_bit_s = 1_000_000
 _FLOOD_LOAD = 0.5
 _LISTEN_S = 0.1
 _POLL_S = 0.01
@@ -36,7 +36,7 @@ class IdentifierTraffic:
 
 
 def measure_traffic(
-    url: BusUrl, clock: Clock, seconds: float, bitrate: int = _BITRATE
+    url: BusUrl, clock: Clock, seconds: float, bitrate_bit_s: int = USUAL_BITRATE_bit_s
 ) -> list[IdentifierTraffic]:
     """Receive everything on a bus for `seconds`; return the traffic by identifier, busiest first.
 
@@ -63,18 +63,20 @@ def measure_traffic(
         reader.close()
     elapsed_s = max(clock.now_s - begin_s, 1e-6)
     return [
-        IdentifierTraffic(identifier, frames[identifier] / elapsed_s, count / elapsed_s / bitrate)
+        IdentifierTraffic(
+            identifier, frames[identifier] / elapsed_s, count / elapsed_s / bitrate_bit_s
+        )
         for identifier, count in bits.most_common()
     ]
 
 
-def flood_text(url: BusUrl, clock: Clock, bitrate: int = _BITRATE) -> str:
+def flood_text(url: BusUrl, clock: Clock, bitrate_bit_s: int = USUAL_BITRATE_bit_s) -> str:
     """Return which identifier floods a bus, where its load is above 50 %, else an empty text.
 
     It explains another failure, so a bus that cannot be opened gives an empty text too.
     """
     try:
-        traffic = measure_traffic(url, clock, _LISTEN_S, bitrate)
+        traffic = measure_traffic(url, clock, _LISTEN_S, bitrate_bit_s)
     except BusError:
         return ""
     load = sum(entry.load for entry in traffic)

@@ -228,7 +228,7 @@ def test_work_aside_returns_what_it_does_and_raises_what_it_raises(kind: type[Cl
 def test_in_real_time_simulated_time_is_never_ahead_of_the_walls() -> None:
     clock = LockstepClock(real_time=True)
     clock.sleep(0.01)
-    begin_s, began_s = clock.now_s, time.monotonic()
+    began_s, begin_s = time.monotonic(), clock.now_s
     for _ in range(10):
         clock.sleep(0.02)
         assert clock.now_s - begin_s <= time.monotonic() - began_s + 0.02

@@ -359,6 +359,6 @@ def test_a_cycle_that_is_held_up_is_counted_and_makes_none_run_in_a_hurry() -> N
         device.at = rig.began + 50
         rig.operator.wait(lambda: rig.cycle >= 100, 1.0, "some cycles")
         assert rig.operator.lateness.worst_s > 0.04
-        # the cycle after it begins late, those that follow a period after each other
-        apart = np.diff(device.syncs)[rig.began + 50 :]
-        assert np.sum(apart < 0.5 * device.period_s) == 0
+        # the cycle after it begins late, and those that follow need their time: none is made up for
+        syncs = device.syncs[rig.began + 50 :]
+        assert syncs[-1] - syncs[0] > 0.05 + (len(syncs) - 3) * device.period_s

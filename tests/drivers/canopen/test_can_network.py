@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from functools import partial
 
 import pytest
@@ -98,7 +97,5 @@ def test_a_bus_that_is_gone_is_a_bus_error() -> None:
     with open_network(simulator.bus, [1]) as network:
         assert network.read_int(1, 0x1000) == 0x00020192
         simulator.stop()
-        begin = time.monotonic()
         with pytest.raises(BusError, match="gone away"):
             network.read_int(1, 0x1000)
-        assert time.monotonic() - begin < 2.0

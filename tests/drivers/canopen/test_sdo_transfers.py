@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -255,9 +254,7 @@ def test_a_drive_that_vanishes_in_the_middle_is_told_and_the_other_goes_on(
 ) -> None:
     network.write_bytes(1, 0x2F10, 0, bytes(700))
     network.write(1, 0x2F00, 10, 5)  # for good: no test may follow that needs drive 1
-    begin = time.monotonic()
     with pytest.raises(SdoTimeoutError) as caught:
         network.read_bytes(1, 0x2F10)
-    assert time.monotonic() - begin < 3.0
     assert "node 1: object 2F10h:0 cannot be read: no answer within 0.5 s" in str(caught.value)
     assert network.read_int(2, 0x1018, 1) == 0x00CD9A01

@@ -293,7 +293,7 @@ class _Server:
             self._client.sendall(b"< ok >")
 
     def tell(self, message: bytes) -> None:
-        self._thread.join(5.0)
+        self._thread.join(60.0)
         assert self._client is not None
         self._client.sendall(message)
 

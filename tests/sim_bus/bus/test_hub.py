@@ -92,7 +92,7 @@ def test_clients_that_wait_together_contend_for_the_bus(stub_node: type) -> None
     pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(3)]
     for mine, theirs in pairs:
         hub.attach(theirs)
-        mine.settimeout(5.0)
+        mine.settimeout(60.0)
     for (mine, _), can_ids in zip(pairs, ((0x300, 0x100), (0x200, 0x400), (0x080,)), strict=True):
         for can_id in can_ids:
             mine.send(pack_frame(can_id))
@@ -232,7 +232,7 @@ def test_a_real_interface_carries_the_same_nodes_and_its_end_ends_the_hub(
     node = stub_node(4, answers=(pack_frame(0x184, b"truth"),))
     hub = Hub([node], name="socketcan:can0")
     mine, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    mine.settimeout(5.0)
+    mine.settimeout(60.0)
     hub.attach(theirs, essential=True)
     mine.send(pack_frame(0x80))
     mine.send(pack_frame(0x123))

@@ -192,8 +192,8 @@ def test_nodes_time_stands_between_syncs_and_runs_after_them(
     started = time.monotonic()
     assert member.recv_id() == 0x705
     waited = time.monotonic() - started
-    assert HOLD_S + 0.03 < waited < HOLD_S + 0.5
-    assert due <= node.advanced[-1] < due + 0.1
+    assert waited > HOLD_S + 0.03
+    assert node.advanced[-1] == due
 
 
 def test_timers_due_between_two_syncs_send_before_the_second(
@@ -212,11 +212,15 @@ def test_timers_due_between_two_syncs_send_before_the_second(
 def test_paced_timers_keep_wall_time(start_bus: Callable[..., object], stub_node: type) -> None:
     node = stub_node(3, sync_period_s=0.001)
     member = start_bus(node, mode=ClockMode.PACED).join()  # type: ignore[attr-defined]
+    before_s = time.monotonic()
     start = member.status()["bus_time_s"]
+    begun_s = time.monotonic()
     assert isinstance(start, float)
     node.timers.extend(start + 0.05 + 0.0025 * k for k in range(1, 41))
     member.send(0x80)
-    started = time.monotonic()
     for _ in range(40):
         assert member.recv_id() == 0x703
-    assert time.monotonic() - started == pytest.approx(0.15, abs=0.08)
+    assert time.monotonic() - before_s >= 0.15
+    end_s = time.monotonic()
+    passed_s = member.status()["bus_time_s"] - start
+    assert end_s - begun_s <= passed_s <= time.monotonic() - before_s

@@ -10,8 +10,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import pytest
-
 from cdpr_sim_bus.bus.hub import Hub
 from cdpr_sim_bus.clock import HOLD_S, ClockMode
 from cdpr_sim_bus.fleet import Fleet
@@ -27,7 +25,7 @@ def beat(node_id: int) -> bytes:
 
 
 def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: type) -> None:
-    bus = start_bus(node := stub_node(7, timers=(0.0, 0.01)))
+    bus = start_bus(node := stub_node(7, timers=(0.0, 0.5)))
     member = bus.join()
     time.sleep(0.1)
     assert member.status()["bus_time_s"] == 0.0
@@ -37,8 +35,8 @@ def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: typ
     assert [member.recv(), member.recv()] == [beat(7), beat(7)]
     assert node.advanced[0] == 0.0
     assert node.seen[0][0] == pack_frame(0x123)
-    assert 0.0 < node.seen[0][1] < 0.01
-    assert 0.01 in node.advanced
+    assert node.seen[0][1] > 0.0
+    assert 0.5 in node.advanced
     assert not member.status()["led"]
 
 
@@ -229,10 +227,14 @@ def test_a_leader_that_dies_during_its_go_is_noticed(start_bus: StartBus, stub_n
     while (status := other.status())["led"]:
         pass
     assert first < status["bus_time_s"] < 1e9
-    begin = other.status()["bus_time_s"], time.monotonic()
+    # its time is that of the wall now
+    before_s = time.monotonic()
+    begin_s = other.status()["bus_time_s"]
+    begun_s = time.monotonic()
     time.sleep(0.2)
-    passed_s = other.status()["bus_time_s"] - begin[0]
-    assert passed_s == pytest.approx(time.monotonic() - begin[1], abs=0.05)
+    end_s = time.monotonic()
+    passed_s = other.status()["bus_time_s"] - begin_s
+    assert end_s - begun_s <= passed_s <= time.monotonic() - before_s
 
 
 def test_the_time_is_told_as_soon_as_the_master_reads_again(

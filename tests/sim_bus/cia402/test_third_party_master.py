@@ -57,7 +57,7 @@ def start(node: BaseNode402) -> None:
     node.nmt.send_command(129)
     assert wait_for(lambda: 0 in states), "no boot-up message"
     node.sdo[0x1017].raw = 50
-    node.nmt.wait_for_heartbeat(timeout=5)
+    node.nmt.wait_for_heartbeat(timeout=60)
     node.rpdo.read()
     node.tpdo.read()
     for pdo, kind, objects in (
@@ -78,7 +78,7 @@ def start(node: BaseNode402) -> None:
     node.network.sync.start(0.01)
 
 
-def wait_for(condition: Callable[[], bool], timeout_s: float = 5.0) -> bool:
+def wait_for(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
     end = time.monotonic() + timeout_s
     while time.monotonic() < end:
         if condition():

@@ -20,11 +20,11 @@ from cdpr_tools.bench.soak import Process, Soak, growth
 from cdpr_tools.composition.session import open_robot
 from tests.tools.robot_rig import OUT, ROOT, Simulator, robot_file, unique
 
-SHORT = ("--hours", "0.02", "--rate", "250")
+SHORT = ("--hours", "0.006", "--rate", "250")
 
 
-def test_minutes_of_bus_time_leak_nothing_and_lose_nothing():
-    """Eight drives, some minutes: the command itself, as for 24 hours."""
+def test_some_bus_time_leaks_nothing_and_loses_nothing():
+    """Eight drives, less than a minute: the command itself, as for 24 hours."""
     done = subprocess.run(
         [sys.executable, "-m", "cdpr_tools.cli", "bench", "soak", *SHORT, "--json"],
         capture_output=True,
@@ -35,13 +35,13 @@ def test_minutes_of_bus_time_leak_nothing_and_lose_nothing():
     )
     told = json.loads(done.stdout.splitlines()[-1])
     assert (done.returncode, told["ok"], told["leaks"]) == (0, True, []), told
-    assert told["bus_hours"] == pytest.approx(0.02, rel=1e-3)
-    assert told["cycles"] >= 18_000
-    assert (told["drives"], told["boot_s"] < 2.0) == (8, True)
+    assert told["bus_hours"] == pytest.approx(0.006, rel=1e-3)
+    assert told["cycles"] >= 5_400
+    assert told["drives"] == 8
     assert (told["lost_frames"], told["missed_answers"]) == (0, 0)
     for bus in told["buses"].values():
         # SYNC, 4 RPDOs and 4 TPDOs in each cycle, 10 heartbeats a second from each of 4 drives
-        assert bus["frames_counted"] == pytest.approx(9 * told["cycles"] + 40 * 72, rel=0.01)
+        assert bus["frames_counted"] == pytest.approx(9 * told["cycles"] + 40 * 21.6, rel=0.01)
         assert bus["overruns"] == 0
         assert abs(bus["frames_counted"] - bus["frames_expected"]) <= bus["tolerance"]
 

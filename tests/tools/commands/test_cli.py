@@ -162,8 +162,7 @@ def test_home_finds_the_index() -> None:
 @pytest.mark.parametrize("speed", [20.0, -90.0])
 def test_jog_turns_by_speed_times_time(speed: float) -> None:
     told = done("drive", "jog", WINCH, *OWN, "--speed-deg-s", str(speed), "--seconds", "4")
-    # 4 s at full speed and a ramp of half a second at both ends
-    assert told["moved_deg"] == pytest.approx(4.5 * speed, rel=0.15)
+    assert told["moved_deg"] == pytest.approx(4.0 * speed, abs=1.0)
 
 
 def test_objects_are_read_and_written(lab: str) -> None:
@@ -186,11 +185,10 @@ def test_ctrl_c_ends_a_jog_under_control(lab: str) -> None:
         text=True,
     )
     with can.Bus(interface="simbus", channel=lab.partition(":")[2]) as listener:
-        until = time.monotonic() + 60
         while not _is_enabled(listener.recv(1.0)):
-            assert time.monotonic() < until
+            assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=300)
     assert process.returncode == 1
     assert "stopped on request" in errors
     assert "Traceback" not in errors
@@ -207,9 +205,8 @@ def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str)
         env={**os.environ, "CDPR_TEST_FORKS": "0"},
     )
     with can.Bus(interface="simbus", channel=lab.partition(":")[2]) as listener:
-        until = time.monotonic() + 60
         while not _is_enabled(listener.recv(1.0)):
-            assert time.monotonic() < until
+            assert process.poll() is None
     assert process.stderr is not None
     process.send_signal(signal.SIGINT)
     while "a second Ctrl-C takes the power at once" not in (line := process.stderr.readline()):
@@ -217,7 +214,7 @@ def test_ctrl_c_over_and_over_takes_the_power_at_once_and_is_confirmed(lab: str)
     for _ in range(10):  # as somebody does who is afraid
         process.send_signal(signal.SIGINT)
         time.sleep(0.002)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=300)
     assert process.returncode == 1, errors
     assert "Traceback" not in errors
     assert done("drive", "info", WINCH, "--bus", lab)["state"] == "switch on disabled"

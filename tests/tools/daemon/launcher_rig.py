@@ -30,7 +30,8 @@ def main(folder: Path) -> int:
     launcher.LOOP, launcher.SERVICE = "stand_in_loop", "stand_in_service"  # type: ignore[misc]
     launcher._RESTART_S = (0.1, 0.1, 0.1)  # type: ignore[misc]
     launcher._LOOP_STALLED_S = launcher._SERVICE_STALLED_S = 1.0  # type: ignore[misc]
-    launcher._SERVICE_START_S = 3.0  # type: ignore[misc]
+    plan = json.loads((folder / "plan.json").read_text())
+    launcher._SERVICE_START_S = plan.get("service_start_s", 60.0)  # type: ignore[misc]
     block = SharedBlock.create(1, 0.1, 100.0)
     settings = RunSettings(
         robot=str(folder),

@@ -181,8 +181,8 @@ def test_a_service_that_dies_or_hangs_is_started_again_and_the_loop_goes_on(
 
 
 def test_a_service_that_hangs_before_its_first_turn_is_started_again(start: Start) -> None:
-    daemon = start({"freeze_service": True})
-    assert "has not turned for 3 s" in daemon.line("told")["told"]
+    daemon = start({"freeze_service": True, "service_start_s": 5.0})
+    assert "has not turned for 5 s" in daemon.line("told")["told"]
     assert daemon.line("ready")["ready"]["state"] == "ready"
     daemon.process.terminate()
     assert daemon.ends() == 0

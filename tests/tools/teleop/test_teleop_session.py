@@ -69,7 +69,7 @@ def teleoperate(
         if timer:
             timer.start()
         try:
-            deadline_s = time.monotonic() + 20.0
+            deadline_s = time.monotonic() + 120.0
             return session, session.teleoperate(lambda: time.monotonic() > deadline_s)
         finally:
             if timer:

@@ -1,4 +1,4 @@
-"""Program `path`: the set-point stays on the path whatever is asked of it, and goes on from there."""
+"""Program `path`: the set-point stays on the path whatever is asked of it."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def test_what_is_refused(rig, tmp_path):
     file = rig.folder / f"{rig.name}.path"
     data = file.read_bytes()
     file.write_bytes(data.replace(b'"robot": "', b'"robot": "x', 1)[:4096] + data[4096:])
-    with pytest.raises(ProgramError, match="is damaged|another robot"):
+    with pytest.raises(ProgramError, match=r"is damaged|another robot"):
         program.check({"plan": rig.name})
     file.write_bytes(data[:-8])
     with pytest.raises(ProgramError, match="is damaged"):

@@ -104,7 +104,7 @@ class Rig:
     def start(self) -> None:
         for thread in self._threads:
             thread.start()
-        assert self._up.wait(10.0)
+        assert self._up.wait(60.0)
 
     def stop(self) -> None:
         self._ended.set()
@@ -169,8 +169,17 @@ class Rig:
         return f"http://127.0.0.1:{self.guarded_port}"
 
     @property
+    def lease_until_s(self) -> float:
+        return int(self.block.counters["right_until_ns"][0]) * 1e-9
+
+    @property
     def lease_left_s(self) -> float:
-        return (int(self.block.counters["right_until_ns"][0]) - time.monotonic_ns()) * 1e-9
+        return self.lease_until_s - time.monotonic()
+
+    def wait_for_renewal(self, by_s: float) -> None:
+        """Wait until the right holds for `by_s` longer than now."""
+        now_s = self.lease_until_s
+        wait_for(lambda: self.lease_until_s > now_s + by_s)
 
 
 @contextmanager
@@ -183,7 +192,7 @@ def running(folder: Path) -> Iterator[Rig]:
         rig.stop()
 
 
-def wait_for(seen: Callable[[], bool], seconds: float = 10.0) -> None:
+def wait_for(seen: Callable[[], bool], seconds: float = 60.0) -> None:
     deadline = time.monotonic() + seconds
     while not seen():
         assert time.monotonic() < deadline, "never came true"

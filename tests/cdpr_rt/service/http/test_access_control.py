@@ -145,7 +145,7 @@ def opened(rig: Rig, port: int, query: str, origin: str | None = None) -> int:
             f"ws://127.0.0.1:{port}/control?client=page&{query}",
             origin=origin,  # type: ignore[arg-type]  # a str of its own
         ) as connection:
-            connection.recv(5.0)
+            connection.recv(60.0)
     except InvalidStatus as refused:
         return refused.response.status_code
     wait_for(lambda: rig.service.lease.holder() is None)

@@ -2,7 +2,6 @@
 
 import json
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -350,14 +349,14 @@ def test_states_without_cycles_are_events_too(tmp_path: Path) -> None:
     block = block_with_clock()
     recorder = Recorder(block, tmp_path, "bench", reserve_bytes=0)
     block.write_status({"state": "unconfigured", "reason": ""})
-    recorder.start()
-    time.sleep(0.4)
+    recorder.begin()
+    recorder.look()
     writer = RowWriter(block)
     put(writer, made_rows(0, 50))
-    wait_until(lambda: recorder.status()["rows"] == 50)
+    recorder.look()
     block.write_status({"state": "dead", "reason": "the loop has died: killed by signal 9"})
-    time.sleep(0.4)
-    recorder.stop()
+    recorder.look()
+    recorder.finish()
     texts = [
         value["text"] for _, value in stock_messages(Path(recorder.status()["file"]), "/events")
     ]

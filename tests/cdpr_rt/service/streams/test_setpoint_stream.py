@@ -12,7 +12,6 @@ import socket
 import struct
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,6 +25,7 @@ from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.errors import ControlError
 from cdpr_rt.runtime.right import PublishedRight
 from cdpr_rt.service.lease import Lease, LeaseError
+from cdpr_rt.service.streams import stream_sessions
 from cdpr_rt.service.streams.setpoint_stream import (
     SetpointStream,
     StreamError,
@@ -40,8 +40,7 @@ from cdpr_rt.service.streams.stream_packet import (
     StreamSetpoint,
     seal,
 )
-
-KEY = b"a key that is long enough"
+from tests.cdpr_rt.service.streams.stream_session_rig import KEY, StreamRig
 
 
 class Robot:
@@ -82,14 +81,14 @@ def robot(key: bytes | None = None, host: str = "127.0.0.1") -> Iterator[Robot]:
         one.stream.stop()
 
 
-def until(what: Callable[[], bool], seconds: float = 5.0) -> None:
+def until(what: Callable[[], bool], seconds: float = 60.0) -> None:
     deadline = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < deadline, "not in time"
         time.sleep(0.005)
 
 
-def converse(client: StreamClient, what: Callable[[], bool], seconds: float = 5.0) -> None:
+def converse(client: StreamClient, what: Callable[[], bool], seconds: float = 60.0) -> None:
     """Stream at about 100 Hz until `what`."""
     deadline = time.monotonic() + seconds
     while not what():
@@ -272,7 +271,7 @@ def test_a_flood_neither_pushes_the_holder_aside_nor_fills_memory() -> None:
             size_kB = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
             cpu_s, begin_s = time.process_time(), time.monotonic()
             sent, posted = client.sent, there.posted
-            converse(client, lambda: client.sent >= sent + 60, 20.0)
+            converse(client, lambda: client.sent >= sent + 60)
             share = (time.process_time() - cpu_s) / (time.monotonic() - begin_s)
             until(lambda: there.posted >= posted + 60)
             assert share < 0.6
@@ -358,9 +357,11 @@ PLAUSIBLE = st.builds(
 def besieged(request: pytest.FixtureRequest) -> Iterator[tuple[Robot, StreamClient]]:
     key = request.param
     with (
+        pytest.MonkeyPatch.context() as patch,
         robot(key) as there,
         StreamClient("127.0.0.1", there.port, key or there.give()) as client,
     ):
+        patch.setattr(stream_sessions, "SILENCE_NS", 10_000_000_000)  # a busy machine's
         converse(client, lambda: client.answered >= 2)
         yield there, client
 
@@ -388,35 +389,34 @@ def test_nothing_hostile_gets_through_or_disturbs(
     assert sample["position_m"].tolist() == [0.0, 0.0, 0.2]
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(packets=st.lists(HOSTILE | PLAUSIBLE, min_size=1, max_size=12))
 def test_whatever_reaches_the_loop_can_be_worked_with(
-    alone: tuple[Robot, socket.socket], packets: list[bytes | StreamSetpoint]
+    alone: StreamRig, packets: list[bytes | StreamSetpoint]
 ) -> None:
     """The holder itself signs all of it, good-byes and leaps of its numbers among it."""
-    there, sock = alone
-    given, numbers = there.give(), itertools.count(1)
-    before, total = there.posted, sum(there.stream.status()["packets"].values())
+    alone.now_ns += 11_000_000_000  # the right of the last example has run out
+    alone.begin()
+    given, numbers = alone.given, itertools.count(1)
+    before, total = alone.posted, sum(alone.sessions.counts.values())
     for packet in (GOOD, *packets):
         if isinstance(packet, StreamSetpoint):
             data = replace(packet, session=given.number, sequence=next(numbers)).pack()
         else:
             data = packet[:8] + struct.pack("<I", given.number) + packet[12:]
             data = data if len(packet) >= HEAD.size else packet
-        sock.send(data + hmac.digest(given.key, data, "sha256"))
-    until(lambda: sum(there.stream.status()["packets"].values()) == total + 1 + len(packets))
-    assert there.posted > before
-    samples = there.block.samples
-    for sample in samples[: min(there.posted, len(samples))]:
+        alone.take(data + hmac.digest(given.key, data, "sha256"))
+    assert sum(alone.sessions.counts.values()) == total + 1 + len(packets)
+    assert alone.posted > before
+    samples = alone.block.samples
+    for sample in samples[: min(alone.posted, len(samples))]:
         assert all(math.isfinite(x) and abs(x) <= 20.0 for x in sample["position_m"].tolist())
         assert math.hypot(*sample["quaternion"].tolist()) == pytest.approx(1.0)
         assert 0.0 < sample["scale"] <= 100.0
         assert sample["sent_ns"] >= 0
-    assert any(thread.name == "set-point stream" for thread in threading.enumerate())
 
 
 @pytest.fixture(scope="module")
-def alone() -> Iterator[tuple[Robot, socket.socket]]:
-    with robot() as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.connect(("127.0.0.1", there.port))
-        yield there, sock
+def alone() -> StreamRig:
+    """Without sockets: one that is given back loses what waits in it."""
+    return StreamRig()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import threading
 import time
 from dataclasses import replace
@@ -150,6 +151,7 @@ def test_who_floods_the_bus_is_named_where_a_node_does_not_answer(bus: str) -> N
         with open_network(bus, [1, 9], lead=False) as network, pytest.raises(BootError) as caught:
             boot_all(network, dict.fromkeys([1, 9], (DRIVE, SETTINGS)))
         busiest = measure_traffic(BusUrl.parse(bus), PacedClock(), 0.1)[0]
+        told = flood_text(BusUrl.parse(bus), PacedClock(), 125_000)
     finally:
         stop.set()
         thread.join()
@@ -159,6 +161,8 @@ def test_who_floods_the_bus_is_named_where_a_node_does_not_answer(bus: str) -> N
     assert "identifier 12Ah (node 42 by the usual numbering)" in note
     assert (busiest.identifier, busiest.node_id) == (0x12A, 42)
     assert busiest.load > 0.5
+    load = re.search(r"flooded: (\d+)% load", told)
+    assert load and int(load[1]) > 400, "of a bus eight times slower"
 
 
 def test_a_quiet_bus_is_no_flood(bus: str) -> None:
