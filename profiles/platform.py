@@ -54,6 +54,8 @@ DIRECTIONS: Final[dict[int, tuple[DirectionName, ...]]] = {
 }
 """Directions of a platform by how many coordinates it has: positions, then angles."""
 _LEAST_ARM_m = 0.1
+_RISE_S = 0.1
+"""In which the acceleration is reached where no jerk is given."""
 CLEARANCE_m: Final = 0.01
 """Between centre lines of cables, where a robot's file says no other and none is thicker."""
 
@@ -93,6 +95,9 @@ class PlatformFile(Profile):
     angular_speed_rad_s: float | None = Field(default=None, gt=0, le=100)
     angular_acceleration_rad_s2: float | None = Field(default=None, gt=0, le=10_000)
     """About each axis."""
+    jerk_m_s3: float | None = Field(default=None, gt=0, le=100_000)
+    angular_jerk_rad_s3: float | None = Field(default=None, gt=0, le=10_000_000)
+    """Along and about each direction, on paths; such as reach the acceleration in 0.1 s."""
     controlled: tuple[DirectionName, ...] | None = None
     """Directions that the cables control; what they can if left out."""
     tension_distribution: TensionMethod = "minimum-deviation"
@@ -110,9 +115,10 @@ class Platform:
     """A platform on the cables of a robot's axes; points in the order of the axes.
 
     `exit_points_m` are in the room, `anchor_points_m` in the platform's frame, whose origin is what
-    `home_m` and targets speak of. What is left out (empty, or 0 of an angular speed or
-    acceleration) is filled in: these two are then those with which the furthest anchor point, 0.1 m
-    away at least, moves with `speed_m_s` and `acceleration_m_s2`.
+    `home_m` and targets speak of. What is left out (empty, or 0 of an angular speed,
+    acceleration or jerk) is filled in: angular speed and acceleration are then those with which the
+    furthest anchor point, 0.1 m away at least, moves with `speed_m_s` and `acceleration_m_s2`.
+    Jerks that are left out reach these accelerations in 0.1 s.
     """
 
     mass_kg: float
@@ -135,6 +141,9 @@ class Platform:
     angular_speed_rad_s: float = 0.0
     angular_acceleration_rad_s2: float = 0.0
     """About each axis."""
+    jerk_m_s3: float = 0.0
+    angular_jerk_rad_s3: float = 0.0
+    """Along and about each direction, on paths."""
     controlled: tuple[str, ...] = ()
     """Names out of DIRECTIONS, in their order."""
     tension_distribution: str = "minimum-deviation"
@@ -167,6 +176,9 @@ class Platform:
                 self.angular_acceleration_rad_s2 or self.acceleration_m_s2 / arm_m
             ),
         }
+        filled["jerk_m_s3"] = self.jerk_m_s3 or self.acceleration_m_s2 / _RISE_S
+        turning = filled["angular_acceleration_rad_s2"]
+        filled["angular_jerk_rad_s3"] = self.angular_jerk_rad_s3 or turning / _RISE_S
         for key, value in filled.items():
             object.__setattr__(self, key, value)
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
@@ -14,6 +14,9 @@ from cdpr_profiles.reading.places import reference
 from cdpr_profiles.reading.reader import Profile, one_of
 from cdpr_profiles.winch import BITRATES_bit_s, Winch
 from cdpr_profiles.winch_calibration import WinchCalibration
+
+if TYPE_CHECKING:
+    from cdpr_profiles.calibration.geometry import GeometryCalibration
 
 HEARTBEAT_TIMEOUT_PERIODS = 1.75
 """Heartbeat time-out of the drives in periods of the master's heartbeat: fewer than two."""
@@ -168,6 +171,8 @@ class Robot:
     limits: RobotLimits = field(default_factory=RobotLimits)
     platform: Platform | None = None
     """The platform that the axes hold; None for independent winches."""
+    calibration: "GeometryCalibration | None" = None
+    """The calibration whose geometry the platform and the winches have; None for the file's."""
     is_winch: bool = False
     """Whether it is a single winch, run as a robot of one axis; its file is that of the winch."""
 

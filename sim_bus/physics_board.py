@@ -29,6 +29,8 @@ _POWER_FROM, _POWER_UNTIL, _BRAKE_FROM, _BRAKE_UNTIL, _MASS = range(7, 12)
 _SAMPLES, _SPACING_S = 512, 0.9e-3
 _RING = 16
 _WORDS = _RING + 2 * _SAMPLES
+# in the board's own part, behind its header: the platform's sequence number, time and motion
+_PLATFORM, _MOTION = 8, 1 + 3 + 9 + 3 + 3
 _ALWAYS, _NEVER = (-math.inf, math.inf), (-math.inf, -math.inf)
 _SPINS, _TRIES = 100, 1000
 _PAUSE_S = 5e-4
@@ -49,6 +51,44 @@ class BoardState(NamedTuple):
     motor_rad_s: float
     power_on: bool
     """Whether the power stage is on."""
+
+
+class PlatformState(NamedTuple):
+    """How a platform truly is, its frame's origin in the room; all belong to one instant."""
+
+    time_s: float
+    """Bus time."""
+    position_m: tuple[float, ...]
+    rotation: tuple[float, ...]
+    """From the platform's frame to the room, row by row, 9 numbers."""
+    velocity_m_s: tuple[float, ...]
+    spin_rad_s: tuple[float, ...]
+    """Along the axes of the room."""
+
+
+class BoardPlatform:
+    """The platform of a board, for devices that it carries. The robot publishes, all may read."""
+
+    def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
+        self._words, self._numbers = words, numbers
+
+    def publish(self, state: PlatformState) -> None:
+        """Write how the platform is; for its robot alone."""
+        words, numbers = self._words, self._numbers
+        sequence = words[0] | 1
+        words[0] = sequence
+        flat = (state[0], *state[1], *state[2], *state[3], *state[4])
+        for i, number in enumerate(flat, 1):
+            numbers[i] = number
+        words[0] = (sequence + 1) & 0xFFFFFFFFFFFFFFFF
+
+    def state(self) -> PlatformState | None:
+        """Return what was published last, None where there is no platform."""
+        flat = _consistent(self._words, 0, self._numbers[1 : 1 + _MOTION].tolist)
+        if not self._words[0]:
+            return None
+        parts = (tuple(flat[i:j]) for i, j in ((1, 4), (4, 13), (13, 16), (16, 19)))
+        return PlatformState(flat[0], *parts)
 
 
 class BoardAxis:
@@ -98,7 +138,7 @@ class BoardAxis:
 
     def state(self) -> BoardState:
         """Return what the drive wrote last, as it is where the writer died in the middle."""
-        numbers = self._consistent(self._numbers[_TIME : _POWER_ON + 1].tolist)
+        numbers = _consistent(self._words, _SEQUENCE, self._numbers[_TIME : _POWER_ON + 1].tolist)
         time_s, tension, angle, speed, power = numbers
         return BoardState(time_s, tension, angle, speed, power != 0.0)
 
@@ -108,22 +148,13 @@ class BoardAxis:
         A sample is (bus time, tension in N), one a millisecond at the most; only the last
         `_SAMPLES` are kept.
         """
-        count, ring = self._consistent(
-            lambda: (self._words[_COUNT], self._numbers[_RING:_WORDS].tolist())
+        count, ring = _consistent(
+            self._words,
+            _SEQUENCE,
+            lambda: (self._words[_COUNT], self._numbers[_RING:_WORDS].tolist()),
         )
         places = (2 * (i % _SAMPLES) for i in range(max(after, count - _SAMPLES), count))
         return count, [(ring[at], ring[at + 1]) for at in places]
-
-    def _consistent(self, read: Callable[[], _T]) -> _T:
-        words = self._words
-        for attempt in range(_TRIES):
-            before = words[_SEQUENCE]
-            value = read()
-            if not before & 1 and words[_SEQUENCE] == before:
-                break
-            if attempt > _SPINS:  # its process waits for a core, perhaps for ours
-                time.sleep(_PAUSE_S)
-        return value
 
     # -- what others write
 
@@ -174,6 +205,18 @@ class BoardAxis:
     @hung_mass_kg.setter
     def hung_mass_kg(self, mass_kg: float) -> None:
         self._numbers[_MASS] = mass_kg
+
+
+def _consistent(words: memoryview[int], sequence: int, read: Callable[[], _T]) -> _T:
+    """Return what `read` returns while nobody writes, as `words[sequence]` tells."""
+    for attempt in range(_TRIES):
+        before = words[sequence]
+        value = read()
+        if not before & 1 and words[sequence] == before:
+            break
+        if attempt > _SPINS:  # its process waits for a core, perhaps for ours
+            time.sleep(_PAUSE_S)
+    return value
 
 
 class PhysicsBoard:
@@ -243,6 +286,14 @@ class PhysicsBoard:
         words, numbers = part.cast("Q"), part.cast("d")
         self._views += [words, numbers, part]
         return BoardAxis(words, numbers)
+
+    @property
+    def platform(self) -> BoardPlatform:
+        """The platform that moves on the axes' cables."""
+        part = memoryview(self._memory)[8 * _PLATFORM : 8 * (_PLATFORM + 1 + _MOTION)]
+        words, numbers = part.cast("Q"), part.cast("d")
+        self._views += [words, numbers, part]
+        return BoardPlatform(words, numbers)
 
     def close(self) -> None:
         """Let go of the file, and remove it where it was made here."""

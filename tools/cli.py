@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer import BadParameter
+from typing_extensions import override
 
 from cdpr_drivers.errors import ConfigurationError, DriverError
 from cdpr_profiles.errors import ProfileError
@@ -47,7 +50,7 @@ MODULES = {
         "then.",
         "lower": "Let the platform down onto its stand; the power stays on, the cables are loose.",
         "pause": "Stop the platform and hold it there; `resume` goes on.",
-        "resume": "Go on to the position that the platform had not reached when it was paused.",
+        "resume": "Go on to the position, or along the path, that was left when it was paused.",
     },
     "daemon.daemon_state": {
         "status": "Say how a daemon and its robot are; changes nothing.",
@@ -64,6 +67,12 @@ MODULES = {
     "bus.bus": {
         "bus": "Look at a CAN bus.",
     },
+    "calibrate": {
+        "calibrate": "Calibrate a robot's geometry, drums and elongation; take over, undo.",
+    },
+    "camera": {
+        "camera": "Cameras: images, and intrinsics.",
+    },
     "cogging": {
         "cogging": "Cogging: sweep, fit, validate, report.",
     },
@@ -75,6 +84,15 @@ MODULES = {
     },
     "log": {
         "log": "The daemon's recordings: what is in them, as tables and pictures.",
+    },
+    "markers": {
+        "markers": "Printed markers: sheets, and maps of them.",
+    },
+    "poses": {
+        "poses": "Draw poses that a robot reaches, held and without contact all the way.",
+    },
+    "path": {
+        "path": "Look at a path before it is followed, follow it, take it up again.",
     },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
@@ -98,8 +116,31 @@ MODULES = {
 _INTERRUPTED = 130
 _BAD_INPUTS = (ProfileError, BusSetupError, ConfigurationError, InvalidRequestError)
 
+_WORDS = (
+    (r"Input should be less than or equal to (\S+)", r"allowed: up to \1"),
+    (r"Input should be greater than or equal to (\S+)", r"allowed: \1 or more"),
+    (r"Input should be a valid integer.*", "allowed: a whole number"),
+    (r"Input should be a valid number.*", "allowed: a number"),
+    (r"Value error, (.*) is not one of (.*)\.", r"\1; allowed: \2"),
+)
+"""What the library says of a value that is not allowed, and how it is said here."""
+
+
+class _Commands(group_of(MODULES)):  # type: ignore[misc]
+    """All commands; what is wrong with their arguments is told as everything else is."""
+
+    @override
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BadParameter as error:
+            for pattern, words in _WORDS:
+                error.message = re.sub(pattern, words, error.message)
+            raise
+
+
 app = typer.Typer(
-    cls=group_of(MODULES),
+    cls=_Commands,
     name="cdpr",
     help="Commission, run and simulate the winches of cable-driven parallel robots.",
     no_args_is_help=True,
@@ -143,7 +184,8 @@ def main() -> None:
     except ModuleNotFoundError as error:
         if not error.name or error.name.startswith("cdpr_"):
             raise
-        _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[daemon]'", FAILED)
+        extra = "camera" if error.name == "cv2" else "daemon"
+        _end(f"needs {error.name}, which comes with: pip install 'cdpr-rt[{extra}]'", FAILED)
     except KeyboardInterrupt:  # while libraries are loaded
         _end("interrupted", FAILED)
     except SystemExit as end:

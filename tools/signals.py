@@ -9,7 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_TOLD = b"stopping under control; a second Ctrl-C takes the power at once\n"
+_TOLD = "stopping under control; a second Ctrl-C takes the power at once"
+HELD = "the motion stops and is held, with power; `cdpr disable` or `cdpr stop` takes that"
+"""What a Ctrl-C does to a command that has a daemon move something."""
 
 
 class StopRequest:
@@ -19,7 +21,8 @@ class StopRequest:
     switched off.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, told: str = "") -> None:
+        self._told = told
         self._times = 0
         self._interrupts = True
         self.energised = False
@@ -36,8 +39,10 @@ class StopRequest:
     def note(self, _number: int, _frame: FrameType | None) -> None:
         """Take a signal."""
         self._times += 1
-        if self._times == 1 and self.energised and self._interrupts:
-            os.write(sys.stderr.fileno(), _TOLD)  # printing is not allowed to interrupt itself
+        told = _TOLD if self.energised else self._told
+        if self._times == 1 and told and self._interrupts:
+            # printing is not allowed to interrupt itself
+            os.write(sys.stderr.fileno(), f"{told}\n".encode())
         if self._times > 1 and self._interrupts:
             self._interrupts = False
             raise KeyboardInterrupt
@@ -58,12 +63,13 @@ def interrupted_by_sigterm() -> Iterator[None]:
 
 
 @contextmanager
-def stop_on_signals() -> Iterator[StopRequest]:
+def stop_on_signals(told: str = "") -> Iterator[StopRequest]:
     """Yield what tells whether the user wants an end; asked a second time it is an interrupt.
 
-    After a Ctrl-C in the block further ones change nothing: the command ends already.
+    `told` is said at the first request. After a Ctrl-C in the block further ones change nothing:
+    the command ends already.
     """
-    wanted = StopRequest()
+    wanted = StopRequest(told)
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, wanted.note) for number in numbers}
     try:

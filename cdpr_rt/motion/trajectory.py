@@ -57,11 +57,16 @@ class Leg:
     """A move of n axes at constant velocity, with a linear velocity ramp before and after.
 
     Parameters: `start_rad` (n,) and `velocity_rad_s` (n,), signed; `cruise_s` seconds at full
-    velocity; `ramp_s` seconds for each ramp, positive.
+    velocity; `ramp_s` seconds for each ramp, positive; `settle_s` for which it stays at its end.
     """
 
     def __init__(
-        self, start_rad: FloatArray, velocity_rad_s: FloatArray, cruise_s: float, ramp_s: float
+        self,
+        start_rad: FloatArray,
+        velocity_rad_s: FloatArray,
+        cruise_s: float,
+        ramp_s: float,
+        settle_s: float = 0.0,
     ) -> None:
         if ramp_s <= 0.0 or cruise_s < 0.0:
             raise ValueError(f"ramp_s {ramp_s} must be positive, cruise_s {cruise_s} not negative")
@@ -69,7 +74,7 @@ class Leg:
         self.velocity_rad_s = np.array(velocity_rad_s, float)
         self.cruise_s = float(cruise_s)
         self.ramp_s = float(ramp_s)
-        self.duration_s = self.cruise_s + 2.0 * self.ramp_s
+        self.duration_s = self.cruise_s + 2.0 * self.ramp_s + settle_s
 
     def fill(self, time_s: float, setpoint: Setpoint) -> None:
         """Write the set-point at `time_s` after the leg's start."""

@@ -10,7 +10,7 @@ import numpy as np
 from cdpr_profiles import RobotAxis
 from cdpr_rt.control.compensation import AxisCompensation
 from cdpr_rt.control.pid import PidGains
-from cdpr_rt.control.tuning import stand_firm, stiffest_pid, sweep_gain
+from cdpr_rt.control.tuning import PidDesign, stand_firm, stiffest_pid, sweep_gain
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.limits import Limits
 
@@ -48,10 +48,10 @@ class RobotModel:
         return len(self.gains)
 
 
-def position_gains(inertia_kg_m2: float, latency_s: float, period_s: float) -> PidGains:
-    """Return the position gains of a bare rotor; raises TuningError."""
+def position_loop(inertia_kg_m2: float, latency_s: float, period_s: float) -> PidDesign:
+    """Return the position loop of a bare rotor with its margins; raises TuningError."""
     design = stiffest_pid(inertia_kg_m2, latency_s, BANDWIDTHS_Hz, period_s)
-    return stand_firm(design, period_s).gains
+    return stand_firm(design, period_s)
 
 
 def model_of(
@@ -71,7 +71,8 @@ def model_of(
     inertia = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
     pairs = list(zip(inertia, latency_s, strict=True))
     designs = {
-        (J, latency): position_gains(J, latency, period_s) for J, latency in dict.fromkeys(pairs)
+        (J, latency): position_loop(J, latency, period_s).gains
+        for J, latency in dict.fromkeys(pairs)
     }
     return RobotModel(
         period_s=period_s,

@@ -21,6 +21,7 @@ from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import RobotModel
 from cdpr_rt.programs.platform.lower import LowerProgram
+from cdpr_rt.programs.platform.path import PathProgram
 from cdpr_rt.programs.platform.platform_axes import PlatformHold, PlatformIdle, PlatformJog
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.pose import PoseProgram
@@ -81,13 +82,15 @@ def _of_platform(
     model: RobotModel, loop: PositionLoop, stream: PoseStream, parts: PlatformParts
 ) -> tuple[Program, ...]:
     torque_Nm, cable_m = model.torque_Nm, model.cable_m_per_rad
+    path = PathProgram(parts, torque_Nm)
     return (
         PlatformIdle(parts, model),
-        PlatformHold(parts, model, loop),
+        PlatformHold(parts, model, loop, path),
         PlatformJog(parts, model, loop),
         PretensionProgram(parts, torque_Nm, cable_m),
         PoseProgram(parts, torque_Nm, stream),
         LowerProgram(parts, torque_Nm, cable_m),
+        path,
     )
 
 

@@ -14,7 +14,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.loop_design import loop_model_of
 from cdpr_rt.robots.platform_model import platform_model
-from cdpr_rt.robots.rigid_body import is_point
+from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import NONE_rad, PlatformStatics, statics_of
 
@@ -55,7 +55,7 @@ def findings(robot: Robot) -> list[Finding]:
         found += [*_tensions(statics), *_motors(robot, statics), *_lengths(robot, statics)]
         if statics.turns:
             found += _turning(statics)
-        found += [*_loop(robot, statics), *_swinging(robot.platform)]
+        found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -292,6 +292,25 @@ def _swinging(platform: Platform) -> Iterator[Finding]:
             "with as it is at home"
         )
         yield Finding("platform.controlled", text, impossible=False)
+
+
+def _standing(statics: PlatformStatics) -> Iterator[Finding]:
+    """Look whether a turned platform meets, at the bottom of its box, what it stands on at home."""
+    platform, up = statics.platform, statics.model.positions - 1
+    angle = platform.workspace_angle_rad
+    b = np.array([in_space(point) for point in platform.anchor_points_m])
+    b = b @ statics.model.home_pose.Q.T
+    height = b[:, up]
+    aside = np.linalg.norm(b[:, :up], axis=1)
+    lower_m = float(height.min() - (math.cos(angle) * height - math.sin(angle) * aside).min())
+    above_m = platform.workspace_min_m[up] - platform.home_m[up]
+    if angle > 0.0 and lower_m > above_m:
+        text = (
+            f"turned so, the lowest anchor point is {lower_m:.2f} m lower, and the box begins "
+            f"{above_m:.2f} m above home: the platform may meet what it stands on; a box from "
+            f"{platform.home_m[up] + lower_m:.2f} m upward helps"
+        )
+        yield Finding("platform.workspace_angle_rad", text, impossible=False)
 
 
 def _lengths(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:

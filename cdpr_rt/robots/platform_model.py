@@ -76,6 +76,11 @@ class PlatformModel:
         return self._each(platform.acceleration_m_s2, platform.angular_acceleration_rad_s2)
 
     @property
+    def jerk(self) -> FloatArray:
+        """The highest jerks of paths, (d,), in m/s3 and rad/s3."""
+        return self._each(self.platform.jerk_m_s3, self.platform.angular_jerk_rad_s3)
+
+    @property
     def angle_rad(self) -> float:
         """Largest angle from home's orientation in which targets may lie."""
         return self.platform.workspace_angle_rad
@@ -111,17 +116,18 @@ class PlatformModel:
             about_room = Q @ inertia_kg_m2(platform) @ Q.T
             turning = share * platform.angular_acceleration_rad_s2 * about_room
         directions = self.kinematics.directions
-        wrenches = wrenches_in_motion(
+        weight, motions = wrenches_in_motion(
             platform.mass_kg, wanted, self.positions - 1, directions, turning
         )
         return CableWorkspace(
             self.about_mass,
-            wrenches,
+            weight,
             self.low_N,
             self.high_N,
             self.wrench_scale,
             self.reserve_N if reserve_N is None else reserve_N,
             in_space(platform.centre_of_mass_m),
+            motions,
         )
 
     @cached_property

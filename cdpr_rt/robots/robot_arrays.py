@@ -11,6 +11,7 @@ import numpy as np
 
 from cdpr_profiles import Robot, RobotAxis
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
+from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import WinchArrays
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limits, reactions_of
@@ -26,6 +27,10 @@ SLACK_SHARE: Final = 0.25
 FOLLOWING_m: Final = 0.15
 """Following error of a platform's cables, where its file says no other: three times the lag at
 which its set-point waits for it."""
+DISAGREE_SHARE: Final = 0.0075
+DISAGREE_m: Final = 0.03
+"""By how much lengths may contradict each other, as a share of the diagonal of the box around the
+exit points, and at most, where a robot's file says no other."""
 LOW_SHARE: Final = 0.5
 """Of the least tension, where torques alone tell of tensions."""
 
@@ -57,6 +62,7 @@ def limits_of(robot: Robot) -> Limits:
         cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
         following = np.maximum(following, FOLLOWING_m / np.abs(cable_m))
     figures: dict[str, Any] = {key: one for key, one in told if isinstance(one, int | float)}
+    figures.setdefault("lengths_disagree_m", _disagreement_m(robot.platform))
     return Limits(
         torque_Nm=torque_Nm,
         torque_rate_Nm_s=each(told.torque_rate_Nm_s, torque_Nm / TORQUE_RISE_S),
@@ -70,6 +76,17 @@ def limits_of(robot: Robot) -> Limits:
         reactions=reactions_of(told.reactions, lowers=can_lower(robot)),
         **figures,
     )
+
+
+def frame_m(platform: Platform) -> float:
+    """Return the diagonal of the box around a platform's exit points."""
+    return float(np.linalg.norm(np.ptp(np.array(platform.exit_points_m), axis=0)))
+
+
+def _disagreement_m(platform: Platform | None) -> float:
+    """Return by how much lengths may disagree: on a small frame a slip tells less."""
+    share_m = np.inf if platform is None else DISAGREE_SHARE * frame_m(platform)
+    return float(min(DISAGREE_m, share_m))
 
 
 def supervised(limits: Limits, robot: Robot) -> Limits:

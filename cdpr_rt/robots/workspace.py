@@ -13,6 +13,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.jit import bound
 from cdpr_rt.robots.interface import Kinematics
 from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.tension.circuit_margin import MOST_NULL_DIRECTIONS, write_circuit_margins
 from cdpr_rt.robots.tension.null_space import null_spaces
 from cdpr_rt.robots.tension.tension_projection import write_margins
 
@@ -37,8 +38,11 @@ class CableWorkspace:
         wrench_scale: FloatArray,
         reserve_N: float = 0.0,
         centre_m: FloatArray | None = None,
+        generators: FloatArray | None = None,
     ) -> None:
         """Take wrenches (k, d) of all else on the platform and the tensions' bounds (n,).
+
+        To each of them any sum a_k g_k of the `generators` g (j, d) may be added, |a_k| <= 1.
 
         Where those act at another point than the platform's origin, `centre_m` (3,) is that point
         in the platform's frame, and the kinematics are those about it: weight then is the same
@@ -48,7 +52,11 @@ class CableWorkspace:
         is that of `TensionDistribution`.
         """
         self.kinematics, self.reserve_N = kinematics, reserve_N
-        self.wrenches = np.ascontiguousarray(wrenches, float)
+        sets = np.atleast_2d(np.asarray(wrenches, float))
+        added = np.zeros((0, sets.shape[1])) if generators is None else generators
+        self._sets, self._generators = np.ascontiguousarray(np.vstack([sets, added])), len(added)
+        self.wrenches = corners(sets, added)
+        """The corners of all these wrenches, (c, d)."""
         low, high = np.asarray(low_N, float) + reserve_N, np.asarray(high_N, float) - reserve_N
         self._bounds = np.array([low, high, 0.5 * (low + high)])
         self.low, self.high = self._bounds[0], self._bounds[1]
@@ -85,12 +93,36 @@ class CableWorkspace:
         tried.run()
         return tried.margins, tried.tensions
 
+    def capacity_margins(self, poses: FloatArray, least_N: float = -math.inf) -> FloatArray:
+        """Return the same margins (m,) alone, in closed form up to d + 2 cables.
+
+        That is some ten times as fast. One that is below `least_N` may be less still: for a
+        yes or no, give what is asked for.
+        """
+        if self.kinematics.n - len(self.kinematics.directions) > MOST_NULL_DIRECTIONS:
+            return self.margins(poses)[0]
+        matrices, margins = self.wrench_matrices(poses), np.zeros(len(poses))
+        (d, n), k = matrices.shape[1:], len(self._sets)
+        side = max(n, 8)
+        write_circuit_margins(
+            matrices, self._sets, self._generators, self._scale, self._bounds, least_N, margins,
+            np.zeros((k, n)), np.zeros((n + 1, n)), np.zeros((d, n + 1)), np.zeros((4, side, side)),
+        )  # fmt: skip
+        return margins
+
     def wrench_matrices(self, poses: FloatArray) -> FloatArray:
         """Return the W (m, d, n) by which tensions act at the poses, about the wrenches' point."""
-        tried = self._pass(len(poses), 0.0)
-        tried.poses[:] = poses
-        tried.run()
-        return tried.matrices
+        d, n = len(self.kinematics.directions), self.kinematics.n
+        centred, matrices = np.array(poses, float), np.zeros((len(poses), d, n))
+        if self._centre.any():
+            centred[:, 0] += centred[:, 1:] @ self._centre
+        self.kinematics.wrench_matrices(centred, matrices)
+        return matrices
+
+    @property
+    def arrays(self) -> tuple[FloatArray, FloatArray, int, FloatArray, FloatArray]:
+        """The `centre` (3,), wrenches (k, d), how many of them are generators, scale, bounds."""
+        return self._centre, self._sets, self._generators, self._scale, self._bounds
 
     def stands(self, pose: Pose) -> bool:
         """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
@@ -181,26 +213,32 @@ def missing(margin_N: float, tension_N: FloatArray, low_N: FloatArray, high_N: F
     )
 
 
+def corners(wrenches: FloatArray, generators: FloatArray) -> FloatArray:
+    """Return the corners (k 2^j, d) of the sets w + sum a_k g_k, |a_k| <= 1."""
+    signs = np.array(list(itertools.product((1.0, -1.0), repeat=len(generators))))
+    added = signs.reshape(len(signs), len(generators)) @ np.asarray(generators)
+    return np.ascontiguousarray((wrenches[:, None] + added).reshape(-1, wrenches.shape[1]))
+
+
 def wrenches_in_motion(
     mass_kg: float,
     acceleration_m_s2: float,
     up: int,
     directions: Sequence[int],
     turning_Nm: FloatArray | None = None,
-) -> FloatArray:
-    """Return what acts on a platform that is accelerated along all directions at once, (k, d).
+) -> tuple[FloatArray, FloatArray]:
+    """Return what acts on a platform accelerated along all directions at once: w (1, d), g (j, d).
 
-    The weight against coordinate `up`, with each combination of signs of accelerations along the
-    controlled positions, and of the moments `turning_Nm` (3, 3), a row for the angular acceleration
-    about each axis: whatever carries these carries all between them, rest among it. All of it about
-    the centre of mass.
+    The weight against coordinate `up`; to it either sign of each acceleration along the controlled
+    positions, and of the moments `turning_Nm` (3, 3), a row for the angular acceleration about each
+    axis, may be added: rest is among these. All of it about the centre of mass.
     """
     motions = [np.eye(6)[i] * mass_kg * acceleration_m_s2 for i in directions if i < 3]
     if turning_Nm is not None and turning_Nm.any():
         motions += [np.concatenate([np.zeros(3), turning_Nm[i - 3]]) for i in directions if i >= 3]
     if not acceleration_m_s2:
         motions = []
-    signs = np.array(list(itertools.product((1.0, -1.0), repeat=len(motions))))
-    wrenches = signs @ np.reshape(motions, (-1, 6))
-    wrenches[:, up] -= mass_kg * G_m_s2
-    return np.ascontiguousarray(wrenches[:, list(directions)])
+    weight = np.zeros((1, 6))
+    weight[0, up] = -mass_kg * G_m_s2
+    chosen = list(directions)
+    return weight[:, chosen], np.reshape(motions, (-1, 6))[:, chosen]

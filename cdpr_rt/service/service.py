@@ -16,6 +16,7 @@ from cdpr_rt.service.http.tickets import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
 from cdpr_rt.service.link import LoopLink, Reply
 from cdpr_rt.service.part import Part
+from cdpr_rt.service.path_planner import PathPlanner
 from cdpr_rt.service.rows import newest_row, plain, row_table
 from cdpr_rt.service.streams.setpoint_stream import SetpointStream, StreamError
 
@@ -47,6 +48,8 @@ class Service:
         self.events = self.link.events
         self.parts: list[Part] = []
         self._unstarted: dict[str, str] = {}
+        self.planner = PathPlanner()
+        """Plans paths, in a process of its own."""
         self.stream: SetpointStream | None = None
         """That which has started, None where set-points are not received."""
         self.counts = {"refused": 0, "live_clients": 0, "slow_clients_dropped": 0}
@@ -55,6 +58,8 @@ class Service:
         """What else runs while the service does, until cancelled."""
         self.http: tuple[str, int] | None = None
         """Where it listens on TCP, None where it does not."""
+        self.end_daemon: Callable[[], None] = lambda: None
+        """Ends the daemon where its loop has died, and no command can reach it."""
         self._held_by = ""
         self._noted: Reply | None = None
 
@@ -131,7 +136,15 @@ class Service:
                 await asyncio.sleep(_TURN_S)
 
     async def command(self, do: str, client: str, **fields: Any) -> Reply:
-        """Send a command that anybody may give; raises what `LoopLink.command` raises."""
+        """Send a command that anybody may give; raises what `LoopLink.command` raises.
+
+        A daemon whose loop has died is ended by `shutdown` as well: its drives have stopped by
+        themselves.
+        """
+        if do == "shutdown" and self.link.dead:
+            self.events.add("command", f"{do} by {client}")
+            self.end_daemon()
+            return Reply(True, self.link.ended_how, self.link.state())
         reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
         if reply is self._noted:
             return reply  # many have asked for the same at once

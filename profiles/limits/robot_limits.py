@@ -65,8 +65,9 @@ class RobotLimits(Profile):
     window_cycles: int = Field(default=1000, ge=1, le=10_000)
     stale_cycles: int = Field(default=250, ge=1, le=10_000)
     """Cycles for which a drive may be unheard or its answers irregular."""
-    lengths_disagree_m: float = Field(default=0.03, gt=0, le=10)
-    """By how much the cables of a platform may contradict each other, root mean square."""
+    lengths_disagree_m: float | None = Field(default=None, gt=0, le=10)
+    """By how much the cables of a platform may contradict each other, root mean square; by the
+    size of the frame where left out."""
     late_s: float = Field(default=0.05, gt=0, le=10)
     """For how long the loop itself may be held up."""
     reactions: Reactions = Reactions()

@@ -100,9 +100,8 @@ def test_a_jog_turns_as_long_and_as_fast_as_asked(quick: RealDaemon, terminal: T
     result = terminal.told("jog", "left=40", "--seconds", "1", *quick.at)
     assert result["program"] == "hold"
     turned = [now - then for now, then in zip(setpoints(quick), start, strict=True)]
-    assert 25.0 < turned[0] < 120.0  # the machine may be busy, the jog then lasts longer
-    assert turned[1] == pytest.approx(0.0, abs=0.1)
-    assert abs(angles(quick)[0] - setpoints(quick)[0]) < 15.0
+    assert turned == pytest.approx([40.0, 0.0], abs=0.1)
+    assert angles(quick)[0] == pytest.approx(setpoints(quick)[0], abs=1.0)
 
 
 def test_a_controller_runs_to_its_end_and_hold_follows(
@@ -119,12 +118,13 @@ def test_a_controller_runs_to_its_end_and_hold_follows(
         (("jog", "middle=3"), 2, "middle=3: allowed: AXIS=deg/s with axis left, right"),
         (("jog", "left=fast"), 2, "'fast' is no number of deg/s"),
         (("jog", "left=nan"), 2, "left=nan: allowed: a finite number"),
-        (("jog", "left=1e6"), 1, "velocity_rad_s[0]"),
+        (("jog", "left=1e6"), 2, "left=1e+06: allowed: -4749 to 4749 deg/s"),
+        (("move", "left=1e9"), 2, "left=1e+09: allowed: -5.73e+05 to 5.73e+05 deg"),
+        (("move", "left=1", "--speed", "1e6"), 2, "--speed 1e+06: allowed: 0.00573 to 4749 deg/s"),
         (("controller", "waltz"), 1, "program: 'waltz'; allowed: idle, hold"),
         (("controller", "sweep", "legs"), 2, "legs: allowed: KEY=VALUE"),
         (("controller", "sweep", "legs=NaN"), 2, "legs: value NaN; allowed: a finite number"),
         (("controller", "sweep", "legs=[1"), 2, "legs: is not valid JSON"),
-        (("enable",), 1, "enable: not in state active"),
         (("ack",), 1, "acknowledge: not in state active; allowed in fault"),
     ],
 )
@@ -146,8 +146,10 @@ def test_status_is_for_people_and_for_programs(active: RealDaemon, terminal: Ter
 
 
 def test_disable_and_enable(active: RealDaemon, terminal: Terminal) -> None:
-    assert terminal.told("disable", *active.at)["state"] == "ready"
-    assert terminal.told("enable", *active.at)["state"] == "active"
+    for _ in range(2):  # what is so already is no error
+        assert terminal.told("disable", *active.at)["state"] == "ready"
+    for _ in range(2):
+        assert terminal.told("enable", *active.at)["state"] == "active"
 
 
 def handles_sigterm(pid: int) -> bool:

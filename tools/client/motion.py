@@ -8,11 +8,20 @@ from collections.abc import Callable
 from typing import Any
 
 from cdpr_tools.client.client import Daemon, HeldRight
-from cdpr_tools.client.status_text import in_millimetres, platform_text
+from cdpr_tools.client.status_text import (
+    in_millimetres,
+    place_text,
+    platform_text,
+    stage_text,
+    target_text,
+    tightness_text,
+)
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 
 RENEW_S = 0.1
+TELL_S = 2.0
+"""How often a motion says how far it has come."""
 _SETTLE_S = 2.0
 _REST_RAD, _REST_RAD_S = math.radians(0.5), math.radians(2.0)
 
@@ -41,9 +50,9 @@ def await_end(
 ) -> dict[str, Any] | None:
     """Renew the right to move until the program is done; return its progress, else None.
 
-    What holds it back meanwhile is noted in `out`.
+    How it goes on, and what holds it back meanwhile, is told in `out`.
     """
-    deadline, noted = time.monotonic() + seconds, ""
+    deadline, told = time.monotonic() + seconds, Told(out)
     while not stop_requested() and time.monotonic() < deadline:
         time.sleep(RENEW_S)
         control.renew()
@@ -51,13 +60,51 @@ def await_end(
         progress = require_program(control.daemon, name).get("program_progress", {})
         if progress.get("trouble") and progress.get("done") != 1.0:
             raise WorkFailedError(f"{name}: {in_millimetres(progress['trouble'])}")
-        held_back = in_millimetres(progress.get("held_back") or "")
-        if out is not None and held_back and not noted:
-            out.note(held_back)
-        noted = held_back
-        if progress.get("done") == 1.0 and progress.get("leg") == progress.get("legs"):
+        told(name, progress)
+        if is_done(progress):
             return progress
     return None
+
+
+def is_done(progress: dict[str, Any]) -> bool:
+    """Whether a program has come to its end, of a sweep that of its last leg."""
+    return progress.get("done") == 1.0 and progress.get("leg") == progress.get("legs")
+
+
+class Told:
+    """Says how a motion goes on, each thing once: its stages, what holds it back, its progress."""
+
+    def __init__(self, out: Output | None) -> None:
+        self._out = out
+        self._stage = self._held_back = ""
+        self._next_s = time.monotonic() + TELL_S
+
+    def __call__(self, program: str, progress: dict[str, Any]) -> None:
+        """Take in the progress of a program."""
+        if self._out is None:
+            return
+        stage = stage_text(program, progress) or target_text(progress)
+        if stage and stage != self._stage:
+            self._out.note(f"{stage} ...")
+            self._next_s = time.monotonic() + TELL_S
+        held_back = in_millimetres(progress.get("held_back") or "")
+        if held_back and not self._held_back:
+            self._out.note(held_back)
+        self._stage, self._held_back = stage, held_back
+        if not is_done(progress) and time.monotonic() >= self._next_s:
+            self._next_s = time.monotonic() + TELL_S
+            if text := _so_far(progress):
+                self._out.note(text)
+
+
+def _so_far(progress: dict[str, Any]) -> str:
+    """Return how far a motion has come: where the platform is, else the share that is done."""
+    if place := place_text(progress):
+        return place
+    if not (done := progress.get("done")):
+        return ""
+    leg = f"leg {progress['leg']} of {progress['legs']}, " if "legs" in progress else ""
+    return f"{leg}{100.0 * done:.0f} %"
 
 
 def _at_rest(axis: dict[str, Any]) -> bool:
@@ -69,28 +116,28 @@ def _at_rest(axis: dict[str, Any]) -> bool:
 
 
 def finish(
-    daemon: Daemon, out: Output, stopped: bool, ended: dict[str, Any] | None = None, **figures: Any
+    daemon: Daemon,
+    out: Output,
+    stopped: bool,
+    ended: dict[str, Any] | None = None,
+    where: str = "",
+    **figures: Any,
 ) -> None:
-    """Say where the axes are once they have settled, or after a while where they have not.
+    """Say where the platform or the axes are once they have settled, or have not for a while.
 
-    `ended` is the progress of what came to its end. Raises WorkFailedError where the user has
-    stopped it, or a fault has ended it or is about to.
+    `ended` is the progress of what came to its end, `where` the words for that. Raises
+    WorkFailedError where the user has stopped it, or a fault has ended it or is about to.
     """
     deadline = time.monotonic() + _SETTLE_S
     status = daemon.get("/status")
     while not all(map(_at_rest, status["axes"])) and time.monotonic() < deadline:
         time.sleep(RENEW_S)
         status = daemon.get("/status")
-    for axis in status["axes"]:
-        angle = axis.get("position_rad")
-        shown = "-" if angle is None else f"{math.degrees(angle):.3f} deg"
-        out.say(f"{axis['name']}: {shown}")
-    if text := platform_text(status):
-        out.say(text)
+    if status["state"] == "active":
+        out.say(*_where(status, where if ended and not stopped else ""))
     if trouble := (ended or {}).get("trouble"):
         figures["trouble"] = trouble
-        out.say(str(trouble))
-    out.say(f"{status['state']}, {status['program']}")
+        out.say(in_millimetres(str(trouble)))
     if status["state"] != "active":
         raise WorkFailedError(f"{status['reason'] or 'the power was taken'} ({status['state']})")
     if status.get("reacting", "none") != "none":
@@ -103,3 +150,20 @@ def finish(
     keys = ("position_m", "rotation_rad", "trouble")
     told |= {key: progress[key] for key in keys if progress.get(key)}
     out.result({"ok": True, **told, **figures})
+
+
+def _where(status: dict[str, Any], where: str) -> list[str]:
+    """Return where everything has ended: a platform as a whole, else axis by axis."""
+    if where:
+        return [where]
+    tightness = tightness_text(status)
+    place = platform_text(status)
+    if tightness and place:
+        return [f"{place}; {tightness}"]
+    lines = []
+    for axis in status["axes"]:
+        angle = axis.get("position_rad")
+        shown = "-" if angle is None else f"{math.degrees(angle):.2f} deg"
+        lines.append(f"{axis['name']}: {shown}")
+    held = "held there, with power" if status["program"] == "hold" else f"runs {status['program']}"
+    return [*lines, *([place] if place else []), tightness or held]

@@ -12,6 +12,7 @@ from typing import Any, Final
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.status_text import in_millimetres
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.number_options import numbers
 
 _COORDINATES: Final = {2: ("x", "y"), 3: ("x", "y", "z")}
 _ANGLES: Final = {"angle": 2, "rx": 0, "ry": 1, "rz": 2}
@@ -53,7 +54,7 @@ class PlatformMove:
             raise BadInputError(f"{self.typed}: the robot has no platform; allowed: AXIS=ANGLE...")
         names = _COORDINATES[len(platform["home_m"])]
         turns = [name for name in platform.get("controlled", ()) if name in _ANGLES]
-        to = None if self.to is None else _numbers("--to", self.to, names, "mm", 1e-3)
+        to = None if self.to is None else numbers("--to", self.to, names, "mm", 1e-3)
         rotate = None
         if self.rotate is not None:
             if not turns:
@@ -61,7 +62,7 @@ class PlatformMove:
                     f"--rotate {self.rotate}: no angle of this platform is controlled; allowed: "
                     f"--to {' '.join(names).upper()}"
                 )
-            rotate = _numbers("--rotate", self.rotate, turns, "deg", math.radians(1.0))
+            rotate = numbers("--rotate", self.rotate, turns, "deg", math.radians(1.0))
         if self.relative:
             to, rotate = self._from_here(daemon, platform, to, rotate, turns)
         elif self.frame is not Frame.ROOM:
@@ -140,21 +141,6 @@ class PlatformMove:
         if not speed <= most:
             raise BadInputError(f"--speed {speed:g}: allowed: up to {most:g} mm/s")
         return 1e-3 * speed
-
-
-def _numbers(option: str, text: str, names: Sequence[str], unit: str, factor: float) -> list[float]:
-    """Return the numbers of an option in SI; raises BadInputError."""
-    allowed = f"{' '.join(names).upper()} in {unit}"
-    words = text.split()
-    if len(words) != len(names):
-        raise BadInputError(f"{option} {text}: {len(words)} numbers; allowed: {allowed}")
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        raise BadInputError(f"{option} {text}: allowed: {allowed}") from None
-    if not all(map(math.isfinite, values)):
-        raise BadInputError(f"{option} {text}: allowed: finite numbers, {allowed}")
-    return [factor * value for value in values]
 
 
 def _in_space(values: Sequence[float], about: Sequence[int]) -> list[float]:

@@ -14,6 +14,18 @@ from rich.text import Text
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _PLACE = re.compile(r"\bat ((?:-?\d+\.\d+, )+-?\d+\.\d+) m\b")
 _TURN = re.compile(r"\bturned by ((?:-?\d+\.\d+(?:, )?)+) rad\b")
+_STAGES = {
+    ("tighten", "slack"): "winding in the slack of the cables",
+    ("tighten", "pull"): "pulling the cables tight",
+    ("tighten", "beyond"): "pulling half as much again, so that friction cancels out",
+    ("tighten", "lengths"): "taking the cables' lengths",
+    ("tighten", "index"): "moving the platform until each motor's index has passed",
+    ("tighten", "held"): "holding the platform",
+    ("lower", "home"): "taking the platform home, above its stand",
+    ("lower", "down"): "letting the platform down",
+    ("lower", "fade"): "letting the cables go loose",
+}
+"""What a program is doing in each of its stages."""
 _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
 
 
@@ -34,8 +46,9 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     lines = [first]
     if status["reason"]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
-    if text := platform_text(status):
-        lines.append(Text(text))
+    told = [text for text in (platform_text(status), tightness_text(status)) if text]
+    if told:
+        lines.append(Text("; ".join(told)))
     if text := compensation_text(status["axes"]):
         lines.append(Text(text))
     control = status["control"]
@@ -66,20 +79,50 @@ def _lines(status: dict[str, Any]) -> list[Text]:
 def platform_text(status: dict[str, Any]) -> str:
     """Return where the platform is and what is in its way, an empty text of robots without."""
     progress = status.get("program_progress") or {}
-    words = []
-    for place, turn, word in (
-        ("position_m", "rotation_rad", "platform at"),
-        ("target_m", "target_rotation_rad", "target"),
-    ):
-        if progress.get(place):
-            words.append(f"{word} {_listed(progress[place], 1e3, 1)} mm")
-        if progress.get(turn):
-            words[-1] += f", turned by {_listed(progress[turn], math.degrees(1.0), 2)} deg"
-    if progress.get("stage"):
-        words.append(str(progress["stage"]))
+    target = _place(progress, "target_")
+    words = [text for text in (place_text(progress), target and f"target {target}") if text]
+    if stage := stage_text(status.get("program", ""), progress):
+        words.append(stage)
     found = (progress.get(key) for key in ("missing", "held_back", "trouble"))
     words += [in_millimetres(text) for text in found if text]
     return "; ".join(words)
+
+
+def place_text(progress: dict[str, Any]) -> str:
+    """Return where the platform is, an empty text where that is not known."""
+    place = _place(progress)
+    return place and f"platform at {place}"
+
+
+def target_text(progress: dict[str, Any]) -> str:
+    """Return where the platform or the axes go, an empty text where nowhere."""
+    target = _place(progress, "target_")
+    if not target and progress.get("target_rad"):
+        target = f"{_listed(progress['target_rad'], math.degrees(1.0), 1)} deg"
+    return target and f"moving to {target}"
+
+
+def _place(progress: dict[str, Any], of: str = "") -> str:
+    """Return a place and the rotation there in mm and deg, an empty text where there is none."""
+    place, turned = progress.get(f"{of or 'position_'}m"), progress.get(f"{of}rotation_rad")
+    text = f"{_listed(place, 1e3, 1)} mm" if place else ""
+    if text and turned:
+        text += f", turned by {_listed(turned, math.degrees(1.0), 2)} deg"
+    return text
+
+
+def stage_text(program: str, progress: dict[str, Any]) -> str:
+    """Return what a program that goes by stages is doing, an empty text for others."""
+    stage = str(progress.get("stage") or "")
+    return _STAGES.get((program, stage), stage)
+
+
+def tightness_text(status: dict[str, Any]) -> str:
+    """Return whether the cables hold the platform, an empty text of robots without one."""
+    tight = (status.get("program_progress") or {}).get("tight")
+    if tight is None or status["state"] != "active":
+        return ""
+    return "held by its cables" if tight else "cables loose, power on"
 
 
 def in_millimetres(text: str) -> str:

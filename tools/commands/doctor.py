@@ -3,30 +3,67 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from cdpr_tools.commands.options import JsonOption
-from cdpr_tools.errors import FAILED
-from cdpr_tools.host.host_checks import look_around
+from cdpr_tools.commands.options import JsonOption, OverwriteOption
+from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError
+from cdpr_tools.host.host_checks import Finding, look_around
 from cdpr_tools.output import Output
 
 app = typer.Typer()
 
+_Report = Annotated[
+    Path | None,
+    typer.Option(
+        help="Write all that a report of a fault should have into this file; it holds no keys.",
+    ),
+]
+_Robot = Annotated[
+    list[str] | None,
+    typer.Option("--robot", help="With --report: a robot's file to put in; may be repeated."),
+]
+
 
 @app.command()
-def doctor(as_json: JsonOption = False) -> None:
+def doctor(
+    report: _Report = None,
+    robot: _Robot = None,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Look at this machine and say what to mend before a robot runs on it.
 
-    Changes nothing. A `problem` must be mended, a `note` makes cycles more punctual.
+    Changes nothing. A `problem` must be mended, a `note` makes cycles more punctual. With --report
+    versions, findings, robot files and the end of the last recording go into a text file.
     """
     out = Output(as_json)
+    if robot and report is None:
+        raise BadInputError("--robot: only with --report")
+    if report is not None and report.exists() and not overwrite:
+        raise BadInputError(f"--report {report}: is there already; replace it with --overwrite")
     findings = list(look_around())
     for f in findings:
-        out.say(f"{f.level:8}{f.what:22}{f.found}")
-        if f.remedy:
-            out.say(f"{'':8}{'':22}-> {f.remedy}")
+        out.say(*lines_of(f))
+    if report is not None:
+        # loaded here: reading recordings takes libraries that the checks do without
+        from cdpr_tools.host.fault_report import fault_report  # noqa: PLC0415
+
+        found = [line for f in findings for line in lines_of(f)]
+        try:
+            report.write_text(fault_report(found, robot or []), encoding="utf-8")
+        except OSError as error:
+            raise WorkFailedError(f"{report}: cannot be written: {error.strerror}") from error
+        out.say(f"report: {report}; look through it before you send it")
     ok = all(f.level != "problem" for f in findings)
-    out.result({"ok": ok, "findings": [asdict(f) for f in findings]})
+    out.result({"ok": ok, "findings": [asdict(f) for f in findings], "report": report})
     if not ok:
         raise typer.Exit(FAILED)
+
+
+def lines_of(finding: Finding) -> list[str]:
+    """Return a finding as lines for people."""
+    lines = [f"{finding.level:8}{finding.what:22}{finding.found}"]
+    return lines + [f"{'':8}{'':22}-> {finding.remedy}"] * bool(finding.remedy)

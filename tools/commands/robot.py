@@ -9,10 +9,12 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.platform import Platform
 from cdpr_rt.robots import checks
 from cdpr_rt.robots.calibration_state import mark_calibrated
-from cdpr_tools.commands import robot_trial
+from cdpr_tools.calibrate.words import calibration_lines
+from cdpr_tools.commands import robot_trial, robot_workspace
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.errors import BAD_INPUT, BadInputError
 from cdpr_tools.output import Output
@@ -31,6 +33,7 @@ _Picture = Annotated[Path | None, typer.Option("--png", help="Draw it into this 
 
 
 app.add_typer(robot_trial.app)
+app.add_typer(robot_workspace.app)
 
 
 @app.callback()
@@ -45,7 +48,7 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
     Ends with status 2 where something about it is impossible.
     """
     out = Output(as_json)
-    profile = load_robot(robot)
+    profile = calibrated(load_robot(robot))
     platform = profile.platform
     if platform is None:
         raise BadInputError(
@@ -54,6 +57,10 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
         )
     figures = summary.figures(profile, platform)
     out.say(*summary.lines(profile, platform, figures))
+    known = profile.calibration
+    figures["calibration"] = None if known is None else known.summary()
+    if known is not None:
+        out.say("", *calibration_lines(known, profile))
     if png is not None:
         _draw(profile, platform, png, out)
     found = checks.findings(profile)

@@ -23,6 +23,7 @@ class KindOfTrial(StrEnum):
     LINE = "line"
     RANDOM = "random"
     STREAM = "stream"
+    PATH = "path"
     TAPE = "tape"
 
 
@@ -38,7 +39,8 @@ def trial(
         KindOfTrial,
         typer.Argument(
             help="targets: accuracy at rest; line: lines and turns with compensation and without; "
-            "random: targets at the limits; stream: a hand that leads through a bad network; "
+            "random: targets at the limits; path: lines, arcs and cut corners of a G-code file; "
+            "stream: a hand that leads through a bad network; "
             "tape: exit points 20 to 50 mm off what the robot's file says."
         ),
     ],
@@ -51,7 +53,8 @@ def trial(
         typer.Option(min=0.05, max=600.0, help="How long, in the robot's time; not for line."),
     ] = None,
     speed_mm_s: Annotated[
-        float | None, typer.Option(min=0.1, help="Of lines, 10 where left out.")
+        float | None,
+        typer.Option(min=0.1, help="Of lines, 10 where left out; of a path, what the robot has."),
     ] = None,
     commissioned: Annotated[
         Path | None,
@@ -89,11 +92,17 @@ def trial(
         profile = load_robot(robot)
         name = f"trial-{profile.profile}-{kind}-{time.strftime('%Y%m%d-%H%M%S')}"
         folder = out_dir or Path("out") / name
+        if folder.exists() and any(folder.iterdir()):
+            raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
         usual = trials.KINDS[kind]
         if minutes is not None and usual.compares:
             raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
-        if speed_mm_s is not None and kind is not KindOfTrial.LINE:
-            raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line")
+        if speed_mm_s is not None and kind not in (KindOfTrial.LINE, KindOfTrial.PATH):
+            raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line and path")
+        if minutes is not None and kind is KindOfTrial.PATH:
+            raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
+        if speed_mm_s is None and kind is KindOfTrial.PATH and profile.platform is not None:
+            speed_mm_s = 1e3 * profile.platform.speed_m_s
         settings = trials.TrialSettings(
             kind=kind.value,
             robot=robot,

@@ -17,6 +17,7 @@ def show(out: Output, results: dict[str, Any]) -> None:
     show_identified(out, results["identification"])
     show_validation(out, results["validation"], results["bandwidth_Hz"])
     _show_shortfall(out, results["validation"])
+    _show_loop(out, results["pid"][0])
     bus = results["bus"]
     seconds = bus["cycles"] * bus["period_s"]
     out.say(
@@ -68,6 +69,14 @@ def show_validation(out: Output, validation: dict[str, Any], bandwidth_Hz: float
         gains = [f" ({ratio:.1f}x)" if method != "none" else "" for ratio in ratios.values()]
         table.add_row(_NAMES[method], *(c + g for c, g in zip(cells, gains, strict=True)))
     out.text.print(table)
+
+
+def _show_loop(out: Output, design: dict[str, Any]) -> None:
+    out.say(
+        f"loop tuned to {design['bandwidth_Hz']:.3g} Hz: phase margin "
+        f"{design['phase_margin_deg']:.0f} deg, gain margin {design['gain_margin_dB']:.1f} dB, "
+        f"sensitivity at most {design['sensitivity_peak']:.2f}"
+    )
 
 
 def _show_shortfall(out: Output, validation: dict[str, Any]) -> None:

@@ -39,6 +39,7 @@ class OwnSimulator:
         board: Path | None = None,
         paced: bool = False,
         detached: bool = False,
+        scanner: Path | None = None,
     ) -> None:
         command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "sim", "up", winch, "--bus", bus]
         command += ["--paced" if paced else "--lockstep", "--exit-with-stdin"]
@@ -49,6 +50,8 @@ class OwnSimulator:
             command += ["--plant", str(plant)]
         if truth_log is not None:
             command += ["--truth-log", str(truth_log)]
+        if scanner is not None:
+            command += ["--scanner", str(scanner)]
         if board is not None:
             command += ["--board", str(board)]
         if log := os.environ.get("CDPR_SIM_FRAME_LOG"):

@@ -268,7 +268,7 @@ class Launcher:
     def _stop_loop(self) -> str:
         """End the loop; return why it did not end well, empty when it did."""
         timeout_s = self._described("lowering_s") + _LOOP_STOP_S
-        if self._status().get("driving"):
+        if self._status().get("driving") and not self._loop.end:
             self._say(self._stop_notice(timeout_s))
         timeout_s = _LOOP_STALLED_S if self._stalled else timeout_s
         self._loop.process.terminate()

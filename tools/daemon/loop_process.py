@@ -16,7 +16,9 @@ from cdpr_drivers.robot.commissioned import compensation_of, load_profiles, with
 from cdpr_drivers.robot.listening_machine import ListeningMachine
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.shared_block import SharedBlock
@@ -24,6 +26,7 @@ from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
+from cdpr_rt.programs.platform.path_store import PathStore, paths_folder
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.registry import (
     build_programs,
@@ -49,7 +52,8 @@ def main() -> int:
     settings = RunSettings.from_argv()
     block = SharedBlock.attach(settings.block_fd)
     try:
-        robot = with_commissioned(load_robot(settings.robot), settings.commissioned)
+        robot = calibrated(load_robot(settings.robot))
+        robot = with_commissioned(robot, settings.commissioned)
         require_fit(robot)
         machine: Machine
         if settings.read_only:
@@ -67,6 +71,8 @@ def main() -> int:
     if parts.last is not None and robot.platform is not None:
         parts.last.path = state_path("lengths", robot.profile)
         parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
+    if parts.paths is not None:
+        _open_paths(parts.paths, robot)
     loop = ControlLoop(block, machine, parts)
     loop.engine.notices += freeze_memory()
     _obey_signals(loop)
@@ -81,6 +87,14 @@ def main() -> int:
         print(f"cdpr: {unconfirmed}", file=sys.stderr)
         return FAILED
     return DONE
+
+
+def _open_paths(paths: PathStore, robot: Robot) -> None:
+    """Have planned paths from their folder; a robot without one runs all the same."""
+    try:
+        paths.open(paths_folder(robot.profile))
+    except ControlError as error:
+        print(f"cdpr: paths cannot be followed: {error}", file=sys.stderr)
 
 
 def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
@@ -103,6 +117,7 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
         lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
         lowering=lowering,
         last=None if platform is None else platform.last,
+        paths=None if platform is None else platform.paths,
         before_power=lambda: _look_at_calibration(robot, platform),
         enable_realtime=enable_realtime,
     )
@@ -140,9 +155,16 @@ def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any
         "limits": described(limits, len(robot.axes)),
         "programs": list(parts.programs),
         "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
-        "platform": None if robot.platform is None else asdict(robot.platform),
+        "platform": None if robot.platform is None else _told(robot.platform),
+        "calibration": None if robot.calibration is None else robot.calibration.summary(),
         "notes": list(robot.notes),
     }
+
+
+def _told(platform: Platform) -> dict[str, Any]:
+    body = None if platform.body is None else platform.body.model_dump()
+    obstacles = [box.model_dump() for box in platform.obstacles]
+    return {**asdict(platform), "body": body, "obstacles": obstacles}
 
 
 def _obey_signals(loop: ControlLoop) -> None:

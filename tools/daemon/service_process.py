@@ -30,6 +30,7 @@ from cdpr_rt.service.service import Service
 from cdpr_rt.service.streams.setpoint_stream import SetpointStream
 from cdpr_rt.service.view.foxglove_view import LiveView
 from cdpr_tools.daemon.child import end_with_launcher, is_running, launcher_ended
+from cdpr_tools.daemon.path_process import plan_in_process
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import DONE, FAILED, CommandError
 
@@ -52,6 +53,8 @@ def main() -> int:
     block.counters["service_pid"] = os.getpid()
     service = Service(block, settings.name)
     service.background.append(bounded.watch)
+    service.end_daemon = partial(os.kill, settings.launcher_pid or os.getpid(), signal.SIGTERM)
+    service.planner.work = partial(plan_in_process, settings.robot)
     try:
         asyncio.run(_serve(settings, service))
     except (ControlError, CommandError) as error:
@@ -73,7 +76,9 @@ def build_parts(settings: RunSettings, service: Service) -> list[Part]:
     block, lease = service.block, service.lease
     if settings.record is not None:
         ended = partial(service.note_failure, Recorder.name)
-        recorder = Recorder(block, settings.record, settings.name, ended=ended)
+        recorder = Recorder(
+            block, settings.record, settings.name, ended=ended, retention=settings.keep
+        )
         service.events.listeners.append(partial(_note, recorder))
         parts.append(recorder)
     if settings.live is not None:

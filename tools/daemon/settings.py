@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import open_regular
 from cdpr_rt.service.listening import ListenError, listen_tcp
+from cdpr_rt.service.recordings.retention import Retention
 from cdpr_rt.service.streams.setpoint_stream import StreamError, listen_udp
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
@@ -76,7 +77,7 @@ class RunSettings(BaseModel):
     The launcher makes it of the command line; both child processes get it as their only argument.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
     robot: str
     """What `load_robot` finds the robot by."""
@@ -95,6 +96,8 @@ class RunSettings(BaseModel):
     key_file: _Path | None = None
     record: _Path | None = None
     """Folder for recordings, None to record nothing."""
+    keep: Retention = Retention()
+    """Which recordings stay in that folder."""
     live: int | None = Field(default=None, ge=0, le=_HIGHEST_PORT)
     """Port of the live view, on loopback."""
     live_origins: tuple[str, ...] = ()

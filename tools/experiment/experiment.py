@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import io
-import multiprocessing
-import os
-import signal
 from collections.abc import Iterable
 from functools import partial
-from multiprocessing.pool import Pool
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,6 +21,7 @@ from cdpr_tools.experiment.points import Points, points_of_perfect_robot, points
 from cdpr_tools.experiment.report import lines
 from cdpr_tools.experiment.session import ExperimentSettings, run_session
 from cdpr_tools.experiment.statistics import rows, variance_analysis
+from cdpr_tools.jobs import processes
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.stored_settings import load_settings
 from cdpr_tools.trials.directions import platform_of
@@ -81,7 +78,7 @@ def perform(settings: ExperimentSettings, folder: Path, jobs: int, out: Output) 
     out.note(f"{total - len(missing)} of {total} sessions are there; {jobs} side by side ...")
     done, failed = total - len(missing), []
     work = partial(_perform_session, settings, folder)
-    with _processes(jobs) as pool, out.progress("sessions", total * _SESSION_S) as advance:
+    with processes(jobs) as pool, out.progress("sessions", total * _SESSION_S) as advance:
         for name, error in pool.imap_unordered(work, missing):
             if error:
                 failed.append(f"{name}: {error}")
@@ -90,14 +87,6 @@ def perform(settings: ExperimentSettings, folder: Path, jobs: int, out: Output) 
             out.note(f"{name}: {error or 'done'}")
     if failed:
         raise WorkFailedError(f"{len(failed)} of {total} sessions failed; {failed[0]}")
-
-
-def _processes(jobs: int) -> Pool:
-    """Return processes that end with the block; an interrupt of the terminal is ours to handle."""
-    # each is started with -c, which looks into the working directory before all others
-    os.environ["PYTHONSAFEPATH"] = "1"
-    own = multiprocessing.get_context("spawn")
-    return own.Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN))
 
 
 def _perform_session(settings: ExperimentSettings, folder: Path, name: str) -> tuple[str, str]:
@@ -133,7 +122,7 @@ def finished(settings: ExperimentSettings, folder: Path) -> list[Path]:
 
 def measured(sessions: Iterable[Path], jobs: int) -> Points:
     """Return the targets confirmed in sessions, from their recordings; raises CommandError."""
-    with _processes(jobs) as pool:
+    with processes(jobs) as pool:
         return np.concatenate(pool.map(points_of_session, list(sessions)))
 
 

@@ -5,29 +5,41 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.core.states import LoopState
-from cdpr_rt.service.recordings.recording_reader import Columns
+from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.recordings.selection import ELAPSED, Selection
-from cdpr_tools.report.style import canvas, decimated, legend_above
+from cdpr_tools.report.style import decimated, legend_above
 
 FIELDS = (
     "setpoint_rad", "position_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N",
     "lateness_s", "exchange_s", "compute_s", "state", "pose", "pose_setpoint",
+    "program", "reaction", "stamp_ns",
 )  # fmt: skip
 _COLOURS = (
     "#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#8a8f98",
 )  # fmt: skip
+_TENSION = "tension (N)"
+_MOST_TOLD, _PATH_POINTS = 8, 3000
+_LETTER = 0.012
+"""Share of the picture's width that a letter takes."""
 _MOVED = 1e-6
 """A coordinate that differs by less over a recording is none of its robot's, m or rad."""
 _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "lateness_s"}
-_SHADES = {LoopState.FAULT: ("#e8b4a8", "fault"), None: ("#e3e5e8", "without power")}
+_POWERLESS, _REACTING, _FAULT = range(1, 4)
+_SHADES = {
+    _POWERLESS: ("#e3e5e8", "without power"),
+    _REACTING: ("#f6dfae", "reaction to a fault"),
+    _FAULT: ("#e8b4a8", "fault"),
+}
 
 
 def axes_of(names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
@@ -48,35 +60,46 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
     names = selection.readers[-1].axes[:count]
     names += [str(k) for k in range(len(names), count)]
     chosen = axes_of(names, axes)
+    description = selection.readers[-1].description
     degrees = {name: np.degrees(columns[name]) for name in FIELDS[:3]}
     panels = [
         ("motor angle (deg)", degrees["position_rad"]),
         ("set-point − angle (deg)", degrees["setpoint_rad"] - degrees["position_rad"]),
         ("speed (deg/s)", degrees["velocity_rad_s"]),
         ("torque sent (Nm)", columns["torque_sent_Nm"]),
-        ("tension (N)", columns["tension_N"]),
+        (_TENSION, columns["tension_N"]),
     ]
     panels = [one for one in panels if np.isfinite(one[1][:, chosen]).any()]
     poses = pose_curves(columns)
     dot = "." if columns[ELAPSED].size == 1 else None
-    figure, all_axes = canvas(rows=len(panels) + len(poses) + 1, height=1.75, sharex=True)
-    for ax, (label, values) in zip(all_axes, panels, strict=False):
+    figure, (strip, *timed), path_ax = _grid(len(panels) + len(poses) + 1, bool(poses))
+    for ax, (label, values) in zip(timed, panels, strict=False):
         for k in chosen:
             colour, line = _COLOURS[k % len(_COLOURS)], "-" if k < len(_COLOURS) else "--"
             x, y = decimated(columns[ELAPSED], values[:, k])
             ax.plot(x, y, color=colour, ls=line, marker=dot, label=_as_it_is(names[k]))
         ax.set_ylabel(label)
-    for ax, (label, curves) in zip(all_axes[len(panels) :], poses.items(), strict=False):
+        if label == _TENSION:
+            _draw_limits(ax, description, chosen)
+    for ax, (label, curves) in zip(timed[len(panels) :], poses.items(), strict=False):
         ax.set_ylabel(label)
         _draw_pose(ax, columns[ELAPSED], curves, dot)
-    _draw_times(all_axes[-1], columns)
-    for ax in all_axes:
+    if path_ax is not None:
+        _draw_path(path_ax, columns)
+    _draw_times(timed[-1], columns)
+    for ax in (strip, *timed):
         _shade(ax, columns)
-    all_axes[-1].set_xlabel("bus time since the first cycle (s)")
+    draw_programs(strip, columns, description.get("programs", []))
+    happened = faults_of(selection.readers, columns)
+    for after_s, _ in happened:
+        for ax in (strip, *timed):
+            ax.axvline(after_s, color="#b3261e", lw=0.9)
+    told = [f"{after_s:.3f} s: {text}" for after_s, text in happened[:_MOST_TOLD]]
+    timed[-1].set_xlabel("\n".join(["bus time since the first cycle (s)", *map(_as_it_is, told)]))
     if dot is None:
-        all_axes[-1].set_xlim(columns[ELAPSED][0], columns[ELAPSED][-1])
+        timed[-1].set_xlim(columns[ELAPSED][0], columns[ELAPSED][-1])
     if panels:
-        legend_above(figure, all_axes[0])
+        legend_above(figure, timed[0])
     figure.align_ylabels()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -84,6 +107,79 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
     except OSError as error:
         raise WorkFailedError(f"{path}: cannot be written: {error.strerror or error}") from error
     return int(columns["state"].size)
+
+
+def _grid(rows: int, with_path: bool) -> tuple[Figure, list[Axes], Axes | None]:
+    """Return a figure with a strip and `rows` panels over one time, and one for the path."""
+    heights = [0.25, *[1.75] * rows, *[3.0] * with_path]
+    figure = Figure(figsize=(7.4, sum(heights)), layout="constrained")
+    places = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    timed = [figure.add_subplot(places[0])]
+    timed += [figure.add_subplot(places[k], sharex=timed[0]) for k in range(1, rows + 1)]
+    for ax in timed[:-1]:
+        ax.tick_params(labelbottom=False)
+    return figure, timed, figure.add_subplot(places[rows + 1]) if with_path else None
+
+
+def draw_programs(ax: Axes, columns: Columns, names: Sequence[str]) -> None:
+    """Name the program that runs at each moment, where there is room for it."""
+    elapsed, program = columns[ELAPSED], columns["program"]
+    ax.set_yticks([])
+    ax.grid(visible=False)
+    whole_s = elapsed[-1] - elapsed[0]
+    edges = [0, *(np.flatnonzero(np.diff(program)) + 1), program.size]
+    for a, b in pairwise(edges):
+        number, last_s = int(program[a]), elapsed[min(b, program.size - 1)]
+        name = names[number] if number < len(names) else str(number)
+        ax.axvline(elapsed[a], color="#777777", lw=0.6)
+        if last_s - elapsed[a] > _LETTER * len(name) * whole_s:
+            middle = 0.5 * (elapsed[a] + last_s)
+            ax.text(middle, 0.5, name, ha="center", va="center", fontsize=8, clip_on=True)
+
+
+def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tuple[float, str]]:
+    """Return when a limit made the loop react, and when its state became a fault, with words."""
+    found = []
+    for reader in readers:
+        for event in reader.events:
+            of_row = "reaction" in event and "cycle" in event
+            if not of_row or not (
+                event["reaction"] > Reaction.CLAMP or "state fault" in event["text"]
+            ):
+                continue
+            stamp_ns = event["log_time_ns"] - reader.offset_ns
+            if columns["stamp_ns"][0] <= stamp_ns <= columns["stamp_ns"][-1]:
+                after_s = float(np.interp(stamp_ns, columns["stamp_ns"], columns[ELAPSED]))
+                found.append((after_s, str(event["text"])))
+    return found
+
+
+def _draw_limits(ax: Axes, description: dict[str, Any], chosen: Sequence[int]) -> None:
+    limits = description.get("limits", {})
+    for key, label in (("tension_min_N", "limits"), ("tension_max_N", None)):
+        known = [value for value in limits.get(key) or () if value is not None]
+        for number, value in enumerate(sorted({known[k] for k in chosen if k < len(known)})):
+            named = label if number == 0 else None
+            ax.axhline(value, color="#b3261e", lw=0.8, ls=":", label=named)
+
+
+def _draw_path(ax: Axes, columns: Columns) -> None:
+    """Draw the platform's way seen from the front, its target dashed."""
+    pose, wanted = columns["pose"], columns["pose_setpoint"]
+    upward = 1 if _flat(pose[:, 2]) else 2
+    step = max(1, len(pose) // _PATH_POINTS)
+    for values, style, label in ((pose, "-", "platform"), (wanted, "--", "target")):
+        known = 1e3 * values[::step]
+        ax.plot(known[:, 0], known[:, upward], style, color=_COLOURS[style == "--"], label=label)
+    ax.set_xlabel("x (mm)")
+    ax.set_ylabel(f"{'xyz'[upward]} (mm)")
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=2)
+
+
+def _flat(values: FloatArray) -> bool:
+    known = values[np.isfinite(values)]
+    return not known.size or bool(np.ptp(known) <= _MOVED)
 
 
 Curves = dict[str, tuple[FloatArray, FloatArray]]
@@ -113,7 +209,11 @@ def pose_curves(columns: Columns) -> dict[str, Curves]:
             for name, (is_there, wanted) in _moved(rotation).items()
         },
     }
-    return {label: curves for label, curves in panels.items() if curves}
+    found = {label: curves for label, curves in panels.items() if curves}
+    if panels["platform (m)"]:
+        off = np.linalg.norm(poses[0][:, :3] - poses[1][:, :3], axis=1)
+        found["off its target (mm)"] = {"distance": (1e3 * off, np.full(off.size, np.nan))}
+    return found
 
 
 def _moved(curves: Curves) -> Curves:
@@ -153,14 +253,17 @@ def _shade(ax: Axes, columns: Columns) -> None:
     """Colour what was not active; the first stretch of each kind carries its name."""
     elapsed: FloatArray = columns[ELAPSED]
     state = columns["state"]
-    edges = [0, *(np.flatnonzero(np.diff(state)) + 1), state.size]
+    kinds = np.where(state == LoopState.ACTIVE, 0, _POWERLESS)
+    kinds[columns["reaction"] > Reaction.CLAMP] = _REACTING
+    kinds[state == LoopState.FAULT] = _FAULT
+    edges = [0, *(np.flatnonzero(np.diff(kinds)) + 1), kinds.size]
     named = set()
     for a, b in pairwise(edges):
-        if state[a] == LoopState.ACTIVE:
+        kind = int(kinds[a])
+        if kind == 0:
             continue
-        kind = LoopState.FAULT if state[a] == LoopState.FAULT else None
         colour, label = _SHADES[kind]
-        last = elapsed[min(b, state.size - 1)]
+        last = elapsed[min(b, kinds.size - 1)]
         shown = label if kind not in named else None
         named.add(kind)
         ax.axvspan(elapsed[a], last, color=colour, alpha=0.6, lw=0, label=shown, zorder=0)

@@ -24,6 +24,10 @@ _FIELDS = (
     "compute_s",
     "late_cycles",
     "missed",
+    "program",
+    "position_rad",
+    "pose",
+    "pose_setpoint",
 )
 _EVERY = 20
 
@@ -44,6 +48,8 @@ class _Count:
     stamps_ns: list[FloatArray] = field(default_factory=list)
     elapsed_s: list[FloatArray] = field(default_factory=list)
     """When some of the rows were, by the wall's clock and by the bus'."""
+    runs: list[dict[str, Any]] = field(default_factory=list)
+    """What ran one after the other: program, seconds, where axes and platform were at its end."""
 
     def add(self, rows: Columns) -> None:
         """Take in some rows."""
@@ -56,6 +62,7 @@ class _Count:
         else:
             elapsed = np.concatenate([[self.last_s], elapsed])
             cycle = np.concatenate([[self.last["cycle"]], cycle])
+        self._add_runs(rows)
         steps = np.diff(cycle)
         self.missing_cycles += int((steps[steps > 1] - 1).sum())
         self.restarts += int((steps <= 0).sum())
@@ -70,6 +77,18 @@ class _Count:
         self.last = {name: int(rows[name][-1]) for name in ("cycle", "missed", "late_cycles")}
         self.last_s = float(rows[ELAPSED][-1])
         self.rows += rows["cycle"].size
+
+    def _add_runs(self, rows: Columns) -> None:
+        program, active = rows["program"], rows["state"] == LoopState.ACTIVE
+        elapsed = rows[ELAPSED] - self.first_s
+        kind = np.where(active, program.astype(int), -1)
+        ends = [*np.flatnonzero(np.diff(kind)), kind.size - 1]
+        for begin, end in zip([0, *(k + 1 for k in ends)], ends, strict=False):
+            if not self.runs or self.runs[-1]["program"] != kind[begin]:
+                self.runs.append({"program": int(kind[begin]), "from_s": float(elapsed[begin])})
+            last = {name: rows[name][end].tolist() for name in ("pose", "pose_setpoint")}
+            angles = rows["position_rad"][end].tolist()
+            self.runs[-1] |= {"until_s": float(elapsed[end]), "position_rad": angles, **last}
 
     def when_s(self, stamp_ns: float) -> float:
         """Return the recording's time, as `cdpr log plot` counts it, at one of the wall's clock."""
@@ -114,8 +133,54 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         "axes": reader.axes,
         "period_s": reader.description.get("period_s"),
         **count.result(),
+        "runs": _named_runs(count.runs, reader.description.get("programs", [])),
         "events": sorted(reader.events, key=lambda event: int(event["log_time_ns"])),
     }
+
+
+def _named_runs(runs: list[dict[str, Any]], programs: Sequence[str]) -> list[dict[str, Any]]:
+    """Return what ran with power, by the names of the programs."""
+    return [
+        {**run, "program": programs[number] if number < len(programs) else str(number)}
+        for run in runs
+        if (number := run["program"]) >= 0
+    ]
+
+
+def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
+    """Return when a program ran and where the platform, or the axes, were at its end."""
+    pose, wanted = np.array(run["pose"], float), np.array(run["pose_setpoint"], float)
+    if np.isfinite(pose).all():
+        size = 3 if pose[2] else 2  # in a plane its third coordinate is none
+        at = ", ".join(f"{x:z.1f}" for x in 1e3 * pose[:size])
+        where = f"platform at {at} mm"
+        if np.isfinite(wanted).all():
+            where += f", {1e3 * float(np.linalg.norm(pose[:3] - wanted[:3])):.1f} mm off its target"
+    else:
+        angles = np.degrees(np.array(run["position_rad"], float))
+        where = ", ".join(f"{name} {x:.1f}" for name, x in zip(axes, angles, strict=False)) + " deg"
+    time = f"{run['from_s']:10.3f} s to {run['until_s']:9.3f} s"
+    return f"  {time}  {run['program']}: ended with {where}"
+
+
+def worth_telling(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return events without who may move, what is refused over and over being told once."""
+    found: list[dict[str, Any]] = []
+    for event in events:
+        if event.get("kind") == "control":
+            continue
+        if found and _alike(event["text"], found[-1]["text"]):
+            found[-1]["times"] += 1
+            continue
+        found.append({**event, "times": 1})
+    return found
+
+
+def _alike(text: str, last: str) -> bool:
+    refused = ": refused: "
+    if refused in text and refused in last:
+        return text.split(refused, maxsplit=1)[0] == last.split(refused, maxsplit=1)[0]
+    return text == last
 
 
 def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
@@ -145,10 +210,15 @@ def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
             )
         ]
         lines.append(f"  at most: {', '.join(longest)}")
-    events = figures["events"]
+    runs = [run for run in figures["runs"] if run["program"] not in ("hold", "idle")]
+    if len(runs) > most_events:
+        lines.append(f"  ({len(runs) - most_events} earlier motions are in --json)")
+    lines += [_run_text(run, figures["axes"]) for run in runs[-most_events:]]
+    events = worth_telling(figures["events"])
     if len(events) > most_events:
         lines.append(f"  ({len(events) - most_events} earlier events are in --json)")
     for event in events[-most_events:]:
         at = f"{event['after_s']:10.3f} s" if event["after_s"] is not None else " " * 12
-        lines.append(f"  {at}  {event['text']}")
+        times = f" ({event['times']} times alike)" if event["times"] > 1 else ""
+        lines.append(f"  {at}  {event['text']}{times}")
     return lines

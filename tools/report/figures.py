@@ -140,6 +140,19 @@ def spectrum(
     return data_uri(figure)
 
 
+def friction(speed_rad_s: FloatArray, forward_Nm: FloatArray, backward_Nm: FloatArray) -> str:
+    """Draw the model's friction over the speed (k,), each direction (k,), both to the right."""
+    figure, (ax,) = canvas(height=2.4)
+    speed = np.degrees(speed_rad_s)
+    pairs = ((forward_Nm, FORWARD), (-backward_Nm, BACKWARD))
+    for (torque, colour), label in zip(pairs, DIRECTIONS, strict=True):
+        ax.semilogx(speed, 1e3 * torque, color=colour, label=label)
+    ax.set(xlabel="speed (deg/s)", ylabel="friction (mNm)")
+    ax.set_ylim(bottom=0.0)
+    legend_above(figure, ax)
+    return data_uri(figure)
+
+
 @dataclass(frozen=True)
 class Deviation:
     """What is drawn of one figure of merit: the axis' label and the floor under it."""

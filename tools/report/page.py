@@ -24,6 +24,7 @@ from cdpr_tools.report.figures import Deviation
 from cdpr_tools.report.save import check, save
 from cdpr_tools.report.text import number, page, paragraph, picture, plain, section
 
+_SPEEDS_RAD_S = (math.radians(1.0), math.radians(600.0))
 _ORDERS_SHOWN = 100
 
 
@@ -73,6 +74,7 @@ class _Report:
             section("The thesis’ method beside the harmonic model", *self._methods(ramps)),
             section("Softer and stiffer loops", *self._bandwidths()),
             section("What is left", *self._residual()),
+            section("What to do next", *map(paragraph, words.next_words(self._results))),
             section("Bus and files", tables.bus(self._results["bus"]), self._files()),
         ]
         return page(title, "\n".join(parts))
@@ -190,9 +192,20 @@ class _Report:
                 "that are as good as the best within one standard error.",
             ),
             tables.harmonics(facts),
+            self._friction(),
             tables.estimates(self._found.better),
             tables.quality(facts),
         ]
+
+    def _friction(self) -> str:
+        speed = np.geomspace(*_SPEEDS_RAD_S, 200)
+        both = np.array([curves.friction_Nm(self._found.better, one) for one in speed.tolist()])
+        return self._picture(
+            figures.friction(speed, both[:, 0], both[:, 1]),
+            "Friction over speed in both directions",
+            "Friction of the harmonic model over the speed, from 1 deg/s to that of the fastest "
+            "recorded turns. Where it falls, a rotor under a soft loop sticks and slips.",
+        )
 
     def _ramp(self, ramps: dict[str, Ramp]) -> list[str]:
         floor = self._validation["floor"]

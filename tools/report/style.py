@@ -27,7 +27,7 @@ _POINTS = 4000
 
 mpl.rcParams.update(
     {
-        "savefig.dpi": 130,
+        "savefig.dpi": 170,
         "font.size": 9.5,
         "axes.titlesize": 10,
         "axes.titlelocation": "left",

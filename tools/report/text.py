@@ -35,6 +35,9 @@ tbody .small { display: block; }
 .good { color: #2a7145; } .bad { color: #a85d00; }
 figure { margin: 1.2rem 0 1.5rem; }
 figure img { display: block; width: 100%; height: auto; }
+figure img { cursor: zoom-in; }
+figure img:focus { position: fixed; inset: 0; z-index: 1; width: 100vw; height: 100vh;
+  object-fit: contain; background: #fff; cursor: zoom-out; }
 figcaption { font-size: .86rem; color: #414850; line-height: 1.45; margin-top: .35rem; }
 @media (max-width: 40rem) {
   body { font-size: 1rem; } table { font-size: .84rem; } th, td { padding-right: .45rem; }
@@ -94,9 +97,13 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "")
 
 
 def picture(source: str, number_: int, what: str, caption: str) -> str:
-    """Return a numbered picture; `what` is its text for those who do not see it."""
+    """Return a numbered picture; `what` is its text for those who do not see it.
+
+    It fills the window as long as it has the focus: after a click, until another elsewhere.
+    """
     return (
-        f'<figure>\n<div class="scroll"><img src="{source}" alt="{escape(what)}"></div>\n'
+        f'<figure>\n<div class="scroll"><img tabindex="0" src="{source}" '
+        f'alt="{escape(what)}"></div>\n'
         f"<figcaption><b>Figure {number_}.</b> {escape(caption)}</figcaption>\n</figure>"
     )
 

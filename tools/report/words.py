@@ -149,6 +149,7 @@ def _percent(share: float) -> str:
 
 def loop_words(design: Mapping[str, Any]) -> str:
     """Say which PID was used and by which margins it was tuned."""
+    gains = design["gains"]
     return (
         "All three runs have one and the same PID, tuned by margins on the uncompensated motor "
         f"(inertia {number(1e6 * design['inertia_kg_m2'])} kg mm², and by the drive’s profile "
@@ -157,8 +158,31 @@ def loop_words(design: Mapping[str, Any]) -> str:
         f"{number(design['bandwidth_Hz'])} Hz, crossover {number(design['crossover_Hz'])} Hz, "
         f"phase margin {number(design['phase_margin_deg'])} deg, gain margin "
         f"{number(design['gain_margin_dB'])} dB, peak of the sensitivity "
-        f"{number(design['sensitivity_peak'])}."
+        f"{number(design['sensitivity_peak'])}. Its gains: proportional "
+        f"{number(gains['proportional_Nm_rad'])} Nm/rad, integral "
+        f"{number(gains['integral_Nm_rad_s'])} Nm/(rad s), derivative "
+        f"{number(gains['derivative_Nms_rad'])} Nm s/rad behind a filter of "
+        f"{number(1e3 * gains['derivative_filter_s'])} ms."
     )
+
+
+def next_words(results: Mapping[str, Any]) -> list[str]:
+    """Say what this commissioning is for, and what to do where it fell short."""
+    folder, winch = results["files"]["report"].rpartition("/")[0] or ".", results["winch"]
+    words = [
+        f"To run the motor compensated: cdpr run {winch} --commissioned {folder}, or "
+        "`commissioned` under [[axes]] in the file of its robot. Its loops are tuned by the same "
+        "margins.",
+        "Commission it again after a change of motor, drive or encoder, and when the error grows: "
+        "friction ages, cogging does not.",
+    ]
+    if missed_targets(results["validation"], "better"):
+        words.append(
+            "A target was missed. See above whether the floor of encoder and torque steps is near: "
+            "then nothing is to be gained. Otherwise commission without --quick, with the motor "
+            "warm and nothing on its shaft."
+        )
+    return words
 
 
 def method_words(

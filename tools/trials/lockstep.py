@@ -22,6 +22,7 @@ from cdpr_drivers.robot.commissioned import with_commissioned, without_commissio
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
@@ -55,6 +56,8 @@ class LockstepRobot:
     recording (MCAP), none where left out. `programs` are run besides the robot's own.
     `commissioned` is the folder of what commissioning has learnt of the motors, where the robot's
     file does not name it; nothing is made of it where the robot is not to be `compensated`. The
+    calibration of its geometry in force is left aside where it is not to be run `as_calibrated`.
+    `scanner` is where a simulated device outside logs the poses that it measures. The
     right to move is held from the beginning, see `right`. Raises CommandError, DriverError and
     ProfileError as `cdpr run` does, WorkFailedError where the robot does not get ready.
     """
@@ -69,13 +72,19 @@ class LockstepRobot:
         programs: Mapping[str, Program] | None = None,
         commissioned: Path | None = None,
         compensated: bool = True,
+        as_calibrated: bool = True,
+        scanner: Path | None = None,
     ) -> None:
-        self.robot = with_commissioned(load_robot(robot), commissioned)
+        loaded = load_robot(robot)
+        self.robot = with_commissioned(
+            calibrated(loaded) if as_calibrated else loaded, commissioned
+        )
         if not compensated:
             self.robot = without_commissioned(self.robot)
         self.period_s = self.robot.sync_period_s
         self._reference = str(robot)
         self._plant, self._truth_path, self._record = plant, truth_log, record
+        self._scanner = scanner
         self._more_programs = dict(programs or {})
         self._stack = ExitStack()
         self._turns = self._status_seen = 0
@@ -105,7 +114,9 @@ class LockstepRobot:
         if self._truth_path is None and robot.platform is not None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-"))
             self._truth_path = Path(folder) / "truth.log"
-        simulator = OwnSimulator(self._reference, bus, self._plant, self._truth_path)
+        simulator = OwnSimulator(
+            self._reference, bus, self._plant, self._truth_path, scanner=self._scanner
+        )
         stack.callback(simulator.stop)
         self.simulator = simulator
         self.block = block = SharedBlock.create(n, RING_S, 1.0 / self.period_s)

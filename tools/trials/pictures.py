@@ -11,7 +11,7 @@ from cdpr_profiles import Robot
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.report.style import canvas, decimated, legend_above
-from cdpr_tools.trials import limits, line, targets
+from cdpr_tools.trials import limits, line, path, targets
 from cdpr_tools.trials.directions import Directions
 from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.streams import streaming
@@ -233,3 +233,23 @@ def _ways(ax: Axes, recorded: Recorded, view: tuple[int, int]) -> None:
     ax.set_aspect("equal", "datalim")
     ax.autoscale_view()
     ax.set(xlabel=f"{name} (m)", ylabel=f"{other} (m)")
+
+
+def of_path(recorded: Recorded, robot: Robot, speed_m_s: float) -> Figure:
+    """Draw a path as it was wanted and truly, and how far the platform was off it."""
+    errors = path.errors_of(recorded, robot, speed_m_s)
+    views = _VIEWS[recorded.directions.k]
+    figure = Figure(figsize=(7.4, 6.0), layout="constrained")
+    grid = figure.add_gridspec(2, len(views), height_ratios=[3.2, 2.0])
+    for column, (i, j) in enumerate(views):
+        ax = figure.add_subplot(grid[0, column])
+        ax.plot(*errors.described_m[:, [i, j]].T, color=_WANTED, lw=0.8, label="file")
+        ax.plot(*errors.true_m[:, [i, j]].T, color=_TRUE, lw=0.8, label="true")
+        ax.set(xlabel=f"{'xyz'[i]} (m)", ylabel=f"{'xyz'[j]} (m)", aspect="equal")
+        if not column:
+            ax.legend(ncols=2)
+    over = figure.add_subplot(grid[1, :])
+    over.plot(*decimated(errors.time_s, errors.off_mm), color=_TRUE, lw=0.7)
+    over.axhline(path.RMS_mm, color=_BOUND, lw=0.8, ls="--")
+    over.set(xlabel="s", ylabel="mm", title="true distance from the planned path (dashed: wanted)")
+    return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -47,7 +48,10 @@ class Recorded:
         columns, self.marks = _read(paths)
         self.folder = folder
         begin, end = self._only("begin"), self._only("end")
-        self.directions = Directions.of(platform_of(load_robot(begin["robot"])))
+        platform = platform_of(load_robot(begin["robot"]))
+        # targets were turned from the orientation at home that the robot's calibration had found
+        home_rad = tuple(begin.get("home_rotation_rad", platform.home_rotation_rad))
+        self.directions = Directions.of(replace(platform, home_rotation_rad=home_rad))
         cycle = columns["cycle"]
         kept = (cycle >= begin["cycle"]) & (cycle <= end["cycle"])
         self.cycles: Columns = {name: column[kept] for name, column in columns.items()}

@@ -147,7 +147,10 @@ def trial_run(
     ) as rig:
         run = TrialRun(rig, np.random.default_rng(seed), advance)
         run.start_up()
-        run.mark("begin", sync_offset=rig.sync_offset, robot=robot, seed=seed)
+        home_rad = platform_of(rig.robot).home_rotation_rad
+        run.mark(
+            "begin", sync_offset=rig.sync_offset, robot=robot, seed=seed, home_rotation_rad=home_rad
+        )
         yield run
         run.mark("end", refused=run.refused)
         rig.turn()  # the last cycle is in the recording as well

@@ -15,7 +15,7 @@ from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.stored_settings import load_settings
-from cdpr_tools.trials import limits, line, pictures, tape, targets
+from cdpr_tools.trials import limits, line, path, pictures, tape, targets
 from cdpr_tools.trials.directions import platform_of
 from cdpr_tools.trials.figures import Figure, all_reached
 from cdpr_tools.trials.recorded import Recorded
@@ -40,7 +40,7 @@ class TrialSettings:
     commissioned: str | None
     compensated: bool
     speed_m_s: float = line.SPEED_m_s
-    """Of lines."""
+    """Of lines and paths."""
 
     @classmethod
     def load(cls, folder: Path) -> TrialSettings:
@@ -92,6 +92,12 @@ KINDS: Final = {
         lambda run, settings: streaming.drive(run, 60.0 * settings.minutes),
         lambda parts, _robot, _settings: streaming.judge(parts[_ONE]),
         lambda parts, _robot, _settings: pictures.of_stream(parts[_ONE]),
+        1.0,
+    ),
+    "path": TrialKind(
+        lambda run, settings: path.drive(run, settings.speed_m_s),
+        lambda parts, robot, settings: path.judge(parts[_ONE], robot, settings.speed_m_s),
+        lambda parts, robot, settings: pictures.of_path(parts[_ONE], robot, settings.speed_m_s),
         1.0,
     ),
     "tape": TrialKind(

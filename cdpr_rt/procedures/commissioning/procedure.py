@@ -18,6 +18,7 @@ from cdpr_rt.errors import TripError
 from cdpr_rt.identification import MOST_ROUNDS, HarmonicResult, SecondPass
 from cdpr_rt.identification.cogging_profile import CoggingProfile, stored_harmonic_model
 from cdpr_rt.procedures.commissioning.commission_files import Paths
+from cdpr_rt.procedures.commissioning.evaluation import METHODS
 from cdpr_rt.procedures.commissioning.finding_index import Index
 from cdpr_rt.procedures.commissioning.identified import (
     Identified,
@@ -27,7 +28,12 @@ from cdpr_rt.procedures.commissioning.identified import (
     store_profile,
     validation_name,
 )
-from cdpr_rt.procedures.commissioning.winch_passes import VALIDATION_SPEED_RAD_S, Measurement
+from cdpr_rt.procedures.commissioning.winch_passes import (
+    SWEEP_LEAD_IN_RAD,
+    VALIDATION_SPEED_RAD_S,
+    Measurement,
+    fast_passes,
+)
 from cdpr_rt.procedures.measurement import Pass, both_ways
 from cdpr_rt.procedures.winch_operator import Notifier, WinchOperator
 
@@ -72,6 +78,27 @@ def _refine(second: SecondPass, recorded: list[Path]) -> None:
     second.add(legs(recorded))
 
 
+def planned_s(plan: Plan) -> float:
+    """Return about how long the motor turns by a plan, bus time."""
+    ramp = ramps(both=False)[0].duration_s()
+    refining = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 1)
+    others = len([b for b in plan.bandwidths_Hz if b != DEFAULT_BANDWIDTH_HZ])
+    passes = [
+        *both_ways(plan.sweep_speed_rad_s, SWEEP_LEAD_IN_RAD, plan.turns),
+        *fast_passes(),
+        *plan.rounds * refining,
+        *len(METHODS) * ramps(plan.both_ways),
+    ]
+    return sum(one.duration_s() for one in passes) + len(METHODS) * others * ramp
+
+
+def ramps(both: bool) -> tuple[Pass, ...]:
+    """Return the passes of one validation."""
+    if both:
+        return both_ways(VALIDATION_SPEED_RAD_S, _LEAD_IN_RAD, 1)
+    return (Pass(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, math.tau),)
+
+
 class Commissioning:
     """Runs the steps on an open session; each leaves its files in `paths`."""
 
@@ -82,11 +109,14 @@ class Commissioning:
         self._plan = plan
         self._out = out
         self._paths = paths
-        self._measure = Measurement(session, out, paths)
+        self._measure = Measurement(session, out, paths, planned_s(plan))
         self._bounds = MotorBounds(session.winch.motor)
 
     def run(self, bandwidth_Hz: float, index: Index = "homing") -> dict[str, Any]:
         """Do everything on the bus; return what the report has to know of it."""
+        self._out.note(
+            f"turns the motor for about {planned_s(self._plan) / 60.0:.0f} min of bus time"
+        )
         session, winch = self._session, self._session.winch
         started = time.monotonic()
         self.prepare(index)
@@ -270,11 +300,5 @@ class Commissioning:
         # what was just learnt comes first: a motor that warms up is soon another one
         for method in ("better", "none", "thesis"):
             name = validation_name(method, wanted_Hz)
-            passes = self._ramps(both_ways)
+            passes = ramps(both_ways)
             self._measure.track(name, design, known[method], passes, {"method": method})
-
-    @staticmethod
-    def _ramps(both: bool) -> tuple[Pass, ...]:
-        if both:
-            return both_ways(VALIDATION_SPEED_RAD_S, _LEAD_IN_RAD, 1)
-        return (Pass(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, math.tau),)

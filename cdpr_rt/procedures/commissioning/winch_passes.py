@@ -32,12 +32,25 @@ _FAST_LEGS = (
     (math.radians(12.0), 0.25 * math.tau, 0.3),
 )
 _TORQUE_SHARE = 0.25
+_SPOKEN = {
+    "sweep": "slow sweeps",
+    "fast": "turns at other speeds",
+    "index": "a turn to see the index",
+}
+_METHODS = {
+    "none": "no compensation",
+    "thesis": "thesis' method",
+    "better": "harmonic model",
+}
 
 
 class Measurement:
-    """Runs passes of one winch and records them."""
+    """Runs passes of one winch and records them; `planned_s` is how long all take, about."""
 
-    def __init__(self, session: WinchOperator, out: Notifier, paths: Paths) -> None:
+    def __init__(
+        self, session: WinchOperator, out: Notifier, paths: Paths, planned_s: float = math.inf
+    ) -> None:
+        self._planned_s, self._done_s = planned_s, 0.0
         self._session = session
         self._out = out
         self._paths = paths
@@ -53,12 +66,7 @@ class Measurement:
 
     def fast_legs(self, design: PidDesign) -> list[Path]:
         """Turn back and forth at other speeds, which tells inertia and the friction curve."""
-        passes = [
-            Pass(sign * speed, 0.0, distance, ramp, with_ramps=True)
-            for speed, distance, ramp in _FAST_LEGS
-            for sign in (1.0, -1.0)
-        ]
-        return self.track("fast", design, None, passes)
+        return self.track("fast", design, None, fast_passes())
 
     def track(
         self,
@@ -84,7 +92,12 @@ class Measurement:
         meta["latency_s"] = session.winch.latency_s
         total = sum(one.duration_s() for one in passes)
         recorded = []
-        with self._out.progress(name, total) as advance:
+        share = min(self._done_s / self._planned_s, 1.0)
+        label = spoken_name(name)
+        if math.isfinite(self._planned_s):
+            label += f" (so far {100.0 * share:.0f} % of all)"
+        self._done_s += total
+        with self._out.progress(label, total) as advance:
             done = 0.0
             for number, one in enumerate(passes):
                 path = self._paths.raw(f"{name}-{number}")
@@ -92,6 +105,25 @@ class Measurement:
                 recorded.append(run_pass(session, controller, one, path, meta, so_far))
                 done += one.duration_s()
         return recorded
+
+
+def fast_passes() -> list[Pass]:
+    """Return the turns back and forth at other speeds."""
+    return [
+        Pass(sign * speed, 0.0, distance, ramp, with_ramps=True)
+        for speed, distance, ramp in _FAST_LEGS
+        for sign in (1.0, -1.0)
+    ]
+
+
+def spoken_name(name: str) -> str:
+    """Return what a recording's name means."""
+    if name in _SPOKEN:
+        return _SPOKEN[name]
+    if name.startswith("round"):
+        return f"refining, round {int(name.removeprefix('round')) + 1}"
+    _, bandwidth, method = name.split("-", 2)
+    return f"validating at {bandwidth.removesuffix('Hz')} Hz, {_METHODS[method]}"
 
 
 def _further(advance: Callable[[float], None], done_s: float, time_s: float) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,11 +16,20 @@ from cdpr_rt.programs.model import RobotModel
 
 DEFAULT_TIMEOUT_S = 0.5
 LONGEST_TIMEOUT_S = 2.0
+LONGEST_S = 3600.0
+"""How long one jog may last."""
+
+
+_DURATION: Final = "duration_s"
+_Jog = tuple[FloatArray, float, float]
+"""Speeds (n,), time-out, duration."""
 
 
 class JogProgram(AxisProgram):
     """Turns the axes at commanded speeds; brakes when the command is not renewed in time.
 
+    With `duration_s` it brakes after that much in all as well: from standstill an axis has turned
+    by speed times duration then, since it takes as long to brake as to set out.
     Time is counted in cycles: a period a call of `update`.
     """
 
@@ -29,21 +39,27 @@ class JogProgram(AxisProgram):
     def __init__(self, model: RobotModel, loop: BumplessController) -> None:
         super().__init__(model, loop)
         self._speed = np.zeros(model.n)
-        self._cycles_left = 0
+        self._cycles_left = self._cycles = 0
+        self._duration: float = math.inf
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until speeds are commanded."""
         super().start(feedback, setpoint, torque_Nm)
-        self._cycles_left = 0
+        self._cycles_left = self._cycles = 0
+        self._duration = math.inf
 
     def progress(self) -> dict[str, Any]:
-        """Return the commanded speeds, and how long they hold without being renewed."""
-        left = self._cycles_left * self._model.period_s
-        return {"velocity_rad_s": self._speed.tolist(), "left_s": left}
+        """Return the commanded speeds, how long they hold without being renewed, and `done`.
 
-    def _parsed(self, arguments: Mapping[str, Any]) -> tuple[FloatArray, float]:
+        That is the share of the duration that is over, where one was given.
+        """
+        left = self._cycles_left * self._model.period_s
+        done = min(1.0, self._cycles / self._duration)
+        return {"velocity_rad_s": self._speed.tolist(), "left_s": left, "done": done}
+
+    def _parsed(self, arguments: Mapping[str, Any]) -> _Jog:
         keys = CommandArguments(
-            self.name, arguments, ("velocity_rad_s", "cable_velocity_m_s", "timeout_s")
+            self.name, arguments, ("velocity_rad_s", "cable_velocity_m_s", "timeout_s", _DURATION)
         )
         limit, cable = self._model.speed_rad_s, self._model.cable_m_per_rad
         if keys.one_of("velocity_rad_s", "cable_velocity_m_s") == "velocity_rad_s":
@@ -51,17 +67,25 @@ class JogProgram(AxisProgram):
         else:
             speed = keys.axes("cable_velocity_m_s", limit * np.abs(cable)) / cable
         shortest = self._model.period_s
-        return speed, keys.number("timeout_s", shortest, LONGEST_TIMEOUT_S, DEFAULT_TIMEOUT_S)
+        timeout = keys.number("timeout_s", shortest, LONGEST_TIMEOUT_S, DEFAULT_TIMEOUT_S)
+        duration = math.inf
+        if _DURATION in keys:
+            duration = keys.number(_DURATION, shortest, LONGEST_S, LONGEST_S)
+        return speed, timeout, duration
 
-    def _take(self, parsed: tuple[FloatArray, float]) -> None:
-        self._speed[:], timeout = parsed
+    def _take(self, parsed: _Jog) -> None:
+        self._speed[:], timeout, duration = parsed
         self._cycles_left = max(1, round(timeout / self._model.period_s))
+        self._duration = (
+            duration if duration == math.inf else round(duration / self._model.period_s)
+        )
 
     def _move(self, setpoint: Setpoint) -> bool:
-        if self._cycles_left == 0:
+        if self._cycles_left == 0 or self._cycles >= self._duration:
             self._speed[:] = 0.0
             return self._brake(setpoint)
         self._cycles_left -= 1
+        self._cycles += 1
         ramp_velocity(
             self._speed,
             self._model.acceleration_rad_s2,

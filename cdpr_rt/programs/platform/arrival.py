@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-NEAR_m = 5e-4
-"""So near a platform has arrived, unless friction keeps it farther away."""
+NEAR_m, NEAR_SHARE = 5e-4, 1e-4
+"""So near a platform has arrived, unless friction keeps it farther away; on a large robot, whose
+long cables stretch and sag more, within this share of the diagonal of its frame."""
 _NEAR_S = 0.2
 _WAITED_S = 5.0
 

@@ -13,6 +13,7 @@ from cdpr_rt.programs.axes.jog import JogProgram
 from cdpr_rt.programs.base import Program, ProgramError
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.platform.path import PathProgram
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.program_base import ProgramDefaults
 from cdpr_rt.robots.workspace import G_m_s2
@@ -22,13 +23,18 @@ _CARRIED_SHARE = 0.8
 
 
 class PlatformHold(ProgramDefaults):
-    """Brakes and holds the platform, or each axis by itself where the cables are slack."""
+    """Brakes and holds the platform, or each axis by itself where the cables are slack.
+
+    One that is on a path stays on it.
+    """
 
     name = "hold"
     needs_lease = False
 
-    def __init__(self, parts: PlatformParts, model: RobotModel, loop: BumplessController) -> None:
-        self._parts = parts
+    def __init__(
+        self, parts: PlatformParts, model: RobotModel, loop: BumplessController, path: PathProgram
+    ) -> None:
+        self._parts, self._path = parts, path
         self._axes = AxisProgram(model, loop)
         self._platform = PlatformProgram(parts, model.torque_Nm)
         self._active: Program = self._axes
@@ -36,9 +42,13 @@ class PlatformHold(ProgramDefaults):
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
-        self._active = self._platform if self._parts.tight else self._axes
+        if self._parts.tight and self._path.is_on_path(feedback.cycle):
+            self._active = self._path
+            self._path.stop()
+        else:
+            self._active = self._platform if self._parts.tight else self._axes
+            self._active.start(feedback, setpoint, torque_Nm)
         self.controller = self._active.controller
-        self._active.start(feedback, setpoint, torque_Nm)
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (n,) each, in place."""
@@ -65,7 +75,9 @@ class PlatformHold(ProgramDefaults):
 
     def progress(self) -> dict[str, Any]:
         """Return whether the platform or the axes are held, and where."""
-        return {"tight": self._parts.tight, **self._active.progress()}
+        told = {"tight": self._parts.tight, **self._active.progress()}
+        left = self._path.left()
+        return told if left is None else {**told, "path": left}
 
 
 class PlatformIdle(IdleProgram):

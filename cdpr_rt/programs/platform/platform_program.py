@@ -14,12 +14,14 @@ from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach, stopping_position
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
-from cdpr_rt.programs.platform.arrival import Arrival
+from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
+from cdpr_rt.programs.platform.path_store import PathStore
 from cdpr_rt.programs.program_base import CommandedProgram
 from cdpr_rt.robots.interface import PlatformControl
 from cdpr_rt.robots.kinematics.pose_setpoint import place, write_quaternion
 from cdpr_rt.robots.last_lengths import LastLengths
 from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.robot_arrays import frame_m
 
 _SLOWED_m, _WAITING_m = 0.02, 0.05
 _LEAST_PACE = 1e-3
@@ -75,9 +77,13 @@ class PlatformParts:
         self.model, self.platform = model, model.platform
         self.lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
         """The largest residual of the forward kinematics that is allowed."""
+        self.near_m = max(NEAR_m, NEAR_SHARE * frame_m(model.platform))
+        """How far from its set-point a platform has arrived."""
         self.compensation = compensation
         self.last = LastLengths()
         """The lengths at which it was stopped."""
+        self.paths = PathStore()
+        """The planned paths."""
         self.control = control
         self.estimator = estimator
         self.period_s = period_s
@@ -161,7 +167,7 @@ class PlatformProgram(CommandedProgram):
         self._speed, self._acceleration = np.array(parts.speed), np.array(parts.acceleration)
         self._directions = np.array(model.kinematics.directions)
         self._wanted, self._room, self._seen = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(7)
-        self._arrival = Arrival(parts.period_s)
+        self._arrival = Arrival(parts.period_s, parts.near_m)
         # compiled here, not when the first pose is recorded
         self._write_setpoint(self._target)
 

@@ -30,6 +30,7 @@ _STANDING = 0.85
 _HIGHEST = 0.9
 _SETTLING_S = 0.5
 _HANGING = 0.5
+_PRESSING, _MODEST = (0.5, 0.25, 0.0), 0.4
 _RISE_1_s = 1.0
 _FALL_S = 0.2
 _STILL_m = 0.0003
@@ -57,7 +58,7 @@ class PretensionProgram(PlatformProgram):
 
     def __init__(self, parts: PlatformParts, torque_Nm: FloatArray, cable_m: FloatArray) -> None:
         super().__init__(parts, torque_Nm)
-        self._arrival = Arrival(parts.period_s, near_s=_SETTLING_S)
+        self._arrival = Arrival(parts.period_s, parts.near_m, _SETTLING_S)
         self._cable = np.array(cable_m)
         self._pretension_N = np.minimum(
             home_pretension_N(parts), torque_Nm / np.abs(cable_m) / OVERSHOOT
@@ -314,9 +315,10 @@ class PretensionProgram(PlatformProgram):
 def home_pretension_N(parts: PlatformParts) -> FloatArray:
     """Return tensions (n,) under which a platform at home stays on its stand.
 
-    None is below the least tension. Their wrench presses the platform down with its own weight,
-    where some cable pulls downward; else it carries part of the weight, too little to lift the
-    platform even at the overshoot.
+    None is below the least tension. Their wrench is along the weight: it presses the platform down
+    where the cables can without pulling hard; else it carries part of the weight, too little to
+    lift the platform even at the overshoot. Friction makes the tensions differ from what is asked
+    for by some newtons, which a platform whose weight is all but carried does not stand still for.
     """
     model, control, t = parts.model, parts.control, np.zeros(parts.model.kinematics.n)
     home, weight = model.pose(model.home), model.weight()
@@ -324,6 +326,11 @@ def home_pretension_N(parts: PlatformParts) -> FloatArray:
     most = np.maximum(_HIGHEST * model.high_N / OVERSHOOT, 1.1 * control.least_N)
     for least in (np.minimum(control.low_N, 0.9 * most), control.least_N):
         if model.least_tensions(least, most).solve(W, -weight, t) is TensionOutcome.FEASIBLE:
+            return t
+    modest = np.minimum(most, np.maximum(_MODEST * model.high_N, 1.1 * control.least_N))
+    least_pressing = model.least_tensions(control.least_N, modest)
+    for share in _PRESSING:
+        if least_pressing.solve(W, -share * weight, t) is TensionOutcome.FEASIBLE:
             return t
     model.least_tensions(control.least_N, most).solve(W, weight, t)
     return np.maximum(_STANDING / OVERSHOOT * t, 0.0)

@@ -79,9 +79,13 @@ class Interference:
         self._way[0], self._way[4:] = self._home[0], self._home[1:]
         if len(self.pairs):
             self._first_contact = bound(
-                first_contact, self._geometry, self._boxes, self.pairs, clearance_m, self._trim,
-                self._way,
+                first_contact, *self.arrays, self._way,
             )  # fmt: skip
+
+    @property
+    def arrays(self) -> tuple[FloatArray, FloatArray, IntArray, float, float]:
+        """Geometry, boxes, pairs, clearance and trim, as of `contact_kernel`."""
+        return self._geometry, self._boxes, self.pairs, self.clearance_m, self._trim
 
     def clearances(self, poses: FloatArray) -> tuple[FloatArray, IntArray]:
         """Return the least distances (m,), m, and which pair has it, at poses (m, 4, 3).

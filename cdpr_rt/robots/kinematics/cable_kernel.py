@@ -52,6 +52,13 @@ def run_cables(geometry: FloatArray, pose: FloatArray, cables: FloatArray) -> No
 
 
 @jit
+def run_poses(geometry: FloatArray, poses: FloatArray, cables: FloatArray) -> None:
+    """Write all cables at each of m poses (m, 4, 3) into `cables` (m, 9, n), as `run_cables`."""
+    for j in range(poses.shape[0]):
+        run_cables(geometry, poses[j], cables[j])
+
+
+@jit
 def wrench_matrices(
     geometry: FloatArray, poses: FloatArray, chosen: IntArray, cables: FloatArray, W: FloatArray
 ) -> None:

@@ -37,7 +37,7 @@ from cdpr_rt.robots.workspace import SHARES
 _REGULATOR_SHARE = 0.25
 _INTEGRAL_SHARE = 0.3
 _DEAD_m = 6e-5
-_BREAKING = 6.0
+_BREAKING = 20.0
 _STUCK_m_s = 0.002
 _SETTLING_STEPS = 60
 _LIFT_S = 0.05

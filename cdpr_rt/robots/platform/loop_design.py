@@ -45,7 +45,9 @@ _SMOOTHERS_Hz = ((0.0, 25.0), (0.55, 25.0), (0.55, 12.0), (0.8, 12.0), (0.8, 8.0
 """Shares of smooth velocity that are tried, each with the frequency of its low-pass."""
 _ROTOR_SHARES = (1.6, 0.8, 0.4)
 _LOOSE_SHARE = 0.075
-_INTEGRAL_RATE_1_s, _INTEGRAL_SHARE = 5.0, 0.15
+_INTEGRAL_RATE_1_s = 5.0
+_INTEGRAL_SHARES = (0.3, 0.15)
+"""Rates of the integral part that are tried, over 2 ζ ω of the slowest mode."""
 _CABLE_DAMPING_s = 2e-3
 _SLOWEST_rad_s, _FASTEST_rad_s = 1.0, 80.0
 _STEP, _REFINEMENTS = 1.3, 3
@@ -66,6 +68,8 @@ class LoopGains:
     """Double pole of the low-pass."""
     loose_N_s_m: float
     """Damping of cables that pull against each other."""
+    integral_share: float
+    """Rate of the integral part over 2 ζ ω of the slowest mode, at most."""
     integral_1_s: float
     rotor_kg: float
     """Mass of a rotor, as its cable feels it."""
@@ -218,28 +222,33 @@ class LoopModel:
         return keeps_margin(self._plants, *factors, damping, stiffness, LEAST_MARGIN, room)
 
     def design(self) -> LoopGains:
-        """Return the stiffest loop that keeps LEAST_MARGIN at all poses, with all stiffness.
+        """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
 
-        The stiffest is the one whose modes are, in their geometric mean, in N/m of cable: dry
-        friction in the winches, about the same in each, is what keeps a platform from its target.
+        They keep it at all poses, with all stiffness. Dry friction in the winches, about the same
+        in each, is what keeps a platform from its target, and the integral part what overcomes it:
+        in N/(m s) of cable, in the geometric mean over the modes.
         """
-        best, stiffest = None, 0.0
-        for (smooth, smoother_Hz), share in itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES):
-            gains = self._slowest(smooth, 2.0 * math.pi * smoother_Hz, share)
-            at_most = self._stiffness_N_m(replace(gains, bandwidth_rad_s=math.inf))
-            if best is None or at_most > stiffest:
+        best, soonest = None, 0.0
+        tried = itertools.product(_SMOOTHERS_Hz, _ROTOR_SHARES, _INTEGRAL_SHARES)
+        for (smooth, smoother_Hz), share, integral in tried:
+            gains = self._slowest(smooth, 2.0 * math.pi * smoother_Hz, share, integral)
+            at_most = self._integral_N_m_s(self._with(gains, math.inf))
+            if best is None or at_most > soonest:
                 found = self._quickest(gains)
-                if (stiffness := self._stiffness_N_m(found)) > stiffest:
-                    best, stiffest = found, stiffness
+                if (integral := self._integral_N_m_s(found)) > soonest:
+                    best, soonest = found, integral
         assert best is not None
         return best
 
-    def _slowest(self, smooth: float, smoother_rad_s: float, share: float) -> LoopGains:
+    def _slowest(
+        self, smooth: float, smoother_rad_s: float, share: float, integral_share: float
+    ) -> LoopGains:
         """Return the slowest loop with this part of smooth velocity, and of a rotor's damping."""
         late_s = latency_s(self.period_s) + 2.0 / OBSERVER_rad_s
         most = self._lightest_kg / late_s / (1.0 - smooth)
+        loose = _LOOSE_SHARE * most
         gains = LoopGains(
-            0.0, share * most, smooth, smoother_rad_s, _LOOSE_SHARE * most, 0.0, self.rotor_kg
+            0.0, share * most, smooth, smoother_rad_s, loose, integral_share, 0.0, self.rotor_kg
         )
         return self._with(gains, _SLOWEST_rad_s)
 
@@ -260,14 +269,15 @@ class LoopModel:
 
     def _with(self, gains: LoopGains, bandwidth_rad_s: float) -> LoopGains:
         gains = replace(gains, bandwidth_rad_s=bandwidth_rad_s)
-        rate = _INTEGRAL_SHARE * 2.0 * DAMPING_RATIO * self._slowest_rad_s(gains)
+        rate = gains.integral_share * 2.0 * DAMPING_RATIO * self._slowest_rad_s(gains)
         return replace(gains, integral_1_s=min(_INTEGRAL_RATE_1_s, rate))
 
     def _slowest_rad_s(self, gains: LoopGains) -> float:
         return float(self._along_modes(gains)[2].min())
 
-    def _stiffness_N_m(self, gains: LoopGains) -> float:
-        return float(np.exp(np.log(self._along_modes(gains)[1]).mean()))
+    def _integral_N_m_s(self, gains: LoopGains) -> float:
+        stiffness = np.exp(np.log(self._along_modes(gains)[1]).mean())
+        return gains.integral_1_s * float(stiffness)
 
 
 def loop_model_of(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> LoopModel:

@@ -22,6 +22,9 @@ from cdpr_rt.service.http.token_buckets import TokenBuckets
 from cdpr_rt.service.link import URGENT
 
 MOST_BODY_BYTES: Final = 16384
+MOST_PATH_BYTES: Final = 1 << 21
+"""Of a path's file, in the body of `POST /path`."""
+_PATH_PATH: Final = "/path"
 _BODY_S = 5.0
 _REQUESTS_PER_S, _BURST = 200.0, 400.0
 _FAILURES_PER_S, _FAILURES = 2.0, 10.0
@@ -124,7 +127,8 @@ class AccessControl:
         try:
             await self._check(scope)
             if scope["type"] == "http":
-                receive = await _read_body(receive)
+                most = MOST_PATH_BYTES if scope["path"] == _PATH_PATH else MOST_BODY_BYTES
+                receive = await _read_body(receive, most)
         except _RefusedError as refused:
             self._refused()
             await _answer(scope, send, refused)
@@ -260,7 +264,7 @@ def _is_stop(scope: Scope) -> bool:
     return is_post and scope["path"] in URGENT_PATHS
 
 
-async def _read_body(receive: Receive) -> Receive:
+async def _read_body(receive: Receive, most: int) -> Receive:
     """Return a `receive` that gives the body at once, which was neither large nor slow."""
     body = bytearray()
     try:
@@ -270,10 +274,10 @@ async def _read_body(receive: Receive) -> Receive:
                 if message["type"] == "http.disconnect":
                     raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body is not whole")
                 body += message.get("body", b"")
-                if len(body) > MOST_BODY_BYTES:
+                if len(body) > most:
                     raise _RefusedError(
                         HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-                        f"the body has more than {MOST_BODY_BYTES} bytes",
+                        f"the body has more than {most} bytes",
                     )
                 if not message.get("more_body"):
                     break

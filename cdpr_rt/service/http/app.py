@@ -18,6 +18,7 @@ from cdpr_rt.service.http.tickets import VALID_S
 from cdpr_rt.service.http.websocket_routes import WebSocketRoutes
 from cdpr_rt.service.lease import LeaseError
 from cdpr_rt.service.link import CommandTooLongError, LoopBusyError, LoopGoneError, Reply
+from cdpr_rt.service.path_planner import PlannerBusyError
 from cdpr_rt.service.service import Service
 from cdpr_rt.service.streams.setpoint_stream import StreamError
 
@@ -30,6 +31,7 @@ all who ask at once get one answer. What was asked for before them, and waits st
 """
 _STATUS: Final[dict[type[Exception], HTTPStatus]] = {
     LeaseError: HTTPStatus.CONFLICT,
+    PlannerBusyError: HTTPStatus.CONFLICT,
     LoopGoneError: HTTPStatus.SERVICE_UNAVAILABLE,
     LoopBusyError: HTTPStatus.SERVICE_UNAVAILABLE,
     CommandTooLongError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
@@ -278,6 +280,19 @@ def _add_commands(app: FastAPI, service: Service) -> None:
     async def change(body: models.Set, request: Request, token: Token = None) -> models.Done:
         """Tell the running program what it is to do."""
         return await ask("set", body, token, request, wanted=body.wanted)
+
+    @app.post("/path", responses=_REFUSALS)
+    async def plan_path(body: models.PathFile) -> models.Planned:
+        """Begin to plan a path for the robot; `GET /path` tells when it is planned."""
+        return models.Planned.model_validate(service.planner.begin(body.model_dump()))
+
+    @app.get("/path")
+    async def planned_path() -> models.Planned:
+        """The path that was planned last, or why the robot cannot follow it.
+
+        The program `path` follows it by the name in `plan`.
+        """
+        return models.Planned.model_validate(service.planner.job)
 
     @app.post("/lengths", responses=_REFUSALS)
     async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:

@@ -109,6 +109,30 @@ class Program(Who):
     wanted: _Wanted = {}
 
 
+class PathFile(Who):
+    """A path's file, to be planned."""
+
+    name: Annotated[
+        str,
+        Field(
+            pattern=r"^[A-Za-z0-9][A-Za-z0-9_. -]{0,59}\.(toml|csv|nc|ngc|gcode|tap|cnc)$",
+            description="Its name; what comes after the dot says what it is.",
+            examples=["part.nc"],
+        ),
+    ]
+    text: Annotated[str, Field(max_length=1 << 21, description="What is in it.")]
+    origin_mm: Annotated[
+        str | None,
+        Field(pattern=r"^[-+.0-9 ]{1,64}$", description="Where G-code's zero is in the room."),
+    ] = None
+    blend_mm: Annotated[
+        float, Field(ge=0, le=1000, description="Within which G-code's corners may be cut.")
+    ] = 1.0
+    ignore: Annotated[
+        str, Field(pattern=r"^[A-Za-z0-9. ]{0,64}$", description="Words of G-code to be skipped.")
+    ] = ""
+
+
 class Set(Who):
     """What the running program is to do now."""
 
@@ -132,6 +156,18 @@ class Done(_Answer):
 
     text: str
     state: str
+
+
+class Planned(_Answer):
+    """A path that is planned, or was."""
+
+    number: int
+    """One more for each."""
+    planning: bool
+    error: str | None
+    """Where the robot cannot follow it: the first place, by line and coordinates, and why."""
+    plan: str | None
+    """What the program `path` knows it by."""
 
 
 class Held(_Answer):

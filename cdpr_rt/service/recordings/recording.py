@@ -23,6 +23,7 @@ from cdpr_rt.service.recordings import recording_schema as topics
 from cdpr_rt.service.recordings.recording_events import Events
 from cdpr_rt.service.recordings.recording_file import NameTakenError, RecordingError, RecordingFile
 from cdpr_rt.service.recordings.recording_json import RowTexts
+from cdpr_rt.service.recordings.retention import Retention, size_text
 from cdpr_rt.service.rows import plain
 
 MOST_BYTES: Final = 1 << 30
@@ -40,7 +41,8 @@ class Recorder:
     """Writes rows, status, description and events of a block into MCAP files in `folder`.
 
     A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, the next file begins where one
-    has `most_bytes`. A disk that takes no more, or has less than `reserve_bytes` left (without:
+    has `most_bytes`. Before each, what `retention` does not keep is removed.
+    A disk that takes no more, or has less than `reserve_bytes` left (without:
     64 MB, or a twentieth of a small disk), ends the recording for good: `told` says why, `ended` is
     called with it, and nobody else is concerned.
     A recorder that follows on another one of the same block goes on at the first row that was not
@@ -59,6 +61,7 @@ class Recorder:
         most_bytes: int = MOST_BYTES,
         reserve_bytes: int | None = None,
         ended: Callable[[str], None] | None = None,
+        retention: Retention | None = None,
     ) -> None:
         self._block = block
         self._folder = folder
@@ -66,6 +69,7 @@ class Recorder:
         self._most_bytes = most_bytes
         self._reserve_bytes = reserve_bytes
         self._ended = ended
+        self._retention = retention or Retention()
         self._wall = WallClock(block)
         self._texts = RowTexts(block.n, topics.CYCLE_FIELDS)
         self._timing_texts = RowTexts(block.n, topics.TIMING_FIELDS)
@@ -174,6 +178,9 @@ class Recorder:
         return Channel(topic, schema=schema, context=self._context)
 
     def _open(self) -> None:
+        if removed := self._retention.prune(self._folder, self._robot):
+            names = ", ".join(path.name for path in removed)
+            self.remark(f"removed {len(removed)} old recordings: {names}")
         date = datetime.fromtimestamp(self._wall.start_ns / 1e9, UTC)
         session = f"{self._robot}-{date:%Y%m%dT%H%M%SZ}"
         numbers = [path.stem.rpartition("-")[2] for path in self._folder.glob(f"{session}-*.mcap")]
@@ -206,7 +213,8 @@ class Recorder:
         least = reserve_of(size) if self._reserve_bytes is None else self._reserve_bytes
         if room < least:
             raise RecordingError(
-                f"{self._folder}: recording ended: less than {least / 1e6:.0f} MB free"
+                f"{self._folder}: recording ended: {size_text(room)} free, less than the "
+                f"{size_text(least)} that are left to others"
             )
         if file.size >= self._most_bytes:
             self._close()

@@ -124,7 +124,7 @@ class RecordingReader:
         except _BROKEN as error:
             self.ended = CUT
             if not self.metadata:
-                reason = str(error) or "nothing in it"
+                reason = str(error).partition(", invalid magic")[0] or "nothing in it"
                 raise RecordingError(f"{self.path}: not a recording: {reason}") from None
         if not self.metadata:
             raise RecordingError(f"{self.path}: not a recording: does not say of what")

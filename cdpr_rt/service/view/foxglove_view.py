@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
 
+import numpy as np
 from foxglove import Schema
 from foxglove.messages import (
     FrameTransform,
@@ -20,6 +21,7 @@ from foxglove.messages import (
     Pose,
     PoseInFrame,
     Quaternion,
+    SceneUpdate,
     Timestamp,
     Vector3,
 )
@@ -29,6 +31,7 @@ from cdpr_rt.core.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.service.recordings.recording import WallClock
 from cdpr_rt.service.recordings.recording_events import Events
 from cdpr_rt.service.rows import LABELS
+from cdpr_rt.service.view.cable_scene import CableScene
 from cdpr_rt.service.view.foxglove_server import FoxgloveServer, Topic
 
 RATE_Hz: Final = 50.0
@@ -131,6 +134,10 @@ class LiveView:
             if self._topics is not None:
                 self._server.withdraw()
             self._topics = _Topics(self._server, names, self._block.n)
+        try:
+            self._topics.scene = CableScene(description)
+        except (KeyError, TypeError, ValueError):  # no platform, or not as it should be
+            self._topics.scene = None
 
     def _changed(self, name: str) -> dict[str, Any] | None:
         version = int(self._block.counters[name][0])
@@ -166,6 +173,9 @@ class _Topics:
         pose = PoseInFrame.get_schema()
         self._pose = server.advertise("/pose", "protobuf", pose)
         self._wanted = server.advertise("/pose_setpoint", "protobuf", pose)
+        self.scene: CableScene | None = None
+        """What is drawn of cables and platform, None of robots without one."""
+        self._cables = server.advertise("/cables", "protobuf", SceneUpdate.get_schema())
         self._frame = server.advertise("/tf", "protobuf", FrameTransform.get_schema())
         self._log = server.advertise("/log", "protobuf", Log.get_schema())
 
@@ -191,6 +201,8 @@ class _Topics:
                 self._server.send(topic, json.dumps(value(row)).encode(), time_ns)
         if self._server.is_wanted(self._timing):
             self._server.send(self._timing, json.dumps(_timing_of(rows)).encode(), time_ns)
+        if self.scene is not None and self._server.is_wanted(self._cables):
+            self._show_cables(self.scene, row, time_ns)
         self._show_pose(row["pose"].tolist(), self._pose, time_ns)
         self._show_pose(row["pose_setpoint"].tolist(), self._wanted, time_ns)
 
@@ -208,6 +220,12 @@ class _Topics:
     def _tensions_of(self, row: Row) -> dict[str, Any]:
         named = zip(self._names, row["tension_N"].tolist(), strict=True)
         return {name: value for name, value in named if math.isfinite(value)}
+
+    def _show_cables(self, scene: CableScene, row: Row, time_ns: int) -> None:
+        pose = np.array(row["pose"], float)
+        if np.isfinite(pose).all():
+            drawn = scene.update(pose, np.array(row["tension_N"], float), _stamp(time_ns))
+            self._server.send(self._cables, drawn.encode(), time_ns)
 
     def _show_pose(self, pose: list[float], topic: Topic, time_ns: int) -> None:
         if not all(math.isfinite(value) for value in pose):

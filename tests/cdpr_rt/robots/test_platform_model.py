@@ -14,6 +14,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.robots.platform_control import platform_control
 from cdpr_rt.robots.platform_model import RESERVE, directions_of, platform_model_of
+from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
 
 PLANAR, SUSPENDED = load_robot("planar-3"), load_robot("suspended-8")
@@ -81,3 +82,38 @@ def test_least_tensions_of_three_cables_have_the_least_sum(
     if outcome is TensionOutcome.FEASIBLE and ((u > 0.01).all() or (u < -0.01).all()):
         assert t.sum() == pytest.approx(least.fun, rel=1e-6)
         assert (t - model.low_N).min() == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("size", "allowed_m"),
+    [(0.35, 0.01312), (1.0, 0.03), (3.0, 0.03)],
+    ids=["board", "wall", "hall"],
+)
+def test_lengths_may_disagree_by_less_on_a_smaller_frame(size: float, allowed_m: float) -> None:
+    assert PLANAR.platform is not None
+    exits = tuple(tuple(size * x for x in point) for point in PLANAR.platform.exit_points_m)
+    platform = dataclasses.replace(PLANAR.platform, exit_points_m=exits)
+    robot = dataclasses.replace(PLANAR, platform=platform)
+    assert limits_of(robot).lengths_disagree_m == pytest.approx(allowed_m, abs=1e-5)
+    told = robot.limits.model_copy(update={"lengths_disagree_m": 0.05})
+    assert limits_of(dataclasses.replace(robot, limits=told)).lengths_disagree_m == 0.05
+
+
+@pytest.mark.parametrize("slipped", range(3))
+def test_a_slip_on_a_small_frame_is_noticed(slipped: int) -> None:
+    # 1.5 m x 1 m, whose cables let a slip of 60 mm pass as a motion of 47 mm
+    board = dataclasses.replace(
+        PLANAR.platform,
+        exit_points_m=((-0.75, 1.0), (0.75, 1.0), (0.0, 0.0)),
+        anchor_points_m=((0.0, 0.0),) * 3,
+        home_m=(0.0, 0.5),
+        workspace_min_m=(-0.3, 0.4),
+        workspace_max_m=(0.3, 0.7),
+    )
+    robot = dataclasses.replace(PLANAR, platform=board)
+    kinematics = platform_model_of(robot).kinematics
+    pose = platform_model_of(robot).home_pose
+    J = kinematics.jacobian(pose)
+    slip = 0.06 * np.eye(3)[slipped]
+    left = slip - J @ np.linalg.lstsq(J, slip, rcond=None)[0]
+    assert np.sqrt(np.mean(left**2)) > limits_of(robot).lengths_disagree_m

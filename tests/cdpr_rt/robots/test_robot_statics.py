@@ -222,6 +222,13 @@ def test_orientations_that_cables_cannot_hold_are_told_with_the_angle_that_they_
     )
 
 
+def test_a_turned_platform_that_meets_its_stand_is_told(tmp_path: Path) -> None:
+    text = SUSPENDED.replace("[-2.6, -1.8, 0.75]", "[-2.6, -1.8, 0.6]")
+    told = findings_of(tmp_path, text)["platform.workspace_angle_rad"]
+    assert "0.18 m lower, and the box begins 0.10 m above home" in told
+    assert "from 0.68 m upward" in told
+
+
 def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
     text = SUSPENDED.replace("angular_speed_rad_s = 0.25", "angular_speed_rad_s = 0.6")
     assert "platform.speed_m_s" in findings_of(tmp_path, text)

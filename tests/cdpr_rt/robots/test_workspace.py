@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
+from scipy.spatial.transform import Rotation
 
+from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.kinematics.kinematics import (
     PLANAR,
     PLANAR_POINT,
@@ -18,7 +20,8 @@ from cdpr_rt.robots.kinematics.kinematics import (
     CableKinematics,
 )
 from cdpr_rt.robots.kinematics.pose import Pose
-from cdpr_rt.robots.workspace import SHARES, CableWorkspace, wrenches_in_motion
+from cdpr_rt.robots.workspace import SHARES, CableWorkspace, corners, wrenches_in_motion
+from cdpr_tools.bench.geometries import COGIRO, held_tensions
 
 SHAPES = [(PLANAR_POINT, 2), (PLANAR_POINT, 3), (PLANAR, 4), (PLANAR, 5), (POINT, 4), (POINT, 7)]
 SHAPES += [(SPATIAL, 6), (SPATIAL, 7), (SPATIAL, 8), (SPATIAL, 9)]
@@ -30,11 +33,12 @@ def made_up(
 ) -> tuple[CableWorkspace, Pose]:
     a, b = rng.uniform(-3.0, 3.0, (n, 3)), rng.uniform(-0.3, 0.3, (n, 3))
     d = len(directions)
-    wrenches = rng.normal(0.0, 80.0, (int(rng.integers(1, 5)), d))
+    wrenches = rng.normal(0.0, 80.0, (int(rng.integers(1, 4)), d))
+    generators = rng.normal(0.0, 25.0, (int(rng.integers(0, 4)), d))
     low, high = LOW_N * rng.uniform(0.5, 1.5, n), HIGH_N * rng.uniform(0.5, 1.5, n)
     robot = CableKinematics(a, b, directions)
     pose = Pose(rng.uniform(-0.8, 0.8, 3)).plus(np.array([0, 0, 0, *rng.uniform(-0.2, 0.2, 3)]))
-    return CableWorkspace(robot, wrenches, low, high, np.ones(d)), pose
+    return CableWorkspace(robot, wrenches, low, high, np.ones(d), generators=generators), pose
 
 
 def by_linear_programming(workspace: CableWorkspace, pose: Pose) -> float:
@@ -63,6 +67,10 @@ def test_the_margin_is_what_linear_programming_finds(
     if np.linalg.cond(W) > 1e4:
         return
     assert margin == pytest.approx(by_linear_programming(workspace, pose), abs=1e-5, rel=1e-7)
+    (closed_form,) = workspace.capacity_margins(pose.array[None])
+    assert closed_form == pytest.approx(margin, abs=1e-6, rel=1e-7)
+    (early,) = workspace.capacity_margins(pose.array[None], 0.0)
+    assert (early >= 0.0) == (closed_form >= 0.0)
     # the tensions carry one of the wrenches, and have the margin
     missing = np.abs(W @ t + workspace.wrenches).max(axis=1)
     assert missing.min() < 1e-6
@@ -76,7 +84,7 @@ def test_what_no_tension_holds_is_told() -> None:
     flat = CableKinematics(
         np.array([[-1.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), np.zeros((3, 2)), (0, 1)
     )
-    weight = wrenches_in_motion(2.0, 0.0, 1, (0, 1))
+    weight, _ = wrenches_in_motion(2.0, 0.0, 1, (0, 1))
     workspace = CableWorkspace(flat, weight, np.zeros(3), np.full(3, 9.0), np.ones(2))
     assert "cannot hold one direction" in workspace.feasible(Pose(np.zeros(3)))
     assert "cannot hold one direction" in workspace.feasible(Pose(np.array([1.0, 0.0, 0.0])))
@@ -85,8 +93,32 @@ def test_what_no_tension_holds_is_told() -> None:
     assert "N outside" in workspace.feasible(Pose(np.array([0.5, -0.3, 0.0])))
 
 
+def test_margins_in_closed_form_are_those_of_every_corner_of_a_published_robot() -> None:
+    """CoGiRo with its published payload and tensions: the polygon of its tensions has corners."""
+    rng = np.random.default_rng(2025)
+    robot = CableKinematics(COGIRO.exit_points_m, COGIRO.anchor_points_m)
+    weight = np.array([0.0, 0.0, -100.0 * 9.81, 0.0, 0.0, 0.0])
+    low, high = np.full(8, 10.0), np.full(8, 6000.0)
+    workspace = CableWorkspace(robot, weight[None], low, high, np.ones(6))
+    turns = Rotation.from_euler("xyz", rng.uniform(-30.0, 30.0, (400, 3)), degrees=True)
+    poses = np.zeros((400, 4, 3))
+    poses[:, 0] = rng.uniform((-6.75, -4.75, 0.0), (6.75, 4.75, 4.75), (400, 3))
+    poses[:, 1:] = turns.as_matrix()
+    margins = workspace.capacity_margins(poses)
+    held = [
+        held_tensions(W, weight, 10.0, 6000.0) is not None for W in robot_matrices(robot, poses)
+    ]
+    assert 20 < sum(held) < 380
+    clear = np.abs(margins) > 1e-6
+    assert ((margins >= 0.0) == held)[clear].all()
+
+
+def robot_matrices(robot: CableKinematics, poses: FloatArray) -> list[FloatArray]:
+    return [robot.wrench_matrix(Pose(pose[0], pose[1:])).copy() for pose in poses]
+
+
 def test_a_platform_in_motion_needs_more_in_every_direction() -> None:
-    told = wrenches_in_motion(2.0, 3.0, 2, SPATIAL)
+    told = corners(*wrenches_in_motion(2.0, 3.0, 2, SPATIAL))
     assert told.shape == (8, 6)
     assert {tuple(row) for row in np.abs(told[:, :2])} == {(6.0, 6.0)}
     assert sorted(set(told[:, 2])) == pytest.approx([-2.0 * 9.80665 - 6.0, -2.0 * 9.80665 + 6.0])
@@ -96,7 +128,7 @@ def test_a_platform_in_motion_needs_more_in_every_direction() -> None:
 def test_the_first_place_in_the_way_is_found() -> None:
     ceiling = np.array([[-2.0, -2.0, 3.0], [2.0, -2.0, 3.0], [2.0, 2.0, 3.0], [-2.0, 2.0, 3.0]])
     robot = CableKinematics(ceiling, np.zeros((4, 3)), POINT)
-    weight = wrenches_in_motion(10.0, 0.0, 2, POINT)
+    weight, _ = wrenches_in_motion(10.0, 0.0, 2, POINT)
     workspace = CableWorkspace(robot, weight, np.full(4, 1.0), np.full(4, 200.0), np.ones(3))
 
     def first_obstacle(start: tuple[float, ...], end: tuple[float, ...]) -> tuple[Pose, str] | None:

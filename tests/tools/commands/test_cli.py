@@ -162,8 +162,7 @@ def test_home_finds_the_index() -> None:
 @pytest.mark.parametrize("speed", [20.0, -90.0])
 def test_jog_turns_by_speed_times_time(speed: float) -> None:
     told = done("drive", "jog", WINCH, *OWN, "--speed-deg-s", str(speed), "--seconds", "4")
-    # 4 s at full speed and a ramp of half a second at both ends
-    assert told["moved_deg"] == pytest.approx(4.5 * speed, rel=0.15)
+    assert told["moved_deg"] == pytest.approx(4.0 * speed, abs=1.0)
 
 
 def test_objects_are_read_and_written(lab: str) -> None:

@@ -13,10 +13,13 @@ from cdpr_here import cdpr_here
 from matplotlib.image import imread
 
 from cdpr_rt.core.cycle_row import Row
+from cdpr_rt.core.limits import Limit
 from cdpr_rt.core.shared_block import RowWriter
-from cdpr_rt.core.states import LoopState
+from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording import Recorder
-from cdpr_tools.recordings.picture import pose_curves
+from cdpr_tools.recordings.picture import FIELDS, faults_of, pose_curves
+from cdpr_tools.recordings.selection import Selection
+from cdpr_tools.recordings.summary import worth_telling
 from cdpr_tools.report.style import decimated
 from tests.cdpr_rt.service.recordings.recording_rig import block_with_clock, made_rows, put
 
@@ -177,7 +180,7 @@ def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     rows["pose"][:10] = np.nan
     curves = pose_curves({name: rows[name] for name in ("pose", "pose_setpoint")})
     assert {label: list(each) for label, each in curves.items()} == {
-        "platform (m)": ["y"], "turned (deg)": ["ry"],
+        "platform (m)": ["y"], "turned (deg)": ["ry"], "off its target (mm)": ["distance"],
     }  # fmt: skip
     is_there, wanted = curves["turned (deg)"]["ry"]
     assert np.isnan(is_there[:10]).all()
@@ -261,3 +264,34 @@ def test_where_nothing_can_be_written_it_is_said(folder: Path) -> None:
         status, _, errors = _log(command, folder, "--out", f"/proc/{name}")
         assert status == 1
         assert f"/proc/{name}: cannot be written" in errors
+
+
+def test_what_ran_and_what_went_wrong_are_told_with_their_times(tmp_path: Path) -> None:
+    rows = made_rows(0, 1000)
+    rows["program"][:300], rows["program"][300:600], rows["program"][600:] = 0, 1, 0
+    rows["state"][:] = LoopState.ACTIVE
+    rows["pose"] = rows["pose_setpoint"] = [0.3, 2.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    rows["pose"][:, 0] += 1e-3 * np.linspace(0.0, 1.0, 1000)
+    rows["reaction"][700:], rows["limit"][700:] = Reaction.CONTROLLED_STOP, Limit.BROKEN_CABLE
+    rows["limit_axis"][700:], rows["state"][900:] = 1, LoopState.FAULT
+    axes = [{"name": "left"}, {"name": "right"}]
+    path = _recorded(tmp_path, rows, axes=axes, programs=["hold", "pose"])
+    (figures,) = _done("info", path)["recordings"]
+    assert [run["program"] for run in figures["runs"]] == ["hold", "pose", "hold"]
+    _, shown, _ = _log("info", path)
+    assert "pose: ended with platform at 300.6, 2000.0 mm, 0.6 mm off its target" in shown
+
+    selection = Selection([path], FIELDS)
+    columns = selection.columns()
+    (after_s, text), (fault_s, _) = faults_of(selection.readers, columns)
+    assert after_s == pytest.approx(0.7, abs=1e-3) and fault_s == pytest.approx(0.9, abs=1e-3)
+    assert text == "controlled stop by broken cable of right"
+    assert _done("plot", path)["rows"] == 1000
+
+
+def test_who_may_move_and_refusals_over_and_over_do_not_fill_the_list() -> None:
+    texts = ["pose by me: refused: a", "pose by me: refused: b", "state fault"]
+    events = [{"text": text, "kind": "command"} for text in texts]
+    events.insert(0, {"text": "me may move", "kind": "control"})
+    told = worth_telling(events)
+    assert [(event["text"], event["times"]) for event in told] == [(texts[0], 2), (texts[2], 1)]

@@ -104,7 +104,7 @@ def test_page_needs_nothing_beside_itself(page: Page) -> None:
     assert not {"script", "link", "iframe", "object", "base"} & set(page.tags)
     assert not page.links
     assert not re.search(r"https?://|url\(|@import|srcset", page.text)
-    assert len(page.sources) == page.tags.count("img") == 9
+    assert len(page.sources) == page.tags.count("img") == 10
     for source in page.sources:
         head, body = source.split(",", 1)
         assert head == "data:image/png;base64"
@@ -186,7 +186,7 @@ def test_one_direction_and_one_bandwidth(quick: Commissioned, winch: Winch) -> N
         quick.found,
     )
     told = Page(quick.paths.page)
-    assert len(told.sources) == 8
+    assert len(told.sources) == 9
     assert "one bandwidth only" in told.plain
     assert "come back at the same angle" not in told.plain  # no turn before to compare with
 

@@ -10,13 +10,18 @@ from cdpr_tools.bench import cycle as cycle_bench
 from cdpr_tools.bench import profile_loading
 from cdpr_tools.commands.bench import (
     bench_bus,
+    bench_calibration,
     bench_control,
     bench_kinematics,
     bench_latency,
     bench_loop,
+    bench_markers,
+    bench_path,
+    bench_poses,
     bench_soak,
     bench_stop,
     bench_tension,
+    bench_workspace,
 )
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.output import Output
@@ -34,13 +39,18 @@ _VARIANTS = {
 
 for _part in (
     bench_bus,
+    bench_calibration,
     bench_control,
     bench_kinematics,
     bench_latency,
     bench_loop,
+    bench_markers,
+    bench_poses,
+    bench_path,
     bench_soak,
     bench_stop,
     bench_tension,
+    bench_workspace,
 ):
     app.add_typer(_part.app)
 

@@ -4,40 +4,30 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
-from typing_extensions import override
 
+from cdpr_tools.client.axis_words import in_typed_words
 from cdpr_tools.client.client import Daemon, axis_values, key_values
-from cdpr_tools.client.motion import RENEW_S, await_end, finish, require_program
+from cdpr_tools.client.motion import (
+    RENEW_S,
+    Told,
+    await_end,
+    finish,
+    is_done,
+    require_program,
+)
 from cdpr_tools.client.platform_move import Frame, PlatformMove
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.number_options import numbers_command
 from cdpr_tools.output import Output
-from cdpr_tools.signals import stop_on_signals
+from cdpr_tools.signals import HELD, stop_on_signals
 
 _DEADMAN_S = 0.6
-_NUMBERS = frozenset({"--to", "--rotate"})
 _STANDING = frozenset({"hold", "idle"})
-
-
-class _NumbersCommand(TyperCommand):
-    """A command whose options `--to` and `--rotate` take all the numbers that follow them."""
-
-    @override
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Join each of these options with its numbers, negative ones too."""
-        joined: list[str] = []
-        takes = False
-        for word in args:
-            if takes and _is_number(word):
-                joined[-1] += f" {word}" if "=" in joined[-1] else f"={word}"
-                continue
-            takes = word in _NUMBERS
-            joined.append(word)
-        return super().parse_args(ctx, joined)
 
 
 app = typer.Typer()
@@ -61,19 +51,23 @@ def jog(
     factor = 1e-3 if cable else math.radians(1.0)
     values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
     key = "cable_velocity_m_s" if cable else "velocity_rad_s"
-    wanted = {key: values, "timeout_s": _DEADMAN_S}
-    deadline = time.monotonic() + seconds
-    with stop_on_signals() as stop_requested, daemon.control() as control:
-        control.post("/program", {"program": "jog", "wanted": wanted})
-        while time.monotonic() < deadline and not stop_requested():
+    wanted = {key: values, "timeout_s": _DEADMAN_S, "duration_s": seconds}
+    told = Told(out)
+    with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
+        begin = partial(control.post, "/program", {"program": "jog", "wanted": wanted})
+        in_typed_words(begin, _names(daemon))
+        while not stop_requested():
             time.sleep(RENEW_S)
-            require_program(daemon, "jog")
+            progress = require_program(daemon, "jog").get("program_progress", {})
+            told("jog", progress)
+            if is_done(progress):
+                break
             control.post("/set", {"wanted": wanted})
         control.hold()
     finish(daemon, out, stop_requested())
 
 
-@app.command(cls=_NumbersCommand)
+@app.command(cls=numbers_command("--to", "--rotate"))
 @with_daemon
 def move(
     daemon: Daemon,
@@ -133,19 +127,16 @@ def _move_platform(daemon: Daemon, out: Output, move: PlatformMove) -> None:
 
 
 def _run_to_end(daemon: Daemon, out: Output, program: str, wanted: dict[str, Any]) -> None:
-    with stop_on_signals() as stop_requested, daemon.control() as control:
-        control.post("/program", {"program": program, "wanted": wanted})
+    with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
+        begin = partial(control.post, "/program", {"program": program, "wanted": wanted})
+        in_typed_words(begin, _names(daemon))
         ended = await_end(control, program, stop_requested, math.inf, out)
         control.hold()
     finish(daemon, out, stop_requested(), ended, arrived=ended is not None)
 
 
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+def _names(daemon: Daemon) -> list[str]:
+    return [str(axis["name"]) for axis in daemon.get("/status")["axes"]]
 
 
 def _to_angles(
@@ -191,7 +182,7 @@ def controller(
     `hold` and `idle` run on when the command has ended.
     """
     wanted, ended = key_values(values or []), None
-    with stop_on_signals() as stop_requested, daemon.control() as control:
+    with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
         control.post("/program", {"program": name, "wanted": wanted})
         if name not in _STANDING:
             ended = await_end(control, name, stop_requested, seconds or math.inf, out)

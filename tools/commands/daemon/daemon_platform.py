@@ -13,7 +13,7 @@ from cdpr_tools.client.motion import await_end, finish
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
-from cdpr_tools.signals import stop_on_signals
+from cdpr_tools.signals import HELD, stop_on_signals
 
 
 class Source(StrEnum):
@@ -63,7 +63,8 @@ def lower(
 ) -> None:
     """Let the platform down onto its stand; the power stays on, the cables are loose."""
     wanted = {"blind": True} if blind else {}
-    _carry_out(daemon, out, "lower", wanted)
+    where = "let down blind" if blind else "on its stand"
+    _carry_out(daemon, out, "lower", wanted, f"{where}, cables loose, power on")
 
 
 @app.command()
@@ -78,7 +79,12 @@ def pause(daemon: Daemon, out: Output) -> None:
 @app.command()
 @with_daemon
 def resume(daemon: Daemon, out: Output) -> None:
-    """Go on to the position that the platform had not reached when it was paused."""
+    """Go on to the position, or along the path, that was left when it was paused."""
+    if (daemon.get("/status").get("program_progress") or {}).get("path"):
+        from cdpr_tools.client.path_following import go_on  # noqa: PLC0415  # slow to load
+
+        go_on(daemon, out)
+        return
     _carry_out(daemon, out, "pose", {"resume": True})
 
 
@@ -88,11 +94,13 @@ def _require_platform(daemon: Daemon, what: str) -> None:
         raise BadInputError(f"{what}: only for robots whose platform is moved as a whole")
 
 
-def _carry_out(daemon: Daemon, out: Output, program: str, wanted: dict[str, Any]) -> None:
-    """Have a program run to its end, then hold."""
+def _carry_out(
+    daemon: Daemon, out: Output, program: str, wanted: dict[str, Any], where: str = ""
+) -> None:
+    """Have a program run to its end, then hold; `where` are the words for its end."""
     _require_platform(daemon, program)
-    with stop_on_signals() as stop_requested, daemon.control() as control:
+    with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
         control.post("/program", {"program": program, "wanted": wanted})
         ended = await_end(control, program, stop_requested, math.inf, out)
         control.hold()
-    finish(daemon, out, stop_requested(), ended)
+    finish(daemon, out, stop_requested(), ended, where)

@@ -9,17 +9,28 @@ import typer
 from rich.live import Live
 from rich.text import Text
 
-from cdpr_tools.client.client import Daemon, NoDaemonError
+from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
+from cdpr_tools.client.motion import Told
 from cdpr_tools.client.status_text import status_text
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
-from cdpr_tools.commands.options import YesOption
+from cdpr_tools.commands.options import (
+    JsonOption,
+    KeyFileOption,
+    RobotOption,
+    SocketOption,
+    UrlOption,
+    YesOption,
+)
 from cdpr_tools.consent import require_consent
+from cdpr_tools.daemon.left_over import end_left_over
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals
 
 _WATCH_S = 0.2
 _END_S = 90.0
+_BOOT_S = 60.0
+_BOOTING = ("unconfigured", "inactive")
 
 
 app = typer.Typer()
@@ -76,10 +87,28 @@ def enable(
     program: Annotated[str, typer.Option(help="What runs from the first moment on.")] = "hold",
     yes: YesOption = False,
 ) -> None:
-    """Give the drives power; they hold where they are."""
-    _confirm(daemon.get("/status"), yes)
+    """Give the drives power; they hold where they are. Those that have it already keep it."""
+    status = _booted(daemon, out)
+    if status["state"] == "active":
+        out.say(f"has power already, program {status['program']}")
+        out.result({"ok": True, "state": "active", "text": ""})
+        return
+    _confirm(status, yes)
     with daemon.control() as control:
         _show(out, control.post("/enable", {"program": program}))
+
+
+def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
+    """Return the status once the drives have booted, or why they have not is known."""
+    deadline, told = time.monotonic() + _BOOT_S, False
+    while (status := daemon.get("/status"))["state"] in _BOOTING and not status["reason"]:
+        if time.monotonic() > deadline:
+            break
+        if not told:
+            out.note("the drives are still booting ...")
+        told = True
+        time.sleep(_WATCH_S)
+    return status
 
 
 @app.command()
@@ -104,18 +133,39 @@ def ack(daemon: Daemon, out: Output) -> None:
 
 
 @app.command()
-@with_daemon
-def stop(daemon: Daemon, out: Output) -> None:
+def stop(
+    robot: RobotOption = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """End the daemon: the motion stops under control, the power goes off."""
+    out = Output(as_json)
+    try:
+        with open_daemon(robot, socket, url, key_file) as daemon:
+            _end(daemon, out)
+    except NoDaemonError:
+        left = [] if url is not None else end_left_over(robot, socket)
+        out.say(*left or ["nothing runs"])
+    out.result({"ok": True})
+
+
+def _end(daemon: Daemon, out: Output) -> None:
+    """Ask the daemon to end and wait for it; raises WorkFailedError where it does not."""
+    status = daemon.get("/status")
     daemon.post("/shutdown")
-    deadline = time.monotonic() + _END_S
+    told, deadline = Told(out), time.monotonic() + _END_S
+    if status["state"] == "active":
+        out.note("stopping: what moves is brought to rest, then the power goes off ...")
     while time.monotonic() < deadline:
         try:
-            daemon.get("/status")
+            status = daemon.get("/status")
         except NoDaemonError:
-            out.say("stopped")
-            out.result({"ok": True})
+            dead = "; its loop had died, the drives stop by themselves without its heartbeat"
+            out.say("stopped, power off" if status["state"] != "dead" else f"ended{dead}")
             return
+        told(str(status["program"]), status.get("program_progress") or {})
         time.sleep(_WATCH_S)
     raise WorkFailedError(f"the daemon still runs {_END_S:g} s after it was asked to end")
 

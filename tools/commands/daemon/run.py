@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import sys
@@ -21,6 +22,7 @@ from cdpr_drivers.robot.robot_buses import asks_for_own_simulator, robot_urls
 from cdpr_profiles import Robot, load_robot
 from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
 from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.service.recordings.retention import BYTES_PER_AXIS, Retention, size_text
 from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
@@ -32,6 +34,7 @@ from cdpr_tools.daemon.settings import Address, RunSettings
 from cdpr_tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Output, to_json
 
+_KEPT_DAYS, _KEPT_GB = 30.0, 20.0
 _RING_S = 15.0  # longer than a service that hangs is waited for and started again
 
 _Robot = Annotated[
@@ -59,6 +62,18 @@ _Record = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Record into this folder instead of the user's.")
 ]
 _NoRecord = Annotated[bool, typer.Option("--no-record", help="Record nothing.")]
+_KeepDays = Annotated[
+    float | None,
+    typer.Option(min=0.01, help="Remove older recordings of this robot; 30 in the user's folder."),
+]
+_KeepGb = Annotated[
+    float | None,
+    typer.Option(
+        "--keep-gb",
+        min=0.01,
+        help="Remove its oldest recordings beyond so much in all; 20 in the user's folder.",
+    ),
+]
 _Live = Annotated[
     int | None,
     typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
@@ -102,6 +117,8 @@ def run(
     key_file: _KeyFile = None,
     record: _Record = None,
     no_record: _NoRecord = False,
+    keep_days: _KeepDays = None,
+    keep_gb: _KeepGb = None,
     live: _Live = None,
     live_origin: _LiveOrigin = None,
     stream: _Stream = None,
@@ -131,6 +148,8 @@ def run(
         key_file=key_file,
         record=record,
         no_record=no_record,
+        keep_days=keep_days,
+        keep_gb=keep_gb,
         live=live,
         live_origin=live_origin,
         stream=stream,
@@ -165,6 +184,8 @@ def settings_for(
     key_file: Path | None,
     record: Path | None,
     no_record: bool,
+    keep_days: float | None = None,
+    keep_gb: float | None = None,
     live: int | None,
     live_origin: list[str] | None = None,
     stream: str | None,
@@ -200,11 +221,30 @@ def settings_for(
         http=None if http is None else Address.parse("--http", http),
         key_file=key_file,
         record=None if no_record else record or default_recordings(),
+        keep=_kept(record, keep_days, keep_gb),
         live=live,
         live_origins=tuple(live_origin or ()),
         stream=None if stream is None else Address.parse("--stream", stream),
         launcher_pid=os.getpid(),
     )
+
+
+def _kept(record: Path | None, days: float | None, gb: float | None) -> Retention:
+    """Return which recordings are kept: all in a folder of the user's own, unless he says."""
+    usual_days, usual_gb = (_KEPT_DAYS, _KEPT_GB) if record is None else (math.inf, math.inf)
+    return Retention(usual_days if days is None else days, 1e9 * (usual_gb if gb is None else gb))
+
+
+def _recording_text(robot: Robot, settings: RunSettings) -> str:
+    """Return where is recorded, how much an hour, and what is kept."""
+    if settings.record is None:
+        return "records nothing"
+    hour = 3600.0 * BYTES_PER_AXIS * len(robot.axes) / robot.sync_period_s
+    keep = settings.keep
+    kept = [f"{keep.days:g} days"] * math.isfinite(keep.days)
+    kept += [size_text(keep.total_bytes)] * math.isfinite(keep.total_bytes)
+    until = f"keeps {' and '.join(kept)} at most" if kept else "removes none"
+    return f"records into {settings.record}: about {size_text(hour)} an hour; {until}"
 
 
 def _launch(
@@ -223,6 +263,7 @@ def _launch(
         report = {"robot": robot.name, "state": status["state"], "reason": status.get("reason", "")}
         _report_ready({**report, "socket": str(settings.socket), "pid": os.getpid()}, out)
 
+    out.note(_recording_text(robot, settings))
     launcher = Launcher(settings, block, out.note, ready, manager, simulator)
     status = launcher.run()
     if status != DONE:

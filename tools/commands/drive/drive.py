@@ -14,9 +14,9 @@ from cdpr_drivers.errors import SdoError
 from cdpr_drivers.robot.session import Session
 from cdpr_profiles import Winch
 from cdpr_rt.control.pid import Pid
-from cdpr_rt.control.tuning import stiffest_pid
 from cdpr_rt.motion.trajectory import Leg
 from cdpr_rt.procedures.winch_operator import Tolerance
+from cdpr_rt.programs.model import position_loop
 from cdpr_tools.commands.drive import drive_configure, drive_import, drive_setup
 from cdpr_tools.commands.options import SafetyIoOption, YesOption
 from cdpr_tools.commands.with_winch import WinchOnBus, with_powered_winch, with_winch
@@ -27,7 +27,7 @@ from cdpr_tools.output import Output
 app = typer.Typer(name="drive", help="One drive on the bus.", no_args_is_help=True)
 
 _JOG_RAMP_S = 0.5
-_JOG_HZ = (20.0, 15.0, 12.0, 8.0, 5.0)
+_JOG_SETTLE_S = 1.0
 _TORQUE_SHARE = 0.25
 _START_UP_LOOK_S = 0.01
 # a motor that turns the wrong way is to be stopped before half a turn
@@ -163,7 +163,7 @@ def jog(
     fastest = 0.1 * math.degrees(winch.profile.motor.rated_speed_rad_s)
     if not 0.0 < abs(speed_deg_s) <= fastest:
         raise BadInputError(
-            f"--speed-deg-s {speed_deg_s:g}: allowed are up to {fastest:.0f} deg/s, not 0"
+            f"--speed-deg-s {speed_deg_s:g}: allowed: up to {fastest:.0f} deg/s, not 0"
         )
     speed = math.radians(speed_deg_s)
     tolerance = Tolerance(_JOG_ERROR_RAD, max(_JOG_SPEEDS * abs(speed), _JOG_LEAST_RAD_S))
@@ -171,19 +171,23 @@ def jog(
     with winch.powered(what, tolerance) as session:
         session.enable()
         start = session.device.feedback.position_rad.copy()
-        leg = Leg(start, np.array([speed]), seconds, _JOG_RAMP_S)
+        # ramps included it turns by speed times seconds
+        ramp_s = min(_JOG_RAMP_S, 0.5 * seconds)
+        leg = Leg(start, np.array([speed]), seconds - ramp_s, ramp_s, _JOG_SETTLE_S)
         session.follow(_jog_controller(session), leg)
         moved = math.degrees(session.device.feedback.position_rad[0] - start[0])
         session.disable()
-    out.say(f"turned by {moved:.2f} deg")
-    out.result({"ok": True, "moved_deg": moved})
+    asked = speed_deg_s * seconds
+    out.say(f"turned by {moved:.2f} deg, asked for {asked:g} deg")
+    out.result({"ok": True, "moved_deg": moved, "asked_deg": asked})
 
 
 def _jog_controller(session: Session) -> Pid:
     motor, period = session.winch.motor, session.device.period_s
     # a soft loop lets a rotor with friction stick and slip: by turns at these speeds
-    design = stiffest_pid(motor.rotor_inertia_kg_m2, session.winch.latency_s, _JOG_HZ, period)
-    return Pid([design.gains], np.array([_TORQUE_SHARE * motor.rated_torque_Nm]), period)
+    design = position_loop(motor.rotor_inertia_kg_m2, session.winch.latency_s, period)
+    most = np.array([_TORQUE_SHARE * motor.rated_torque_Nm])
+    return Pid([design.gains], most, period, overcomes_stiction=True)
 
 
 @app.command()

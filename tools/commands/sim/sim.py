@@ -23,6 +23,12 @@ MODULES = {
         "fault": "Break something on a simulated robot that runs: cut-cable, slip, encoder-jump, "
         "...",
     },
+    "sim.sim_camera": {
+        "camera": "Run a camera on a simulated platform until Ctrl-C; other commands know it as "
+        "sim:SOCKET.",
+        "photos": "Write images of a simulated camera from random poses, without a robot; and its "
+        "intrinsics.",
+    },
     "sim.sim_tension": {
         "tension": "Run simulated load cells on a pseudo-terminal until Ctrl-C; tells its path "
         "when it is up.",

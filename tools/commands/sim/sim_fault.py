@@ -62,7 +62,10 @@ def fault(
         ),
     ] = None,
     *,
-    bus: Annotated[list[str], typer.Option(help="The simulator's buses, as given to `sim up`.")],
+    bus: Annotated[
+        list[str] | None,
+        typer.Option(help="The simulator's buses; those of the robot's daemon where left out."),
+    ] = None,
     axis: Annotated[str, typer.Option(help="Axis by its name, or by its number from 1.")] = "1",
 ) -> None:
     """Break something on a simulated robot that runs: cut-cable, slip, encoder-jump, ...
@@ -74,7 +77,7 @@ def fault(
     chosen = _axis(robot, axis)
     how = _HOW[what]
     amount = _amount(what, how, value)
-    url = robot_urls(robot, bus)[chosen.bus]
+    url = robot_urls(robot, bus or _buses_of_daemon(profile.profile))[chosen.bus]
     winch = chosen.winch
     try:
         network = CanNetwork(
@@ -90,6 +93,19 @@ def fault(
     finally:
         network.close()
     typer.echo(f"{chosen.name}: {what}{_amount_text(what, amount, how)}")
+
+
+def _buses_of_daemon(robot: str) -> list[str]:
+    """Return the buses of the daemon that runs the robot, as options give them.
+
+    Raises NoDaemonError where none does.
+    """
+    # loaded here: a simulator without a daemon needs no client
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415
+
+    with open_daemon(robot, None, None, None) as daemon:
+        buses = daemon.get("/status")["buses"]
+    return [f"{name}={bus['url']}" for name, bus in buses.items()]
 
 
 def _amount_text(what: Fault, amount: int, how: _How) -> str:

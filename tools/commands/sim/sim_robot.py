@@ -16,6 +16,7 @@ from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.fleet import FleetBus, serve_fleet
 from cdpr_sim_bus.frame_log import FrameLog
 from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_sim_bus.robot.board_pose import BoardPose
 from cdpr_sim_bus.robot.cable_robot import CableRobot
 from cdpr_sim_bus.robot.motor_state import Transmission
 from cdpr_sim_bus.robot.plant import Plant
@@ -79,6 +80,9 @@ def up(
             shared = stack.enter_context(made)
             for i, drive in enumerate(drives):
                 drive.connect(shared.axis(i))
+            if body is not None:
+                # neither the truth's drive nor the scanner's: a platform has more than two cables
+                drives[1].record_with(BoardPose(body, shared.platform))
         fleet = [
             FleetBus(
                 bus.name,

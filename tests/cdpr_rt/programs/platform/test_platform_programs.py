@@ -318,3 +318,28 @@ def test_a_set_point_waits_for_a_platform_that_does_not_come(robot: Standing) ->
     robot.program.stop()
     robot.run(0.2)
     assert robot.program.at_rest
+
+
+@pytest.mark.parametrize("name", ["planar-3", "planar-4", "spatial-8"])
+def test_tightening_leaves_the_platform_its_weight_where_lower_cables_can(name: str):
+    machine = load_robot(name)
+    model = model_of(machine.axes, PERIOD_S, [2.3e-3] * len(machine.axes), limits_of(machine))
+    estimator = Estimator(len(machine.axes), PERIOD_S, winches_of(machine.axes))
+    parts = platform_parts(machine, limits_of(machine), model, estimator)
+    assert parts is not None
+    t = home_pretension_N(parts)
+    pull = parts.model.kinematics.wrench_matrix(parts.model.home_pose) @ t
+    weight = parts.model.weight()
+    assert (t >= parts.control.least_N - 1e-9).all()
+    assert pull @ weight >= -1e-6  # carried in part, friction slid spatial-8 by 0.7 mm on its stand
+    assert pull == pytest.approx((pull @ weight) / (weight @ weight) * weight, abs=1e-6)
+
+
+def test_what_counts_as_arrived_grows_with_the_robot(robot: Standing):
+    assert robot.parts.near_m == 5e-4
+    large = load_robot("suspended-8")
+    n, limits = len(large.axes), limits_of(large)
+    model = model_of(large.axes, PERIOD_S, [2.3e-3] * n, limits)
+    parts = platform_parts(large, limits, model, Estimator(n, PERIOD_S, winches_of(large.axes)))
+    assert parts is not None
+    assert parts.near_m == pytest.approx(1.9e-3, abs=1e-4)

@@ -12,6 +12,8 @@ from mcap.reader import NonSeekingReader, make_reader
 
 from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.service.recordings.recording import Recorder, reserve_of
+from cdpr_rt.service.recordings.recording_reader import RecordingReader
+from cdpr_rt.service.recordings.retention import Retention
 from tests.cdpr_rt.service.recordings.recording_rig import (
     RecorderProcess,
     block_with_clock,
@@ -160,6 +162,40 @@ def test_it_ends_before_the_disk_is_full(tmp_path: Path) -> None:
     put(RowWriter(block), made_rows(0, 10))
     wait_until(lambda: recorder.status()["error"])
     recorder.stop()
-    assert "MB free" in recorder.status()["error"] and ends == [recorder.status()["error"]]
+    assert "GB free, less than the 1.15e+09 GB that" in recorder.status()["error"] and ends == [
+        recorder.status()["error"]
+    ]
     (path,) = tmp_path.iterdir()
     assert stock_cycles(path) == list(range(10))
+
+
+def test_old_recordings_and_those_beyond_the_size_are_removed_the_oldest_first(
+    tmp_path: Path,
+) -> None:
+    def leave(name: str, days: float) -> Path:
+        path = tmp_path / name
+        path.write_bytes(bytes(1000))
+        os.utime(path, (time.time() - 86400.0 * days,) * 2)
+        return path
+
+    old = [leave(f"bench-2026010{day}T080000Z-001.mcap", 40.0 - day) for day in (1, 2, 3)]
+    others = [
+        leave("bench-2-20260101T080000Z-001.mcap", 99.0),
+        leave("bench-by-hand.mcap", 99.0),
+        leave("bench-20260101T080000Z-001.png", 99.0),
+    ]
+    writing = leave("bench-20270101T080000Z-001.mcap", 0.0)
+    assert Retention(days=37.5).prune(tmp_path, "bench") == old[:2]
+    assert Retention(total_bytes=1500.0).prune(tmp_path, "bench") == old[2:]
+    assert Retention(days=0.0, total_bytes=0.0).prune(tmp_path, "bench") == []
+    assert writing.exists() and all(path.exists() for path in others)
+
+    gone = leave("bench-20260101T080000Z-001.mcap", 40.0)
+    recorder = Recorder(block_with_clock(), tmp_path, "bench", retention=Retention(days=30.0))
+    recorder.start()
+    recorder.stop()
+    assert not gone.exists() and Path(recorder.status()["file"]).exists()
+    reader = RecordingReader(Path(recorder.status()["file"]))
+    assert list(reader.cycles()) == []
+    told = [event["text"] for event in reader.events]
+    assert f"removed 1 old recordings: {gone.name}" in told

@@ -1,0 +1,171 @@
+"""What a calibration measured, as a file; and points that a person measured beside it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.geometry import file_sha256, write_text
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import read_text
+from cdpr_profiles.reading.reader import Profile, read_json_model
+from cdpr_rt.calibration.observations import Observations
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.errors import InvalidRequestError
+from cdpr_rt.robots.platform_model import PlatformModel
+
+_MOST_BYTES = 4 << 20
+_AXES = "xyz"
+_STD_mm = 2.0
+_COLUMNS = ("pose", "x_mm", "y_mm", "z_mm", "sigma_mm")
+_FURTHEST_mm = 1e6
+
+Numbers = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...]
+
+
+class PoseReading(Profile):
+    """What was read while the platform stood somewhere."""
+
+    target: Numbers
+    """Where it was to be, (d,), as the program `pose` takes it; the first search begins there."""
+    length_m: Numbers
+    """Lengths without tension as encoders and the robot's file have them, (n,)."""
+    tension_N: Numbers
+    position_m: Numbers | None = None
+    """Measured from outside, (3,)."""
+    position_std_m: float | None = Field(default=None, gt=0)
+    rotation: tuple[Numbers, ...] | None = None
+    rotation_std_rad: float | None = Field(default=None, gt=0)
+
+
+class CalibrationData(Profile):
+    """Readings at all poses of a calibration; the first is of the platform at home."""
+
+    format: Literal["cdpr-rt geometry data 1"] = "cdpr-rt geometry data 1"
+    robot: str
+    robot_sha256: str
+    date: str
+    left_out: tuple[str, ...] = ()
+    """Poses that were tried in vain, and why."""
+    poses: tuple[PoseReading, ...] = Field(max_length=100_000)
+
+    def save(self, path: Path) -> None:
+        """Write the file; raises ProfileError."""
+        write_text(path, self.model_dump_json(indent=1) + "\n")
+
+    def observations(self, robot: Robot, model: PlatformModel) -> Observations:
+        """Return the readings for the fit; raises InvalidRequestError where they do not fit."""
+        if self.robot_sha256 != file_sha256(robot.path):
+            raise InvalidRequestError(
+                f"the data are of another state of {self.robot!r}: {robot.path} has been changed "
+                "since; allowed: the file they were measured with"
+            )
+        if not self.poses:
+            raise InvalidRequestError("the data hold no poses; allowed: at least a few")
+        n, d = len(robot.axes), model.size
+        for j, reading in enumerate(self.poses):
+            counts = (len(reading.length_m), len(reading.tension_N), len(reading.target))
+            if counts != (n, n, d):
+                raise InvalidRequestError(
+                    f"pose {j + 1} has {counts} lengths, tensions and coordinates; allowed: "
+                    f"{(n, n, d)}"
+                )
+        start = model.poses(np.array([reading.target for reading in self.poses]))
+        seen = Observations.of_lengths(
+            np.array([reading.length_m for reading in self.poses]),
+            np.array([reading.tension_N for reading in self.poses]),
+            start,
+        )
+        return self._with_measured(seen, model.positions)
+
+    def _with_measured(self, seen: Observations, coordinates: int) -> Observations:
+        count = seen.poses
+        position, std = np.full((count, 3), np.nan), np.ones((count, 3))
+        turn, turn_std = np.full((count, 3, 3), np.nan), np.ones((count, 3))
+        for j, reading in enumerate(self.poses):
+            if reading.position_m is not None and reading.position_std_m is not None:
+                position[j, :coordinates] = reading.position_m[:coordinates]
+                std[j] = reading.position_std_m
+            if reading.rotation is not None and reading.rotation_std_rad is not None:
+                turn[j], turn_std[j] = np.array(reading.rotation), reading.rotation_std_rad
+        return seen.with_positions(position, std).with_rotations(turn, turn_std)
+
+
+def load_data(path: Path) -> CalibrationData:
+    """Return the data in a file; raises ProfileError."""
+    return read_json_model(path, CalibrationData)
+
+
+@dataclass(frozen=True)
+class MeasuredPoint:
+    """Where the platform's origin was at a pose, as far as it was measured; nan where not."""
+
+    pose: int
+    """Counted from 0."""
+    position_m: FloatArray
+    std_m: float
+
+
+def load_points(path: Path) -> list[MeasuredPoint]:
+    """Return measured points: CSV, columns pose,x_mm,y_mm,z_mm,sigma_mm, poses counted from 1.
+
+    Coordinates may be left empty; sigma_mm is 2 where it is. Raises ProfileError.
+    """
+    rows = list(csv.reader(io.StringIO(read_text(path, _MOST_BYTES))))
+    rows = [row for row in rows if row and not row[0].lstrip().startswith("#")]
+    if not rows or [name.strip() for name in rows[0]] not in (
+        [c for c in _COLUMNS if c not in left]
+        for left in ((), ("z_mm",), ("sigma_mm",), ("z_mm", "sigma_mm"))
+    ):
+        raise ProfileError(path, "line 1", f"allowed: the columns {','.join(_COLUMNS)}")
+    names = [name.strip() for name in rows[0]]
+    return [
+        _point(path, k + 2, dict(zip(names, row, strict=False))) for k, row in enumerate(rows[1:])
+    ]
+
+
+def _point(path: Path, line: int, row: dict[str, str]) -> MeasuredPoint:
+    def number(key: str, otherwise: float) -> float:
+        text = row.get(key, "").strip()
+        if not text:
+            return otherwise
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= _FURTHEST_mm:
+            raise ProfileError(path, f"line {line}: {key}", f"value {text!r}; allowed: a number")
+        return value
+
+    pose, sigma = number("pose", math.nan), number("sigma_mm", _STD_mm)
+    if not (pose >= 1.0 and pose.is_integer()):
+        raise ProfileError(path, f"line {line}: pose", "allowed: a pose's number, from 1")
+    if not sigma > 0.0:
+        raise ProfileError(path, f"line {line}: sigma_mm", f"value {sigma:g}; allowed: above 0")
+    at = np.array([number(f"{axis}_mm", math.nan) for axis in _AXES])
+    return MeasuredPoint(int(pose) - 1, 1e-3 * at, 1e-3 * sigma)
+
+
+def with_points(
+    seen: Observations, points: Sequence[MeasuredPoint], coordinates: int
+) -> Observations:
+    """Return observations with points in place of what else was measured of positions there."""
+    position = np.where(np.isfinite(seen.position_std_m), seen.position_m, np.nan)
+    std = np.where(np.isfinite(seen.position_std_m), seen.position_std_m, 1.0)
+    for point in points:
+        if point.pose >= seen.poses:
+            raise InvalidRequestError(
+                f"points: pose {point.pose + 1}; allowed: 1 to {seen.poses}, the poses of the data"
+            )
+        position[point.pose, :coordinates] = point.position_m[:coordinates]
+        std[point.pose] = point.std_m
+    return replace(seen.with_positions(position, std, seen.target_m), used=seen.used)

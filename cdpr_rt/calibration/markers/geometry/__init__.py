@@ -1,0 +1,1 @@
+"""Rotations, lenses, and squares seen through them."""

@@ -1,0 +1,225 @@
+"""Time along a path: as fast as speeds, accelerations, jerks and tensions allow, at rest in stops.
+
+Each run between two stops is scaled by the passes of `time_scaling_kernel`, whose motion is then
+averaged over time so that its acceleration has no steps. Averaged, it is too fast where it was
+slow for a moment only: those places are slowed down and the run is scaled again, until all samples
+of the smoothed motion keep all limits. What little is left is left to time: the run is slowed as a
+whole, by which nothing that was within limits leaves them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.motion.path import time_scaling_kernel as kernel
+from cdpr_rt.motion.path.nodes import PathNodes
+
+PERIOD_S: Final = 0.01
+"""Between the samples of a plan."""
+_TOLERANCE: Final = 1.005
+_ROUNDS: Final = 20
+_FINER: Final = 3.0
+"""Places that are looked at for each sample."""
+_SHARE: Final = 0.98
+"""Of acceleration and jerk that the first passes use; the rest is for smoothing."""
+_SLOWEST_m_s: Final = 1e-4
+_NOTHING: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class PathLimits:
+    """The most of each coordinate, (d,) each, by s, s² and s³."""
+
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+    @property
+    def table(self) -> FloatArray:
+        """All of it, (3, d)."""
+        return np.array([self.velocity, self.acceleration, self.jerk])
+
+    @property
+    def smoothing_s(self) -> float:
+        """Over what time velocities are averaged: accelerations step by twice their most, over it.
+
+        A jerk that is not limited leaves a millisecond.
+        """
+        return max(2.0 * float((self.acceleration / self.jerk).max()), 1e-3)
+
+
+@dataclass(frozen=True)
+class WrenchBounds:
+    """Which wrenches the tensions can exert along a path, as half-spaces, and which it takes.
+
+    lower <= normals · (by_u u + by_x x) <= upper at node i with `row[i]`, -1 where any motion
+    within the limits of acceleration is carried anyway.
+    """
+
+    row: NDArray[np.int64]
+    """(N,)"""
+    normals: FloatArray
+    """(t, f, d)"""
+    lower: FloatArray
+    """(t, f), below 0, as `upper` above: what rest takes has been taken off."""
+    upper: FloatArray
+    by_u: FloatArray
+    """(N, d), what d²s/dt² takes, and ..."""
+    by_x: FloatArray
+    """... (ds/dt)²."""
+
+    @classmethod
+    def none(cls, count: int, d: int) -> WrenchBounds:
+        """Return no bounds for so many nodes."""
+        nothing = np.zeros((count, d))
+        rows = np.full(count, -1, np.int64)
+        return cls(rows, np.zeros((1, 1, d)), np.zeros((1, 1)), np.zeros((1, 1)), nothing, nothing)
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+        """What does not go by node."""
+        return self.row, self.normals, self.lower, self.upper
+
+
+@dataclass(frozen=True)
+class TimedPath:
+    """A path in time: samples every `period_s`."""
+
+    period_s: float
+    samples: FloatArray
+    """Position, velocity and acceleration (c, 3, d)."""
+    node: NDArray[np.int64]
+    """The node before each, (c,)."""
+    along_m: FloatArray
+    """Length along the path, weighted as the nodes', (c,)."""
+    waits: NDArray[np.int64]
+    """Samples at which it waits until it is told to go on."""
+    rounds: int
+    """How often runs were scaled, at most."""
+
+    @property
+    def duration_s(self) -> float:
+        """How long it takes, without what it waits."""
+        return self.period_s * (len(self.samples) - 1)
+
+
+def time_path(nodes: PathNodes, limits: PathLimits, wrenches: WrenchBounds) -> TimedPath:
+    """Return the fastest motion along a path within limits, as near as smoothing comes to it."""
+    bound = speed_bounds(nodes, limits)
+    samples, node, along, waits, most = [], [], [], [], 0
+    count = 0
+    for (begin, end), dwell_s, wait in zip(nodes.runs, nodes.dwell_s, nodes.waits, strict=True):
+        last_q, last_s = nodes.q[end], nodes.s[end]
+        if end > begin:
+            motion, slower, rounds = _scale(nodes, limits, wrenches, bound, int(begin), int(end))
+            part = np.zeros((len(motion), 3, nodes.q.shape[1]))
+            where = np.zeros(len(motion), np.int64)
+            kernel.sample_run(
+                begin, end, slower, nodes.s, nodes.q, nodes.first, nodes.second, motion, part, where
+            )
+            part[-1], part[-1, 0] = 0.0, last_q  # not as rounded
+            samples.append(part[:-1])
+            node.append(where[:-1])
+            along.append(motion[:-1, 0])
+            count += len(part) - 1
+            most = max(most, rounds)
+        resting = int(np.ceil(dwell_s / PERIOD_S))
+        still = np.zeros((resting, 3, nodes.q.shape[1]))
+        still[:, 0] = last_q
+        samples.append(still)
+        node.append(np.full(resting, end))
+        along.append(np.full(resting, last_s))
+        count += resting
+        if wait:
+            waits.append(count)
+    final = np.zeros((1, 3, nodes.q.shape[1]))
+    final[0, 0] = nodes.q[-1]
+    return TimedPath(
+        PERIOD_S,
+        np.concatenate([*samples, final]),
+        np.append(np.concatenate(node), len(nodes.s) - 1),
+        np.append(np.concatenate(along), nodes.s[-1]),
+        np.array(waits, np.int64),
+        most,
+    )
+
+
+def speed_bounds(nodes: PathNodes, limits: PathLimits) -> FloatArray:
+    """Return the greatest (ds/dt)² of each node, (N,), by velocity, feed and bends."""
+    k = nodes.coordinates.positions
+    first, second = np.abs(nodes.first), np.abs(nodes.second)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bounds = [(limits.velocity / first) ** 2, _SHARE * limits.acceleration / second]
+        straight, turned = (np.linalg.norm(part, axis=1) for part in (first[:, :k], first[:, k:]))
+        along = np.where(straight > _NOTHING, straight, turned)
+        feed = ((nodes.speed / along) ** 2)[:, None]
+        third = np.zeros_like(second)
+        step = np.diff(nodes.s)
+        bend = np.abs(np.diff(nodes.second, axis=0)) / np.maximum(step, _NOTHING)[:, None]
+        bend[step <= 0.0] = 0.0
+        third[:-1], third[1:] = bend, np.maximum(third[1:], bend)
+        bounds += [feed, (_SHARE * limits.jerk / third) ** (2.0 / 3.0)]
+    least = np.min([np.nan_to_num(one, nan=np.inf).min(axis=1) for one in bounds], axis=0)
+    least[nodes.runs.ravel()] = 0.0
+    return np.asarray(least)
+
+
+def _scale(
+    nodes: PathNodes,
+    limits: PathLimits,
+    wrenches: WrenchBounds,
+    bound: FloatArray,
+    begin: int,
+    end: int,
+) -> tuple[FloatArray, float, int]:
+    """Return a run's smoothed motion (c, 4), by how much it is to be slower, and the rounds."""
+    x, times, swept = np.zeros((3, len(bound)))
+    width_s, most = limits.smoothing_s, _SHARE * limits.acceleration
+    forces = (wrenches.by_u, wrenches.by_x)
+    geometry = (nodes.s, nodes.q, nodes.first, nodes.second)
+    for rounds in range(1, _ROUNDS + 1):
+        kernel.scale_run(
+            begin, end, nodes.s, nodes.first, nodes.second, most, *wrenches.arrays, *forces,
+            bound, x,
+        )  # fmt: skip
+        kernel.clock_run(begin, end, nodes.s, x, times, swept)
+        duration_s = float(times[end]) + width_s
+        motion = _smoothed(nodes, begin, end, width_s, duration_s, _FINER, x, times, swept)
+        strain, where = np.zeros(len(motion)), np.zeros(len(motion), np.int64)
+        kernel.strain_run(
+            begin, end, *geometry, nodes.speed, nodes.coordinates.positions, limits.table,
+            *wrenches.arrays, *forces, motion, strain, where,
+        )  # fmt: skip
+        if rounds == _ROUNDS or not kernel.lower_bounds(
+            begin, end, width_s, _TOLERANCE, nodes.s, motion, strain, where, bound
+        ):
+            break
+        np.maximum(bound[begin + 1 : end], _SLOWEST_m_s**2, out=bound[begin + 1 : end])
+    slower = max(1.0, float(strain.max()))  # its count of samples says by how much
+    motion = _smoothed(nodes, begin, end, width_s, duration_s, slower, x, times, swept)
+    slower = PERIOD_S * (len(motion) - 1) / duration_s
+    return motion, slower, rounds
+
+
+def _smoothed(
+    nodes: PathNodes,
+    begin: int,
+    end: int,
+    width_s: float,
+    duration_s: float,
+    stretch: float,
+    x: FloatArray,
+    times: FloatArray,
+    swept: FloatArray,
+) -> FloatArray:
+    """Return a run's smoothed motion, (c, 4): places even in time, as many as if it was stretched."""
+    count = max(int(np.ceil(stretch * duration_s / PERIOD_S - _NOTHING)), 1)
+    motion = np.zeros((count + 1, 4))
+    kernel.smooth_run(begin, end, width_s, duration_s / count, nodes.s, x, times, swept, motion)
+    motion[-1] = nodes.s[end], 0.0, 0.0, 0.0
+    return motion

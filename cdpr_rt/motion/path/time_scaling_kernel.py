@@ -1,0 +1,359 @@
+"""Kernels of the time scaling: the fastest motion along a path's nodes that limits bear.
+
+State and control are those of Bobrow and of TOPP-RA (Pham and Pham, 2018): x = ds/dt squared and
+u = d²s/dt². All limits on velocity bound x, all limits on acceleration and on tensions are
+inequalities linear in (x, u) at each node; u is even between two nodes, so that x is linear in s.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.jit import jit
+
+_NOTHING: Final = 1e-12
+_MOST_CUTS: Final = 60
+_FAR: Final = 1e12
+_REACH: Final = 0.55
+
+
+@jit
+def _bounds(
+    x: float,
+    first: FloatArray,
+    second: FloatArray,
+    most: FloatArray,
+    row: int,
+    normals: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    by_u: FloatArray,
+    by_x: FloatArray,
+    found: FloatArray,
+) -> None:
+    """Write the least and the greatest u at x, and how fast they change with x, into found (4,).
+
+    Of accelerations first·u + second·x, up to `most` either way; and where `row` is not -1 of
+    wrenches by_u·u + by_x·x whose products with `normals[row]` (f, d) are within bounds (f,).
+    """
+    found[0], found[1], found[2], found[3] = -_FAR, _FAR, 0.0, 0.0
+    for k in range(first.size):
+        _narrow(first[k], second[k], -most[k], most[k], x, found)
+    if row >= 0:
+        for f in range(normals.shape[1]):
+            a, b = 0.0, 0.0
+            for k in range(normals.shape[2]):
+                a += normals[row, f, k] * by_u[k]
+                b += normals[row, f, k] * by_x[k]
+            _narrow(a, b, lower[row, f], upper[row, f], x, found)
+
+
+@jit
+def _narrow(a: float, b: float, low: float, high: float, x: float, found: FloatArray) -> None:
+    """Narrow u to low <= a u + b x <= high."""
+    if abs(a) < _NOTHING:
+        return
+    if a < 0.0:
+        a, b, low, high = -a, -b, -high, -low
+    least, most = (low - b * x) / a, (high - b * x) / a
+    if least > found[0]:
+        found[0], found[2] = least, -b / a
+    if most < found[1]:
+        found[1], found[3] = most, -b / a
+
+
+@jit
+def scale_run(
+    begin: int,
+    end: int,
+    s: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    most: FloatArray,
+    rows: IntArray,
+    normals: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    by_u: FloatArray,
+    by_x: FloatArray,
+    bound: FloatArray,
+    x: FloatArray,
+) -> None:
+    """Write the greatest x (N,) up to `bound` (N,) from node `begin` to `end`, at rest at both.
+
+    Backward: the greatest x from which the next node's can be reached. Forward: the greatest u.
+    """
+    found = x[:4].copy()
+    x[begin] = x[end] = 0.0
+    for i in range(end - 1, begin, -1):
+        step = 2.0 * (s[i + 1] - s[i])
+        here = bound[i]
+        for _ in range(_MOST_CUTS):
+            _bounds(
+                here, first[i], second[i], most, rows[i], normals, lower, upper, by_u[i], by_x[i],
+                found,
+            )  # fmt: skip
+            _narrow(1.0, 1.0 / step, 0.0, x[i + 1] / step, here, found)
+            gap, slope = found[0] - found[1], found[2] - found[3]
+            if gap <= _NOTHING:
+                break
+            # the gap is convex in x: a tangent's zero is never below the first one of the gap
+            here = here - gap / slope if slope > _NOTHING else 0.5 * here
+            if here <= 0.0:
+                here = 0.0
+                break
+        x[i] = here
+    for i in range(begin, end - 1):
+        step = 2.0 * (s[i + 1] - s[i])
+        _bounds(
+            x[i], first[i], second[i], most, rows[i], normals, lower, upper, by_u[i], by_x[i],
+            found,
+        )  # fmt: skip
+        x[i + 1] = max(min(x[i + 1], x[i] + step * found[1]), 0.0)
+
+
+@jit
+def clock_run(
+    begin: int, end: int, s: FloatArray, x: FloatArray, t: FloatArray, swept: FloatArray
+) -> None:
+    """Write the time (N,) of each node of a run since its beginning, and the integral of s."""
+    t[begin] = swept[begin] = 0.0
+    for i in range(begin, end):
+        v, w = math.sqrt(x[i]), math.sqrt(x[i + 1])
+        step = s[i + 1] - s[i]
+        dt = 2.0 * step / max(v + w, _NOTHING)
+        slope = (w - v) / dt
+        t[i + 1] = t[i] + dt
+        here = s[i] - s[begin]
+        swept[i + 1] = swept[i] + dt * (here + dt * (0.5 * v + dt * slope / 6.0))
+
+
+@jit
+def _at(
+    t: float,
+    i: int,
+    begin: int,
+    end: int,
+    s: FloatArray,
+    x: FloatArray,
+    times: FloatArray,
+    swept: FloatArray,
+    out: FloatArray,
+) -> int:
+    """Write integral of s, s, ds/dt and d²s/dt² at a time into out (4,); return the node before."""
+    if t <= 0.0:
+        out[0] = out[1] = out[2] = out[3] = 0.0
+        return begin
+    if t >= times[end]:
+        out[1] = s[end] - s[begin]
+        out[0] = swept[end] + out[1] * (t - times[end])
+        out[2] = out[3] = 0.0
+        return end - 1
+    while i < end - 1 and times[i + 1] <= t:
+        i += 1
+    v, w = math.sqrt(x[i]), math.sqrt(x[i + 1])
+    slope, dt, here = (w - v) / (times[i + 1] - times[i]), t - times[i], s[i] - s[begin]
+    out[0] = swept[i] + dt * (here + dt * (0.5 * v + dt * slope / 6.0))
+    out[1] = here + dt * (v + 0.5 * dt * slope)
+    out[2], out[3] = v + dt * slope, slope
+    return i
+
+
+@jit
+def smooth_run(
+    begin: int,
+    end: int,
+    width_s: float,
+    period_s: float,
+    s: FloatArray,
+    x: FloatArray,
+    times: FloatArray,
+    swept: FloatArray,
+    motion: FloatArray,
+) -> None:
+    """Write s and three derivatives by time, (c, 4), every `period_s`, of a run's smoothed motion.
+
+    Its average over the last `width_s`: whatever steps the acceleration takes, the third derivative
+    is at most their height over the width. It lasts longer by the width, at rest at both ends.
+    """
+    now, before = motion[0].copy(), motion[0].copy()
+    i = j = begin
+    for c in range(motion.shape[0]):
+        t = c * period_s
+        i = _at(t, i, begin, end, s, x, times, swept, now)
+        j = _at(t - width_s, j, begin, end, s, x, times, swept, before)
+        for k in range(4):
+            motion[c, k] = (now[k] - before[k]) / width_s
+        motion[c, 0] += s[begin]
+
+
+@jit
+def place_between(
+    along: float,
+    i: int,
+    s: FloatArray,
+    q: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write position and three derivatives by length, (4, d), between the nodes i and i + 1.
+
+    The polynomial of fifth order that has both nodes' positions and two derivatives.
+    """
+    h = s[i + 1] - s[i]
+    u = min(max((along - s[i]) / h, 0.0), 1.0)
+    for k in range(q.shape[1]):
+        p0, v0, a0 = q[i, k], h * first[i, k], h * h * second[i, k]
+        p1, v1, a1 = q[i + 1, k], h * first[i + 1, k], h * h * second[i + 1, k]
+        gap, slope, bend = p1 - p0 - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
+        c3 = 10.0 * gap - 4.0 * slope + 0.5 * bend
+        c4 = -15.0 * gap + 7.0 * slope - bend
+        c5 = 6.0 * gap - 3.0 * slope + 0.5 * bend
+        out[0, k] = p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))))
+        out[1, k] = (v0 + u * (a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h
+        out[2, k] = (a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / h**2
+        out[3, k] = (6 * c3 + u * (24 * c4 + u * 60 * c5)) / h**3
+
+
+@jit
+def strain_run(
+    begin: int,
+    end: int,
+    s: FloatArray,
+    q: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    speed: FloatArray,
+    positions: int,
+    limits: FloatArray,
+    rows: IntArray,
+    normals: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    by_u: FloatArray,
+    by_x: FloatArray,
+    motion: FloatArray,
+    strain: FloatArray,
+    node: IntArray,
+) -> None:
+    """Write by which factor (c,) each sample of `motion` (c, 4) would have to be slower, and where.
+
+    `limits` (3, d) are those of velocity, acceleration and jerk, `speed` (N,) that along the path.
+    """
+    at = q[:4].copy()  # a run has five nodes at least
+    i = begin
+    for c in range(motion.shape[0]):
+        while i < end - 1 and s[i + 1] <= motion[c, 0]:
+            i += 1
+        node[c] = i
+        place_between(motion[c, 0], i, s, q, first, second, at)
+        v, a, j = motion[c, 1], motion[c, 2], motion[c, 3]
+        worst, straight, turned = 0.0, 0.0, 0.0
+        for k in range(q.shape[1]):
+            rate = at[1, k] * v
+            slope = at[1, k] * a + at[2, k] * v * v
+            jerk = at[1, k] * j + 3.0 * at[2, k] * v * a + at[3, k] * v * v * v
+            worst = max(worst, abs(rate) / limits[0, k])
+            worst = max(worst, math.sqrt(abs(slope) / limits[1, k]))
+            worst = max(worst, (abs(jerk) / limits[2, k]) ** (1.0 / 3.0))
+            if k < positions:
+                straight += rate * rate
+            else:
+                turned += rate * rate
+        along = math.sqrt(straight if straight > _NOTHING * v * v else turned)
+        wanted = speed[i] if motion[c, 0] - s[i] < 0.5 * (s[i + 1] - s[i]) else speed[i + 1]
+        worst = max(worst, along / wanted)
+        if rows[i] >= 0:
+            worst = max(
+                worst, _wrench_strain(rows[i], normals, lower, upper, by_u[i], by_x[i], v * v, a)
+            )
+        strain[c] = worst
+
+
+@jit
+def _wrench_strain(
+    row: int,
+    normals: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    by_u: FloatArray,
+    by_x: FloatArray,
+    x: float,
+    u: float,
+) -> float:
+    worst = 0.0
+    for f in range(normals.shape[1]):
+        needed = 0.0
+        for k in range(normals.shape[2]):
+            needed += normals[row, f, k] * (by_u[k] * u + by_x[k] * x)
+        room = upper[row, f] if needed > 0.0 else -lower[row, f]
+        worst = max(worst, abs(needed) / max(room, _NOTHING))
+    return math.sqrt(worst)
+
+
+@jit
+def lower_bounds(
+    begin: int,
+    end: int,
+    width_s: float,
+    tolerance: float,
+    s: FloatArray,
+    motion: FloatArray,
+    strain: FloatArray,
+    node: IntArray,
+    bound: FloatArray,
+) -> bool:
+    """Lower `bound` (N,) of x where the smoothed motion is too fast; return whether it is anywhere.
+
+    A sample is an average over `width_s`: as much of the path is slowed as is passed in that time
+    at the speed that is wanted.
+    """
+    lowered = False
+    for c in range(motion.shape[0]):
+        if strain[c] <= tolerance:
+            continue
+        lowered = True
+        v = motion[c, 1] / strain[c]
+        reach = _REACH * v * width_s
+        i = node[c]
+        while i >= begin and s[i] >= motion[c, 0] - reach:
+            bound[i] = min(bound[i], v * v)
+            i -= 1
+        bound[max(i, begin)] = min(bound[max(i, begin)], v * v)
+        i = node[c] + 1
+        while i <= end and s[i] <= motion[c, 0] + reach:
+            bound[i] = min(bound[i], v * v)
+            i += 1
+        bound[min(i, end)] = min(bound[min(i, end)], v * v)
+    return lowered
+
+
+@jit
+def sample_run(
+    begin: int,
+    end: int,
+    slower: float,
+    s: FloatArray,
+    q: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    motion: FloatArray,
+    samples: FloatArray,
+    node: IntArray,
+) -> None:
+    """Write positions, velocities and accelerations (c, 3, d) of a motion slowed by a factor."""
+    at = q[:4].copy()  # a run has five nodes at least
+    i = begin
+    for c in range(motion.shape[0]):
+        while i < end - 1 and s[i + 1] <= motion[c, 0]:
+            i += 1
+        node[c] = i
+        place_between(motion[c, 0], i, s, q, first, second, at)
+        v, a = motion[c, 1] / slower, motion[c, 2] / slower**2
+        for k in range(q.shape[1]):
+            samples[c, 0, k] = at[0, k]
+            samples[c, 1, k] = at[1, k] * v
+            samples[c, 2, k] = at[1, k] * a + at[2, k] * v * v

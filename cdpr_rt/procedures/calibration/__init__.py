@@ -1,0 +1,1 @@
+"""Procedures that calibrate a robot's geometry."""

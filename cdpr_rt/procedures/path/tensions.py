@@ -1,0 +1,53 @@
+"""The tensions that a planned path takes, by the robot's own distribution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.motion.path.time_scaling import TimedPath
+from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.tension.tension_distribution import TensionOutcome, tension_distribution
+from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.wrenches.path_wrenches import InertialWrenches
+
+_MOST: Final = 20_000
+
+
+@dataclass(frozen=True)
+class PathTensions:
+    """Tensions at some of a plan's samples, evenly chosen where there are too many."""
+
+    sample: NDArray[np.int64]
+    """Which, (m,)."""
+    tension_N: FloatArray
+    """(m, n)"""
+    low_N: FloatArray
+    """Bounds that are planned with: the file's, with the control's reserve, (n,)."""
+    high_N: FloatArray
+    carried: NDArray[np.bool_]
+    """Where there are tensions within these bounds, (m,)."""
+
+
+def path_tensions(model: PlatformModel, timed: TimedPath, high_N: FloatArray) -> PathTensions:
+    """Return the tensions along a plan; `high_N` (n,) are upper bounds, as for the planner."""
+    step = -(-len(timed.samples) // _MOST)
+    chosen = np.arange(0, len(timed.samples), step)
+    q, v, a = (np.ascontiguousarray(timed.samples[chosen, i]) for i in range(3))
+    low, high = model.low_N + model.reserve_N, high_N - model.reserve_N
+    method = model.platform.tension_distribution
+    wanted = low if method == "minimum-deviation" else None
+    distribution = tension_distribution(method, low, high, model.wrench_scale, wanted)
+    weight = np.zeros(6)
+    weight[model.positions - 1] = -model.platform.mass_kg * G_m_s2
+    others = weight[list(model.kinematics.directions)] - InertialWrenches(model, q).of(v, a)
+    matrices = model.workspace(0.0, 0.0).wrench_matrices(model.poses(q))
+    tension, carried = np.zeros((len(q), model.kinematics.n)), np.zeros(len(q), bool)
+    for i, W in enumerate(matrices):
+        outcome = distribution.solve(W, others[i], tension[i])
+        carried[i] = outcome is TensionOutcome.FEASIBLE
+    return PathTensions(chosen, tension, low, high, carried)

@@ -1,0 +1,63 @@
+"""Kernel that finds how far a platform gets on straight ways, held and without contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.jit import jit
+from cdpr_rt.robots.interference.contact_kernel import (
+    BASE,
+    START,
+    STEP,
+    TURNED,
+    WAY_ROWS,
+    first_contact,
+)
+from cdpr_rt.robots.reach.held_kernel import held_until
+
+WHOLE, CONTACT, NOT_HELD = range(3)
+"""Why a way ends: it is the whole of it, something is in contact, or tensions do not hold."""
+
+
+@jit
+def reach_all(
+    home: FloatArray,
+    start: FloatArray,
+    ends: FloatArray,
+    chosen: IntArray,
+    geometry: FloatArray,
+    boxes: FloatArray,
+    pairs: IntArray,
+    clearance: float,
+    trim: float,
+    centred: FloatArray,
+    centre: FloatArray,
+    wrenches: FloatArray,
+    generators: int,
+    scale: FloatArray,
+    bounds: FloatArray,
+    shares: FloatArray,
+    why: IntArray,
+) -> None:
+    """Write for which share of each straight way a platform is held and clear, eq. (3.38).
+
+    Ways lead from the position `start` (d,) to each of `ends` (m, d); all else is that of
+    `first_contact` and, about the point where wrenches act, of `held_until`.
+    """
+    way = np.zeros((WAY_ROWS, 3))
+    way[START], way[BASE:] = home[0], home[1:]
+    for j in range(ends.shape[0]):
+        for k in range(start.size):
+            row, column = START, chosen[k]
+            if chosen[k] > 2:
+                row, column = TURNED, chosen[k] - 3
+            way[row, column], way[row + STEP, column] = start[k], ends[j, k] - start[k]
+        touches, pair, _ = first_contact(geometry, boxes, pairs, clearance, trim, way)
+        until = min(touches, 1.0)
+        why[j] = WHOLE if pair < 0 else CONTACT
+        shares[j], _ = held_until(
+            centred, centre, chosen, wrenches, generators, scale, bounds, way, until
+        )
+        if shares[j] < until:
+            why[j] = NOT_HELD

@@ -1,0 +1,97 @@
+"""The wrenches that tensions within bounds exert, as half-spaces: facets of a zonotope."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.jit import jit
+
+_FLAT: Final = 1e-9
+
+
+@jit
+def _largest(room: FloatArray, r: int) -> tuple[int, int]:
+    """Return row and column of the entry that is farthest from 0, from r on, of (d - 1, d)."""
+    row, column = r, r
+    for i in range(r, room.shape[0] - 1):
+        for k in range(r, room.shape[1]):
+            if abs(room[i, k]) > abs(room[row, column]):
+                row, column = i, k
+    return row, column
+
+
+@jit
+def _normal(W: FloatArray, columns: IntArray, room: FloatArray, normal: FloatArray) -> bool:
+    """Write the direction (d,) at right angles to d - 1 columns of W; False where there are more.
+
+    Gauss' elimination with full pivoting.
+    """
+    d = W.shape[0]
+    order = np.arange(d)
+    for r in range(d - 1):
+        for k in range(d):
+            room[r, k] = W[k, columns[r]]
+    for r in range(d - 1):
+        row, column = _largest(room, r)
+        if abs(room[row, column]) < _FLAT:
+            return False
+        for k in range(d):
+            room[r, k], room[row, k] = room[row, k], room[r, k]
+        for i in range(d - 1):
+            room[i, r], room[i, column] = room[i, column], room[i, r]
+        order[r], order[column] = order[column], order[r]
+        for i in range(d - 1):
+            if i != r:
+                factor = room[i, r] / room[r, r]
+                for k in range(r, d):
+                    room[i, k] -= factor * room[r, k]
+    size = 1.0
+    for r in range(d - 1):
+        normal[order[r]] = -room[r, d - 1] / room[r, r]
+        size += normal[order[r]] ** 2
+    normal[order[d - 1]] = 1.0
+    normal /= np.sqrt(size)
+    return True
+
+
+@jit
+def write_facets(
+    matrices: FloatArray,
+    scale: FloatArray,
+    combinations: IntArray,
+    low: FloatArray,
+    high: FloatArray,
+    normals: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+) -> None:
+    """Write normals (m, f, d) and bounds (m, f) of the wrenches W t at m poses, low <= t <= high.
+
+    Each d - 1 cables of `combinations` (f, d - 1) span a facet on both sides: hyperplane shifting
+    (Bouchard, Gosselin, Moore 2010; Gouttefarde, Krut 2010). Combinations that span less get a
+    normal of 0 within 0. `matrices` (m, d, n) are those by which tensions act, `scale` (d,) what of
+    each direction counts as much as 1 N.
+    """
+    m, d, n = matrices.shape
+    W, room = np.zeros((d, n)), np.zeros((d, d))
+    for j in range(m):
+        for k in range(d):
+            for i in range(n):
+                W[k, i] = matrices[j, k, i] / scale[k]
+        for f in range(combinations.shape[0]):
+            normal = normals[j, f]
+            lower[j, f] = upper[j, f] = 0.0
+            if not _normal(W, combinations[f], room, normal):
+                normal[:] = 0.0
+                continue
+            for i in range(n):
+                along = 0.0
+                for k in range(d):
+                    along += normal[k] * W[k, i]
+                lower[j, f] += min(along * low[i], along * high[i])
+                upper[j, f] += max(along * low[i], along * high[i])
+            for k in range(d):
+                normal[k] /= scale[k]

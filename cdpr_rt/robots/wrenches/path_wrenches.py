@@ -1,0 +1,120 @@
+"""What wrenches motion along a path takes of the cables, and which ones they can exert there."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.rigid_body import in_space, inertia_kg_m2
+from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.wrenches.facet_kernel import write_facets
+
+_STEP = 1e-6
+_SMALL_rad = 1e-4
+
+
+@dataclass(frozen=True)
+class AvailableWrenches:
+    """Half-spaces of the wrenches by which a platform can be accelerated at m poses.
+
+    lower <= normals · F <= upper for F (d,): force and moment about the centre of mass, with what
+    rest takes taken off already.
+    """
+
+    normals: FloatArray
+    """(m, f, d)"""
+    lower: FloatArray
+    """(m, f)"""
+    upper: FloatArray
+
+    @property
+    def holds(self) -> NDArray[np.bool_]:
+        """Where the platform can be held at rest, (m,)."""
+        return np.asarray(((self.lower <= 0.0) & (self.upper >= 0.0)).all(axis=1))
+
+    def spare(self, most: FloatArray) -> NDArray[np.bool_]:
+        """Return where each wrench of a box is carried, (m,); `most` (m, d) are half its sides."""
+        needed = np.einsum("mfd,md->mf", np.abs(self.normals), most)
+        return np.asarray(((needed <= self.upper) & (-needed >= self.lower)).all(axis=1))
+
+
+def available_wrenches(
+    model: PlatformModel, positions: FloatArray, high_N: FloatArray
+) -> AvailableWrenches:
+    """Return the wrenches at positions (m, d), for tensions with the model's reserve to bounds.
+
+    `high_N` (n,) are upper bounds, such as what the motors' torque leaves.
+    """
+    matrices = model.workspace(0.0, 0.0).wrench_matrices(model.poses(positions))
+    m, d, n = matrices.shape
+    chosen = np.array(list(itertools.combinations(range(n), d - 1)), np.int64)
+    normals = np.zeros((m, len(chosen), d))
+    lower, upper = np.zeros((2, m, len(chosen)))
+    low, high = model.low_N + model.reserve_N, high_N - model.reserve_N
+    write_facets(matrices, model.wrench_scale, chosen, low, high, normals, lower, upper)
+    weight = np.zeros(6)
+    weight[model.positions - 1] = -model.platform.mass_kg * G_m_s2
+    rest = normals @ weight[list(model.kinematics.directions)]
+    return AvailableWrenches(normals, lower + rest, upper + rest)
+
+
+class InertialWrenches:
+    """The wrench (d,) about the centre of mass that accelerates a platform along a path."""
+
+    def __init__(self, model: PlatformModel, positions: FloatArray) -> None:
+        """Take positions (m, d)."""
+        platform = model.platform
+        self._directions, self._k = list(model.kinematics.directions), model.positions
+        self._mass_kg = platform.mass_kg
+        Q = model.poses(positions)[:, 1:]
+        self._centre = Q @ in_space(platform.centre_of_mass_m)
+        self._inertia = Q @ inertia_kg_m2(platform) @ np.swapaxes(Q, 1, 2)
+        self._turn = self._vectors(positions)
+
+    def of(self, velocity: FloatArray, acceleration: FloatArray) -> FloatArray:
+        """Return the wrenches (m, d) for velocities and accelerations of positions (m, d)."""
+        linear = self._linear(acceleration)
+        rate, slope = self._vectors(velocity), self._vectors(acceleration)
+        # the angular velocity is J(φ) φ'
+        spin = _spin(self._turn, rate)
+        size = np.maximum(np.linalg.norm(rate, axis=1), 1.0)[:, None]
+        step = _STEP / size
+        ahead = _spin(self._turn + step * rate, rate)
+        turning = _spin(self._turn, slope) + (ahead - spin) / step
+        arm = self._centre
+        linear = linear + np.cross(turning, arm) + np.cross(spin, np.cross(spin, arm))
+        momentum = np.einsum("mij,mj->mi", self._inertia, spin)
+        moment = np.einsum("mij,mj->mi", self._inertia, turning) + np.cross(spin, momentum)
+        return np.hstack([self._mass_kg * linear, moment])[:, self._directions]
+
+    def _linear(self, values: FloatArray) -> FloatArray:
+        out = np.zeros((len(values), 3))
+        out[:, : self._k] = values[:, : self._k]
+        return out
+
+    def _vectors(self, values: FloatArray) -> FloatArray:
+        """Return the rotational entries of (m, d) as vectors (m, 3)."""
+        out = np.zeros((len(values), 3))
+        for column, direction in enumerate(self._directions):
+            if direction >= 3:
+                out[:, direction - 3] = values[:, column]
+        return out
+
+
+def _spin(turn: FloatArray, rate: FloatArray) -> FloatArray:
+    """Return the angular velocities (m, 3) of rotation vectors that change at a rate.
+
+    J(φ) = 1 + (1 - cos θ)/θ² [φ]× + (θ - sin θ)/θ³ [φ]×².
+    """
+    angle = np.linalg.norm(turn, axis=1)[:, None]
+    small = angle < _SMALL_rad
+    safe = np.where(small, 1.0, angle)
+    one = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    two = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (safe - np.sin(safe)) / safe**3)
+    across = np.cross(turn, rate)
+    return np.asarray(rate + one * across + two * np.cross(turn, across))

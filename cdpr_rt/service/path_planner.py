@@ -1,0 +1,70 @@
+"""Planning of paths for the service, in a process that does not keep the service from its work."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import tempfile
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+from cdpr_rt.errors import ControlError
+
+Plan = Callable[[Path, dict[str, Any]], Awaitable[tuple[int, str]]]
+"""Plans a file with the options that came with it; returns the exit status and a JSON text."""
+
+
+class PlannerBusyError(ControlError):
+    """No path can be planned now."""
+
+
+class PathPlanner:
+    """Plans one path at a time; who has asked looks at `job` until it is not `planning`."""
+
+    def __init__(self) -> None:
+        self.work: Plan | None = None
+        """Set by who has the robot's file; without it nothing is planned."""
+        self.job: dict[str, Any] = {"number": 0, "planning": False, "error": None, "plan": None}
+        """The last one: `error` says why the robot cannot follow it, `plan` is its name if it can.
+        """
+        self._task: asyncio.Task[None] | None = None
+
+    def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """Begin to plan a file; returns the job. Raises PlannerBusyError while one is planned."""
+        if self.work is None:
+            raise PlannerBusyError("this daemon plans no paths")
+        if self.job["planning"]:
+            raise PlannerBusyError("another path is being planned")
+        number = self.job["number"] + 1
+        self.job = {"number": number, "planning": True, "error": None, "plan": None}
+        self._task = asyncio.create_task(self._plan(self.work, wanted))
+        return self.job
+
+    async def _plan(self, work: Plan, wanted: dict[str, Any]) -> None:
+        told: dict[str, Any] = {"error": "planning was ended"}
+        try:
+            with tempfile.TemporaryDirectory(prefix="cdpr-path-") as folder:
+                file = Path(folder) / wanted["name"]
+                file.write_text(wanted["text"], encoding="utf-8")
+                status, text = await work(file, wanted)
+            told = _read(status, text.replace(str(file), wanted["name"]))
+        except OSError as error:
+            told = {"error": f"cannot be planned: {error.strerror}"}
+        finally:
+            self.job = {**told, "number": self.job["number"], "planning": False}
+            self.job.setdefault("plan", None)
+            self.job.setdefault("error", None)
+
+
+def _read(status: int, text: str) -> dict[str, Any]:
+    """Return what the process has told."""
+    try:
+        told = json.loads(text)
+    except ValueError:
+        told = None
+    if not isinstance(told, dict):
+        return {"error": f"planning ended with status {status}"}
+    if status:
+        return {"error": str(told.get("error", "refused"))}
+    return told

@@ -1,0 +1,98 @@
+"""A robot's cables and platform as Foxglove draws them in its 3D panel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from foxglove.messages import (
+    Color,
+    LinePrimitive,
+    LinePrimitiveLineType,
+    Point3,
+    SceneEntity,
+    SceneUpdate,
+    Timestamp,
+)
+
+from cdpr_rt.core.exchange import FloatArray
+
+_LOOSE, _PLATFORM = Color(r=0.6, g=0.6, b=0.6, a=1.0), Color(r=0.82, g=0.35, b=0.1, a=1.0)
+_PIXELS = 3.0
+_LOW_N, _HIGH_N = 0.0, 100.0
+
+
+class CableScene:
+    """The lines of one robot's cables, from exit to anchor points, and of its platform's edges.
+
+    A cable is coloured by its tension: blue at the least that is allowed, over green, to red at the
+    most; grey where it is loose or not known.
+    """
+
+    def __init__(self, description: dict[str, Any]) -> None:
+        """Raise KeyError, TypeError or ValueError where the description has no platform."""
+        platform, limits = description["platform"], description.get("limits", {})
+        self._exits = _in_space(platform["exit_points_m"])
+        self._anchors = _in_space(platform["anchor_points_m"])
+        n = len(self._exits)
+        self._low = _bounds(limits.get("tension_min_N"), n, _LOW_N)
+        self._high = _bounds(limits.get("tension_max_N"), n, _HIGH_N)
+        self._slack = _bounds(limits.get("slack_N"), n, 0.0)
+
+    def update(self, pose: FloatArray, tension_N: FloatArray, stamp: Timestamp) -> SceneUpdate:
+        """Return the scene with the platform at `pose` (7,) and these tensions (n,)."""
+        anchors = pose[:3] + self._anchors @ _rotation(pose[3:]).T
+        cables = [
+            _line([a, b], self._colour(k, float(tension_N[k])))
+            for k, (a, b) in enumerate(zip(self._exits, anchors, strict=True))
+        ]
+        edges = [
+            _line([anchors[i], anchors[j]], _PLATFORM)
+            for i in range(len(anchors))
+            for j in range(i)
+        ]
+        entity = SceneEntity(timestamp=stamp, frame_id="base", id="robot", lines=[*cables, *edges])
+        return SceneUpdate(entities=[entity])
+
+    def _colour(self, cable: int, tension_N: float) -> Color:
+        if not tension_N > self._slack[cable]:
+            return _LOOSE
+        low, high = self._low[cable], self._high[cable]
+        share = min(max((tension_N - low) / (high - low), 0.0), 1.0)
+        green = 1.0 - abs(2.0 * share - 1.0)
+        return Color(r=max(2.0 * share - 1.0, 0.0), g=green, b=max(1.0 - 2.0 * share, 0.0), a=1.0)
+
+
+def _in_space(points: Sequence[Sequence[float]]) -> FloatArray:
+    """Return points (n, 3); those in a plane lie at z = 0."""
+    flat = np.array(points, float)
+    return np.pad(flat, ((0, 0), (0, 3 - flat.shape[1])))
+
+
+def _bounds(values: Sequence[float | None] | None, n: int, otherwise: float) -> list[float]:
+    given = list(values or [None] * n)
+    return [otherwise if value is None else float(value) for value in given]
+
+
+def _rotation(quaternion: FloatArray) -> FloatArray:
+    """Return the rotation matrix of a quaternion w x y z."""
+    w, x, y, z = quaternion / math.sqrt(float(quaternion @ quaternion))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _line(points: Sequence[FloatArray], color: Color) -> LinePrimitive:
+    return LinePrimitive(
+        type=LinePrimitiveLineType.LineStrip,
+        thickness=_PIXELS,
+        scale_invariant=True,
+        points=[Point3(x=float(x), y=float(y), z=float(z)) for x, y, z in points],
+        color=color,
+    )

@@ -1,0 +1,1 @@
+"""Cameras: one interface, and what is behind it."""

@@ -1,0 +1,57 @@
+"""A folder of image files as a camera: each grab reads the next, in the order of their names."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from cdpr_drivers.camera.camera import Camera, CameraError, Image
+from cdpr_rt.core.clock import Clock
+
+_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
+
+
+class FolderCamera(Camera):
+    """Names are ordered with their numbers as numbers: 9.png comes before 10.png."""
+
+    def __init__(self, place: str, clock: Clock) -> None:
+        """List the folder; raises CameraError where there is no image in it."""
+        self.name = f"folder:{place}"
+        self._clock = clock
+        folder = Path(place).expanduser()
+        try:
+            found = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
+        except OSError as error:
+            raise CameraError(f"folder {folder}: {error.strerror}") from None
+        if not found:
+            allowed = ", ".join(_SUFFIXES)
+            raise CameraError(f"folder {folder}: holds no image; allowed: {allowed}")
+        self.files = sorted(found, key=_order)
+        self._next = 0
+
+    def grab(self) -> Image | None:
+        """See `Camera.grab`."""
+        if self._next >= len(self.files):
+            return None
+        path = self.files[self._next]
+        self._next += 1
+        try:
+            data = np.frombuffer(path.read_bytes(), np.uint8)
+        except OSError as error:
+            raise CameraError(f"image {path}: {error.strerror}") from None
+        pixels = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
+        if pixels is None:
+            raise CameraError(f"image {path}: cannot be decoded")
+        return Image(np.asarray(pixels, np.uint8), self._clock.now_s, None, path.name)
+
+    def close(self) -> None:
+        """See `Camera.close`."""
+        self._next = len(self.files)
+
+
+def _order(path: Path) -> list[tuple[int, str]]:
+    parts = re.split(r"(\d+)", path.name)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]

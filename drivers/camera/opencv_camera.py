@@ -1,0 +1,53 @@
+"""Cameras that OpenCV reads: V4L2 devices by number or path, streams and videos by URL."""
+
+from __future__ import annotations
+
+import cv2
+
+from cdpr_drivers.camera.camera import Camera, CameraError, Image, grey
+from cdpr_rt.core.clock import Clock
+
+# what is wrong is told by the errors here, not by lines of the library's own on standard error
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+
+_STALE = 4
+"""Images that a V4L2 device may have waiting from before."""
+
+
+class OpencvCamera(Camera):
+    """`opencv:0` is /dev/video0; anything that is no number is a path or URL for OpenCV."""
+
+    def __init__(self, place: str, clock: Clock) -> None:
+        """Open it; raises CameraError."""
+        self.name = f"opencv:{place}"
+        self._clock = clock
+        self._number = 0
+        self._live = place.isdigit() or place.startswith("/dev/")
+        source = int(place) if place.isdigit() else place
+        try:
+            self._capture = cv2.VideoCapture(source)
+        except cv2.error as error:
+            raise CameraError(f"camera {self.name}: {error}") from None
+        if not self._capture.isOpened():
+            hint = "; `ls /dev/video*` shows those there are" if self._live else ""
+            raise CameraError(f"camera {self.name} cannot be opened{hint}")
+        # by default a driver hands out images from some time before
+        self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+
+    def grab(self) -> Image:
+        """See `Camera.grab`."""
+        for _ in range(_STALE if self._live else 0):
+            self._capture.grab()
+        there, pixels = self._capture.read()
+        if not there or pixels is None:
+            raise CameraError(
+                f"camera {self.name} gives no image any more: unplugged, its stream ended, or it "
+                "is used by another program"
+            )
+        self._number += 1
+        name = f"image {self._number}"
+        return Image(grey(pixels.astype("uint8"), name), self._clock.now_s, None, name)
+
+    def close(self) -> None:
+        """See `Camera.close`."""
+        self._capture.release()

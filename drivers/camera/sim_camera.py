@@ -1,0 +1,66 @@
+"""Client of the simulated camera, a process of its own that answers on a Unix socket."""
+
+from __future__ import annotations
+
+import socket
+
+import numpy as np
+
+from cdpr_drivers.camera.camera import Camera, CameraError, Image
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.reading.bounded_input import parse_json
+from cdpr_rt.core.clock import Clock
+
+_TIMEOUT_S = 60.0
+_MOST_HEADER, _MOST_PIXELS = 4096, 100_000_000
+
+
+class SimulatedCamera(Camera):
+    """Asks one image at a time; its own time is the time of the simulated bus."""
+
+    def __init__(self, place: str, clock: Clock) -> None:
+        """Connect; raises CameraError."""
+        self.name = f"sim:{place}"
+        self._clock = clock
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.settimeout(_TIMEOUT_S)
+        try:
+            self._socket.connect(place)
+        except OSError as error:
+            self._socket.close()
+            raise CameraError(
+                f"camera {self.name}: {error.strerror or error}; `cdpr sim camera` starts one"
+            ) from None
+        self._answers = self._socket.makefile("rb")
+
+    def grab(self) -> Image:
+        """See `Camera.grab`."""
+        try:
+            self._socket.sendall(b'{"do": "grab"}\n')
+            header = self._answers.readline(_MOST_HEADER)
+            if not header:
+                raise ConnectionResetError("the connection has ended")
+            told = parse_json(header, self.name)
+            if "error" in told:
+                raise CameraError(f"camera {self.name}: {told['error']}")
+            height, width, size = (int(told[key]) for key in ("height", "width", "bytes"))
+            if size != height * width or not 0 < size <= _MOST_PIXELS:
+                raise ValueError(f"{width} x {height} pixels in {size} bytes")
+            data = self._answers.read(size)
+            if len(data) < size:
+                raise ConnectionResetError("the connection has ended")
+            number, time_s = int(told["number"]), float(told["time_s"])
+        except OSError as error:
+            raise CameraError(
+                f"camera {self.name} gives no image any more: {error.strerror or error}; is it "
+                "unplugged?"
+            ) from None
+        except (ProfileError, KeyError, ValueError, TypeError) as error:
+            raise CameraError(f"camera {self.name} answers what is no image: {error}") from None
+        pixels = np.frombuffer(data, np.uint8).reshape(height, width)
+        return Image(pixels, self._clock.now_s, time_s, f"image {number + 1}")
+
+    def close(self) -> None:
+        """See `Camera.close`."""
+        self._answers.close()
+        self._socket.close()

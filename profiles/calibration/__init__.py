@@ -1,0 +1,1 @@
+"""Calibrations of a robot's geometry, kept beside its file."""

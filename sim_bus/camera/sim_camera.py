@@ -1,0 +1,155 @@
+"""A simulated camera: renders what it would see from a true pose of its platform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_sim_bus.camera.camera_plant import CameraPlant
+from cdpr_sim_bus.camera.lens import ray_table, seen_at
+from cdpr_sim_bus.camera.render_kernel import draw_sheet
+from cdpr_sim_bus.camera.scene import Sheet, build_scene
+from cdpr_sim_bus.physics_board import PlatformState
+from cdpr_sim_bus.robot.platform_record import rotation_of
+
+FloatArray = NDArray[np.float64]
+_STILL_px = 0.02
+"""A motion of less in the whole exposure and readout is none."""
+_PLASTIC = np.array([0.8191725134, 0.6710436067, 0.5497004779])
+"""Steps of an evenly spread sequence in three dimensions (inverse powers of 1.2207)."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A camera in the room, and how it moves."""
+
+    position_m: FloatArray
+    rotation: FloatArray
+    velocity_m_s: FloatArray
+    spin_rad_s: FloatArray
+
+
+class SimCamera:
+    """Renders images; the noise of each depends on the plant's seed and its number alone."""
+
+    def __init__(self, plant: CameraPlant) -> None:
+        """Build the scene; raises SimulatorError."""
+        self.plant = plant
+        self.taken = 0
+        """Images so far."""
+        self.dark = False
+        """Whether its light is off."""
+        self.defocus_px = 0.0
+        """Blur on top of the lens'."""
+        self.sheets = build_scene(plant)
+        self._rays = ray_table(plant.lens)
+        steps = np.arange(1, plant.samples + 1)[:, None] * _PLASTIC % 1.0
+        steps[:, :2] -= steps[:, :2].mean(axis=0)  # a pixel's middle is where it looks on average
+        steps[:, 2] = (steps[:, 2] - steps[:, 2].mean()) * plant.sensor.exposure_s
+        self._offsets = np.ascontiguousarray(steps)
+        self._light = self._light_field()
+
+    def camera_pose(self, platform: PlatformState) -> Pose:
+        """Return where the camera is on a platform."""
+        mount = self.plant.mount
+        turn = np.array(platform.rotation).reshape(3, 3)
+        lever = turn @ np.array(mount.position_m)
+        spin = np.array(platform.spin_rad_s)
+        return Pose(
+            np.array(platform.position_m) + lever,
+            turn @ rotation_of(np.radians(mount.rotation_deg)),
+            np.array(platform.velocity_m_s) + np.cross(spin, lever),
+            spin,
+        )
+
+    def grab(self, platform: PlatformState) -> NDArray[np.uint8]:
+        """Return the next image (height, width), grey levels, from a pose of the platform.
+
+        Its middle row has the middle of its exposure at the instant of `platform`.
+        """
+        pose = self.camera_pose(platform)
+        light = self.plant.light
+        image: FloatArray = np.full(self._rays.shape[:2], light.floor)
+        distance = [np.linalg.norm(one.place(self.taken) - pose.position_m) for one in self.sheets]
+        for k in np.argsort(distance)[::-1]:
+            self._draw(image, self.sheets[k], pose)
+        self._occlude(image, pose)
+        image = 1.0 / light.paper_to_black + image * (1.0 - 1.0 / light.paper_to_black)
+        sigma = float(np.hypot(self.plant.lens.blur_px, self.defocus_px))
+        if sigma > 0.0:
+            image = np.asarray(cv2.GaussianBlur(image, (0, 0), sigma))
+        self.taken += 1
+        return self._exposed(image)
+
+    def _draw(self, image: FloatArray, sheet: Sheet, pose: Pose) -> None:
+        place, sensor = sheet.place(self.taken), self.plant.sensor
+        spin = pose.spin_rad_s
+        across = np.array([[0, -spin[2], spin[1]], [spin[2], 0, -spin[0]], [-spin[1], spin[0], 0]])
+        outline = (sheet.outline() @ sheet.rotation.T + place - pose.position_m) @ pose.rotation
+        seen = seen_at(outline, self.plant.lens)
+        if np.isnan(seen).any() or (pose.position_m - place) @ sheet.rotation[:, 2] <= 0.0:
+            return
+        moved = outline - (pose.velocity_m_s + np.cross(spin, outline @ pose.rotation.T)) @ (
+            pose.rotation * self._span_s()
+        )
+        shift = np.nan_to_num(np.abs(seen_at(moved, self.plant.lens) - seen), nan=1e3)
+        reach = float(shift.max())
+        height, width = image.shape
+        low = np.floor(seen.min(axis=0) - reach - 2.0).astype(int).clip(0, (width, height))
+        high = np.ceil(seen.max(axis=0) + reach + 3.0).astype(int).clip(0, (width, height))
+        if (high <= low).any():
+            return
+        to_sheet = sheet.rotation.T
+        row_time = sensor.readout_s / height if sensor.shutter == "rolling" else 0.0
+        offsets = self._offsets.copy()
+        offsets[:, 2] -= 0.5 * height * row_time
+        draw_sheet(
+            image,
+            np.array([*low, *high]),
+            self._rays,
+            (*sheet.half_m, sheet.bend_1_m),
+            sheet.texture,
+            np.stack([to_sheet @ (pose.position_m - place), to_sheet @ pose.velocity_m_s]),
+            np.stack(
+                [
+                    to_sheet @ pose.rotation,
+                    to_sheet @ across @ pose.rotation,
+                    0.5 * to_sheet @ across @ across @ pose.rotation,
+                ]
+            ),
+            offsets,
+            row_time,
+            reach > _STILL_px,
+        )
+
+    def _span_s(self) -> float:
+        """Return from when to when light falls on any row."""
+        sensor = self.plant.sensor
+        return sensor.exposure_s + (sensor.readout_s if sensor.shutter == "rolling" else 0.0)
+
+    def _occlude(self, image: FloatArray, pose: Pose) -> None:
+        """Cover what is behind balls; these count as nearer than all sheets."""
+        for ball in self.plant.occluders:
+            at = (np.array(ball.position_m) - pose.position_m) @ pose.rotation
+            seen = seen_at(at[None], self.plant.lens)[0]
+            if not np.isnan(seen).any():
+                radius = self.plant.lens.focal_px[0] * ball.radius_m / at[2]
+                cv2.circle(image, tuple(np.rint(seen).astype(int)), round(radius), 0.1, -1)
+
+    def _light_field(self) -> FloatArray:
+        lens, light = self.plant.lens, self.plant.light
+        v, u = np.mgrid[-1.0 : 1.0 : lens.height_px * 1j, -1.0 : 1.0 : lens.width_px * 1j]
+        fall = 1.0 - light.vignetting * (u * u + v * v) / 2.0
+        return np.asarray(light.white * fall * (1.0 + 0.5 * light.gradient * u))
+
+    def _exposed(self, image: FloatArray) -> NDArray[np.uint8]:
+        """Return grey levels with light, noise and steps."""
+        sensor = self.plant.sensor
+        chance = np.random.default_rng([self.plant.seed, 12, self.taken])
+        level = image * self._light * (0.01 if self.dark else 1.0)
+        sigma = np.sqrt(sensor.noise**2 + sensor.shot_noise**2 * level / 255.0)
+        level = level + sigma * chance.standard_normal(level.shape, dtype=np.float32)
+        return np.rint(level).clip(0, 255).astype(np.uint8)

@@ -1,0 +1,105 @@
+"""Robots with a truth that differs from their files, and what would be observed of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cdpr_profiles import load_robot
+from cdpr_rt.calibration.observations import Observations
+from cdpr_rt.calibration.parameters import USUAL, CableGeometry
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.kinematics.cable_model import CableModel
+from cdpr_rt.robots.kinematics.kinematics import CableKinematics
+from cdpr_rt.robots.kinematics.pose import Pose
+
+
+@dataclass(frozen=True)
+class MadeUp:
+    """A geometry by the file, the true one, and the poses at which the robot truly stood."""
+
+    file: CableGeometry
+    true: CableGeometry
+    poses: list[Pose]
+    seen: Observations
+
+
+def made_up(
+    robot: str,
+    poses: int,
+    seed: int,
+    *,
+    exit_m: float = 0.008,
+    drum: float = 0.003,
+    elongation: float = -0.3,
+    noise_m: float = 0.0,
+    identified: tuple[str, ...] = USUAL,
+    first: float = 1.0,
+) -> MadeUp:
+    """Return a robot with errors of a normal distribution and its lengths with noise."""
+    profile = load_robot(robot)
+    rng = np.random.default_rng(seed)
+    file = CableGeometry.of(profile, identified)
+    n, k = file.n, file.coordinates
+    cable = np.zeros((n, 9))
+    cable[:, :k] = rng.normal(0.0, exit_m, (n, k))
+    cable[:, 4] = rng.normal(0.0, drum, n)
+    cable[:, 3] = rng.normal(0.0, 0.01, n)
+    true = replace(file, cable=cable, elongation=elongation)
+    model = file.model
+    low, high = model.platform.workspace_min_m, model.platform.workspace_max_m
+    places = np.zeros((poses, model.size))
+    places[:, :k] = rng.uniform(low, high, (poses, k))
+    turns = model.size - k
+    places[:, k:] = rng.uniform(-1, 1, (poses, turns)) * model.angle_rad * first / np.sqrt(3)
+    tension = rng.uniform(model.low_N, model.high_N, (poses, n))
+    exits, anchors = true.kernel_geometry()[:3].T, true.kernel_geometry()[3:6].T
+    soft = float(true.compliance()[0])
+    truly = CableKinematics(
+        exits, anchors, model.kinematics.directions,
+        model=CableModel(1.0 / soft if soft else np.inf, float(file.weight_N_m[0])),
+    )  # fmt: skip
+    lengths = np.zeros((poses, n))
+    held = []
+    for j, array in enumerate(model.poses(places)):
+        pose = Pose(array[0], array[1:])
+        if file.turns:
+            pose = _balanced(pose, exits, anchors, tension[j])
+        held.append(pose)
+        lengths[j] = truly.lengths(pose, tension[j])
+    # what the encoders say: offset and drum taken away again
+    reference = lengths[0] - cable[:, 3]
+    told = (lengths - cable[:, 3] + cable[:, 4] * reference) / (1.0 + cable[:, 4])
+    told += rng.normal(0.0, 1.0, told.shape) * noise_m
+    start = model.poses(places)
+    seen = Observations.of_lengths(told, tension, start)
+    return MadeUp(file, true, held, replace(seen, reference_m=reference))
+
+
+def _balanced(pose: Pose, exits: FloatArray, anchors: FloatArray, t: FloatArray) -> Pose:
+    def moment(angle: float) -> float:
+        c, s = np.cos(angle), np.sin(angle)
+        arm = anchors[:, :2] @ np.array([[c, s], [-s, c]])
+        u = pose.p[:2] + arm - exits[:, :2]
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+        return float((t * (arm[:, 0] * u[:, 1] - arm[:, 1] * u[:, 0])).sum())
+
+    angle = brentq(moment, -0.5, 0.5, xtol=1e-14)
+    return Pose(pose.p).plus(np.array([0, 0, 0, 0, 0, angle]))
+
+
+def measured(what: MadeUp, std_m: float, std_rad: float | None, seed: int) -> Observations:
+    """Return the observations with positions, and rotations unless None, measured with noise."""
+    rng = np.random.default_rng(seed)
+    k = what.file.coordinates
+    p = np.array([pose.p for pose in what.poses]) + rng.normal(0, std_m, (len(what.poses), 3))
+    p[:, k:] = np.nan
+    seen = what.seen.with_positions(p, std_m)
+    if std_rad is None:
+        return seen
+    Q = np.array(
+        [pose.plus(np.append(np.zeros(3), rng.normal(0, std_rad, 3))).Q for pose in what.poses]
+    )
+    return seen.with_rotations(Q, std_rad)

@@ -1,0 +1,111 @@
+"""A room with markers and a camera that sees their corners, without images."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cdpr_profiles.devices.camera import CameraIntrinsics
+from cdpr_rt.calibration.markers.geometry.lens import project
+from cdpr_rt.calibration.markers.images.detection import Sighting
+from cdpr_rt.calibration.markers.marker_map import MarkerMap
+from cdpr_rt.calibration.markers.observations import CORNERS, Observations
+
+LENS = np.array([604.0, 606.0, 322.3, 255.8, -0.112, 0.083, 4e-4, -3e-4, -0.012])
+WIDTH, HEIGHT = 640, 512
+
+
+def intrinsics(lens: np.ndarray = LENS) -> CameraIntrinsics:
+    return CameraIntrinsics(
+        width_px=WIDTH,
+        height_px=HEIGHT,
+        focal_px=tuple(lens[:2].tolist()),
+        centre_px=tuple(lens[2:4].tolist()),
+        distortion=tuple(lens[4:].tolist()),
+    )
+
+
+@dataclasses.dataclass
+class Room:
+    """What is true, and what was seen of it."""
+
+    truth: MarkerMap
+    seen: Observations
+
+    def sightings(self) -> list[Sighting]:
+        seen = self.seen
+        return [
+            Sighting(
+                name,
+                {
+                    seen.ids[m]: corners
+                    for m, corners in zip(
+                        seen.marker[seen.image == i], seen.corners_px[seen.image == i], strict=True
+                    )
+                },
+            )
+            for i, name in enumerate(seen.names)
+        ]
+
+    def with_marker_off(
+        self, marker: int, off_m: tuple[float, float, float], when: Callable[[int], bool]
+    ) -> Room:
+        """Return the room in which a marker is elsewhere in some images, by their numbers."""
+        k, corners = self.seen.ids.index(marker), self.seen.corners_px.copy()
+        map_ = self.truth
+        for row in np.flatnonzero(self.seen.marker == k):
+            i = int(self.seen.image[row])
+            if when(i):
+                at = map_.corners_m()[k] + off_m - map_.camera_position_m[i]
+                corners[row] = project(at @ map_.camera_rotation[i], LENS)
+        return Room(self.truth, dataclasses.replace(self.seen, corners_px=corners))
+
+
+def room(
+    seed: int = 1,
+    *,
+    rows: int = 4,
+    columns: int = 5,
+    images: int = 25,
+    size_m: float = 0.15,
+    noise_px: float = 0.05,
+    heights_m: float = 0.001,
+    tilt_deg: float = 15.0,
+) -> Room:
+    """Return markers in rows on a floor, seen from 1.1 to 1.6 m above it."""
+    print(f"room of seed {seed}")
+    chance = np.random.default_rng(seed)
+    count = rows * columns
+    row, column = np.divmod(np.arange(count), columns)
+    middle = np.column_stack(
+        [(column - (columns - 1) / 2) * 0.32, ((rows - 1) / 2 - row) * 0.32, np.zeros(count)]
+    )
+    middle += chance.normal(0.0, (0.02, 0.02, heights_m), (count, 3))
+    turn = Rotation.from_rotvec(chance.normal(0.0, (0.005, 0.005, 0.3), (count, 3))).as_matrix()
+    reach = ((columns - 1) * 0.16, (rows - 1) * 0.16)
+    where = np.column_stack(
+        [*(chance.uniform(-one, one, images) for one in reach), chance.uniform(1.1, 1.6, images)]
+    )
+    axis = chance.standard_normal((images, 3))
+    axis *= np.radians(chance.uniform(0.0, tilt_deg, images) / np.linalg.norm(axis, axis=1))[
+        :, None
+    ]
+    down = Rotation.from_rotvec(axis).as_matrix() @ np.diag([1.0, -1.0, -1.0])
+    rows_seen = []
+    for i in range(images):
+        for k in range(count):
+            at = (CORNERS * size_m @ turn[k].T + middle[k] - where[i]) @ down[i]
+            corners = project(at, LENS)
+            if (corners > 2).all() and (corners < (WIDTH - 3, HEIGHT - 3)).all():
+                rows_seen.append((i, k, corners + chance.normal(0.0, noise_px, (4, 2))))
+    names = [f"image {i}" for i in range(images)]
+    seen = Observations.of(names, rows_seen, dict.fromkeys(range(count), size_m))
+    k = list(seen.ids)
+    truth = MarkerMap(
+        *(seen.ids, seen.ids[0], seen.size_m, middle[k], turn[k]),
+        *(seen.names, where, down),
+    )
+    return Room(truth, seen)

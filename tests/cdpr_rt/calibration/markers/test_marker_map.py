@@ -1,0 +1,213 @@
+"""Maps from corners: how near the truth, how well they know it, and what they say is wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from marker_room import LENS, Room, intrinsics, room
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from cdpr_profiles.devices.camera import KnownMarker, MarkerSheets, MarkerSize
+from cdpr_rt.calibration.markers.bundle import adjust
+from cdpr_rt.calibration.markers.coverage import coverage
+from cdpr_rt.calibration.markers.geometry.square_pose import square_poses
+from cdpr_rt.calibration.markers.graph import first_map
+from cdpr_rt.calibration.markers.images.detection import Sighting
+from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict
+from cdpr_rt.calibration.markers.marker_map import best_fit, difference
+from cdpr_rt.calibration.markers.reprojection import Estimate, residuals
+from cdpr_rt.errors import InvalidRequestError
+
+SHEETS = MarkerSheets(size_m=0.15)
+ODD = 9
+"""A marker in the middle of the room."""
+
+
+@pytest.fixture(scope="module")
+def one() -> Room:
+    return room(1)
+
+
+@pytest.fixture(scope="module")
+def plain(one: Room) -> MapFit:
+    return fit_map(one.sightings(), intrinsics(), SHEETS)
+
+
+def known_places(one: Room, *ids: int) -> tuple[KnownMarker, ...]:
+    map_ = one.truth
+    turns = Rotation.from_matrix(map_.rotation).as_rotvec(degrees=True)
+    return tuple(
+        KnownMarker(
+            id=marker,
+            position_m=tuple(map_.position_m[map_.ids.index(marker)].tolist()),
+            rotation_deg=tuple(turns[map_.ids.index(marker)].tolist()),
+        )
+        for marker in ids
+    )
+
+
+def test_a_map_is_as_near_the_truth_as_it_says(one: Room, plain: MapFit) -> None:
+    assert not plain.faults
+    assert not plain.warnings
+    assert verdict(plain).startswith("good: 20 markers from 25 images")
+    off = difference(plain.map, one.truth)
+    known = np.linalg.norm(plain.bundle.marker_sigma_m, axis=1)
+    assert off.position_error_m.max() < 4.0 * known.max()
+    assert off.position_error_m.max() < 0.004
+    assert plain.bundle.sigma_px == pytest.approx(0.05, rel=0.1)
+
+
+def test_standard_deviations_are_those_of_many_maps() -> None:
+    base = room(2, rows=3, columns=4, images=15, noise_px=0.0)
+    reference = 5
+    chance = np.random.default_rng(9)
+    start = Estimate(base.truth.seen_from(reference), LENS)
+    weighed = []
+    for _ in range(60):
+        noise = chance.normal(0.0, 0.1, base.seen.corners_px.shape)
+        seen = dataclasses.replace(base.seen, corners_px=base.seen.corners_px + noise)
+        bundle = adjust(start, seen, (reference,))
+        off = bundle.estimate.map.position_m - start.map.position_m
+        for k, marker in enumerate(base.seen.ids):
+            if marker != reference:
+                covariance = bundle.marker_covariance(k)[:3, :3]
+                weighed.append(off[k] @ np.linalg.solve(covariance, off[k]))
+    # mean of chi square with 3 degrees of freedom
+    assert np.mean(weighed) == pytest.approx(3.0, rel=0.15)
+
+
+def test_the_fit_is_that_of_an_independent_solver() -> None:
+    base = room(3, rows=2, columns=3, images=4, noise_px=0.1)
+    poses = square_poses(base.seen, LENS)
+    first = first_map(base.seen, poses)
+    bundle = adjust(Estimate(first, LENS), base.seen, (first.reference,))
+    start = Estimate(bundle.estimate.map, LENS)
+    free = np.flatnonzero(np.diag(bundle.covariance) > 0.0)
+
+    def off(x: np.ndarray) -> np.ndarray:
+        step = np.zeros(start.parameters)
+        step[free] = x
+        root = np.sqrt(bundle.weight)[..., None]
+        return (root * residuals(start.changed(step), base.seen)).ravel()
+
+    solved = least_squares(off, np.full(len(free), 1e-4), method="lm")
+    sigma = np.sqrt(np.diag(bundle.covariance)[free])
+    assert np.abs(solved.x / sigma).max() < 0.1
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_small_markers_that_can_be_either_way_round_end_up_the_right_way(seed: int) -> None:
+    one = room(seed, size_m=0.05, noise_px=0.15, tilt_deg=8.0)
+    fit = fit_map(one.sightings(), intrinsics(), MarkerSheets(size_m=0.05))
+    assert not fit.faults
+    assert difference(fit.map, one.truth).rotation_error_rad.max() < 0.06
+
+
+def test_most_of_what_a_map_is_off_across_its_plane_is_the_tilt_of_its_reference_marker() -> None:
+    # figures 3.20 and 3.21 of the thesis show errors in the frame of one small marker
+    one = room(4, noise_px=0.1)
+    fit = fit_map(one.sightings(), intrinsics(), SHEETS, reference=7)
+    off = difference(fit.map, one.truth)
+    sigma = np.sqrt((fit.bundle.marker_sigma_m**2).mean(axis=0))
+    assert sigma[2] > 3.0 * sigma[:2].max()
+    far = off.distance_m > np.median(off.distance_m)
+    assert off.position_error_m[far].mean() > off.position_error_m[~far].mean()
+    _, turn, shift = best_fit(fit.map.position_m, one.truth.position_m)
+    left = fit.map.position_m @ turn.T + shift - one.truth.position_m
+    told = np.sqrt((fit.bundle.shape_sigma_m**2).sum(axis=1).mean())
+    assert np.sqrt((left**2).sum(axis=1).mean()) < 2.0 * told
+    assert told < 0.5 * sigma[2]
+    assert any("tells little of its own tilt" in note for note in fit.notes)
+
+
+def test_markers_never_seen_together_are_islands_with_advice(one: Room) -> None:
+    split = []
+    for sight in one.sightings():
+        left = {i: c for i, c in sight.corners_px.items() if i % 5 < 3}
+        right = {i: c for i, c in sight.corners_px.items() if i % 5 >= 3}
+        shown = left if len(left) > len(right) else right
+        split.append(Sighting(sight.name, shown))
+    found = coverage(split, placed=range(21))
+    assert [len(island) for island in found.islands] == [12, 8]
+    assert found.unseen == (20,)
+    assert found.share_seen == pytest.approx(20 / 21)
+    assert any("no image shows markers 3, 4" in line for line in found.advice)
+    fit = fit_map(split, intrinsics(), SHEETS)
+    assert "2 islands" in fit.faults[0]
+    assert fit.map.placed.sum() == 12
+
+
+def test_without_two_markers_in_an_image_there_is_no_map() -> None:
+    alone = [Sighting("a", {}), Sighting("b", {3: np.zeros((4, 2))})]
+    with pytest.raises(InvalidRequestError, match="no image shows two markers"):
+        fit_map(alone, intrinsics(), SHEETS)
+
+
+def test_a_marker_that_was_moved_is_named_with_the_image(one: Room) -> None:
+    moved = one.with_marker_off(ODD, (0.04, 0.02, 0.0), lambda i: i >= 12)
+    fit = fit_map(moved.sightings(), intrinsics(), SHEETS)
+    assert len(fit.warnings) == 1
+    assert f"marker {ODD} was moved by 4" in fit.warnings[0]
+    assert "between image 1" in fit.warnings[0]
+    assert not fit.faults
+    keep = fit.map.placed
+    assert ODD not in np.array(fit.map.ids)[keep]
+    assert difference(fit.map, one.truth).position_error_m.max() < 0.004
+
+
+def test_an_id_that_is_there_twice_is_named(one: Room) -> None:
+    twice = one.with_marker_off(ODD, (0.6, 0.0, 0.0), lambda i: i % 2 == 0)
+    fit = fit_map(twice.sightings(), intrinsics(), SHEETS)
+    assert any(f"marker {ODD} is there twice" in line for line in fit.warnings)
+    assert difference(fit.map, one.truth).position_error_m.max() < 0.004
+    both = [dataclasses.replace(one.sightings()[0], repeated=(33,)), *one.sightings()[1:]]
+    assert "printed twice" in fit_map(both, intrinsics(), SHEETS).warnings[0]
+
+
+def test_a_sheet_of_another_size_is_named_with_its_size(one: Room) -> None:
+    told = MarkerSheets(size_m=0.15, sizes=(MarkerSize(ids=(ODD,), size_m=0.145),))
+    fit = fit_map(one.sightings(), intrinsics(), told)
+    assert f"marker {ODD} is +3." in fit.warnings[0]
+
+
+def test_a_wrong_size_of_all_is_seen_by_known_places_alone(one: Room) -> None:
+    wrong = MarkerSheets(size_m=0.153)
+    blind = fit_map(one.sightings(), intrinsics(), wrong)
+    assert not blind.faults
+    assert any("images alone cannot see it wrong" in note for note in blind.notes)
+    told = wrong.model_copy(update={"known": known_places(one, 0, 8, 19)})
+    fit = fit_map(one.sightings(), intrinsics(), told)
+    assert fit.known is not None
+    assert fit.known.scale == pytest.approx(0.15 / 0.153, rel=1e-3)
+    assert any("0.980" in fault for fault in fit.faults)
+
+
+def test_known_places_give_the_frame_and_are_held(one: Room) -> None:
+    told = SHEETS.model_copy(update={"known": known_places(one, 0, 8, 19)})
+    fit = fit_map(one.sightings(), intrinsics(), told)
+    assert not fit.faults
+    assert fit.fixed == (0, 8, 19)
+    assert np.linalg.norm(fit.map.position_m - one.truth.position_m, axis=1).max() < 0.003
+
+
+@pytest.mark.parametrize(
+    "change", [(0, 0.02), (4, -1.0)], ids=["another focal length", "no distortion"]
+)
+def test_intrinsics_of_another_camera_are_recognised(one: Room, change: tuple[int, float]) -> None:
+    lens = LENS.copy()
+    at, share = change
+    lens[at : at + (2 if at == 0 else 5)] *= 1.0 + share
+    fit = fit_map(one.sightings(), intrinsics(lens), SHEETS)
+    assert fit.lens.wrong
+    assert "intrinsics are not this camera's" in fit.faults[0]
+    if at == 0:
+        assert fit.lens.focal_change == pytest.approx(-0.0196, abs=0.004)
+
+
+def test_a_reference_that_is_not_there_is_refused(one: Room) -> None:
+    with pytest.raises(InvalidRequestError, match="reference marker 77 is not in the map"):
+        fit_map(one.sightings(), intrinsics(), SHEETS, reference=77)
+    assert fit_map(one.sightings(), intrinsics(), SHEETS, reference=3).map.reference == 3

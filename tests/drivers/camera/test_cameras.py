@@ -1,0 +1,130 @@
+"""Every back-end that can be tried here behind the one interface, and what it says when it ends."""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+from pathlib import Path
+from unittest import mock
+
+import cv2
+import numpy as np
+import pytest
+
+from cdpr_drivers.camera.camera import CameraError, grey
+from cdpr_drivers.camera.open_camera import open_camera
+from cdpr_rt.core.clock import LockstepClock
+from cdpr_sim_bus.camera.camera_plant import CameraPlant, LensPlant
+from cdpr_sim_bus.camera.camera_server import CameraServer
+from cdpr_sim_bus.camera.sim_camera import SimCamera
+from cdpr_sim_bus.physics_board import PhysicsBoard, PlatformState
+
+TINY = CameraPlant(
+    samples=4,
+    lens=LensPlant(width_px=80, height_px=64, focal_px=(70.0, 70.0), centre_px=(40.0, 32.0)),
+)
+LEVEL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def write_images(folder: Path, count: int) -> None:
+    folder.mkdir(exist_ok=True)
+    for k in range(count):
+        cv2.imwrite(str(folder / f"{k + 1}.png"), np.full((64, 80), 10 * k, np.uint8))
+
+
+def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path: Path) -> None:
+    write_images(tmp_path / "images", 12)
+    (tmp_path / "images" / "notes.txt").write_text("none of them")
+    with open_camera(f"folder:{tmp_path / 'images'}", LockstepClock()) as camera:
+        names = []
+        while (image := camera.grab()) is not None:
+            names.append(image.name)
+            assert image.pixels.shape == (64, 80)
+    assert names == [f"{k + 1}.png" for k in range(12)]
+
+
+def test_a_video_is_a_camera_for_opencv_and_its_end_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "video.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (80, 64))
+    for level in (40, 200):
+        writer.write(np.full((64, 80, 3), level, np.uint8))
+    writer.release()
+    with open_camera(f"opencv:{path}", LockstepClock()) as camera:
+        first, second = camera.grab(), camera.grab()
+        assert first is not None and second is not None
+        assert abs(int(first.pixels.mean()) - 40) < 5 < second.pixels.mean() - 150
+        with pytest.raises(CameraError, match="gives no image any more: unplugged"):
+            camera.grab()
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [
+        ("webcam", "allowed: opencv:0 or"),
+        ("folder:", "allowed: opencv:0 or"),
+        ("folder:/nowhere/at/all", "No such file"),
+        ("opencv:/nowhere.avi", "cannot be opened"),
+        ("sim:/nowhere.sock", "`cdpr sim camera` starts one"),
+    ],
+)
+def test_what_cannot_be_opened_is_told(url: str, said: str) -> None:
+    with pytest.raises(CameraError, match=said):
+        open_camera(url, LockstepClock())
+
+
+def test_a_library_that_is_missing_is_named_with_its_extra() -> None:
+    with (
+        mock.patch.dict(sys.modules, {"harvesters": None, "harvesters.core": None}),
+        pytest.raises(CameraError, match=r"pip install 'cdpr-rt\[genicam\]'"),
+    ):
+        open_camera("genicam:/opt/some.cti", LockstepClock())
+
+
+def test_an_image_that_is_none_is_named(tmp_path: Path) -> None:
+    (tmp_path / "1.png").write_bytes(b"not a picture")
+    with (
+        open_camera(f"folder:{tmp_path}", LockstepClock()) as camera,
+        pytest.raises(CameraError, match=r"1\.png: cannot be decoded"),
+    ):
+        camera.grab()
+    with pytest.raises(CameraError, match="allowed: grey, or 3 colours"):
+        grey(np.zeros((4, 4, 2), np.uint8), "x")
+
+
+def serve(board: Path, path: Path) -> None:
+    with PhysicsBoard.attach(board) as shared:
+        CameraServer(SimCamera(TINY), shared.platform, path).serve(False, {})
+
+
+def test_a_simulated_camera_shows_the_boards_platform_until_it_is_unplugged(tmp_path: Path) -> None:
+    path = tmp_path / "camera"
+    with PhysicsBoard.create(tmp_path / "board", 3) as board:
+        platform = board.platform
+        assert platform.state() is None
+        state = PlatformState(2.5, (0.0, 0.1, 1.5), LEVEL, (0.0,) * 3, (0.0,) * 3)
+        platform.publish(state)
+        assert platform.state() == state
+        server = multiprocessing.get_context("fork").Process(
+            target=serve, args=(tmp_path / "board", path)
+        )
+        server.start()
+        clock = LockstepClock()
+        while not path.exists() and server.is_alive():
+            server.join(0.05)
+        with open_camera(f"sim:{path}", clock) as camera:
+            image = camera.grab()
+            assert image is not None
+            assert image.device_time_s == 2.5
+            platform.publish(state._replace(time_s=3.0, position_m=(0.0, 0.1, 1.3)))
+            np.testing.assert_array_equal(
+                image.pixels, SimCamera(TINY).grab(state), "the same seed, the same image"
+            )
+            later = camera.grab()
+            assert later is not None
+            assert later.device_time_s == 3.0
+            assert np.abs(later.pixels.astype(float) - image.pixels).max() > 50
+            server.terminate()
+            server.join()
+            with pytest.raises(CameraError, match=r"gives no image any more.*unplugged\?"):
+                camera.grab()
+    assert not path.exists()

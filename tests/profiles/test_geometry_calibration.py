@@ -1,0 +1,147 @@
+"""The calibration beside a robot's file: applied, refused, kept in versions, undone."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from cdpr_profiles import ProfileError, Robot, load_robot
+from cdpr_profiles.calibration.geometry import (
+    GeometryCalibration,
+    file_sha256,
+    load_geometry_calibration,
+)
+from cdpr_profiles.calibration.in_force import (
+    calibrated,
+    calibration_file,
+    next_version,
+    take_over,
+    undo,
+)
+from cdpr_profiles.reading.places import SHIPPED
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    path = tmp_path / "mine.toml"
+    shutil.copy(SHIPPED / "robots" / "planar-4.toml", path)
+    return load_robot(path)
+
+
+def calibration(robot: Robot, version: int = 1, move_m: float = 0.01) -> GeometryCalibration:
+    platform = robot.platform
+    assert platform is not None
+    return GeometryCalibration(
+        robot=robot.profile,
+        robot_sha256=file_sha256(robot.path),
+        version=version,
+        date=datetime(2026, 3, 4, 5, 6, tzinfo=UTC),
+        method="points",
+        frame="the room",
+        exit_points_m=tuple((x + move_m, y) for x, y in platform.exit_points_m),
+        home_m=(platform.home_m[0] + 0.002, platform.home_m[1]),
+        home_rotation_rad=platform.home_rotation_rad,
+        drum_scales=(1.01, 1.0, 0.99, 1.0),
+        elongation_scale=1.4,
+        poses=40,
+        exit_std_m=(0.001,) * 4,
+        predicted_3_sigma_mm=0.5,
+        verified_poses=8,
+        verified_mean_mm=0.7,
+        verified_worst_mm=1.5,
+        raw_data="data.json",
+    )
+
+
+def test_a_robot_without_one_is_as_its_file_says(robot: Robot) -> None:
+    assert calibrated(robot) is robot
+    assert next_version(robot) == 1
+
+
+def test_one_in_force_takes_the_place_of_the_file(robot: Robot) -> None:
+    path = take_over(robot, calibration(robot))
+    assert path == calibration_file(robot) and path.parent == robot.path.parent
+    told = calibrated(robot)
+    assert told.platform is not None and robot.platform is not None
+    for here, before in zip(told.platform.exit_points_m, robot.platform.exit_points_m, strict=True):
+        assert here[0] == pytest.approx(before[0] + 0.01)
+    first, before_first = told.axes[0].winch, robot.axes[0].winch
+    assert first.drum_radius_m == pytest.approx(1.01 * before_first.drum_radius_m)
+    assert first.cable.stiffness_N == pytest.approx(before_first.cable.stiffness_N / 1.4)
+    assert told.platform.home_m[0] == pytest.approx(robot.platform.home_m[0] + 0.002)
+    assert told.calibration == calibration(robot)
+    # the file itself is as it was: a simulator that loads it has no part in it
+    assert load_robot(robot.path).platform == robot.platform
+
+
+def test_the_file_reads_back_as_it_was_written(robot: Robot) -> None:
+    given = calibration(robot)
+    held = load_geometry_calibration(take_over(robot, given))
+    assert held == given
+    assert held.identity == given.identity
+    assert calibration(robot, move_m=0.011).identity != given.identity
+
+
+def test_versions_are_kept_and_undone_one_by_one(robot: Robot) -> None:
+    take_over(robot, calibration(robot, 1))
+    assert next_version(robot) == 2
+    take_over(robot, calibration(robot, 2, 0.02))
+    assert next_version(robot) == 3
+    back = undo(robot)
+    assert back is not None and back.version == 1
+    held = calibrated(robot).calibration
+    assert held is not None and held.version == 1
+    assert undo(robot) is None
+    assert calibrated(robot) is robot
+    with pytest.raises(ProfileError, match="none to undo"):
+        undo(robot)
+
+
+def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> None:
+    take_over(robot, calibration(robot))
+    robot.path.write_text(robot.path.read_text() + "\n# another winch\n")
+    with pytest.raises(ProfileError, match=r"has been changed since .* cdpr calibrate undo"):
+        calibrated(load_robot(robot.path))
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"drum_scales": (1.0, 1.0)}, "drum_scales: 2 entries; allowed: 4"),
+        ({"drum_scales": (1.0, 3.0, 1.0, 1.0)}, r"drum_scales\[1\]"),
+        ({"home_m": (0.0, 0.0, 0.0)}, "allowed: 2 coordinates"),
+        ({"exit_points_m": ((9.0, 3.0),) * 4}, "more than 0.5 m"),
+        ({"home_rotation_rad": (0.0, 0.0, 0.0)}, "home_rotation_rad"),
+    ],
+)
+def test_what_cannot_be_of_the_robot_is_refused(
+    robot: Robot, change: dict[str, object], named: str
+) -> None:
+    wrong = calibration(robot).model_copy(update=change)
+    with pytest.raises(ProfileError, match=named):
+        take_over(robot, wrong)
+    calibration_file(robot).write_text(wrong.to_toml())
+    with pytest.raises(ProfileError, match=named):
+        calibrated(robot)
+
+
+def test_a_damaged_file_is_refused_by_its_name(robot: Robot) -> None:
+    calibration_file(robot).write_text("robot = 7\n")
+    with pytest.raises(ProfileError, match=r"mine\.calibration"):
+        calibrated(robot)
+
+
+def test_that_of_a_shipped_robot_lies_in_the_users_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    shipped = load_robot("planar-4")
+    take_over(shipped, calibration(shipped))
+    assert calibration_file(shipped).is_relative_to(tmp_path)
+    assert calibrated(load_robot("planar-4")).calibration is not None
+    winch = replace(shipped, is_winch=True)
+    assert calibrated(winch) is winch

@@ -1,0 +1,175 @@
+"""`cdpr calibrate`: offline from data as typed, taken over, shown, undone, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+from cdpr_here import cdpr_here
+
+from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.geometry import file_sha256
+from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_rt.calibration.data import CalibrationData, PoseReading
+from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
+
+
+@pytest.fixture(autouse=True)
+def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv("COLUMNS", "100")
+
+
+def data_of(what: MadeUp, path: Path, spoil: Any = None) -> Path:
+    """Write what a run would have read of a robot made up, and return the file."""
+    robot = load_robot("spatial-8")
+    lengths = what.seen.length_m.copy()
+    if spoil is not None:
+        spoil(lengths)
+    turns = what.file.model.home_pose.Q.T
+    readings = []
+    for j in range(what.seen.poses):
+        del_rotation = what.seen.start[j, 1:] @ turns
+        vector = np.array([del_rotation[2, 1], del_rotation[0, 2], del_rotation[1, 0]])
+        target = (*what.seen.start[j, 0].tolist(), *vector.tolist())
+        readings.append(
+            PoseReading(
+                target=target,
+                length_m=tuple(lengths[j].tolist()),
+                tension_N=tuple(what.seen.tension_N[j].tolist()),
+            )
+        )
+    data = CalibrationData(
+        robot="spatial-8",
+        robot_sha256=file_sha256(robot.path),
+        date=datetime.now(UTC).isoformat(),
+        poses=tuple(readings),
+    )
+    data.save(path)
+    return path
+
+
+def points_of(what: MadeUp, path: Path, every: int = 1) -> Path:
+    """Write the positions as a person measures them, to 1 mm."""
+    rng = np.random.default_rng(5)
+    rows = ["pose,x_mm,y_mm,z_mm,sigma_mm"]
+    for j in range(0, len(what.poses), every):
+        x, y, z = 1e3 * what.poses[j].p + rng.normal(0.0, 1.0, 3)
+        rows.append(f"{j + 1},{x:.1f},{y:.1f},{z:.1f},1")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def result(done: Any) -> dict[str, Any]:
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert isinstance(told, dict)
+    return told
+
+
+def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_path: Path) -> None:
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    data, points = data_of(what, tmp_path / "data.json"), points_of(what, tmp_path / "p.csv")
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--points", points, "--json")
+    assert done.returncode == 0, done.stderr
+    told = result(done)
+    assert told["good"] and told["frame"].startswith("the room")
+    proof = told["verification"]
+    assert proof["mean_position_error_mm"] < 0.6 * proof["mean_position_error_before_mm"]
+    assert len(told["parameters"]) == 8 * 5 + 1
+    assert matplotlib.image.imread(told["picture"]).std() > 0.01
+    robot = load_robot("spatial-8")
+    assert calibrated(robot).calibration is not None
+    shown = cdpr_here("robot", "show", "spatial-8", "--json")
+    assert result(shown)["calibration"]["identity"] == told["in_force"]["identity"]
+    assert "calibrated 20" in shown.stderr and "cdpr calibrate undo spatial-8" in shown.stderr
+    undone = cdpr_here("calibrate", "undo", "spatial-8", "--json")
+    assert undone.returncode == 0 and result(undone)["in_force"] is None
+    assert calibrated(robot) is robot
+    again = cdpr_here("calibrate", "undo", "spatial-8")
+    assert again.returncode == 2 and "none to undo" in again.stderr
+
+
+def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    data = data_of(what, tmp_path / "data.json")
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--dry-run", "--json")
+    assert done.returncode == 0, done.stderr
+    told = result(done)
+    assert told["frame"].startswith("the exit points of the robot's file")
+    assert told["in_force"] is None and calibrated(load_robot("spatial-8")).calibration is None
+    assert "measure the platform at three poses" in done.stderr
+    assert "measure one distance" in done.stderr
+    residuals = told["verification"]
+    assert residuals["length_residual_mm"] < residuals["length_residual_before_mm"]
+
+
+def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
+    def slip(lengths: Any) -> None:
+        lengths[20:, 6] += 0.015
+
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    data = data_of(what, tmp_path / "data.json", slip)
+    points = points_of(what, tmp_path / "p.csv")
+    done = cdpr_here(
+        "calibrate", "fit", "spatial-8", "--data", data, "--points", points, "--dry-run", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    faults = result(done)["faults"]
+    assert [(f["kind"], f["cable"], f["pose"]) for f in faults] == [("jump", 7, 21)]
+    assert "cable 7 is -15" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("a,b\n1,2\n", "pose,x_mm,y_mm,z_mm,sigma_mm"),
+        ("pose,x_mm,y_mm,z_mm\n1,2,three,4\n", "line 2: y_mm: value 'three'"),
+        ("pose,x_mm,y_mm,z_mm\n0,2,3,4\n", "line 2: pose"),
+        ("pose,x_mm,y_mm,z_mm,sigma_mm\n1,2,3,4,-1\n", "sigma_mm"),
+        ("pose,x_mm,y_mm,z_mm\n99,2,3,4\n", "pose 99; allowed: 1 to 45"),
+    ],
+)
+def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:
+    what = made_up("spatial-8", 45, 12)
+    data, points = data_of(what, tmp_path / "data.json"), tmp_path / "p.csv"
+    points.write_text(text)
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--points", points)
+    assert done.returncode == 2
+    assert named in done.stderr and "Traceback" not in done.stderr
+
+
+def test_bad_data_and_requests_are_refused(tmp_path: Path) -> None:
+    few = data_of(made_up("spatial-8", 9, 12), tmp_path / "few.json")
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", few)
+    assert done.returncode == 2 and "15 and more" in done.stderr
+    other = cdpr_here("calibrate", "fit", "planar-4", "--data", few)
+    assert other.returncode == 2 and "another state" in other.stderr
+    few.write_text("{}")
+    assert cdpr_here("calibrate", "fit", "spatial-8", "--data", few).returncode == 2
+    assert cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path / "no").returncode == 2
+    both = cdpr_here("calibrate", "run", "planar-4", "--redundancy", "--scanner")
+    assert both.returncode == 2 and "give one of" in both.stderr
+    none = cdpr_here("calibrate", "run", "bench-2", "--redundancy")
+    assert none.returncode == 2 and "no platform" in none.stderr
+    kind = cdpr_here("calibrate", "run", "planar-4", "--redundancy", "--identify", "exit,colour")
+    assert kind.returncode == 2 and "colour" in kind.stderr
+
+
+def test_the_study_has_the_ratio_and_the_table(tmp_path: Path) -> None:
+    picture = tmp_path / "study.png"
+    done = cdpr_here("calibrate", "study", "--draws", "12", "--png", picture, "--json")
+    assert done.returncode == 0, done.stderr
+    rows = result(done)["cases"]
+    small = [row for row in rows if row["share"] <= 0.5]
+    assert len(small) == 12
+    # sqrt(3), less what the directions to an exit point differ
+    assert all(1.4 < row["ratio"] < 1.75 for row in small)
+    assert np.mean([row["off"] for row in small]) == pytest.approx(0.0, abs=0.1)
+    assert "table 3.1" in done.stderr and "figure 3.7" in done.stderr
+    assert matplotlib.image.imread(picture).std() > 0.01

@@ -1,0 +1,89 @@
+"""The mistakes that are made most: each is made, and the page that lists them compared with it."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from cdpr_here import cdpr_here
+
+import cdpr_profiles
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "mistakes.md"
+SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
+WRITE = "CDPR_WRITE_PAGES"
+"""Where this is in the environment the page is written instead of compared."""
+MISTAKES = (
+    ("A command misspelt", "cdpr comission planar-3"),
+    ("An option misspelt", "cdpr doctor --jsn"),
+    ("A robot misspelt", "cdpr robot show planar3"),
+    ("A key misspelt in a robot's file", "cdpr robot show misspelt.toml"),
+    ("A bus that the robot's file has not", "cdpr robot show other-bus.toml"),
+    ("An interface without its kind", "cdpr run planar-3 --bus can0"),
+    ("No bus named", "cdpr drive info winch-mpp0923d"),
+    ("A simulated bus that nobody runs", "cdpr drive info winch-mpp0923d --bus simbus:lab"),
+    ("No daemon runs", "cdpr move --to 300 2000"),
+    ("A folder in use already", "cdpr commission winch-mpp0923d --bus simbus: --out used"),
+    ("Which motor of the robot?", "cdpr commission planar-3 --bus simbus:"),
+    ("An axis that is not there", "cdpr commission planar-3 --bus simbus: --axis left"),
+    ("A speed out of range", "cdpr drive jog winch-mpp0923d --bus simbus: --speed-deg-s 99999"),
+    ("A number below its least", "cdpr drive jog winch-mpp0923d --bus simbus: --seconds 0"),
+    ("A choice that is none", "cdpr tighten --from nowhere"),
+    ("Motors that were not commissioned", "cdpr run planar-3 --bus simbus: --commissioned used"),
+    ("Open to the network without a key", "cdpr run planar-3 --bus simbus: --http 0.0.0.0:8080"),
+    ("A key that others may read", "cdpr status --url http://robot:8080 --key-file key"),
+    ("A robot's file that exists", "cdpr robot new misspelt.toml"),
+    ("No recording", "cdpr log info notes.mcap"),
+    ("A picture of another format", "cdpr log plot notes.mcap --out run.jpg"),
+)
+HEAD = """\
+# The commonest mistakes, and what is said
+
+Each was made, and this is what the command answered. Exit status 2 is bad input: nothing was done,
+and nothing had power. 1 means that the work failed. Where a file is concerned the message names
+file, key, value and what is allowed.
+
+| mistake | command | answer | exit |
+|---|---|---|---|
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with files that have something wrong, of a user who runs no daemon."""
+    for name in ("XDG_RUNTIME_DIR", "XDG_STATE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / name.lower()))
+    robot = SHIPPED.read_text()
+    (tmp_path / "misspelt.toml").write_text(robot.replace("mass_kg", "mas_kg"))
+    (tmp_path / "other-bus.toml").write_text(robot.replace('bus = "can0"', 'bus = "can1"', 1))
+    (tmp_path / "notes.mcap").write_text("notes of the day, and some more of them")
+    (tmp_path / "key").write_text("0123456789abcdef")
+    (tmp_path / "key").chmod(0o644)
+    (tmp_path / "used" / "raw").mkdir(parents=True)
+    (tmp_path / "used" / "raw" / "sweep-0.raw").write_bytes(b"")
+    return tmp_path
+
+
+def answered(command: str, folder: Path) -> tuple[str, int]:
+    """Return what the command says, in one line without its frame, and its exit status."""
+    ended = cdpr_here(*command.split()[1:], cwd=folder)
+    assert "Traceback" not in ended.stderr
+    lines = [re.sub(r"^[│╭╰].?|[│╮╯─]+$", "", line).strip() for line in ended.stderr.splitlines()]
+    told = [line for line in lines if line and not line.startswith(("Usage:", "Try ", "─"))]
+    told = [line for line in told if not line.endswith(" ...") and set(line) - set("─ Error")]
+    return " ".join(told).replace(f"{folder}/", "").removeprefix("cdpr: "), ended.returncode
+
+
+def test_every_mistake_gets_the_message_that_the_page_shows(folder: Path) -> None:
+    rows = []
+    for mistake, command in MISTAKES:
+        said, status = answered(command, folder)
+        assert status in (1, 2) and said, command
+        assert "Input should" not in said and "Value error" not in said
+        rows.append(f"| {mistake} | `{command}` | {said.replace('|', chr(92) + '|')} | {status} |")
+    page = HEAD + "\n".join(rows) + "\n"
+    if WRITE in os.environ:
+        PAGE.write_text(page)
+    assert PAGE.read_text() == page, f"to write it anew: {WRITE}=1"

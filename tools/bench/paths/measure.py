@@ -1,0 +1,99 @@
+"""What it costs to plan a path of a CAM program, and how long the planned motion takes."""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cdpr_profiles import load_robot
+from cdpr_tools.bench.paths.cam import cam_program
+from cdpr_tools.output import Output
+from cdpr_tools.paths.options import PathOptions
+from cdpr_tools.paths.picture import draw_path
+from cdpr_tools.paths.preview import Preview, preview
+
+ROBOT = "spatial-8"
+TARGET_s = 20.0
+_LOOKED_AT = 2000
+"""Positions through which the library's spline leads; it is given as many a second as ours."""
+
+
+def measure(lines: int, seed: int, out: Output) -> dict[str, Any]:
+    """Return planning times, preview and picture included, and durations, beside TOPP-RA's."""
+    robot = load_robot(ROBOT)
+    platform = robot.platform
+    assert platform is not None  # it is one of ours
+    middle = 0.5 * (np.array(platform.workspace_min_m) + np.array(platform.workspace_max_m))
+    options = PathOptions(" ".join(f"{1e3 * x:.3f}" for x in middle))
+    with tempfile.TemporaryDirectory(prefix="cdpr-bench-") as folder:
+        file, small = Path(folder) / "cam.nc", Path(folder) / "warm.nc"
+        file.write_text(cam_program(lines, seed), encoding="utf-8")
+        small.write_text(cam_program(60, seed), encoding="utf-8")
+        out.note("compiling ...")
+        draw_path(preview(robot, small, options, _quiet), robot, Path(folder) / "warm.png")
+        out.note(f"planning {lines} lines ...")
+        begun = time.perf_counter()
+        shown = preview(robot, file, options, _quiet)
+        planned = time.perf_counter()
+        draw_path(shown, robot, Path(folder) / "cam.png")
+        drawn = time.perf_counter()
+    timed = shown.plan.timed
+    assert timed is not None and shown.obstacle is None  # it is made to fit
+    figures: dict[str, Any] = {
+        "lines": lines,
+        "seed": seed,
+        "robot": ROBOT,
+        "nodes": len(shown.plan.nodes.s),
+        "samples": len(timed.samples),
+        "length_m": shown.plan.nodes.length_m,
+        "plan_s": planned - begun,
+        "with_picture_s": drawn - begun,
+        "duration_s": timed.duration_s,
+        "constant_limit_s": shown.plan.constant_s,
+        "gain": shown.plan.constant_s / timed.duration_s,
+        "target_s": TARGET_s,
+        "reached": drawn - begun <= TARGET_s,
+        "toppra": None,
+    }
+    if importlib.util.find_spec("toppra") is not None:
+        out.note("planning a part of it by the package toppra ...")
+        figures["toppra"] = _by_toppra(shown)
+    return figures
+
+
+def _quiet(_what: str, _part: float) -> None:
+    """Tell nobody."""
+
+
+def _by_toppra(shown: Preview) -> dict[str, float]:
+    """Return how long the package takes for the longest run's first nodes, by its own solver.
+
+    The same nodes, limits of velocity and acceleration; it knows no jerk, no feed, and here no
+    tensions.
+    """
+    import toppra  # noqa: PLC0415  # not a part of what is installed with the project
+    from toppra import algorithm, constraint  # noqa: PLC0415
+
+    toppra.setup_logging("ERROR")
+    nodes, limits = shown.plan.nodes, shown.planner.limits
+    begin, end = max(nodes.runs.tolist(), key=lambda run: run[1] - run[0])
+    end = min(end, begin + _LOOKED_AT)
+    s = nodes.s[begin : end + 1] - nodes.s[begin]
+    chosen = np.concatenate([[True], np.diff(s) > 0.0])
+    begun = time.perf_counter()
+    path = toppra.SplineInterpolator(s[chosen], nodes.q[begin : end + 1][chosen])
+    bounds = [
+        constraint.JointVelocityConstraint(limits.velocity),
+        constraint.JointAccelerationConstraint(limits.acceleration),
+    ]
+    algorithm.TOPPRA(
+        bounds, path, gridpoints=s[chosen], solver_wrapper="seidel"
+    ).compute_trajectory(0, 0)
+    taken_s = time.perf_counter() - begun
+    count = int(chosen.sum())
+    return {"nodes": count, "plan_s": taken_s, "us_a_node": 1e6 * taken_s / count}

@@ -1,0 +1,1 @@
+"""Calibration of geometry at the terminal: the simulated robot, files and pictures."""

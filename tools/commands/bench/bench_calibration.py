@@ -1,0 +1,44 @@
+"""`cdpr bench calibration`: what identifying a geometry costs, beside plain SciPy."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.output import Output
+
+app = typer.Typer()
+
+
+@app.command()
+def calibration(
+    poses: Annotated[int, typer.Option(min=10, max=2000, help="Poses of the fit.")] = 100,
+    repeats: Annotated[int, typer.Option(min=2, max=1000, help="Fits, the fastest counts.")] = 10,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure the identification of spatial-8: poses measured, unknown, and by plain SciPy.
+
+    SciPy solves the same with poses as unknowns and a numeric Jacobian, once.
+    """
+    from cdpr_tools.bench import calibration as bench  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    told = bench.measure(poses, repeats, out)
+    verdict = "reached" if told["reached"] else "MISSED"
+    out.say(
+        f"{poses} poses x 8 cables, exit points and offsets, processor time:",
+        *(
+            f"  {text:34}{told[name]['ms']:10.1f} ms, exit points {told[name]['off_mm']:.2f} mm off"
+            for name, text in (
+                ("measured", "poses measured"),
+                ("redundancy", "poses unknown"),
+                ("scipy", "SciPy, poses measured"),
+            )
+        ),
+        f"  {'with drums and elongation too':34}{told['usual']:10.1f} ms",
+        f"  SciPy takes {told['ratio']:.0f} times as long; wanted at most "
+        f"{told['target_ms']:g} ms: {verdict}",
+    )
+    out.result({"ok": True, **told})

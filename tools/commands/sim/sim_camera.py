@@ -1,0 +1,105 @@
+"""`cdpr sim camera` and `cdpr sim photos`: a simulated camera beside a robot, or without one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import typer
+
+from cdpr_profiles.devices.camera import CameraIntrinsics
+from cdpr_sim_bus.camera.camera_plant import CameraPlant
+from cdpr_sim_bus.camera.camera_server import CameraServer
+from cdpr_sim_bus.camera.random_poses import Box, random_poses
+from cdpr_sim_bus.camera.sim_camera import SimCamera
+from cdpr_sim_bus.physics_board import PhysicsBoard
+from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption, OverwriteOption
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.report.save import save
+
+_PlantOption = Annotated[
+    Path | None,
+    typer.Option(help="Camera's plant file: the truth about lens, mount, light and markers."),
+]
+
+app = typer.Typer()
+
+
+@app.command()
+def camera(
+    socket: Annotated[Path, typer.Argument(help="Unix socket to make.", metavar="SOCKET")],
+    board: Annotated[Path, typer.Option(help="Physics board of the robot that carries it.")],
+    plant: _PlantOption = None,
+    exit_with_stdin: ExitWithStdinOption = False,
+) -> None:
+    """Run a camera on a simulated platform until Ctrl-C; other commands know it as sim:SOCKET.
+
+    Type `dark`, `defocus 6`, `mend` or `unplug` to break and mend it.
+    """
+    made = SimCamera(_plant(plant))
+    with PhysicsBoard.attach(board) as shared:
+        platform = shared.platform
+        if platform.state() is None:
+            raise BadInputError(f"--board {board}: no platform moves on its axes' cables")
+        lens = made.plant.lens
+        details = {"width_px": lens.width_px, "height_px": lens.height_px}
+        CameraServer(made, platform, socket).serve(exit_with_stdin, details)
+
+
+@app.command()
+def photos(
+    folder: Annotated[Path, typer.Argument(help="New folder for the images.", metavar="FOLDER")],
+    plant: _PlantOption = None,
+    count: Annotated[int, typer.Option(min=1, max=2000, help="How many.")] = 40,
+    seed: Annotated[int, typer.Option(min=0, help="Of the poses.")] = 1,
+    low: Annotated[
+        str, typer.Option(help="Lowest position of the platform, m.", metavar='"X Y Z"')
+    ] = "-0.5 -0.4 1.4",
+    high: Annotated[
+        str, typer.Option(help="Highest position of the platform, m.", metavar='"X Y Z"')
+    ] = "0.2 0.6 1.75",
+    tilt_deg: Annotated[float, typer.Option(min=0.0, max=80.0, help="Most rotation.")] = 15.0,
+    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write images of a simulated camera from random poses, without a robot; and its intrinsics.
+
+    The intrinsics are the true ones, in camera.toml beside the images.
+    """
+    out = Output(as_json)
+    truth = _plant(plant)
+    box = Box(_vector(low, "--low"), _vector(high, "--high"), tilt_deg)
+    if folder.exists() and any(folder.iterdir()) and not overwrite:
+        raise BadInputError(f"{folder}: holds something already; --overwrite replaces images")
+    folder.mkdir(parents=True, exist_ok=True)
+    made, lens = SimCamera(truth), truth.lens
+    with out.progress(f"{count} images", float(count)) as advance:
+        for k, state in enumerate(random_poses(box, count, seed)):
+            path = folder / f"image-{k:04d}.png"
+            if not cv2.imwrite(str(path), made.grab(state)):
+                raise BadInputError(f"{path}: cannot be written")
+            advance(k + 1.0)
+    intrinsics = CameraIntrinsics(
+        width_px=lens.width_px,
+        height_px=lens.height_px,
+        focal_px=lens.focal_px,
+        centre_px=lens.centre_px,
+        distortion=lens.distortion,
+    )
+    save(folder / "camera.toml", intrinsics.to_toml())
+    out.say(f"{count} images and camera.toml in {folder}")
+    out.result({"ok": True, "folder": folder, "images": count})
+
+
+def _plant(path: Path | None) -> CameraPlant:
+    return CameraPlant() if path is None else CameraPlant.load_file(path)
+
+
+def _vector(text: str, option: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = map(float, text.split())
+    except ValueError:
+        raise BadInputError(f"{option} {text!r}; allowed: three numbers, m") from None
+    return x, y, z

@@ -1,0 +1,93 @@
+"""Work in parts that any process can do: here, in processes of this machine, or on a cluster."""
+
+from __future__ import annotations
+
+import importlib
+import multiprocessing
+import os
+import signal
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.pool import Pool
+from typing import Any, Protocol
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_tools.errors import BadInputError, WorkFailedError
+
+_ANSWER_S = 5.0
+
+
+class Job(Protocol):
+    """One part of the work; it can be pickled and knows all that it takes."""
+
+    def run(self) -> FloatArray:
+        """Return the result, which depends on the job alone."""
+
+
+Runner = Callable[[Sequence[Job]], Iterator[FloatArray]]
+"""Yields the results of jobs in their order."""
+
+
+@contextmanager
+def runner(workers: int, cluster: str | None) -> Iterator[Runner]:
+    """Yield what runs jobs in so many processes, or on the Ray cluster at an address.
+
+    One worker is this process. All of them end with the block, whether it is done or interrupted.
+    """
+    if cluster is not None:
+        with _ray(cluster) as run:
+            yield run
+    elif workers == 1:
+        yield lambda jobs: map(_run, jobs)
+    else:
+        with processes(workers) as pool:
+            yield lambda jobs: pool.imap(_run, jobs)
+
+
+def processes(workers: int) -> Pool:
+    """Return processes that end with the block; an interrupt of the terminal is ours to handle."""
+    # each is started with -c, which looks into the working directory before all others
+    os.environ["PYTHONSAFEPATH"] = "1"
+    own = multiprocessing.get_context("spawn")
+    return own.Pool(workers, signal.signal, (signal.SIGINT, signal.SIG_IGN))
+
+
+@contextmanager
+def _ray(address: str) -> Iterator[Runner]:
+    try:
+        ray: Any = importlib.import_module("ray")
+    except ModuleNotFoundError:
+        raise BadInputError(
+            f"--cluster {address}: needs ray, which comes with: pip install 'cdpr-rt[cluster]'"
+        ) from None
+    try:
+        _knock(address)
+        ray.init(address=address, log_to_driver=False, logging_level="error")
+    except (ConnectionError, OSError, RuntimeError, ValueError) as error:
+        raise WorkFailedError(f"--cluster {address}: {str(error).splitlines()[0]}") from error
+    try:
+        remote = ray.remote(_run)
+
+        def run(jobs: Sequence[Job]) -> Iterator[FloatArray]:
+            for result in [remote.remote(job) for job in jobs]:
+                try:
+                    yield ray.get(result)
+                except ray.exceptions.RayError as error:
+                    told = str(error).strip().splitlines()[-1]
+                    raise WorkFailedError(f"--cluster {address}: {told}") from error
+
+        yield run
+    finally:
+        ray.shutdown()
+
+
+def _knock(address: str) -> None:
+    """Raise OSError where nobody listens at HOST:PORT, which Ray itself notices after minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if colon and port.isdecimal():
+        socket.create_connection((host, int(port)), timeout=_ANSWER_S).close()
+
+
+def _run(job: Job) -> FloatArray:
+    return job.run()

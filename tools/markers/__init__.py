@@ -1,0 +1,1 @@
+"""Printed markers: sheets of them, and pictures of their maps."""

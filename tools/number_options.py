@@ -1,0 +1,55 @@
+"""Options that take several numbers, each of which may be negative: `--to -100 200`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from typer.core import TyperCommand
+from typing_extensions import override
+
+from cdpr_tools.errors import BadInputError
+
+
+def numbers_command(*options: str) -> type[TyperCommand]:
+    """Return the class of a command whose `options` take all the numbers that follow them."""
+
+    class _NumbersCommand(TyperCommand):
+        @override
+        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+            """Join each of these options with its numbers, negative ones too."""
+            joined: list[str] = []
+            takes = False
+            for word in args:
+                if takes and _is_number(word):
+                    joined[-1] += f" {word}" if "=" in joined[-1] else f"={word}"
+                    continue
+                takes = word in options
+                joined.append(word)
+            return super().parse_args(ctx, joined)
+
+    return _NumbersCommand
+
+
+def numbers(option: str, text: str, names: Sequence[str], unit: str, factor: float) -> list[float]:
+    """Return the numbers of an option in SI, one for each name; raises BadInputError."""
+    allowed = f"{' '.join(names).upper()} in {unit}"
+    words = text.split()
+    if len(words) != len(names):
+        raise BadInputError(f"{option} {text}: {len(words)} numbers; allowed: {allowed}")
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        raise BadInputError(f"{option} {text}: allowed: {allowed}") from None
+    if not all(map(math.isfinite, values)):
+        raise BadInputError(f"{option} {text}: allowed: finite numbers, {allowed}")
+    return [factor * value for value in values]
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,1 @@
+"""Paths on the command line: preview, picture, and following them."""

@@ -1,0 +1,1 @@
+"""Poses that a robot reaches: chosen, written to a file, drawn."""

@@ -1,0 +1,68 @@
+"""Poses that are reached, and which of them are chosen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from cdpr_rt.calibration.pose_choice import informative, predicted_deviation_m, spread
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.reach.reachable import Reach, Reached
+
+AMONG = 20
+"""Times as many poses are drawn as are chosen among them."""
+
+
+class Choose(StrEnum):
+    """By what poses are chosen."""
+
+    RANDOM = "random"
+    SPREAD = "spread"
+    INFORMATION = "information"
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Positions (m, d) in the order they were chosen in, and what they were drawn from."""
+
+    positions: FloatArray
+    shares: FloatArray
+    drawn: Reached
+    clearance_m: float
+    margin_N: float
+    deviation_m: float | None
+    """Of exit points after a calibration with these poses, where there are three directions."""
+
+
+def choose(
+    reach: Reach, count: int, seed: int, by: Choose, angle_rad: float | None, share: float
+) -> Chosen:
+    """Return `count` poses that are reached, chosen among many more unless at random."""
+    model = reach.model
+    among = count if by is Choose.RANDOM else AMONG * count
+    drawn = reach.draw(among, seed, angle_rad, share)
+    taken = np.arange(count)
+    if by is Choose.SPREAD:
+        taken = spread(drawn.positions, model.wrench_scale, count)
+    elif by is Choose.INFORMATION:
+        taken = informative(*points_of(model), model.poses(drawn.positions), count)
+    positions = drawn.positions[taken]
+    poses = model.poses(positions)
+    clearances, _ = model.interference.clearances(poses)
+    return Chosen(
+        positions,
+        drawn.shares[taken],
+        drawn,
+        float(clearances.min()),
+        float(model.workspace().capacity_margins(poses).min()),
+        predicted_deviation_m(*points_of(model), poses) if model.positions == 3 else None,
+    )
+
+
+def points_of(model: PlatformModel) -> tuple[FloatArray, FloatArray]:
+    """Return exit and anchor points (n, 3)."""
+    geometry = model.kinematics.geometry
+    return geometry[:3].T, geometry[3:6].T

@@ -1,0 +1,1 @@
+"""The workspace of a robot for people: searched, told, drawn, as a mesh."""

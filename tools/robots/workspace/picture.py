@@ -1,0 +1,135 @@
+"""Pictures of a workspace: its surface by rays and by the grid, and three sections with margins."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from scipy.interpolate import RegularGridInterpolator
+
+import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
+from cdpr_profiles import Robot
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.statics import Box
+from cdpr_rt.robots.workspace_analysis.rays import Rays
+from cdpr_tools.robots.workspace.mesh import section
+from cdpr_tools.robots.workspace.search import Found, Search, in_mm
+
+_RAYS, _GRID, _MACHINE = "#d1581a", "#1b4f8a", "#444444"
+_WIDE_in = 9.6
+_FINE, _KNOTS = 90, 700
+_OUTSIDE_N = -1e6
+_SECTIONS = ((0, 2), (1, 2), (0, 1))
+_NAMES = "xyz"
+_LEGEND = [
+    Line2D([], [], color=_RAYS, lw=1.4, label="border by rays"),
+    Line2D([], [], color=_GRID, lw=1.4, ls="--", label="border by the grid"),
+    Line2D([], [], color=_MACHINE, ls="", marker="s", ms=5, label="exit points"),
+    Line2D([], [], color=_MACHINE, ls="", marker="+", ms=8, label="where the rays start"),
+]
+
+
+def draw_workspace(robot: Robot, wanted: Search, found: Found, path: Path) -> None:
+    """Write the picture as PNG; raises OSError.
+
+    In space, after figures 3.3 and 3.4 of the thesis: both surfaces, and the three sections
+    through the centre of the rays, coloured by the margin.
+    """
+    if len(wanted.box.low_m) == 2:
+        figure = Figure(figsize=(7.4, 5.8), layout="constrained")
+        _draw_section(figure, figure.subplots(), wanted, found, (0, 1))
+    else:
+        figure = Figure(figsize=(_WIDE_in, 0.82 * _WIDE_in), layout="constrained")
+        _draw_surfaces(figure.add_subplot(2, 2, 1, projection="3d"), wanted, found)
+        for k, view in enumerate(_SECTIONS):
+            _draw_section(figure, figure.add_subplot(2, 2, 2 + k), wanted, found, view)
+    figure.suptitle(f"{robot.name}: {_title(wanted)}", fontsize=10, x=0.01, ha="left")
+    figure.legend(handles=_LEGEND, loc="outside lower center", ncols=4)
+    figure.savefig(path, format="png")
+
+
+def _title(wanted: Search) -> str:
+    moving = wanted.criterion.acceleration_m_s2
+    kind = f"wrench-feasible workspace at {moving:g} m/s2" if moving else "static workspace"
+    turns = len(wanted.criterion.turns_rad)
+    return kind + (f", all of {turns} orientations" if turns > 1 else "")
+
+
+def _draw_surfaces(ax: Any, wanted: Search, found: Found) -> None:
+    """Draw the grid's surface, and over it a net whose knots are ends of rays."""
+    vertices, triangles = found.grid.surface
+    ax.plot_trisurf(*vertices.T, triangles=triangles, color=_GRID, alpha=0.3, linewidth=0.0)
+    rays = found.rays
+    each = max(1, len(rays.lengths_m) // _KNOTS)
+    net = Rays(rays.centre_m, rays.directions[::each], rays.lengths_m[::each])
+    edges = np.concatenate([net.triangles[:, [0, 1]], net.triangles[:, [1, 2]]])
+    ax.add_collection3d(Line3DCollection(list(net.ends_m[edges]), colors=_RAYS, linewidths=0.5))
+    ax.plot(*np.array(wanted.criterion.platform.exit_points_m).T, "s", ms=4, color=_MACHINE)
+    low, high = np.array([wanted.box.low_m, wanted.box.high_m])
+    ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(tuple(high - low), zoom=1.2)
+
+
+def _draw_section(
+    figure: Figure, ax: Axes, wanted: Search, found: Found, view: tuple[int, int]
+) -> None:
+    i, j = view
+    low, high = np.array([wanted.box.low_m, wanted.box.high_m])
+    sides = high - low
+    counts = [max(2, round(_FINE * float(sides[k] / sides.max()))) for k in view]
+    cells = Box((low[i], low[j]), (high[i], high[j])).grid(*counts)
+    centre = found.rays.centre_m
+    points = np.broadcast_to(centre, (cells[..., 0].size, len(centre))).copy()
+    points[:, view] = cells.reshape(-1, 2)
+    least = wanted.criterion.least_N
+    margins = wanted.criterion.depths(points).reshape(cells.shape[:2]) + least
+    levels = MaxNLocator(8).tick_values(least, max(found.grid.deepest[1] + least, least + 1e-3))
+    filled = ax.contourf(
+        cells[0, :, 0], cells[:, 0, 1], np.maximum(margins, _OUTSIDE_N),
+        np.unique(np.clip(levels, least, None)), cmap="YlGnBu", alpha=0.8,
+    )  # fmt: skip
+    bar = figure.colorbar(filled, ax=ax, shrink=0.85, format="%.0f")
+    bar.set_label("margin (N)")
+    bar.outline.set_visible(False)
+    _draw_borders(ax, found, view, cells)
+    ax.plot(*np.array(wanted.criterion.platform.exit_points_m)[:, view].T, "s", ms=4, c=_MACHINE)
+    ax.plot(*centre[list(view)], "+", ms=8, color=_MACHINE)
+    ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
+    ax.set(xlim=(low[i], high[i]), ylim=(low[j], high[j]))
+    ax.grid(visible=False)
+    if len(centre) == 3:
+        across = ({0, 1, 2} - {i, j}).pop()
+        ax.set_title(f"{_NAMES[across]} = {in_mm(centre[across : across + 1])} mm")
+
+
+def _draw_borders(ax: Axes, found: Found, view: tuple[int, int], cells: FloatArray) -> None:
+    """Draw where rays end in a plane, and where depths between the grid's places are 0."""
+    rays, grid = found.rays, found.grid
+    points = np.broadcast_to(rays.centre_m, (cells[..., 0].size, len(rays.centre_m))).copy()
+    points[:, view] = cells.reshape(-1, 2)
+    sides = [
+        np.linspace(*side)
+        for side in zip(grid.box.low_m, grid.box.high_m, grid.depths.shape, strict=True)
+    ]
+    depths = np.maximum(grid.depths, _OUTSIDE_N)
+    between = RegularGridInterpolator(sides, depths)(points).reshape(cells.shape[:2])
+    if between.min() < 0.0 < between.max():
+        ax.contour(
+            cells[0, :, 0], cells[:, 0, 1], between, [0.0],
+            colors=_GRID, linestyles="dashed", linewidths=1.4, zorder=3,
+        )  # fmt: skip
+    if len(rays.centre_m) == 2:
+        ends = rays.ends_m
+        border = np.stack([ends, np.roll(ends, -1, axis=0)], axis=1)
+    else:
+        across = ({0, 1, 2} - set(view)).pop()
+        border = section(rays.ends_m, rays.triangles, rays.centre_m, across)[:, :, view]
+    ax.add_collection(LineCollection(list(border), colors=_RAYS, linewidths=1.4))

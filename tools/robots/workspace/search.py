@@ -1,0 +1,144 @@
+"""Searches a robot's workspace, by a grid and by rays, in parts that any process can do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.statics import Box
+from cdpr_rt.robots.workspace_analysis.criterion import Criterion
+from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, WayJob, grid_points, shape_of
+from cdpr_rt.robots.workspace_analysis.rays import RayJob, Rays, directions
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.jobs import Job, Runner, runner
+from cdpr_tools.output import Output
+
+_CHECKS_A_JOB = 100_000
+_CHECKS_A_RAY = 80
+_WAYS_A_JOB = 5_000
+_WORTH_PROCESSES = 1_000_000
+"""Poses below which other processes take longer to start than they save."""
+_CHECKS_A_SECOND = 100_000.0
+
+
+@dataclass(frozen=True)
+class Search:
+    """How a workspace is searched."""
+
+    criterion: Criterion
+    box: Box
+    cells: int
+    """Of the grid, along the longest side of the box."""
+    rays: int
+    centre_m: FloatArray | None
+    """Where rays start; by default in the middle of the box of targets, or where it is deepest."""
+    workers: int | None
+    cluster: str | None
+
+
+@dataclass(frozen=True)
+class Found:
+    """A workspace by the same criterion twice."""
+
+    grid: Grid
+    rays: Rays
+
+
+def search(wanted: Search, out: Output) -> Found:
+    """Search it; raises CommandError where it is empty, or the centre outside."""
+    shape = shape_of(wanted.box, wanted.cells)
+    turns = len(wanted.criterion.turns_rad)
+    checks = turns * (int(np.prod(shape)) + _CHECKS_A_RAY * wanted.rays)
+    with (
+        runner(_workers(wanted, checks), wanted.cluster) as run,
+        out.progress("poses", checks / _CHECKS_A_SECOND) as advance,
+    ):
+
+        def told(jobs: Sequence[Job], first: int, each: int) -> FloatArray:
+            results = []
+            for k, result in enumerate(run(jobs), start=1):
+                results.append(result)
+                advance(turns * (first + k * each) / _CHECKS_A_SECOND)
+            return np.concatenate(results)
+
+        points = grid_points(wanted.box, shape)
+        count = max(1, _CHECKS_A_JOB // turns)
+        grid_jobs = [
+            GridJob(wanted.criterion, points[k : k + count]) for k in range(0, len(points), count)
+        ]
+        grid = Grid(wanted.box, told(grid_jobs, 0, count).reshape(shape))
+        centre = _centre(wanted, grid)
+        if wanted.criterion.contact_free:
+            grid = _reached(wanted.criterion, grid, centre, run)
+        ways = directions(wanted.rays, len(shape))
+        count = max(1, count // _CHECKS_A_RAY)
+        ray_jobs = [
+            RayJob(wanted.criterion, centre, ways[k : k + count], wanted.box)
+            for k in range(0, len(ways), count)
+        ]
+        lengths = told(ray_jobs, len(points), count * _CHECKS_A_RAY)
+    return Found(grid, Rays(centre, ways, lengths))
+
+
+def _reached(criterion: Criterion, grid: Grid, centre: FloatArray, run: Runner) -> Grid:
+    """Return the grid with places that contact keeps away as far outside as they were inside."""
+    depths = grid.depths.ravel().copy()
+    held = np.flatnonzero(depths >= 0.0)
+    count = max(1, _WAYS_A_JOB // len(criterion.turns_rad))
+    jobs = [
+        WayJob(criterion, centre, grid.points[held[k : k + count]])
+        for k in range(0, len(held), count)
+    ]
+    depths[held] *= np.concatenate(list(run(jobs)))
+    return Grid(grid.box, depths.reshape(grid.depths.shape))
+
+
+def _workers(wanted: Search, checks: int) -> int:
+    if wanted.workers is not None:
+        return wanted.workers
+    return 1 if checks < _WORTH_PROCESSES else len(os.sched_getaffinity(0))
+
+
+def _centre(wanted: Search, grid: Grid) -> FloatArray:
+    """Return where rays start."""
+    deepest, depth_N = grid.deepest
+    if not depth_N >= 0.0:
+        near = f"nearest to it is {in_mm(deepest)} mm, {-depth_N:.1f} N short"
+        if not np.isfinite(depth_N):
+            near = "some direction is held by no tensions anywhere"
+        raise WorkFailedError(
+            f"no place of the grid from {in_mm(wanted.box.low_m)} to {in_mm(wanted.box.high_m)} mm "
+            f"is in this workspace; {near}"
+        )
+    platform = wanted.criterion.platform
+    centre = wanted.centre_m
+    if centre is None:
+        centre = np.add(platform.workspace_min_m, platform.workspace_max_m) / 2.0
+    low, high = wanted.box.low_m, wanted.box.high_m
+    inside = bool((centre > low).all() and (centre < high).all())
+    if not inside or not wanted.criterion.depths(centre[None])[0] >= 0.0:
+        if wanted.centre_m is not None:
+            raise _outside(centre, deepest)
+        centre = deepest
+    if not wanted.criterion.clear_shares(centre, centre[None])[0] > 0.0:
+        raise BadInputError(
+            f"--contact-free: something is in contact where the rays start, at {in_mm(centre)} mm; "
+            "allowed: another --centre, or orientation"
+        )
+    return centre
+
+
+def _outside(centre: FloatArray, deepest: FloatArray) -> BadInputError:
+    return BadInputError(
+        f"--centre {in_mm(centre)}: outside the workspace; allowed: a place within it, such as "
+        f"{in_mm(deepest)}"
+    )
+
+
+def in_mm(position_m: FloatArray | Sequence[float]) -> str:
+    """Return a position as it can be typed, in mm."""
+    return " ".join(f"{1e3 * value:.0f}" for value in position_m)

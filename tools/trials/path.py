@@ -1,0 +1,182 @@
+"""The trial of a path: lines, arcs and cut corners out of a G-code file, at speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial import KDTree
+
+from cdpr_profiles import Robot
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
+from cdpr_rt.motion.path.pieces import pieces_of
+from cdpr_rt.procedures.path.planning import PathPlan, PathPlanner
+from cdpr_rt.programs.platform.path_store import write_plan
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.trials.directions import Directions
+from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.run import TrialRun
+
+FILE: Final = "path.nc"
+BLEND_mm: Final = 20.0
+RMS_mm: Final = 2.0
+LATE: Final = 0.01
+"""Share of the planned duration."""
+_LAPS: Final = 3
+_SHARE: Final = 0.35
+"""Of the workspace on either side of its middle."""
+_STEP_m: Final = 5e-4
+_LETTERS: Final = {"rx": "A", "ry": "B", "rz": "C", "angle": "C"}
+_STANDING_m: Final = 1e-6
+_WITHIN_S: Final = 600.0
+
+
+def gcode(directions: Directions, speed_m_s: float) -> str:
+    """Return the file: three laps of lines, an arc and a diagonal, turned on the way."""
+    half = 1e3 * _SHARE * (directions.high_m - directions.low_m)
+    x, y = half[0], half[1]
+    up, down = (f" Z{z:.3f}" for z in ((half[2], -half[2]) if directions.k > 2 else (0.0, 0.0)))
+    if directions.k == 2:
+        up = down = ""
+    turn = unturn = ""
+    if directions.angle_rad > 0.0:
+        letter = _LETTERS[directions.names[directions.k]]
+        turn, unturn = f" {letter}{0.4 * np.degrees(directions.angle_rad):.3f}", f" {letter}0"
+    lap = [
+        f"X{x:.3f}{turn}", f"Y{y:.3f}{up}", f"G3 X{-x:.3f} R{2.0 * x:.3f}",
+        f"G1 Y{-y:.3f}{down}{unturn}", f"X0 Y{0.5 * y:.3f}", f"X{-x:.3f} Y{-y:.3f}",
+    ]  # fmt: skip
+    head = ["G21 G90 G17", f"G0 X{-x:.3f} Y{-y:.3f}{down}", f"G64 P{BLEND_mm:g}"]
+    head.append(f"G1 F{60e3 * speed_m_s:.1f}")
+    return "\n".join([*head, *(_LAPS * lap), "M2", ""])
+
+
+def plan_of(robot: Robot, directions: Directions, speed_m_s: float) -> PathPlan:
+    """Return the plan of the trial's path; raises WorkFailedError where there is none."""
+    planner = PathPlanner(robot)
+    origin = 0.5 * (directions.low_m + directions.high_m)
+    settings = GcodeSettings(origin, 0.0)
+    path = read_gcode(gcode(directions, speed_m_s), FILE, planner.coordinates, settings)
+    plan = planner.plan(path)
+    if plan.timed is None or plan.obstacle is not None:
+        why = "" if plan.obstacle is None else plan.obstacle.text
+        raise WorkFailedError(f"{FILE}: the robot cannot follow it: {why}")
+    return plan
+
+
+def drive(run: TrialRun, speed_m_s: float) -> None:
+    """Plan the path, and follow it once."""
+    rig = run.rig
+    folder = rig.truth_log.parent
+    (folder / FILE).write_text(gcode(run.directions, speed_m_s), encoding="utf-8")
+    plan = plan_of(rig.robot, run.directions, speed_m_s)
+    paths = rig.loop.engine.parts.paths
+    assert plan.timed is not None and paths is not None  # of a robot with a platform
+    planner = PathPlanner(rig.robot)
+    paths.open(folder / "plans")
+    lines = plan.nodes.line[plan.timed.node]
+    name = write_plan(folder / "plans", plan.timed, lines, FILE, planner.model)
+    rig.program("path", plan=name)
+    rig.until(lambda: rig.progress["path"]["stage"] == "path", _WITHIN_S, "the way to the path")
+    run.mark("path", planned_s=plan.timed.duration_s)
+    rig.finish(_WITHIN_S + 2.0 * plan.timed.duration_s)
+    run.mark("path end")
+
+
+@dataclass(frozen=True)
+class PathErrors:
+    """What was recorded along the path, one row a cycle."""
+
+    time_s: FloatArray
+    true_m: FloatArray
+    """(c, k)"""
+    described_m: FloatArray
+    """Points of the file's path, corners not cut, 0.5 mm apart."""
+    off_mm: FloatArray
+    """True distance from the planned path, corners cut."""
+    setpoint_off_mm: FloatArray
+    """The set-point's distance from it."""
+    corner_mm: FloatArray
+    """The planned path's distance from the file's."""
+    lag_mm: FloatArray
+    """True distance from the set-point of the same cycle."""
+    planned_s: float
+    taken_s: float
+
+
+@cache
+def errors_of(recorded: Recorded, robot: Robot, speed_m_s: float) -> PathErrors:
+    """Return the errors of a trial; paths are computed anew, from the file."""
+    (mark,), (end,) = recorded.marked("path"), recorded.marked("path end")
+    rows = slice(recorded.row(mark["cycle"]), recorded.row(end["cycle"]) + 1)
+    k = recorded.directions.k
+    plan = plan_of(robot, recorded.directions, speed_m_s)
+    planned = _dense(plan)[:, :k]
+    described = _described(plan)[:, :k]
+    setpoint, true = recorded.setpoint_m[rows], recorded.true_m[rows]
+    moving = np.flatnonzero(np.linalg.norm(np.diff(setpoint, axis=0), axis=1) > _STANDING_m * 1e-2)
+    return PathErrors(
+        recorded.time_s[rows] - recorded.time_s[rows.start],
+        true,
+        described,
+        1e3 * KDTree(planned).query(true)[0],
+        1e3 * KDTree(planned).query(setpoint)[0],
+        1e3 * KDTree(described).query(planned)[0],
+        1e3 * np.linalg.norm(true - setpoint, axis=1),
+        float(mark["planned_s"]),
+        recorded.period_s * float(moving[-1] - moving[0] + 1),
+    )
+
+
+def _dense(plan: PathPlan) -> FloatArray:
+    """Return points of a planned path 0.5 mm apart."""
+    parts = []
+    for begin, end in plan.nodes.runs:
+        s = plan.nodes.s[begin : end + 1]
+        spline = CubicHermiteSpline(
+            s, plan.nodes.q[begin : end + 1], plan.nodes.first[begin : end + 1]
+        )
+        parts.append(spline(np.linspace(s[0], s[-1], int((s[-1] - s[0]) / _STEP_m) + 2)))
+    return np.concatenate(parts)
+
+
+def _described(plan: PathPlan) -> FloatArray:
+    """Return points of the file's path 0.5 mm apart."""
+    pieces = pieces_of(plan.path, plan.nodes.scale)
+    count = (pieces.length / _STEP_m).astype(np.int64) + 2
+    i = np.repeat(np.arange(len(count)), count)
+    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    return pieces.at(i, number / (count[i] - 1))[0]
+
+
+def judge(recorded: Recorded, robot: Robot, speed_m_s: float) -> list[Figure]:
+    """Return how far from the path the platform was, its corners, and the time that it took."""
+    errors = errors_of(recorded, robot, speed_m_s)
+    late = abs(errors.taken_s / errors.planned_s - 1.0)
+    speed = np.linalg.norm(np.diff(errors.true_m, axis=0), axis=1) / recorded.period_s
+    return [
+        Figure("planned_s", "planned duration", errors.planned_s, "s"),
+        Figure("taken_s", "duration of the set-point's motion", errors.taken_s, "s"),
+        Figure("late_share", "difference of both, share", late, "", LATE),
+        Figure("top_speed_m_s", "fastest, true", float(speed.max()), "m/s"),
+        Figure("path_mm", "RMS distance from the planned path", _rms(errors.off_mm), "mm", RMS_mm),
+        Figure("path_worst_mm", "worst distance from it", float(errors.off_mm.max()), "mm"),
+        Figure("lag_mm", "RMS distance from the set-point", _rms(errors.lag_mm), "mm"),
+        Figure(
+            "corner_mm", "planned path's farthest from the file's, in corners",
+            float(errors.corner_mm.max()), "mm", BLEND_mm,
+        ),
+        Figure(
+            "setpoint_mm", "set-point's farthest from the planned path",
+            float(errors.setpoint_off_mm.max()), "mm",
+        ),
+    ]  # fmt: skip
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
