@@ -107,6 +107,7 @@ def test_a_loop_that_is_killed_is_reported_and_nobody_feeds_the_watchdog(
     assert daemon.children()["service"] == children["service"]
     stopped = cdpr("stop", *daemon.at)  # ends what is left, and is no error where nothing is
     assert (stopped.returncode, "its loop had died" in stopped.stdout) == (0, True)
+    assert daemon.process.wait(30.0) == 1
     assert cdpr("stop", *daemon.at).stdout == "nothing runs\n"
     assert daemon.end() == 1
     assert not any(alive(pid) for pid in children.values())
