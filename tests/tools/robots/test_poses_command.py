@@ -60,8 +60,8 @@ def test_poses_in_a_plane_from_another_place_as_toml(tmp_path: Path) -> None:
         (("spatial-8", "--from", "1500", "0", "1500"), "the start at 1.500, 0.000, 1.500 m: cable"),
         (("spatial-8", "--out", "poses.xlsx"), "poses.xlsx: allowed: NAME.csv or NAME.toml"),
         (("spatial-8", "--out", "/nowhere/poses.csv"), "in a folder that is there"),
-        (("spatial-8", "--choose", "best"), "'best' is not one of"),
-        (("spatial-8", "-n", "0"), "greater than or equal to"),
+        (("spatial-8", "--choose", "best"), "'best'; allowed: 'random', 'spread'"),
+        (("spatial-8", "-n", "0"), "allowed: 1 or more"),
     ],
 )
 def test_what_cannot_be_meant_is_refused(arguments: tuple[str, ...], problem: str) -> None:

@@ -19,7 +19,7 @@ from cdpr_tools.bench.poses.measure import Brute, far_ends
 
 PLACES = 60
 LAMP = BoxFile(min_m=(-0.2, 0.05, 1.98), max_m=(-0.1, 0.15, 2.05))
-WAYS = 120
+WAYS = 100
 
 
 def model_of(name: str) -> PlatformModel:
