@@ -68,7 +68,7 @@ MODULES = {
         "bus": "Look at a CAN bus.",
     },
     "calibrate": {
-        "calibrate": "Calibrate a robot's geometry, drums and elongation; take over, undo.",
+        "calibrate": "Calibrate a robot's geometry, drums and elongation.",
     },
     "camera": {
         "camera": "Cameras: images, and intrinsics.",
@@ -89,7 +89,7 @@ MODULES = {
         "markers": "Printed markers: sheets, and maps of them.",
     },
     "poses": {
-        "poses": "Draw poses that a robot reaches, held and without contact all the way.",
+        "poses": "Draw poses that a robot reaches straight from home, or from another place.",
     },
     "path": {
         "path": "Look at a path before it is followed, follow it, take it up again.",

@@ -69,7 +69,7 @@ def path(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a path and tell how long it takes and what it takes of the cables; nothing moves.
+    """Look at a path before it is followed, follow it, take it up again.
 
     Ends with status 2 where the robot cannot follow it, with the first place named. With --run the
     running daemon plans and follows it.
