@@ -37,6 +37,8 @@ _LEAST_HELD_OUT = 3
 _GRID = 4
 _WANTED_mm_PER_m = 0.3
 """1.5 mm for 5 m of frame, 3 sigma."""
+_MOST_OVER_WANTED = 3.0
+"""What is known worse than so many times what is wanted is not taken over."""
 _MISFIT = 9.0
 _SLACK_SHARE = 0.5
 _MOST_LEFT_OUT = 0.1
@@ -75,6 +77,13 @@ class Outcome:
         left_out = [fault for fault in self.faults if fault.kind in ("outlier", "slack", "jump")]
         if len(left_out) > _MOST_LEFT_OUT * found.seen.used.size:
             told.append(f"{len(left_out)} readings contradict the others: measure anew")
+        most_mm = _MOST_OVER_WANTED * _wanted_mm(self.robot)
+        if self.predicted_3_sigma_mm > most_mm:
+            told.append(
+                f"positions would be known to {self.predicted_3_sigma_mm:.1f} mm only (3 sigma, "
+                f"predicted; allowed: {most_mm:.1f} mm): measure points, or say how well the exit "
+                "points of the robot's file are known (--known-mm)"
+            )
         worse = self.verified.residual_m > self.before.residual_m
         if self.verified.errors_m.size:
             worse = self.verified.mean_mm > self.before.mean_mm
@@ -97,7 +106,7 @@ class Outcome:
         lines = [fault.text for fault in self.faults]
         against = self.objections()
         lines += [f"NOT GOOD: {text}" for text in against]
-        wanted = _WANTED_mm_PER_m * _frame_m(self.robot)
+        wanted = _wanted_mm(self.robot)
         if not against:
             enough = self.predicted_3_sigma_mm <= wanted
             lines.append(
@@ -245,7 +254,8 @@ def _grid(geometry: CableGeometry) -> FloatArray:
     return geometry.model.poses(places)
 
 
-def _frame_m(robot: Robot) -> float:
-    """Return the longest side of the box around the exit points."""
+def _wanted_mm(robot: Robot) -> float:
+    """Return what is wanted of positions, by the longest side of the box around exit points."""
     assert robot.platform is not None
-    return float(np.ptp(np.array(robot.platform.exit_points_m), axis=0).max())
+    frame_m = float(np.ptp(np.array(robot.platform.exit_points_m), axis=0).max())
+    return _WANTED_mm_PER_m * frame_m

@@ -25,7 +25,7 @@ def simulated_bus() -> Iterator[str]:
     try:
         yield bus
     finally:
-        simulator.communicate(timeout=10)
+        simulator.communicate(timeout=120)
 
 
 @pytest.fixture(autouse=True)

@@ -110,7 +110,7 @@ class MixedSimulator:
         assert b"ready" in self._process.stdout.readline()
 
     def stop(self) -> None:
-        self._process.communicate(b"", timeout=10)
+        self._process.communicate(b"", timeout=120)
 
 
 def _serve(bus: str, winches: Sequence[str]) -> None:

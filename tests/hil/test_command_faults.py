@@ -76,7 +76,7 @@ class Lab:
     def close(self) -> None:
         with suppress(Exception):
             self.leave()
-        self.process.communicate(b"", timeout=10)
+        self.process.communicate(b"", timeout=120)
 
 
 @pytest.fixture(scope="module")
@@ -332,7 +332,7 @@ def test_a_killed_master_leaves_no_power(lab: Lab, tmp_path: Path) -> None:
 def test_the_next_command_finds_the_drive_well(lab: Lab) -> None:
     for _ in range(2):
         command = begin("drive", "enable", WINCH, "--bus", lab.bus, "--seconds", "0.2")
-        _, errors = command.communicate(timeout=60)
+        _, errors = command.communicate(timeout=120)
         assert command.returncode == 0, errors
     time.sleep(1.5)  # longer than a drive waits for a heartbeat
     assert lab.node.sdo[0x1001].raw == 0

@@ -105,6 +105,9 @@ def test_a_loop_that_is_killed_is_reported_and_nobody_feeds_the_watchdog(
     assert "WATCHDOG=1" not in manager.heard(1.0)
     assert daemon.http.post("/hold", json={}).status_code == 503
     assert daemon.children()["service"] == children["service"]
+    stopped = cdpr("stop", *daemon.at)  # ends what is left, and is no error where nothing is
+    assert (stopped.returncode, "its loop had died" in stopped.stdout) == (0, True)
+    assert cdpr("stop", *daemon.at).stdout == "nothing runs\n"
     assert daemon.end() == 1
     assert not any(alive(pid) for pid in children.values())
     assert not daemon.socket.exists()

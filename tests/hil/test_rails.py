@@ -172,7 +172,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rails]:
                 yield Rails(bus, io_device, *axes, modbus, port, tty, folder / "state")
             io_device.close()
             for process in (drive, other, cells):
-                process.communicate(b"", timeout=10)
+                process.communicate(b"", timeout=120)
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def await_motion(rails: Rails, kind: str, command: subprocess.Popen[str], past_m
 
 
 def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
-    out, errors = command.communicate(timeout=60)
+    out, errors = command.communicate(timeout=120)
     assert "Traceback" not in errors + out, errors
     assert command.returncode == status, errors
     told: dict[str, Any] = json.loads(out.splitlines()[-1])
@@ -286,7 +286,7 @@ def test_a_winch_with_power_refuses_the_move_and_ends_it(rails: Rails) -> None:
         assert rails.position_m("modbus") == before
     finally:
         network.disconnect()
-        winch.communicate(b"", timeout=10)
+        winch.communicate(b"", timeout=120)
 
 
 def test_a_rail_on_modbus_heeds_the_safety_io_and_one_command(rails: Rails) -> None:

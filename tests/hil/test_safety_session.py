@@ -96,7 +96,7 @@ class Lab:
 
 
 def result(command: subprocess.Popen[str], status: int = 0) -> dict[str, Any]:
-    out, errors = command.communicate(timeout=60)
+    out, errors = command.communicate(timeout=120)
     assert "Traceback" not in errors + out, errors
     assert command.returncode == status, errors
     told: dict[str, Any] = json.loads(out.splitlines()[-1])
@@ -110,7 +110,7 @@ def simulator() -> Iterator[tuple[str, Path]]:
         process = start("up", WINCH, "--bus", bus, "--lockstep", "--board", board)
         ready(process)
         yield bus, board
-        process.communicate(b"", timeout=10)
+        process.communicate(b"", timeout=120)
 
 
 @pytest.fixture(scope="module")

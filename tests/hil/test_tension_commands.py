@@ -82,7 +82,7 @@ def simulator(*arguments: str | Path) -> Iterator[Simulator]:
         assert process.stdout is not None
         yield Simulator(process, json.loads(process.stdout.readline())["ready"])
     finally:
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
 
 
 @contextmanager
@@ -222,7 +222,7 @@ def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
                 assert broken.poll() is None
                 time.sleep(0.005)
             cells.tell("silent 1")
-            told, _ = broken.communicate(timeout=60)
+            told, _ = broken.communicate(timeout=120)
             assert broken.returncode == FAILED
             error = json.loads(told.splitlines()[-1])["error"]
             assert "winch 1: tension sensor: stale" in error
@@ -257,7 +257,7 @@ def pull(folder: Path, *, disturbed: bool) -> bytes:
                     process.send_signal(signal.SIGSTOP)
                     time.sleep(1.0)
                     process.send_signal(signal.SIGCONT)
-        told, _ = command.communicate(timeout=60)
+        told, _ = command.communicate(timeout=120)
         assert command.returncode == 0, told
     return (out / "raw" / "pull.raw").read_bytes()
 
@@ -339,7 +339,7 @@ def test_stopping_lowers_the_mass_and_a_dead_load_cell_stops_the_pull(tmp_path: 
             assert process.poll() is None
             time.sleep(0.001)
         process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=60)
+        out, _ = process.communicate(timeout=120)
         assert process.returncode == FAILED
         assert "stopped on request" in json.loads(out.splitlines()[-1])["error"]
         without_power(shared)

@@ -191,7 +191,7 @@ def simulator(*options: str) -> Iterator[str]:
         assert b"ready" in process.stdout.readline()
         yield name
     finally:
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
 
 
 @pytest.fixture(scope="module")
@@ -279,7 +279,7 @@ def tool(*words: str) -> Iterator[subprocess.Popen[bytes]]:
         yield process
     finally:
         process.send_signal(2)
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
 
 
 def test_the_stock_logger_and_player_take_part(drives: str, tmp_path: Path) -> None:

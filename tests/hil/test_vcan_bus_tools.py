@@ -89,7 +89,7 @@ def test_replay_sends_and_switches_off_at_the_end() -> None:
     notes: list[str] = []
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
         bus.bind(("vcan0",))
-        bus.settimeout(2.0)
+        bus.settimeout(60.0)
         with Sender(URL, notes.append) as sender:
             sender.send(Frame(0.0, 0x205, bytes.fromhex("0F000000")))
             sender.complete = True

@@ -47,7 +47,7 @@ def drives(robot: Path) -> Iterator[None]:
         yield
     finally:
         process.stdin.close()
-        process.wait(20)
+        process.wait(120)
         process.stdout.close()
 
 

@@ -75,7 +75,7 @@ def test_cycles_over_vcan(simulator: subprocess.Popen[bytes]) -> None:
 
 
 def test_the_simulator_ends_in_order(simulator: subprocess.Popen[bytes]) -> None:
-    out, _ = simulator.communicate(timeout=30)
+    out, _ = simulator.communicate(timeout=120)
     assert (simulator.returncode, out) == (0, b"closed\n")
 
 

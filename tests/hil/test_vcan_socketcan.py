@@ -49,7 +49,7 @@ def test_two_buses_at_once_keep_apart() -> None:
         peers = [open_python_can(url) for url in (VCAN0, VCAN1)]
         for port in ports:
             stack.callback(port.close)
-            port.settimeout(2.0)
+            port.settimeout(60.0)
         for peer in peers:
             stack.callback(peer.shutdown)
         buffer = bytearray(16)
@@ -65,7 +65,7 @@ def test_two_buses_at_once_keep_apart() -> None:
 
 def test_the_kernel_stamps_when_a_frame_came() -> None:
     port, peer = open_port(VCAN0, [(0x181, 0x7FF)]), open_port(VCAN0, [])
-    port.settimeout(2.0)
+    port.settimeout(60.0)
     before = time.time()
     peer.send(FRAME.pack(0x181, 0, b""))
     after = time.time()
@@ -91,7 +91,7 @@ def test_error_frames_tell_the_health_and_disturb_no_cycle() -> None:
     ]
     for can_id, data, state in told:
         source.send(FRAME.pack(can_id, 8, data))
-        message = acyclic.recv(2.0)
+        message = acyclic.recv(60.0)
         assert message is not None
         assert message.is_error_frame
         assert health.take_error(message.arbitration_id, message.data)
@@ -122,7 +122,7 @@ def test_an_interface_that_is_down_is_told_so(down: None) -> None:
 def test_an_interface_that_goes_down_in_motion_is_noticed_by_readers_and_senders() -> None:
     port, peer = open_port(VCAN1), open_port(VCAN1, [])
     acyclic = open_python_can(VCAN1)
-    port.settimeout(2.0)
+    port.settimeout(60.0)
     peer.send(FRAME.pack(0x181, 0, b""))
     assert port.recv_into(bytearray(16)) == 16
     set_link("vcan1", up=False)
@@ -137,7 +137,7 @@ def test_an_interface_that_goes_down_in_motion_is_noticed_by_readers_and_senders
         assert "'vcan1' is down" in str(peer.lost(caught.value))
         with pytest.raises(can.CanError):
             for _ in range(2):  # the frame of before may come first
-                acyclic.recv(2.0)
+                acyclic.recv(60.0)
     finally:
         set_link("vcan1", up=True)
         acyclic.shutdown()
@@ -207,7 +207,7 @@ def test_a_full_transmit_queue_is_counted_and_told(stalled_adapter: tuple[int, s
 def test_an_adapter_pulled_out_takes_its_interface_away(stalled_adapter: tuple[int, str]) -> None:
     host, name = stalled_adapter
     port = open_port(BusUrl.parse(f"socketcan:{name}"))
-    port.settimeout(2.0)
+    port.settimeout(60.0)
     os.write(host, b"t18121234\r")
     buffer = bytearray(16)
     port.recv_into(buffer)
@@ -246,7 +246,7 @@ def test_the_kernels_own_driver_takes_the_simulated_adapter_for_a_real_one() -> 
     )
     assert simulator.stdout is not None
     ready = json.loads(simulator.stdout.readline())["ready"]
-    with serial.Serial(ready["slcan"], timeout=2.0) as terminal:
+    with serial.Serial(ready["slcan"], timeout=60.0) as terminal:
         terminal.write(b"S8\rO\r")
         assert terminal.read(2) == b"\r\r"
         url = BusUrl.parse(f"socketcan:{kernel_slcan(terminal.fileno())}")
@@ -265,4 +265,4 @@ def test_the_kernels_own_driver_takes_the_simulated_adapter_for_a_real_one() -> 
         assert "gone away" in str(port.lost(caught.value))
         assert not isinstance(caught.value, BlockingIOError)
         port.close()
-    simulator.communicate(timeout=30)
+    simulator.communicate(timeout=120)

@@ -115,7 +115,7 @@ def test_the_stock_master_enables_a_drive_while_the_stock_logger_writes(tmp_path
             assert wait_for(node.is_faulted)
     finally:
         logger.send_signal(2)
-        logger.communicate(timeout=20)
+        logger.communicate(timeout=120)
     identifiers = {message.arbitration_id for message in can.LogReader(str(log))}
     wanted = {0x000, 0x080, 0x080 + NODE, 0x180 + NODE, 0x580 + NODE, 0x600 + NODE, 0x700 + NODE}
     assert wanted <= identifiers

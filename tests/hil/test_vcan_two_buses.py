@@ -37,7 +37,7 @@ def drives() -> Iterator[dict[str, object]]:
         yield json.loads(process.stdout.readline())["ready"]["buses"]
     finally:
         process.stdin.close()
-        process.wait(20)
+        process.wait(120)
         process.stdout.close()
 
 

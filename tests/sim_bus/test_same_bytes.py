@@ -112,7 +112,7 @@ def simulator(log: Path) -> Iterator[tuple[subprocess.Popen[bytes], list[Bus]]]:
     finally:
         # the simulator first, so that no time passes by the wall
         process.stdin.close()
-        process.wait(20.0)
+        process.wait(120)
         process.stdout.close()
         for bus in buses:
             bus.sock.close()

@@ -72,16 +72,16 @@ class Simulator:
 
     def kill(self) -> None:
         self.process.send_signal(signal.SIGKILL)
-        self.process.wait(10.0)
+        self.process.wait(120)
 
     def close(self) -> None:
         assert self.process.stdin is not None
         self.process.stdin.close()
         try:
-            self.process.wait(10.0)
+            self.process.wait(120)
         except subprocess.TimeoutExpired:
             self.process.kill()
-            self.process.wait(10.0)
+            self.process.wait(120)
 
 
 @contextmanager

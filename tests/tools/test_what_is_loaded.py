@@ -9,6 +9,7 @@ import pytest
 
 from cdpr_tools import cli
 from cdpr_tools.command_group import load
+from cdpr_tools.commands.bench import bench
 from cdpr_tools.commands.sim import sim
 
 
@@ -23,7 +24,9 @@ def _loaded(code: str) -> set[str]:
     return set(told.stdout.split("\n")[-2].split())
 
 
-@pytest.mark.parametrize("modules", [cli.MODULES, sim.MODULES], ids=["cdpr", "sim"])
+@pytest.mark.parametrize(
+    "modules", [cli.MODULES, sim.MODULES, bench.MODULES], ids=["cdpr", "sim", "bench"]
+)
 def test_the_lines_of_help_are_those_of_the_commands(modules: dict[str, dict[str, str]]) -> None:
     for module, lines in modules.items():
         for name, line in lines.items():

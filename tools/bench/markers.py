@@ -43,17 +43,20 @@ def measure(count: int, seed: int, out: Output) -> dict[str, Any]:
     )
     sheets = MarkerSheets(size_m=_SIZE_m)
     results: dict[str, Any] = {"images": count, "seed": seed}
+    reference: int | None = None  # the same for both, as errors are told in its frame
     for name, detect in (("ours", _ours), ("opencv", _opencv)):
         out.note(f"map from the corners of {name}")
         start = time.process_time()
         sightings = detect(images)
         seen = time.process_time()
-        fit = fit_map(sightings, intrinsics, sheets)
+        fit = fit_map(sightings, intrinsics, sheets, reference)
         done = time.process_time()
+        reference = fit.map.reference
         results[name] = {
             "detection_s": round(seen - start, 2),
             "fit_s": round(done - seen, 2),
             "corner_sigma_px": round(fit.bundle.sigma_px, 4),
+            "told_mm": round(1e3 * _rms(fit.bundle.shape_sigma_m), 3),
             **_errors(fit, camera),
         }
     ours = results["ours"]
@@ -81,8 +84,12 @@ def _opencv(images: _Images) -> list[Sighting]:
     return found
 
 
+def _rms(vectors: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.nanmean((vectors**2).sum(axis=1))))
+
+
 def _middle(sheet: Sheet) -> NDArray[np.float64]:
-    """Return the middle of a marker's corners, which stand off its paper's middle where it bends."""
+    """Return the middle of a marker's corners, which are off its paper's where it bends."""
     height = 0.5 * sheet.bend_1_m * (_SIZE_m / 2.0) ** 2
     return np.asarray(sheet.position_m + height * sheet.rotation[:, 2])
 
@@ -114,5 +121,5 @@ def _errors(fit: MapFit, camera: SimCamera) -> dict[str, float]:
         "markers": len(there),
         "xy_max_mm": round(1e3 * float(along[..., :2].max()), 3),
         "z_max_mm": round(1e3 * float(along[..., 2].max()), 3),
-        "shape_rms_mm": round(1e3 * float(np.sqrt((left**2).sum(axis=1).mean())), 3),
+        "shape_rms_mm": round(1e3 * _rms(left), 3),
     }

@@ -15,7 +15,7 @@ from cdpr_profiles.calibration.in_force import next_version, take_over
 from cdpr_profiles.calibration.in_force import undo as take_back
 from cdpr_rt.calibration.data import CalibrationData, load_data, load_points, with_points
 from cdpr_rt.calibration.outcome import Method, Outcome, calibrate, calibration_of
-from cdpr_rt.calibration.parameters import USUAL, CableGeometry
+from cdpr_rt.calibration.parameters import USUAL, CableGeometry, Knowledge
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.procedures.calibration.measure_poses import Measured, measure_poses, read_pose
 from cdpr_rt.robots.calibration_state import mark_calibrated
@@ -45,7 +45,15 @@ _Identify = Annotated[
         metavar="LIST",
     ),
 ]
+_KnownMm = Annotated[
+    float,
+    typer.Option(
+        "--known-mm", min=0.1, max=500.0,
+        help="How well the exit points of the robot's file are known, one standard deviation.",
+    ),
+]  # fmt: skip
 _DryRun = Annotated[bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")]
+_TAPE_mm = 1e3 * Knowledge().exit_m
 _DATA, _PICTURE = "data.json", "calibration.png"
 
 
@@ -60,6 +68,7 @@ def fit_data(
     data: Annotated[Path, typer.Option(help="Readings, data.json of a run.", metavar="FILE")],
     points: _Points = None,
     identify: _Identify = None,
+    known_mm: _KnownMm = _TAPE_mm,
     out_dir: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
     dry_run: _DryRun = False,
     as_json: JsonOption = False,
@@ -70,7 +79,15 @@ def fit_data(
     """
     out = Output(as_json)
     profile = load_robot(robot)
-    _finish(out, profile, load_data(data), points, identify, out_dir or data.parent, dry_run)
+    _finish(
+        out,
+        profile,
+        load_data(data),
+        points,
+        _geometry(profile, identify, known_mm),
+        out_dir or data.parent,
+        dry_run,
+    )
 
 
 @app.command()
@@ -89,6 +106,7 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the poses.")] = 1,
     identify: _Identify = None,
+    known_mm: _KnownMm = _TAPE_mm,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for data, result and picture.")
     ] = None,
@@ -106,7 +124,7 @@ def run(
     if sum((redundancy, scanner, points is not None)) != 1:
         raise BadInputError("give one of --redundancy, --scanner and --points")
     refuse_impossible(profile)
-    _geometry(profile, identify)
+    geometry = _geometry(profile, identify, known_mm)
     if points is not None:
         load_points(points)
     folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
@@ -114,7 +132,7 @@ def run(
         raise BadInputError(f"{folder / _DATA}: is there already; allowed: --overwrite")
     with interrupted_by_sigterm():
         measured = _measure(out, profile, plant, scanner, poses, seed, folder / _DATA)
-    _finish(out, profile, measured, points, identify, folder, dry_run)
+    _finish(out, profile, measured, points, geometry, folder, dry_run)
 
 
 @app.command()
@@ -205,9 +223,9 @@ def _told(
         yield place
 
 
-def _geometry(robot: Robot, identify: str | None) -> CableGeometry:
+def _geometry(robot: Robot, identify: str | None, known_mm: float) -> CableGeometry:
     kinds = USUAL if identify is None else tuple(part.strip() for part in identify.split(","))
-    return CableGeometry.of(robot, kinds)
+    return CableGeometry.of(robot, kinds, Knowledge(exit_m=1e-3 * known_mm))
 
 
 def _finish(
@@ -215,12 +233,11 @@ def _finish(
     robot: Robot,
     data: CalibrationData,
     points: Path | None,
-    identify: str | None,
+    geometry: CableGeometry,
     folder: Path,
     dry_run: bool,
 ) -> None:
     """Identify, tell, draw, and take over what is good."""
-    geometry = _geometry(robot, identify)
     seen = data.observations(robot, geometry.model)
     if points is not None:
         seen = with_points(seen, load_points(points), geometry.coordinates)

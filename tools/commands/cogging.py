@@ -109,12 +109,13 @@ def sweep_axis(
             control.post("/enable", {})
             try:
                 speed_rad_s = math.radians(speed_deg_s)
-                span = AxisSweep(control, swept, stop_requested).run(turns, speed_rad_s)
+                span = AxisSweep(control, swept, stop_requested, out).run(turns, speed_rad_s)
             except BaseException:
                 with suppress(CommandError):  # where a fault has taken the power already
                     daemon.post("/disable")
                 raise
             daemon.post("/disable")
+    out.note("reading the recording ...")
     recorded = [str(path) for path in write_passes(span.rows(), swept, paths)]
     for path in recorded:
         out.say(f"recorded {path}")

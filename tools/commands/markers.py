@@ -222,7 +222,7 @@ def _say(out: Output, fit: MapFit) -> None:
 
 def _map_text(fit: MapFit, sheets: MarkerSheets) -> str:
     map_ = fit.map
-    where = f"of marker {fit.fixed[0]}" if fit.known is None else "of the layout"
+    where = "of the layout" if sheets.known else f"of marker {fit.fixed[0]}"
     lines = [
         f"# Marker map in the frame {where}; {verdict(fit)}.",
         f'dictionary = "{sheets.dictionary}"',

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.patheffects import withStroke
 
 import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_rt.calibration.markers.map_fit import MapFit
@@ -22,7 +24,7 @@ def draw_map(fit: MapFit, path: Path) -> None:
     3.20 and 3.21 of the thesis show of errors.
     """
     map_ = fit.map
-    figure = Figure(figsize=(7.4, 8.6), layout="constrained")
+    figure = Figure(figsize=(7.4, 8.6), layout=ConstrainedLayoutEngine(w_pad=0.15))
     top, low = figure.subplots(2, 1, height_ratios=(2.2, 1.0))
     placed = map_.placed
     sigma_mm = 1e3 * fit.bundle.marker_sigma_m
@@ -32,7 +34,10 @@ def draw_map(fit: MapFit, path: Path) -> None:
     top.add_collection(shades)
     for marker, position in zip(np.array(map_.ids)[placed], map_.position_m[placed], strict=True):
         colour = _REFERENCE if marker in fit.fixed else "#222222"
-        top.annotate(str(marker), position[:2], ha="center", va="center", fontsize=7, color=colour)
+        name = top.annotate(
+            str(marker), position[:2], ha="center", va="center", fontsize=7, color=colour
+        )
+        name.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
     cameras = map_.camera_position_m[map_.located]
     top.plot(*cameras[:, :2].T, "+", ms=5, color=_CAMERA, label="camera")
     top.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="marker map")

@@ -23,7 +23,7 @@ _AXES: Final = (
     "#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#8a8f98",
 )  # fmt: skip
 _WIDE_in: Final = 7.4
-_MOST_POINTS: Final = 20_000
+_MOST_POINTS: Final = 5000
 
 
 def draw_path(shown: Preview, robot: Robot, file: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 import numpy as np
@@ -109,7 +108,6 @@ class PathErrors:
     taken_s: float
 
 
-@cache
 def errors_of(recorded: Recorded, robot: Robot, speed_m_s: float) -> PathErrors:
     """Return the errors of a trial; paths are computed anew, from the file."""
     (mark,), (end,) = recorded.marked("path"), recorded.marked("path end")
@@ -124,13 +122,19 @@ def errors_of(recorded: Recorded, robot: Robot, speed_m_s: float) -> PathErrors:
         recorded.time_s[rows] - recorded.time_s[rows.start],
         true,
         described,
-        1e3 * KDTree(planned).query(true)[0],
-        1e3 * KDTree(planned).query(setpoint)[0],
-        1e3 * KDTree(described).query(planned)[0],
+        _away_mm(planned, true),
+        _away_mm(planned, setpoint),
+        _away_mm(described, planned),
         1e3 * np.linalg.norm(true - setpoint, axis=1),
         float(mark["planned_s"]),
         recorded.period_s * float(moving[-1] - moving[0] + 1),
     )
+
+
+def _away_mm(points_m: FloatArray, places_m: FloatArray) -> FloatArray:
+    """Return how far each place is from the next of some points, (m,)."""
+    away_m, _ = KDTree(points_m).query(places_m)
+    return 1e3 * np.asarray(away_m)
 
 
 def _dense(plan: PathPlan) -> FloatArray:

@@ -21,6 +21,7 @@ from cdpr_rt.calibration.markers.reprojection import (
     residuals,
     residuals_and_jacobian,
 )
+from cdpr_rt.calibration.markers.sheet_errors import SheetErrors, sheet_errors
 from cdpr_rt.errors import ControlError
 
 _STEPS = 60
@@ -55,6 +56,8 @@ class Bundle:
     """Standard deviation of a coordinate of a corner, from the weighted residuals."""
     covariance: FloatArray
     """Of all parameters (p, p) in the order of `reprojection`, 0 for what is held fixed."""
+    sheets: SheetErrors
+    """What the sheets are off by themselves; the covariance has it in it."""
     steps: int
 
     @property
@@ -220,7 +223,10 @@ def _finish(
     inverse = _solve(normal / np.outer(root, root), np.eye(len(free)), len(np.unique(used.image)))
     if not inverse.any():
         raise BundleError("what the images show leaves open where a marker or the camera is")
-    covariance[np.ix_(free, free)] = variance * inverse / np.outer(root, root)
+    sheets = sheet_errors(now, used, weights)
+    covariance[np.ix_(free, free)] = sheets.inflation * variance * inverse / np.outer(root, root)
     distance, weight = np.full((len(seen), 4), np.nan), np.zeros((len(seen), 4))
     distance[usable], weight[usable] = np.linalg.norm(off, axis=-1), weights
-    return Bundle(now, distance, weight, float(np.sqrt(variance)) / _LOSS_BIAS, covariance, steps)
+    return Bundle(
+        now, distance, weight, float(np.sqrt(variance)) / _LOSS_BIAS, covariance, sheets, steps
+    )

@@ -90,9 +90,9 @@ def fit_map(
     suspicion = lens_suspicion(bundle, seen, (start,))
     known = _compare(bundle.estimate.map, sheets)
     fixed: tuple[int, ...] = (start,)
-    if known is not None:
+    if numbers := _known_places(bundle.estimate.map, sheets)[0]:
+        fixed = tuple(seen.ids[k] for k in numbers)
         bundle = _held(bundle, seen, sheets)
-        fixed = tuple(one.id for one in sheets.known if one.id in seen.ids)
     faults = _faults(cover, suspicion, known) + _misfits(bundle)
     warnings = _warnings(sightings, dropped)
     notes = _notes(bundle, cover, known, sheets, fixed)
@@ -244,6 +244,11 @@ def _notes(
         notes.append(
             f"the map's scale is that of the size told ({1e3 * sheets.size_m:g} mm): images alone "
             "cannot see it wrong; two markers at known places, or the robot's cables, can"
+        )
+    if bundle.sheets.sigma_m > 0.0:
+        notes.append(
+            f"corners are {1e3 * bundle.sheets.sigma_m:.2f} mm off on their sheets, the same in "
+            "all images: paper that is not flat, or the printer's scale; more images do not help"
         )
     in_frame, shape = (_typical_mm(one) for one in (bundle.marker_sigma_m, bundle.shape_sigma_m))
     if len(fixed) == 1 and in_frame > _FRAME_RATIO * shape:

@@ -217,7 +217,7 @@ def _smoothed(
     times: FloatArray,
     swept: FloatArray,
 ) -> FloatArray:
-    """Return a run's smoothed motion, (c, 4): places even in time, as many as if it was stretched."""
+    """Return a run's smoothed motion, (c, 4), in as many samples as if it was stretched."""
     count = max(int(np.ceil(stretch * duration_s / PERIOD_S - _NOTHING)), 1)
     motion = np.zeros((count + 1, 4))
     kernel.smooth_run(begin, end, width_s, duration_s / count, nodes.s, x, times, swept, motion)

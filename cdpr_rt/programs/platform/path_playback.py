@@ -10,7 +10,7 @@ from cdpr_rt.jit import jit
 
 TIME, RATE = 0, 1
 """Places in the state: time along the plan, s, and how fast it passes."""
-_QUICKEST_1_S: Final = 5.0
+_QUICKEST_1_S: Final = 1e3
 _LEAST_SHARE: Final = 0.25
 _SETTLE_S: Final = 0.5
 _THERE_S: Final = 1e-3

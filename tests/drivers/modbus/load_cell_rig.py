@@ -56,7 +56,7 @@ class LoadCellRig:
         return answer
 
     def close(self) -> None:
-        self.process.communicate(timeout=20)
+        self.process.communicate(timeout=120)
         self.board.close()
 
     def __enter__(self) -> Self:

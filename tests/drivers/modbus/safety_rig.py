@@ -65,7 +65,7 @@ class SafetyIoProcess:
 
     def close(self) -> None:
         self._client.close()
-        self.process.communicate(b"", timeout=10)
+        self.process.communicate(b"", timeout=120)
 
 
 def start(*arguments: str | Path) -> subprocess.Popen[bytes]:

@@ -175,7 +175,7 @@ def test_the_bytes_on_the_line_are_those_of_the_standard(rig: LoadCellRig) -> No
 
     rig.tell("mend all")
     rig.pull([100.0])
-    with serial.Serial(rig.port, 115200, timeout=2.0) as port:
+    with serial.Serial(rig.port, 115200, timeout=60.0) as port:
         question = bytes([1, 4, 0, 0, 0, 3])
         port.write(question + crc(question))
         answer = port.read(11)
@@ -236,7 +236,7 @@ def test_other_register_maps_and_an_adapter_pulled_out(tmp_path: Path) -> None:
             with pytest.raises(LineError, match="no other program"):
                 sampler.start()
             assert rig.tell("unplug") == {"unplugged": True}
-            rig.process.wait(20)
+            rig.process.wait(120)
             with pytest.raises(LineError, match="pulled out"):
                 cells.read(0)
             with pytest.raises(LineError, match="cannot be opened"):

@@ -258,7 +258,7 @@ def travel(folder: Path, *, disturbed: bool) -> list[tuple[float, float]]:
         done = move(rail, axis, clock, 0.02, conditions)
         told.append((done.from_m, done.to_m))
         axis.close()
-        process.communicate(b"", timeout=10)
+        process.communicate(b"", timeout=120)
     return told
 
 

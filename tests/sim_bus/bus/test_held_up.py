@@ -18,7 +18,9 @@ from cdpr_sim_bus.robot.plant import Plant
 pytestmark = pytest.mark.alone
 
 MASTER = 127
-CONSUMER_S = 0.1
+CONSUMER_S = 0.4
+CLOCKS_S = 2e-3
+"""How exactly the kernel's stamps, which are of another clock, become bus time."""
 SYNC, HEARTBEAT = pack_frame(0x080), pack_frame(0x700 + MASTER, b"\x05")
 
 
@@ -60,47 +62,49 @@ class Held:
 
 def test_frames_of_all_clients_are_taken_at_the_times_they_were_sent(stub_node: type) -> None:
     held = Held(node := stub_node(sync_period_s=0.01))
-    begin_s = time.monotonic()
-    sent = []
+    earliest, latest = [], []
     for k in range(100):
-        client = held.clients[k % 2]
-        client.send(SYNC if k % 2 else pack_frame(0x100 + k))
-        sent.append(time.monotonic() - begin_s)
+        earliest.append(time.monotonic())
+        held.clients[k % 2].send(SYNC if k % 2 else pack_frame(0x100 + k))
+        latest.append(time.monotonic())
         time.sleep(0.002)
     time.sleep(0.1)
     held.catch_up()
+    offset = held.hub.clock.now(now_s := time.monotonic()) - now_s
     held.close()
     names = [int.from_bytes(frame[:4], "little") for frame, _ in node.seen]
     assert names == [0x080 if k % 2 else 0x100 + k for k in range(100)]
-    taken = [now for _, now in node.seen]
-    offset = taken[0] - sent[0]
-    # a frame may lie for a moment between being sent and being noted here
-    assert [t - offset for t in taken] == pytest.approx(sent, abs=2e-3)
+    taken = [now - offset for _, now in node.seen]
+    for before, at, after in zip(earliest, taken, latest, strict=True):
+        assert before - CLOCKS_S <= at <= after + CLOCKS_S
     assert all(a <= b for a, b in pairwise(node.advanced))
 
 
 def test_a_timer_goes_off_between_the_frames_around_it(stub_node: type) -> None:
     held = Held(node := stub_node(sync_period_s=0.01))
     held.catch_up()
+    held.clients[0].send(SYNC)
     start = held.hub.clock.now(time.monotonic())
     node.timers.append(start + 0.03)
-    for _ in range(5):
+    while held.hub.clock.peek(time.monotonic()) < start + 0.05:
         held.clients[0].send(SYNC)
         time.sleep(0.01)
-    time.sleep(0.05)
+    held.clients[0].send(SYNC)
     held.catch_up()
-    before = [now for frame, now in node.seen if now < start + 0.03]
+    times = [now for _, now in node.seen]
     fired = next(now for now in node.advanced if now >= start + 0.03)
     held.close()
-    assert 2 <= len(before) <= 4
-    assert fired < start + 0.06
+    assert times[0] < start + 0.03 < times[-1]
+    assert fired <= next(now for now in times if now >= start + 0.03)
 
 
 @pytest.fixture
 def held_drive() -> Held:
     held = Held(SimDrive.for_winch(load_winch("winch-mpp0923d"), Plant()))
     held.catch_up(0.05)
-    request = bytes([0x23, 0x16, 0x10, 0x01]) + (MASTER << 16 | 100).to_bytes(4, "little")
+    request = bytes([0x23, 0x16, 0x10, 0x01]) + (MASTER << 16 | round(1e3 * CONSUMER_S)).to_bytes(
+        4, "little"
+    )
     held.clients[0].send(pack_frame(0x601, request))
     held.clients[0].send(HEARTBEAT)
     held.catch_up(0.02)
@@ -117,16 +121,16 @@ def _emergencies(held: Held) -> list[int]:
 
 
 def test_no_heartbeat_is_lost_by_holding_up_the_simulator(held_drive: Held) -> None:
-    """Half a second, five times what the drive tolerates, between the same heartbeats."""
+    """More than a second, several times what the drive tolerates."""
     cycles, heartbeats = held_drive.clients
-    for k in range(100):
+    for k in range(250):
         cycles.send(SYNC)
-        if k % 8 == 0:
+        if k % 2 == 0:
             heartbeats.send(HEARTBEAT)
         time.sleep(0.005)
     held_drive.catch_up()
     assert _emergencies(held_drive) == []
-    assert held_drive.hub.sync_count == 100
+    assert held_drive.hub.sync_count == 250
     held_drive.catch_up(2 * CONSUMER_S)
     assert _emergencies(held_drive) == [0x8130]
     held_drive.close()
@@ -135,7 +139,7 @@ def test_no_heartbeat_is_lost_by_holding_up_the_simulator(held_drive: Held) -> N
 def test_a_silence_while_it_is_held_up_is_a_silence(held_drive: Held) -> None:
     cycles, heartbeats = held_drive.clients
     heartbeats.send(HEARTBEAT)
-    for _ in range(50):
+    for _ in range(100):
         cycles.send(SYNC)
         time.sleep(0.005)
     heartbeats.send(HEARTBEAT)

@@ -53,7 +53,7 @@ class Simulator:
         return dict(line["ready"])
 
     def ended(self) -> tuple[int, str]:
-        _, errors = self.process.communicate(timeout=10)
+        _, errors = self.process.communicate(timeout=120)
         return self.process.returncode, errors
 
 
@@ -84,7 +84,7 @@ def test_it_ends_with_the_command_that_started_it(simulator: Simulator) -> None:
     simulator.ready()
     assert simulator.process.stdin is not None
     simulator.process.stdin.close()
-    assert simulator.process.wait(10) == 0
+    assert simulator.process.wait(120) == 0
     assert simulator.trace.read_text() == "closed"
 
 

@@ -111,7 +111,7 @@ def test_third_party_runs_pdos_by_sync(site: Site) -> None:
     received = threading.Event()
     tpdo.add_callback(lambda _map: received.set())
     site.network.sync.transmit()
-    assert received.wait(3.0)
+    assert received.wait(60.0)
     assert tpdo[0x6064].raw == -4711
     assert (site.od.get(0x6040), site.od.get(0x6071)) == (6, -55)
 

@@ -62,4 +62,4 @@ class Lab:
 
     def close(self) -> None:
         if self.process.poll() is None:
-            self.process.communicate("", timeout=20)
+            self.process.communicate("", timeout=120)

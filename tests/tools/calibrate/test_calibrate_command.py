@@ -98,8 +98,9 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
     what = made_up("spatial-8", 45, 12, noise_m=2e-4)
     data = data_of(what, tmp_path / "data.json")
-    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--dry-run", "--json")
-    assert done.returncode == 0, done.stderr
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--json")
+    assert done.returncode == 1, done.stderr
+    assert "NOT GOOD" in done.stderr and "--known-mm" in done.stderr
     told = result(done)
     assert told["frame"].startswith("the exit points of the robot's file")
     assert told["in_force"] is None and calibrated(load_robot("spatial-8")).calibration is None

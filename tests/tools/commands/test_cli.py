@@ -73,7 +73,7 @@ def lab() -> Iterator[str]:
     assert process.stdout is not None
     assert bus in process.stdout.readline()
     yield bus
-    process.communicate("", timeout=10)
+    process.communicate("", timeout=120)
     assert process.returncode == 0
 
 

@@ -52,7 +52,7 @@ def simulator(*options: str | Path) -> Iterator[str]:
         assert b"ready" in line, process.communicate()[1]
         yield name
     finally:
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
 
 
 COMMAND = typer.main.get_command(app)
@@ -154,7 +154,7 @@ def test_one_drive_alone_gets_a_bit_rate_that_counts(tmp_path: Path) -> None:
         assert b"ready" in process.stdout.readline()
         assert answers(name, 1)
     finally:
-        process.communicate(timeout=20)
+        process.communicate(timeout=120)
 
 
 def test_a_store_that_is_damaged_is_told(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ def lab(
             ):
                 yield rig, io_device, board.axis(0)
             io_device.close()
-            simulator.communicate(b"", timeout=10)
+            simulator.communicate(b"", timeout=120)
     finally:
         if before is None:
             del os.environ["XDG_STATE_HOME"]

@@ -2,110 +2,76 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
 import typer
 
-from cdpr_tools.bench import cycle as cycle_bench
-from cdpr_tools.bench import profile_loading
-from cdpr_tools.commands.bench import (
-    bench_bus,
-    bench_calibration,
-    bench_control,
-    bench_kinematics,
-    bench_latency,
-    bench_loop,
-    bench_markers,
-    bench_path,
-    bench_poses,
-    bench_soak,
-    bench_stop,
-    bench_tension,
-    bench_workspace,
-)
-from cdpr_tools.commands.options import JsonOption
-from cdpr_tools.output import Output
+from cdpr_tools.command_group import group_of
 
-app = typer.Typer(
-    name="bench", help="Measure this project's own cost on this machine.", no_args_is_help=True
-)
-
-_VARIANTS = {
-    "ours": "ours: AxisGroup",
-    "canopen": "the canopen package's PDOs",
-    "floor": "floor: bare socket and struct",
+MODULES = {
+    "bench.bench_bus": {
+        "bus": "Measure frames per second and host cost per frame, beside plain python-can.",
+    },
+    "bench.bench_calibration": {
+        "calibration": "Measure the identification of spatial-8: poses measured, unknown, and "
+        "by plain SciPy.",
+    },
+    "bench.bench_control": {
+        "control": "Measure one update of a platform's control: pose, wrench, tensions, torques.",
+    },
+    "bench.bench_cycle": {
+        "cycle": "Measure one exchange with 8 axes: ours, the canopen package's PDO path, and "
+        "the floor.",
+        "profiles": "Measure loading and validating every shipped profile, against bare TOML "
+        "parsing.",
+    },
+    "bench.bench_kinematics": {
+        "kinematics": "Measure the pose from cable lengths: along a path, and from bad starts.",
+    },
+    "bench.bench_latency": {
+        "latency": "Measure how late a loop wakes up, with and without the real-time settings, "
+        "as a picture.",
+    },
+    "bench.bench_loop": {
+        "loop": "Measure the control loop of 8 axes on two simulated buses at 1 kHz, and one "
+        "full bus.",
+    },
+    "bench.bench_markers": {
+        "markers": "Make a map of 42 markers from rendered images, beside one from OpenCV's "
+        "own corners.",
+    },
+    "bench.bench_path": {
+        "path": "Measure planning a G-code file as CAM writes it, for spatial-8: preview and "
+        "picture too.",
+    },
+    "bench.bench_poses": {
+        "poses": "Measure drawing reachable poses of spatial-8, and look at ways again by "
+        "plain NumPy.",
+    },
+    "bench.bench_soak": {
+        "soak": "Move a simulated robot in lockstep for hours; no memory may leak and no frame "
+        "be lost.",
+    },
+    "bench.bench_stop": {
+        "stop": "Measure how soon the loop accepts a stop while four clients flood every "
+        "interface.",
+    },
+    "bench.bench_tension": {
+        "tension": "Measure tension distribution on poses of spatial-8 and suspended-8, "
+        "feasible or not.",
+    },
+    "bench.bench_workspace": {
+        "workspace": "Measure whether the cables of spatial-8 hold poses, at full "
+        "acceleration, on one core.",
+    },
 }
 
-
-for _part in (
-    bench_bus,
-    bench_calibration,
-    bench_control,
-    bench_kinematics,
-    bench_latency,
-    bench_loop,
-    bench_markers,
-    bench_poses,
-    bench_path,
-    bench_soak,
-    bench_stop,
-    bench_tension,
-    bench_workspace,
-):
-    app.add_typer(_part.app)
+app = typer.Typer(
+    name="bench",
+    cls=group_of(MODULES),
+    help="Measure this project's own cost on this machine.",
+    no_args_is_help=True,
+)
 
 
-@app.command()
-def cycle(
-    cycles: Annotated[int, typer.Option(min=1, help="Exchanges of each variant.")] = 10_000,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure one exchange with 8 axes: ours, the canopen package's PDO path, and the floor.
-
-    All three talk to the same 8 simulated drives on a bus of their own, in blocks that take turns.
-    """
-    out = Output(as_json)
-    figures = cycle_bench.measure(cycles, out)
-    out.say(*_cycle_table(figures))
-    out.result({"ok": True, **figures})
-
-
-def _cycle_table(figures: dict[str, Any]) -> list[str]:
-    cpu, wall = figures["cpu_us"], figures["wall_us"]
-    ratios, targets, reached = figures["ratios"], figures["targets"], figures["reached"]
-    head = f"{'':30}{'host CPU time, us':>20}{'wall, drives too, us':>24}"
-    columns = f"{'':30}{'p50':>10}{'p99.9':>10}{'p50':>14}{'p99.9':>10}"
-    rows = [
-        f"{text:30}{cpu[name]['p50']:10.1f}{cpu[name]['p99.9']:10.1f}"
-        f"{wall[name]['p50']:14.1f}{wall[name]['p99.9']:10.1f}"
-        for name, text in _VARIANTS.items()
-    ]
-    bounds = (
-        ("canopen_over_ours", "canopen / ours", "at least"),
-        ("ours_over_floor", "ours / floor", "at most"),
-    )
-    verdicts = [
-        f"{text}: {ratios[key]:.2f}, wanted {bound} {targets[key]:g}: "
-        f"{'reached' if reached[key] else 'MISSED'}"
-        for key, text, bound in bounds
-    ]
-    title = f"one exchange with {figures['axes']} axes, {figures['cycles']} cycles of each"
-    return [title, head, columns, *rows, *verdicts]
-
-
-@app.command()
-def profiles(
-    repeats: Annotated[int, typer.Option(min=1, help="The best of so many counts.")] = 5,
-    as_json: JsonOption = False,
-) -> None:
-    """Measure loading and validating every shipped profile, against bare TOML parsing."""
-    out = Output(as_json)
-    figures = profile_loading.measure(repeats)
-    verdict = "reached" if figures["reached"] else "MISSED"
-    out.say(
-        f"all {figures['files']} profile files: {figures['load_all_ms']:.1f} ms loaded and "
-        f"validated, {figures['tomllib_ms']:.1f} ms with tomllib alone, "
-        f"ratio {figures['ratio']:.2f}"
-    )
-    out.say(f"wanted below {figures['bound_ms']:g} ms: {verdict}")
-    out.result({"ok": True, **figures})
+@app.callback()
+def _group() -> None:
+    """Measure this project's own cost on this machine."""

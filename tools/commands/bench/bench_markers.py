@@ -40,6 +40,7 @@ def _table(figures: dict[str, Any], target_s: float) -> list[str]:
         ("largest error along the plane", "xy_max_mm", "mm", 2),
         ("largest error across it", "z_max_mm", "mm", 2),
         ("error where it fits best, rms", "shape_rms_mm", "mm", 2),
+        ("what the map says of that", "told_mm", "mm", 2),
     )
     lines = [f"{figures['images']} images{'ours':>30}{'OpenCV corners':>20}{'ratio':>9}"]
     for text, key, unit, digits in rows:

@@ -32,8 +32,9 @@ def path(
     out.say(
         f"{told['lines']} lines, seed {told['seed']}: {told['length_m']:.1f} m, {told['nodes']} "
         f"nodes, {told['samples']} samples",
-        f"planned in {told['plan_s']:.2f} s, drawn as well in {told['with_picture_s']:.2f} s, "
-        f"wanted at most {told['target_s']:g} s: {verdict}",
+        f"planned in {told['plan_s']:.2f} s of processor time, drawn as well in "
+        f"{told['with_picture_s']:.2f} s, wanted at most {told['target_s']:g} s: {verdict}; "
+        f"{told['wall_s']:.2f} s by the wall",
         f"the motion takes {told['duration_s']:.1f} s; at one speed and acceleration throughout "
         f"{told['constant_limit_s']:.1f} s, {told['gain']:.1f} times as long",
     )

@@ -87,7 +87,10 @@ def enable(
     program: Annotated[str, typer.Option(help="What runs from the first moment on.")] = "hold",
     yes: YesOption = False,
 ) -> None:
-    """Give the drives power; they hold where they are. Those that have it already keep it."""
+    """Give the drives power; they hold where they are.
+
+    Where they have it already nothing changes.
+    """
     status = _booted(daemon, out)
     if status["state"] == "active":
         out.say(f"has power already, program {status['program']}")

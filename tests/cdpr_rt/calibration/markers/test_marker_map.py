@@ -191,6 +191,10 @@ def test_known_places_give_the_frame_and_are_held(one: Room) -> None:
     assert not fit.faults
     assert fit.fixed == (0, 8, 19)
     assert np.linalg.norm(fit.map.position_m - one.truth.position_m, axis=1).max() < 0.003
+    single = SHEETS.model_copy(update={"known": known_places(one, 8)})
+    fit = fit_map(one.sightings(), intrinsics(), single)
+    assert fit.fixed == (8,) and fit.known is None
+    assert np.linalg.norm(fit.map.position_m - one.truth.position_m, axis=1).max() < 0.02
 
 
 @pytest.mark.parametrize(
@@ -211,3 +215,20 @@ def test_a_reference_that_is_not_there_is_refused(one: Room) -> None:
     with pytest.raises(InvalidRequestError, match="reference marker 77 is not in the map"):
         fit_map(one.sightings(), intrinsics(), SHEETS, reference=77)
     assert fit_map(one.sightings(), intrinsics(), SHEETS, reference=3).map.reference == 3
+
+
+def test_errors_of_the_sheets_are_in_what_a_map_says_of_itself(one: Room, plain: MapFit) -> None:
+    assert plain.bundle.sheets.inflation == 1.0
+    chance = np.random.default_rng(6)
+    # told otherwise by 0.2 % each, which is as if the printer had made them so
+    sizes = tuple(
+        MarkerSize(ids=(marker,), size_m=float(0.15 * (1.0 + chance.normal(0.0, 0.002))))
+        for marker in one.seen.ids
+    )
+    fit = fit_map(one.sightings(), intrinsics(), SHEETS.model_copy(update={"sizes": sizes}))
+    assert fit.bundle.sheets.inflation > 2.0
+    _, turn, shift = best_fit(fit.map.position_m, one.truth.position_m)
+    left = fit.map.position_m @ turn.T + shift - one.truth.position_m
+    told = np.sqrt((fit.bundle.shape_sigma_m**2).sum(axis=1).mean())
+    assert np.sqrt((left**2).sum(axis=1).mean()) < 2.0 * told
+    assert any("off on their sheets" in note for note in fit.notes)

@@ -59,7 +59,7 @@ points = st.lists(
 )
 
 
-@settings(deadline=None, derandomize=True, max_examples=40)
+@settings(deadline=None, derandomize=True, max_examples=25)
 @given(points, st.sampled_from([0.0, 0.002, 0.02]), st.floats(0.02, 1.0))
 def test_every_sample_keeps_all_limits_and_every_corner_its_radius(places, blend_m, speed):
     path = polyline(places, blend_m, speed)
@@ -97,9 +97,11 @@ def test_a_cut_corner_has_no_step_in_direction_or_curvature():
 
 
 def test_it_is_nearly_as_fast_as_the_fastest_where_jerk_hardly_counts():
-    chance = np.random.default_rng(5)
-    path = polyline(chance.uniform(-0.3, 0.3, (6, 6)) * [1, 1, 1, 0.3, 0.3, 0.3], 0.1)
+    places = [[0, 0, 0, 0, 0, 0], [0.3, 0, 0, 0.1, 0, 0], [0.3, 0.3, 0.1, 0, 0, 0.1],
+              [0.0, 0.4, 0.1, 0, 0.1, 0.1], [-0.2, 0.1, 0, 0, 0, 0]]  # fmt: skip
+    path = polyline(places, 0.1)
     nodes = nodes_of(path, SCALE)
+    assert len(nodes.runs) == 1
     limits = PathLimits(LIMITS.velocity, LIMITS.acceleration, 1e3 * LIMITS.acceleration)
     plan = timed(nodes, limits)
     s = np.linspace(0.0, nodes.s[-1], 2000)

@@ -114,7 +114,7 @@ def test_available_wrenches_are_those_of_linear_programs(planner, plane):
 
 
 def test_the_inertial_wrench_is_the_momentum_s_derivative(planner):
-    """By finite differences of momenta about a point that stands still, and motion of the centre."""
+    """By finite differences of momenta about a point at rest, and motion of the centre."""
     from cdpr_rt.robots.rigid_body import in_space, inertia_kg_m2  # noqa: PLC0415
 
     model = planner.model

@@ -131,6 +131,9 @@ class _Shape:
         gap = np.minimum(0.4 - np.abs(x), y + 0.4)
         return np.minimum(inside, -gap)
 
+    def clear_shares(self, _: FloatArray, ends_m: FloatArray) -> FloatArray:
+        return np.ones(len(ends_m))
+
 
 def test_what_no_straight_line_reaches_is_told() -> None:
     shape, box = cast(Any, _Shape()), Box((-1.5, -1.5), (1.5, 1.5))

@@ -109,12 +109,12 @@ class RecorderProcess:
         assert self.process.stdin is not None
         self.process.stdin.close()
         value: dict[str, Any] = json.loads(self._line())
-        self.process.wait(20)
+        self.process.wait(120)
         return value
 
     def kill(self) -> None:
         self.process.send_signal(signal.SIGKILL)
-        self.process.wait(20)
+        self.process.wait(120)
 
 
 def run_for(writer: RowWriter, seconds: float, first: int) -> int:

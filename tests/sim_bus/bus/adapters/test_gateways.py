@@ -64,7 +64,7 @@ class Simulator:
         return int(re.split(r"[:/]", self.ready["socketcand"])[4])
 
     def stop(self) -> tuple[int, str]:
-        _, errors = self.process.communicate(timeout=20)
+        _, errors = self.process.communicate(timeout=120)
         return self.process.returncode, errors
 
 
@@ -104,7 +104,7 @@ def frames(bus: can.BusABC, count: int) -> list[tuple[int, bool, bool, bytes]]:
     """Return what comes, `count` frames within two seconds each."""
     seen = []
     while len(seen) < count:
-        message = bus.recv(2.0)
+        message = bus.recv(60.0)
         assert message is not None
         seen.append(
             (
@@ -180,10 +180,9 @@ def test_version_and_serial_number(stock_slcan: Any) -> None:
 
 def test_the_serial_line_takes_its_time(simulator: Simulator) -> None:
     """At 1 Mbaud a character takes 10 us; 200 frames of 23 characters and their answers 46 ms."""
-    with serial.Serial(simulator.ready["slcan"], timeout=2.0) as port:
+    with serial.Serial(simulator.ready["slcan"], timeout=60.0) as port:
         port.write(b"C\rS8\rO\r")
-        time.sleep(0.1)
-        port.reset_input_buffer()
+        port.read(3)
         started = time.monotonic()
         port.write(b"t30181122334455667788\r" * 200)
         answers = port.read(400)
@@ -196,9 +195,9 @@ def test_the_serial_line_takes_its_time(simulator: Simulator) -> None:
 def test_an_adapter_that_nobody_reads_loses_frames_and_lives(
     simulator: Simulator, member: can.BusABC
 ) -> None:
-    with serial.Serial(simulator.ready["slcan"], timeout=2.0) as port:
+    with serial.Serial(simulator.ready["slcan"], timeout=60.0) as port:
         port.write(b"C\rS8\rO\r")
-        time.sleep(0.1)
+        port.read(3)
         for _ in range(1500):
             member.send(can.Message(arbitration_id=0x301, data=bytes(8), is_extended_id=False))
         time.sleep(0.6)
@@ -318,7 +317,7 @@ def test_the_gateways_end_with_the_simulator(way: signal.Signals) -> None:
     pids = [running.ready["slcan_pid"], running.ready["socketcand_pid"]]
     handles = [os.pidfd_open(pid) for pid in pids]
     running.process.send_signal(way)
-    running.process.communicate(timeout=20)
+    running.process.communicate(timeout=120)
     for handle in handles:
         assert select.select([handle], [], [], 5.0)[0]
         os.close(handle)

@@ -1,0 +1,51 @@
+"""The service's planner: one path at a time, in a process that it waits for."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdpr_rt.service.path_planner import PathPlanner, PlannerBusyError
+
+WANTED = {"name": "part.nc", "text": "M2\n"}
+
+
+def planned(status: int, text: str) -> dict[str, Any]:
+    planner, seen = PathPlanner(), []
+
+    async def work(file: Path, wanted: dict[str, Any]) -> tuple[int, str]:
+        seen.append((file.read_text(), wanted))
+        return status, text.replace("FILE", str(file))
+
+    async def go() -> dict[str, Any]:
+        planner.work = work
+        assert planner.begin(WANTED)["planning"]
+        with pytest.raises(PlannerBusyError):
+            planner.begin(WANTED)
+        while planner.job["planning"]:
+            await asyncio.sleep(0)
+        return planner.job
+
+    job = asyncio.run(go())
+    assert seen == [("M2\n", WANTED)]
+    return job
+
+
+def test_a_plan_has_its_name_and_figures():
+    job = planned(0, json.dumps({"plan": "ab", "duration_s": 2.0}))
+    assert job == {"number": 1, "planning": False, "error": None, "plan": "ab", "duration_s": 2.0}
+
+
+def test_what_cannot_be_followed_is_told_by_the_name_that_was_given():
+    job = planned(2, json.dumps({"error": "FILE:3: outside"}))
+    assert (job["plan"], job["error"]) == (None, "part.nc:3: outside")
+    assert planned(1, "no JSON")["error"] == "planning ended with status 1"
+
+
+def test_without_the_robot_nothing_is_planned():
+    with pytest.raises(PlannerBusyError):
+        PathPlanner().begin(WANTED)

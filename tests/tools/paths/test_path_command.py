@@ -1,0 +1,66 @@
+"""`cdpr path` as typed, without a daemon."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from cdpr_here import cdpr_here
+from PIL import Image
+
+from cdpr_profiles import load_robot
+from cdpr_rt.programs.platform.path_store import PathStore, paths_folder
+from cdpr_rt.robots.platform_model import platform_model_of
+
+ORIGIN = "--origin=-150 100 1550"
+GCODE = "G21 G90\nG0 X0 Y0 Z0\nG1 X100 F6000\nY100 Z50\nG3 X0 Y100 I-50 J0\nM2\n"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "part.nc"
+    path.write_text(GCODE)
+    return path
+
+
+def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    picture = tmp_path / "part.png"
+    done = cdpr_here(
+        "path", file, "--robot", "spatial-8", ORIGIN, "--picture", picture, "--keep", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["ok"] and told["moves"] == 3 and told["obstacle"] is None
+    assert told["gain"] > 1.0
+    assert min(told["tension_min_N"]) >= min(told["tension_low_N"]) - 1e-6
+    assert "planned within" in done.stderr
+    with Image.open(picture) as image:
+        assert min(image.size) > 500
+    store = PathStore()
+    store.open(paths_folder("spatial-8"))
+    plan = store.plan(told["plan"], platform_model_of(load_robot("spatial-8")))
+    assert plan.duration_s == pytest.approx(told["duration_s"])
+    assert plan.line[0] == 3 and plan.line[-1] == 5
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "told"),
+    [
+        (("Y100 Z50", "Y100 Z250"), [ORIGIN], "part.nc:4: at "),
+        (("G21", "G20"), [ORIGIN], "part.nc:3: the path is .* perhaps 25.4 times too large"),
+        (("M2", ""), [ORIGIN], "part.nc:5: ends without M2"),
+        (("G21", "G43"), [ORIGIN], "part.nc:1: G43: not known"),
+        (("", ""), ["--origin=1 2"], "--origin 1 2: allowed: 3 numbers in mm"),
+        (("", ""), [ORIGIN, "--run", "--resume"], "--run, --resume, --back: allowed: one"),
+    ],
+)
+def test_what_cannot_be_followed_ends_with_status_2(file, change, options, told):
+    import re  # noqa: PLC0415
+
+    file.write_text(GCODE.replace(*change) if change[0] else GCODE)
+    done = cdpr_here("path", file, "--robot", "spatial-8", *options)
+    assert done.returncode == 2
+    assert re.search(told, done.stderr), done.stderr
+    assert "Traceback" not in done.stderr
