@@ -60,7 +60,8 @@ class PathProgram(PlatformProgram):
         self._low, self._high = (
             np.array(platform.workspace_min_m), np.array(platform.workspace_max_m),
         )  # fmt: skip
-        self._workspace, self._there = parts.model.workspace(0.0), Pose(np.zeros(3))
+        self._workspace = parts.model.workspace(0.0).prepared()
+        self._there = Pose(np.zeros(3))
         self._plan: StoredPlan | None = None
         self._samples, self._period_s = np.zeros((2, 3, d)), 1.0
         self._state, (self._derivatives, self._setpoint) = np.zeros(2), np.zeros((2, 3, d))
