@@ -133,8 +133,7 @@ class PathProgram(PlatformProgram):
     def _parsed(self, arguments: Mapping[str, Any]) -> _Command:
         keys = CommandArguments(self.name, arguments, _KEYS)
         feed = keys.number("feed", _SLOWEST, 1.0, self._feed or 1.0)
-        if not self._parts.tight:
-            raise ProgramError("path: the cables are not tight; run tighten first")
+        self._require_pose()
         if set(arguments) == {"feed"}:
             return _Command("feed", None, 0.0, feed)
         what = keys.one_of("plan", "resume", "pause", "back_m")

@@ -13,6 +13,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach, stopping_position
+from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
 from cdpr_rt.programs.platform.path_store import PathStore
@@ -200,6 +201,16 @@ class PlatformProgram(CommandedProgram):
         """Begin to brake to a standstill."""
         super().stop()
         self._brake()
+
+    def _require_pose(self) -> None:
+        """Raise ProgramError where the platform is not to be moved to a pose."""
+        if self._parts.distrust:
+            raise ProgramError(
+                f"{self.name}: {self._parts.distrust}; calibrate it or say that it is, and enable "
+                "again"
+            )
+        if not self._parts.tight:
+            raise ProgramError(f"{self.name}: the cables are not tight; run tighten first")
 
     @property
     def pose(self) -> FloatArray | None:

@@ -129,12 +129,7 @@ class PoseProgram(PlatformProgram):
         keys = CommandArguments(self.name, arguments, allowed)
         most = float(self._parts.speed[0])
         speed = keys.number("speed_m_s", _SLOWEST_m_s, most, most)
-        if self._parts.distrust:
-            raise ProgramError(
-                f"pose: {self._parts.distrust}; calibrate it or say that it is, and enable again"
-            )
-        if not self._parts.tight:
-            raise ProgramError("pose: the cables are not tight; run tighten first")
+        self._require_pose()
         if not arguments:
             return "stay", None, speed
         if "rotation_rad" in keys and "position_m" not in keys:

@@ -199,3 +199,15 @@ def test_a_plan_beyond_the_limits_does_not_move(rig):
     rig.platform.run(0.3)
     assert "breaks the robot's limits" in rig.program.progress()["trouble"]
     np.testing.assert_allclose(rig.platform.control.position, here, atol=1e-9)
+
+
+def test_a_robot_whose_geometry_is_not_believed_follows_nothing(rig: Rig) -> None:
+    parts = rig.platform.parts
+    rig.begin()
+    parts.distrust = "rail 2 was moved"
+    try:
+        for wanted in ({"plan": rig.name}, {"resume": True}, {"back_m": 0.1}):
+            with pytest.raises(ProgramError, match="path: rail 2 was moved; calibrate it"):
+                rig.program.check(wanted)
+    finally:
+        parts.distrust = ""
