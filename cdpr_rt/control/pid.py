@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 
-from cdpr_rt.control import stiction
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 
@@ -41,8 +40,6 @@ def _update(
     limit: FloatArray,
     period: float,
     state: FloatArray,
-    overcomes_stiction: bool,
-    standing: FloatArray,
     position: FloatArray,
     reference: FloatArray,
     known: FloatArray,
@@ -58,13 +55,8 @@ def _update(
                 # what the error and the known torque do not account for is the integral's
                 state[i, 0] -= (kp + ki * period) * error + known[i]
             state[i, 3] = _RUNNING
-            stiction.start(standing[i], position[i], reference[i])
         slope = (filter_s * state[i, 2] + error - state[i, 1]) / (filter_s + period)
         integral = state[i, 0] + ki * period * error
-        if overcomes_stiction:
-            integral = stiction.step_integral(
-                standing[i], period, kp, ki, state[i, 0], position[i], reference[i], limit[i]
-            )
         u = kp * error + integral + kd * slope
         total = u + known[i]
         limited = min(max(total, -limit[i]), limit[i])
@@ -85,8 +77,7 @@ class Pid:
 
     The derivative is filtered by a first-order lag (backward difference); integration stops
     while it would drive the torque further beyond its limit. Shapes: `gains` one per axis,
-    `limit_Nm` (n,). With `overcomes_stiction` an axis that friction holds off a set-point which
-    stands is brought there; see `stiction`.
+    `limit_Nm` (n,).
     """
 
     def __init__(
@@ -95,7 +86,6 @@ class Pid:
         limit_Nm: FloatArray,
         period_s: float,
         compensation: Compensation | None = None,
-        overcomes_stiction: bool = False,
     ) -> None:
         self._gains = np.array(
             [
@@ -113,8 +103,6 @@ class Pid:
         self._compensation = compensation
         # integral, last error, filtered slope, how to go on
         self._state = np.zeros((len(gains), 4))
-        self._overcomes_stiction = overcomes_stiction
-        self._standing = np.zeros((len(gains), stiction.COLUMNS))
         self.effort_Nm = np.zeros(len(gains))
         self.compensation_Nm = np.zeros(len(gains))
 
@@ -143,8 +131,6 @@ class Pid:
             self._limit,
             self._period_s,
             self._state,
-            self._overcomes_stiction,
-            self._standing,
             feedback.position_rad,
             setpoint.position_rad,
             self.compensation_Nm,

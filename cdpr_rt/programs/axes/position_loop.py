@@ -17,9 +17,7 @@ class PositionLoop:
         known = None
         if any(axis is not None for axis in model.compensation):
             known = Compensation(list(model.compensation), model.period_s)
-        self.controller = Pid(
-            list(model.gains), model.torque_Nm, model.period_s, known, overcomes_stiction=True
-        )
+        self.controller = Pid(list(model.gains), model.torque_Nm, model.period_s, known)
         self._cycle = -2
         self._torque_Nm = np.zeros(model.n)
 

@@ -187,7 +187,7 @@ def _jog_controller(session: Session) -> Pid:
     # a soft loop lets a rotor with friction stick and slip: by turns at these speeds
     design = position_loop(motor.rotor_inertia_kg_m2, session.winch.latency_s, period)
     most = np.array([_TORQUE_SHARE * motor.rated_torque_Nm])
-    return Pid([design.gains], most, period, overcomes_stiction=True)
+    return Pid([design.gains], most, period)
 
 
 @app.command()
