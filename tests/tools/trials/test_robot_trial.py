@@ -119,5 +119,5 @@ def test_what_cannot_be_tried_is_told(tmp_path, robot, kind, options, told):
 
 def test_an_earlier_trial_is_not_written_over(trial):
     folder, _ = trial
-    with pytest.raises(BadInputError, match="not empty"):
+    with pytest.raises(BadInputError, match="holds something already"):
         robot_trial.trial("planar-3", KindOfTrial.TARGETS, minutes=0.1, out_dir=folder)
