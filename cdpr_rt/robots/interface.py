@@ -123,5 +123,5 @@ class PlatformControl(Controller, Protocol):
     def feasible(self, position: FloatArray) -> str:
         """Return why the platform cannot stand at a position, an empty text where it can."""
 
-    def feasible_path(self, position: FloatArray) -> str:
-        """Return what is in the straight way to a position, an empty text for nothing."""
+    def feasible_path(self, position: FloatArray, start: FloatArray | None = None) -> str:
+        """Return what is in the straight way to a position, from where it is or from `start`."""

@@ -17,6 +17,7 @@ from cdpr_rt.programs.platform.path_store import StoredPlan
 from cdpr_rt.programs.platform.platform_program import (
     PlatformParts,
     PlatformProgram,
+    along_velocity,
     synchronise,
 )
 from cdpr_rt.robots.kinematics.pose import Pose
@@ -37,8 +38,10 @@ class _Command:
     what: str
     """Of `_KEYS`."""
     plan: StoredPlan | None
-    time_s: float
-    """Of the plan, where it is to begin, or to step back to."""
+    begins_s: float
+    """Of the plan, where it is taken up."""
+    back_s: float
+    """Where it is to step back to."""
     feed: float
 
 
@@ -135,24 +138,30 @@ class PathProgram(PlatformProgram):
         feed = keys.number("feed", _SLOWEST, 1.0, self._feed or 1.0)
         self._require_pose()
         if set(arguments) == {"feed"}:
-            return _Command("feed", None, 0.0, feed)
+            return _Command("feed", None, 0.0, 0.0, feed)
         what = keys.one_of("plan", "resume", "pause", "back_m")
         if what in ("resume", "pause") and arguments[what] is not True:
             raise ProgramError(f"path: {what}: value {arguments[what]!r}; allowed: true")
         if what == "pause":
-            return _Command(what, None, 0.0, feed)
+            return _Command(what, None, 0.0, 0.0, feed)
         if what == "plan":
             plan, time_s = self.store.plan(str(arguments["plan"]), self._parts.model), 0.0
             feed = keys.number("feed", _SLOWEST, 1.0, 1.0)
         else:
             plan, time_s = self._taken_up()
-        if self._stage != "path" or plan.name != getattr(self._plan, "name", ""):
+        if what == "plan" or not self._follows(plan):
             self._require_way(plan, time_s)
+        back_s = time_s
         if what == "back_m":
             back_m = keys.number("back_m", 0.0, _FARTHEST_BACK_m, 0.0)
             wanted = plan.along_m[plan.row(time_s)] - back_m
-            time_s = plan.period_s * int(np.searchsorted(plan.along_m, wanted))
-        return _Command(what, plan, time_s, feed)
+            back_s = plan.period_s * plan.row_along(wanted)
+        return _Command(what, plan, time_s, back_s, feed)
+
+    def _follows(self, plan: StoredPlan) -> bool:
+        """Return whether the set-point is on this plan, and nothing has moved it since."""
+        known = self._plan is not None and self._plan.name == plan.name
+        return known and self._stage == "path" and self._last_cycle == self._parts.cycle
 
     def _taken_up(self) -> tuple[StoredPlan, float]:
         """Return the plan that was left, and the time up to which it has come."""
@@ -163,14 +172,17 @@ class PathProgram(PlatformProgram):
         plan = self._plan
         if plan is None or plan.name != name:
             plan = self.store.plan(name, self._parts.model)
+        elif self._follows(plan):
+            time_s = float(self._state[playback.TIME])
         return plan, min(max(time_s, 0.0), plan.duration_s)
 
     def _require_way(self, plan: StoredPlan, time_s: float) -> None:
         """Raise ProgramError where the straight way to a place of the plan is not feasible."""
         control, there = self._control, np.array(plan.samples[plan.row(time_s), 0])
-        here = np.zeros(there.size)
-        stopping_position(control.position, control.velocity, self._parts.acceleration, here)
-        missing = control.feasible(there) or control.feasible_path(there)
+        most, here = np.zeros((2, there.size))
+        along_velocity(control.velocity, self._parts.acceleration, most)
+        stopping_position(control.position, control.velocity, most, here)
+        missing = control.feasible(there) or control.feasible_path(there, here)
         if missing:
             raise ProgramError(f"path: on the way to where it begins: {missing}")
 
@@ -180,22 +192,23 @@ class PathProgram(PlatformProgram):
             return
         if command.what == "pause":
             self._paused = "paused"
+            if self._stage == "to the path":
+                self._brake()
+                self._stage = "set out"
             return
         plan = command.plan
         assert plan is not None  # all other commands have one
         self._paused = "stepping back" if command.what == "back_m" else ""
         if self._stage == "path" and command.what != "plan":
-            self._goal = command.time_s if command.what == "back_m" else self._next_stop(plan)
+            self._goal = command.back_s if command.what == "back_m" else self._next_stop(plan)
             return
-        left = self.store.left
-        begins_s = 0.0 if command.what == "plan" or left is None else left[1]
         self._plan, self._samples, self._period_s = plan, plan.samples, plan.period_s
-        self._state[playback.TIME], self._state[playback.RATE] = begins_s, 0.0
+        self._state[playback.TIME], self._state[playback.RATE] = command.begins_s, 0.0
         self._checked = self._held = 0
         self._fault, self._stage = "", "checking"
         self._brake()
-        self.store.begin(plan.name, begins_s)
-        self._goal = command.time_s if command.what == "back_m" else self._next_stop(plan)
+        self.store.begin(plan.name, command.begins_s)
+        self._goal = command.back_s if command.what == "back_m" else self._next_stop(plan)
 
     def _next_stop(self, plan: StoredPlan) -> float:
         """Return when the plan waits next, or ends."""
@@ -211,7 +224,7 @@ class PathProgram(PlatformProgram):
         at_rest = self._go_towards(self._target)
         if self._stage == "checking":
             self._check()
-        elif self._stage == "set out" and at_rest:
+        elif self._stage == "set out" and at_rest and self._paused != "paused":
             self._set_out()
         elif self._stage == "to the path" and at_rest:
             self._stage = "path"

@@ -22,7 +22,7 @@ _NOTHING: Final = 1e-12
 @jit
 def _place(samples: FloatArray, period: float, time: float, out: FloatArray) -> None:
     """Write position and two derivatives (3, d) at a time of the plan: Hermite, fifth order."""
-    i = min(int(time / period), samples.shape[0] - 2)
+    i = min(max(int(time / period), 0), samples.shape[0] - 2)
     u = min(max(time / period - i, 0.0), 1.0)
     for k in range(samples.shape[2]):
         p0, v0 = samples[i, 0, k], period * samples[i, 1, k]

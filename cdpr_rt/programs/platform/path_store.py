@@ -62,6 +62,10 @@ class StoredPlan:
         """Return the sample before a time."""
         return min(max(int(time_s / self.period_s + 1e-6), 0), len(self.samples) - 1)
 
+    def row_along(self, along_m: float) -> int:
+        """Return the first sample as far along the path, or the last one."""
+        return min(int(np.searchsorted(self.along_m, along_m)), len(self.samples) - 1)
+
 
 def paths_folder(robot: str) -> Path:
     """Return where the plans for a robot's profile lie, and how far the last one has come."""

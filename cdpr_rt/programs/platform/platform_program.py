@@ -39,7 +39,7 @@ def distance_m(here: FloatArray, there: FloatArray, scale: FloatArray) -> float:
 
 
 @jit
-def _along_velocity(velocity: FloatArray, most: FloatArray, acceleration: FloatArray) -> None:
+def along_velocity(velocity: FloatArray, most: FloatArray, acceleration: FloatArray) -> None:
     """Write accelerations, up to `most`, that end all velocities in the same time; all are (n,)."""
     longest = 0.0
     for i in range(most.size):
@@ -292,7 +292,7 @@ class PlatformProgram(CommandedProgram):
 
     def _brake(self) -> None:
         """Have the set-point come to rest on the straight line on which it moves."""
-        _along_velocity(self._control.velocity, self._parts.acceleration, self._acceleration)
+        along_velocity(self._control.velocity, self._parts.acceleration, self._acceleration)
         self._target[:] = self._stopping_position()
 
     def _stopping_position(self) -> FloatArray:

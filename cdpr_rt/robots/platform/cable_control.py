@@ -280,13 +280,16 @@ class CableControl:
         self._turn_to(position)
         return self.workspace.feasible(self._to)
 
-    def feasible_path(self, position: FloatArray) -> str:
-        """Return what is in the straight way to a position (d,), an empty text for nothing."""
-        share = SHARES[:, None]
-        poses = self.model.poses((1.0 - share) * self.position + share * np.asarray(position))
+    def feasible_path(self, position: FloatArray, start: FloatArray | None = None) -> str:
+        """Return what is in the straight way to a position (d,), an empty text for nothing.
+
+        The way begins at `start` (d,), or where the set-point is.
+        """
+        share, begin = SHARES[:, None], self.position if start is None else start
+        poses = self.model.poses((1.0 - share) * begin + share * np.asarray(position))
         obstacle = self.workspace.first_obstacle(poses)
         if obstacle is None:
-            contact = self._interference.first_contact(np.array([self.position, position]))
+            contact = self._interference.first_contact(np.array([begin, position]))
             return "" if contact is None else str(contact)
         there, why = obstacle
         place = ", ".join(f"{x:.3f}" for x in there.p[: self.model.positions])

@@ -76,6 +76,8 @@ class IdealControl:
         self.inertia_kg_m2, self.residual_m = np.full(n, 1e-4), 0.0
         self.free_lengths_m = np.zeros(n)
         self._there = model.pose(model.home)
+        self.ways: list[tuple[FloatArray, FloatArray]] = []
+        """Those that were asked for: from where to where."""
 
     @property
     def shaped(self) -> FloatArray:
@@ -115,9 +117,10 @@ class IdealControl:
     def feasible(self, position: FloatArray) -> str:
         return self.workspace.feasible(self._at(position))
 
-    def feasible_path(self, position: FloatArray) -> str:
-        share = SHARES[:, None]
-        poses = self.model.poses((1.0 - share) * self.position + share * position)
+    def feasible_path(self, position: FloatArray, start: FloatArray | None = None) -> str:
+        share, begin = SHARES[:, None], self.position if start is None else start
+        self.ways.append((np.array(begin), np.array(position)))
+        poses = self.model.poses((1.0 - share) * begin + share * position)
         found = self.workspace.first_obstacle(poses)
         return "" if found is None else found[1]
 
