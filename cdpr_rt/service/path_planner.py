@@ -49,6 +49,8 @@ class PathPlanner:
                 file.write_text(wanted["text"], encoding="utf-8")
                 status, text = await work(file, wanted)
             told = _read(status, text.replace(str(file), wanted["name"]))
+        except TimeoutError:  # an OSError too, one without words
+            told = {"error": "cannot be planned: takes too long; divide the path"}
         except OSError as error:
             told = {"error": f"cannot be planned: {error.strerror}"}
         finally:

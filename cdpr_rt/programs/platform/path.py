@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -26,8 +27,10 @@ from cdpr_rt.robots.kinematics.pose_setpoint import place
 _KEYS: Final = ("plan", "resume", "pause", "back_m", "feed")
 _SLOWEST: Final = 0.01
 _FARTHEST_BACK_m: Final = 1000.0
-_CHECKED: Final = 1000
+_CHECKED: Final = 200
 """Samples that are looked at in one cycle."""
+_DIGESTED: Final = 1 << 15
+"""Bytes of the file of which the digest is made in one cycle."""
 _HELD_EVERY: Final = 20
 """Of these samples one is looked at for whether the cables hold it, one in a cycle."""
 _LAGS_m, _WAITS_m = 0.02, 0.05
@@ -71,7 +74,8 @@ class PathProgram(PlatformProgram):
         self._stage = ""
         self._goal = self._feed = 0.0
         self._paused = ""
-        self._checked = self._held = 0
+        self._checked = self._held = self._digested = 0
+        self._digest = hashlib.sha256()
         self._fault = ""
         self._last_cycle = -2
         # compiled here, not when a path begins
@@ -204,7 +208,8 @@ class PathProgram(PlatformProgram):
             return
         self._plan, self._samples, self._period_s = plan, plan.samples, plan.period_s
         self._state[playback.TIME], self._state[playback.RATE] = command.begins_s, 0.0
-        self._checked = self._held = 0
+        self._checked = self._held = self._digested = 0
+        self._digest = hashlib.sha256()
         self._fault, self._stage = "", "checking"
         self._brake()
         self.store.begin(plan.name, command.begins_s)
@@ -238,16 +243,23 @@ class PathProgram(PlatformProgram):
             if not self._stands(self._samples[self._held, 0]):
                 bad = self._held
             self._held += _HELD_EVERY
+        plan = self._plan
+        assert plan is not None  # there is one in this stage
         if bad >= 0:
-            plan = self._plan
-            line = 0 if plan is None else int(plan.line[bad])
-            self._fault = f"the plan breaks the robot's limits at line {line}: plan it anew"
-            self._stage = ""
-            self.store.end()
+            self._give_up(f"breaks the robot's limits at line {int(plan.line[bad])}")
             return
         self._checked += _CHECKED
-        if self._checked >= len(self._samples) and self._held >= len(self._samples):
-            self._stage = "set out"
+        self._digest.update(memoryview(plan.data)[self._digested : self._digested + _DIGESTED])
+        self._digested += _DIGESTED
+        if min(self._checked, self._held) < len(self._samples) or self._digested < len(plan.data):
+            return
+        self._stage = "set out"
+        if not self._digest.hexdigest().startswith(plan.name):
+            self._give_up("is damaged")
+
+    def _give_up(self, why: str) -> None:
+        self._fault, self._stage = f"the plan {why}: plan it anew", ""
+        self.store.end()
 
     def _stands(self, position: FloatArray) -> bool:
         """Return whether the cables hold the platform at rest at a position (d,)."""
@@ -259,7 +271,8 @@ class PathProgram(PlatformProgram):
         parts = self._parts
         return playback.first_fault(
             self._samples, begin, begin + _CHECKED, self._period_s, parts.speed,
-            parts.acceleration, self._low, self._high, parts.model.angle_rad,
+            parts.acceleration, parts.model.jerk, self._low, self._high,
+            parts.model.angle_rad,
         )  # fmt: skip
 
     def _set_out(self) -> None:
@@ -307,7 +320,7 @@ class PathProgram(PlatformProgram):
         control.position[:], control.velocity[:] = self._setpoint[0], self._setpoint[1]
         control.acceleration[:] = self._setpoint[2]
         self._target[:] = self._setpoint[0]
-        self.store.note(self._state[playback.TIME])
+        self.store.note(self._state[playback.TIME], self._state[playback.RATE] == 0.0)
 
     def _approach(self) -> bool:
         """Come to rest: on the path, where it is on it."""

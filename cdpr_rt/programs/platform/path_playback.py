@@ -20,22 +20,32 @@ _NOTHING: Final = 1e-12
 
 
 @jit
+def _between(
+    samples: FloatArray, period: float, i: int, k: int, u: float
+) -> tuple[float, float, float]:
+    """Return a coordinate and two derivatives at a share u between samples: Hermite, 5th order."""
+    p0, v0 = samples[i, 0, k], period * samples[i, 1, k]
+    a0 = period * period * samples[i, 2, k]
+    p1, v1 = samples[i + 1, 0, k], period * samples[i + 1, 1, k]
+    a1 = period * period * samples[i + 1, 2, k]
+    gap, slope, bend = p1 - p0 - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
+    c3 = 10.0 * gap - 4.0 * slope + 0.5 * bend
+    c4 = -15.0 * gap + 7.0 * slope - bend
+    c5 = 6.0 * gap - 3.0 * slope + 0.5 * bend
+    return (
+        p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5)))),
+        (v0 + u * (a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / period,
+        (a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / period**2,
+    )
+
+
+@jit
 def _place(samples: FloatArray, period: float, time: float, out: FloatArray) -> None:
-    """Write position and two derivatives (3, d) at a time of the plan: Hermite, fifth order."""
+    """Write position and two derivatives (3, d) at a time of the plan."""
     i = min(max(int(time / period), 0), samples.shape[0] - 2)
     u = min(max(time / period - i, 0.0), 1.0)
     for k in range(samples.shape[2]):
-        p0, v0 = samples[i, 0, k], period * samples[i, 1, k]
-        a0 = period * period * samples[i, 2, k]
-        p1, v1 = samples[i + 1, 0, k], period * samples[i + 1, 1, k]
-        a1 = period * period * samples[i + 1, 2, k]
-        gap, slope, bend = p1 - p0 - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
-        c3 = 10.0 * gap - 4.0 * slope + 0.5 * bend
-        c4 = -15.0 * gap + 7.0 * slope - bend
-        c5 = 6.0 * gap - 3.0 * slope + 0.5 * bend
-        out[0, k] = p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))))
-        out[1, k] = (v0 + u * (a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / period
-        out[2, k] = (a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / period**2
+        out[0, k], out[1, k], out[2, k] = _between(samples, period, i, k, u)
 
 
 @jit
@@ -98,13 +108,15 @@ def first_fault(
     period: float,
     speed: FloatArray,
     acceleration: FloatArray,
+    jerk: FloatArray,
     low: FloatArray,
     high: FloatArray,
     angle: float,
 ) -> int:
     """Return the first sample from `begin` to `end` that is out of limits, or jumps; -1 for none.
 
-    `low` and `high` (k,) bound the positions, `angle` the length of what follows.
+    `low` and `high` (k,) bound the positions, `angle` the length of what follows. Between samples
+    the acceleration may be larger by what the jerk changes it in half a period, up to double.
     """
     last = samples.shape[0] - 1
     for i in range(begin, min(end, last + 1)):
@@ -126,6 +138,13 @@ def first_fault(
                 step += period * period * (samples[i + 1, 2, k] - a) / 12.0
                 if not abs(step) <= _STEP_m:
                     return i
+                more = min(0.5 * period * jerk[k], acceleration[k])
+                for j in range(1, 4):
+                    _, v, a = _between(samples, period, i, k, 0.25 * j)
+                    if not abs(a) <= _MORE * acceleration[k] + more:
+                        return i
+                    if not abs(v) <= _MORE * speed[k] + 0.25 * period * acceleration[k]:
+                        return i
         if not math.sqrt(turned) <= angle + _STEP_m:
             return i
     return -1

@@ -54,6 +54,8 @@ TOUCH_m: Final = 1e-6
 """What is nearer than this above the clearance is in contact."""
 _LEAVING: Final = 0.9
 """Share of its distance that a pair which is in contact at the start has to keep."""
+_LEAVES: Final = 4.0
+"""Clearances by which the platform moves at most until what touches altogether has come apart."""
 _SPEED, _ACCELERATION, _EXIT, _FAR, _FREE, _HOLDS, _RATES = range(7)
 _TOGETHER = 0.02
 """Share of the way by which pairs are looked at early, since others are looked at anyway."""
@@ -73,7 +75,8 @@ def first_contact(
     """Return the share of the way at which a pair comes into contact, which pair, and its distance.
 
     Returns 2.0 and -1 where none does. What is in contact at the start has to stay about as far
-    apart, but for what touches altogether, and to be clear at the end. A pair that _MOST_LOOKS do
+    apart, and to be clear at the end; what touches altogether there has to be clear before the
+    platform has moved by _LEAVES clearances, and to stay so. A pair that _MOST_LOOKS do
     not prove clear counts as in contact.
     """
     n, count = geometry.shape[1], pairs.shape[0]
@@ -85,6 +88,7 @@ def first_contact(
     until, allowed = np.zeros(count), np.full(count, clearance)
     body_speed = _write_speeds(geometry, boxes, way, rates)
     share, looks = 0.0, 0
+    leaves = _LEAVES * clearance / (max(body_speed, np.max(rates[_SPEED])) + TINY)
     while share < 1.0:
         place_on(way, share, room, pose, twist)
         write_ends(geometry, pose, cables, ends)
@@ -94,10 +98,14 @@ def first_contact(
                 continue
             apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
             if looks == 0:
-                allowed[k] = min(clearance, _LEAVING * apart - TOUCH_m)
+                if apart < clearance + TOUCH_m:
+                    allowed[k] = min(clearance, _LEAVING * apart - TOUCH_m)
+                if allowed[k] < 0.0:
+                    until[k] = leaves
+                    continue
             if allowed[k] < 0.0:
-                until[k] = math.inf
-            elif apart - allowed[k] >= TOUCH_m and looks < _MOST_LOOKS:
+                allowed[k] = clearance  # has to have come apart
+            if apart - allowed[k] >= TOUCH_m and looks < _MOST_LOOKS:
                 until[k] = share + _clear_for(
                     pairs[k], apart, allowed[k], trim, pose, twist, way, points, near, rates,
                     body_speed, moves,
@@ -111,7 +119,7 @@ def first_contact(
     place_on(way, 1.0, room, pose, twist)
     write_ends(geometry, pose, cables, ends)
     for k in range(count):
-        if allowed[k] < clearance:
+        if allowed[k] < clearance or leaves >= 1.0:
             apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
             if not apart >= clearance:
                 return 1.0, k, apart

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -148,6 +149,8 @@ def test_a_hold_brakes_along_it_and_it_is_taken_up_again(rig):
 def test_after_a_kill_it_goes_back_to_where_it_was_left(rig):
     rig.begin()
     rig.platform.run(0.7)
+    rig.program.command({"pause": True})
+    rig.platform.run(0.5)
     left = rig.told["time_s"]
     # another process: nothing is left but the files, and the platform stands elsewhere
     rig.platform.parts.paths = PathStore()
@@ -187,9 +190,33 @@ def test_what_is_refused(rig, tmp_path):
     assert paths.left is None
 
 
-def test_a_plan_beyond_the_limits_does_not_move(rig):
+def swing(samples: np.ndarray, middle: slice) -> None:
+    """Positions that agree with alternating velocities at no acceleration."""
+    samples[middle, 0] = samples[middle.start, 0]
+    samples[middle, 1:] = 0.0
+    samples[middle, 1, 0] = 0.15 * (-1.0) ** np.arange(middle.stop - middle.start)
+
+
+SPOILT = {
+    "position": lambda q, m: q[m, 0].__iadd__(0.01),
+    "outside": lambda q, m: q[:, 0, 0].__iadd__(ROOM.workspace_max_m[0] - 0.01 - q[0, 0, 0]),
+    "turned": lambda q, m: q[:, 0, 5].__iadd__(0.5),
+    "speed": lambda q, m: q[m, 1].__iadd__(10.0),
+    "acceleration": lambda q, m: q[m, 2].__iadd__(50.0),
+    "nan": lambda q, m: q[m, 1].__imul__(np.nan),
+    "begins": lambda q, m: q[0, 1].__iadd__(1e-3),
+    "ends": lambda q, m: q[-1, 2].__iadd__(1e-3),
+    "between": swing,
+}
+
+
+@pytest.mark.parametrize("what", SPOILT)
+def test_a_plan_beyond_the_limits_does_not_move(rig, what):
     samples = rig.timed.samples.copy()
-    samples[len(samples) // 2, 0, 0] += 0.01
+    half = len(samples) // 2
+    while samples[half : half + 4, 1:].any(axis=(1, 2)).sum() < 4 or half in rig.timed.waits:
+        half -= 1
+    SPOILT[what](samples, slice(half, half + 4))
     spoilt = TimedPath(
         rig.timed.period_s, samples, rig.timed.node, rig.timed.along_m, rig.timed.waits, 1
     )
@@ -284,3 +311,48 @@ def test_a_spoilt_time_does_not_reach_the_plan(rig: Rig, time_s: float) -> None:
     rig.begin(resume=True)
     assert rig.told["time_s"] == (0.0 if time_s < 0.0 else rig.timed.duration_s)
     rig.platform.cycle()
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [b'"period_s": NaN', b'"period_s": 0', b'"waits_s": [0.5]', b'"waits_s": [NaN]',
+     b'"waits_s": [-1.0]', b'"waits_s": [1e300]', b'"waits_s": [0.0, 0.0]'],
+)  # fmt: skip
+def test_a_head_that_is_spoilt_is_refused(rig: Rig, spoilt: bytes) -> None:
+    file = rig.folder / f"{rig.name}.path"
+    data = file.read_bytes()
+    key = spoilt.split(b":")[0]
+    head = re.sub(key + rb": (\[.*?\]|[^,}]*)", spoilt, data[:4096].rstrip())
+    file.write_bytes(head.ljust(4096) + data[4096:])
+    with pytest.raises(ProgramError, match="is damaged"):
+        rig.program.check({"plan": rig.name})
+
+
+def test_a_file_that_is_not_what_was_planned_does_not_move(rig: Rig) -> None:
+    file = rig.folder / f"{rig.name}.path"
+    data = bytearray(file.read_bytes())
+    data[-1] ^= 1  # a line's number
+    file.write_bytes(data)
+    rig.platform.restart()
+    rig.platform.switch(rig.program, {"plan": rig.name})
+    rig.platform.run(0.3)
+    assert "is damaged" in rig.program.progress()["trouble"]
+
+
+def test_the_plan_that_was_left_is_kept(rig: Rig) -> None:
+    rig.begin()
+    lines = np.arange(len(rig.timed.samples))
+    for k in range(12):
+        write_plan(rig.folder, rig.timed, lines, f"{k}.nc", rig.platform.model)
+    kept = [path.stem for path in rig.folder.glob("*.path")]
+    assert rig.name in kept
+    assert len(kept) == 9
+
+
+def test_a_second_of_the_path_is_lost_at_most_to_a_kill(rig: Rig) -> None:
+    rig.begin()
+    for _ in range(25):
+        rig.platform.run(0.1)
+        left = rig.platform.parts.paths.left
+        assert left is not None
+        assert 0.0 <= rig.told["time_s"] - left[1] <= 1.01
