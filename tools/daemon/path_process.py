@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -19,9 +18,9 @@ async def plan_in_process(robot: str, file: Path, wanted: dict[str, Any]) -> tup
         told.append(f"--origin={wanted['origin_mm']}")
     command = [sys.executable, "-m", "cdpr_tools.cli", "path", str(file), "--robot", robot]
     process = await asyncio.create_subprocess_exec(
-        *command, "--keep", "--json", *told,
+        "nice", f"-n{_NICER}", *command, "--keep", "--json", *told,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL, preexec_fn=lambda: os.nice(_NICER),
+        stderr=asyncio.subprocess.DEVNULL,
     )  # fmt: skip
     try:
         output, _ = await asyncio.wait_for(process.communicate(), _WITHIN_S)

@@ -21,6 +21,8 @@ from cdpr_rt.motion.path.nodes import PathNodes
 
 PERIOD_S: Final = 0.01
 """Between the samples of a plan."""
+MOST_SAMPLES: Final = 100_000
+"""Of a plan: what the loop reads between two cycles."""
 _TOLERANCE: Final = 1.005
 _ROUNDS: Final = 20
 _FINER: Final = 3.0

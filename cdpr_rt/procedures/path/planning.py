@@ -14,6 +14,8 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
 from cdpr_rt.motion.path.nodes import PathNodes, nodes_of
 from cdpr_rt.motion.path.time_scaling import (
+    MOST_SAMPLES,
+    PERIOD_S,
     PathLimits,
     TimedPath,
     WrenchBounds,
@@ -91,6 +93,7 @@ class PathPlanner:
             return PathPlan(path, nodes, self.limits, obstacle, None, np.nan, 0)
         if not nodes.length_m and not nodes.s[-1]:
             raise PathError(path.source, path.start_line, "nothing moves; allowed: a path")
+        self._require_duration(path, nodes)
         advance("tensions", 0.1)
         wrenches, obstacle = self._wrenches(nodes)
         obstacle = self._first(nodes, obstacle, self._contact(nodes))
@@ -101,6 +104,20 @@ class PathPlanner:
         return PathPlan(
             path, nodes, self.limits, None, timed, self._constant_s(nodes), self._slowed(nodes)
         )
+
+    def _require_duration(self, path: PathDescription, nodes: PathNodes) -> None:
+        """Raise PathError for a path that takes longer than a plan may, however it is followed."""
+        fastest = np.sqrt(speed_bounds(nodes, self.limits))
+        step = np.diff(nodes.s)
+        moves = step > 0.0
+        least_s = nodes.dwell_s.sum()
+        with np.errstate(divide="ignore"):
+            least_s += (step[moves] / np.maximum(fastest[1:], fastest[:-1])[moves]).sum()
+        if not least_s <= MOST_SAMPLES * PERIOD_S:
+            raise PathError(
+                path.source, 0, f"takes {least_s / 60.0:.3g} min or more; allowed: up to "
+                f"{MOST_SAMPLES * PERIOD_S / 60.0:.3g} min: divide it",
+            )  # fmt: skip
 
     # -- where it cannot be
 
@@ -164,8 +181,12 @@ class PathPlanner:
         )  # fmt: skip
 
     def _contact(self, nodes: PathNodes) -> Obstacle | None:
-        """Return the first contact of cables, platform and boxes, between places 20 mm apart."""
-        chosen = self.looked_at(nodes)
+        """Return the first contact of cables, platform and boxes, along chords of the path.
+
+        Of straight pieces 20 mm long, else from node to node.
+        """
+        bent = np.flatnonzero(np.any(nodes.second != 0.0, axis=1))
+        chosen = np.union1d(self.looked_at(nodes), bent)
         found = self.model.interference.first_contact(np.ascontiguousarray(nodes.q[chosen]))
         if found is None:
             return None

@@ -119,7 +119,7 @@ def first_contact(
     place_on(way, 1.0, room, pose, twist)
     write_ends(geometry, pose, cables, ends)
     for k in range(count):
-        if allowed[k] < clearance or leaves >= 1.0:
+        if allowed[k] < clearance:
             apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
             if not apart >= clearance:
                 return 1.0, k, apart

@@ -154,10 +154,26 @@ def test_contact_on_the_way_is_named():
     obstacle = planner.plan(path).obstacle
     assert obstacle is not None
     assert "obstacle 0" in obstacle.text
-    assert 1 <= obstacle.line <= 4
+    assert obstacle.line == 4
 
 
 def test_a_robot_in_a_plane(plane):
     plan = plane.plan(gcode(plane, "G0 X0 Y0", "X100", "F3000", "G3 X100 Y100 I0 J50"))
     assert plan.obstacle is None and plan.timed is not None
     assert path_tensions(plane.model, plan.timed, plane.high_N).carried.all()
+
+
+@pytest.mark.parametrize("lines", [["G1 X100 F0.05"], ["X50", *["G4 P3600"] * 200]])
+def test_what_takes_too_long_is_refused_before_it_is_sampled(planner, lines):
+    with pytest.raises(PathError, match=r"takes .* min or more; allowed: up to 16.7 min"):
+        planner.plan(gcode(planner, "G0 X0 Y0 Z0", *lines))
+
+
+def test_a_small_circle_is_looked_at_from_node_to_node(planner, monkeypatch):
+    ways = []
+    monkeypatch.setattr(
+        type(planner.model.interference), "first_contact", lambda _, way: ways.append(way)
+    )
+    planner.plan(gcode(planner, "G0 X0 Y0 Z0", "F600", "G2 X0 Y0 I4 J0"))
+    (way,) = ways
+    assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() < 0.5e-3

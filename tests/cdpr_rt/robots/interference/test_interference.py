@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_profiles import load_robot
+from cdpr_profiles.platform import BoxFile
 from cdpr_rt.robots.interference.interference import Interference, in_words
 from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
@@ -67,7 +70,9 @@ def test_no_place_before_the_first_contact_is_in_contact(seed: int, parts: str) 
     until = 1.0 if found is None else found.share
     before = robot.apart(np.linspace(0.0, until, PLACES))
     allowed = {
-        pair: min(robot.interference.clearance_m, 0.9 * float(d[0]) - 1e-6)
+        pair: 0.9 * float(d[0]) - 1e-6
+        if d[0] < robot.interference.clearance_m + 1e-6
+        else robot.interference.clearance_m
         for pair, d in before.items()
     }
     for pair, distance in before.items():
@@ -173,3 +178,21 @@ def test_what_is_too_near_at_the_start_may_leave_but_not_come_nearer() -> None:
     assert down is not None and down.position[1] > -0.0011
     aside = interference.first_contact(np.array([[0.0, 0.0], [0.05, 0.0]]))
     assert aside is not None and aside.share == 1.0  # it is no nearer, but not clear either
+
+
+def test_what_touches_at_the_start_has_to_leave_at_once() -> None:
+    """A platform on a box: up, but neither through it nor along it."""
+    robot = load_robot("spatial-8")
+    assert robot.platform is not None
+    assert robot.platform.body is not None
+    model = platform_model_of(robot)
+    low = model.home[2] + robot.platform.body.min_m[2]
+    box = BoxFile(min_m=(-0.6, -0.6, low - 0.3), max_m=(0.6, 0.6, low))
+    there = platform_model_of(replace(robot, platform=replace(robot.platform, obstacles=(box,))))
+    for way, clear in (([0, 0, 1], True), ([0, 0, -1], False), ([1, 0, 0], False)):
+        end = there.home + 0.9 * np.pad(way, (0, 3))
+        if clear:
+            end = there.home + 0.2 * np.pad(way, (0, 3))
+        found = there.interference.first_contact(np.array([there.home, end]))
+        assert (found is None) == clear
+        assert found is None or found.share < 0.2
