@@ -101,6 +101,27 @@ def play(
 
 
 @jit
+def _keeps_between(
+    samples: FloatArray,
+    period: float,
+    i: int,
+    k: int,
+    speed: float,
+    acceleration: float,
+    jerk: float,
+) -> bool:
+    """Return whether a coordinate keeps speed and acceleration at places between two samples."""
+    more = min(0.5 * period * jerk, acceleration)
+    for j in range(1, 4):
+        _, v, a = _between(samples, period, i, k, 0.25 * j)
+        if not abs(a) <= _MORE * acceleration + more:
+            return False
+        if not abs(v) <= _MORE * speed + 0.25 * period * acceleration:
+            return False
+    return True
+
+
+@jit
 def first_fault(
     samples: FloatArray,
     begin: int,
@@ -136,15 +157,9 @@ def first_fault(
             if i < last:
                 step = samples[i + 1, 0, k] - q - 0.5 * period * (v + samples[i + 1, 1, k])
                 step += period * period * (samples[i + 1, 2, k] - a) / 12.0
-                if not abs(step) <= _STEP_m:
+                keeps = _keeps_between(samples, period, i, k, speed[k], acceleration[k], jerk[k])
+                if not (abs(step) <= _STEP_m and keeps):
                     return i
-                more = min(0.5 * period * jerk[k], acceleration[k])
-                for j in range(1, 4):
-                    _, v, a = _between(samples, period, i, k, 0.25 * j)
-                    if not abs(a) <= _MORE * acceleration[k] + more:
-                        return i
-                    if not abs(v) <= _MORE * speed[k] + 0.25 * period * acceleration[k]:
-                        return i
         if not math.sqrt(turned) <= angle + _STEP_m:
             return i
     return -1

@@ -98,8 +98,7 @@ def first_contact(
                 continue
             apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
             if looks == 0:
-                if apart < clearance + TOUCH_m:
-                    allowed[k] = min(clearance, _LEAVING * apart - TOUCH_m)
+                allowed[k] = _to_keep(apart, clearance)
                 if allowed[k] < 0.0:
                     until[k] = leaves
                     continue
@@ -124,6 +123,12 @@ def first_contact(
             if not apart >= clearance:
                 return 1.0, k, apart
     return 2.0, -1, math.inf
+
+
+@jit
+def _to_keep(apart: float, clearance: float) -> float:
+    """Return how far apart a pair has to stay, below 0 where it touches at the start."""
+    return clearance if apart >= clearance + TOUCH_m else _LEAVING * apart - TOUCH_m
 
 
 @jit

@@ -187,7 +187,8 @@ def test_what_touches_at_the_start_has_to_leave_at_once() -> None:
     assert robot.platform.body is not None
     model = platform_model_of(robot)
     low = model.home[2] + robot.platform.body.min_m[2]
-    box = BoxFile(min_m=(-0.6, -0.6, low - 0.3), max_m=(0.6, 0.6, low))
+    x, y = model.home[:2]
+    box = BoxFile(min_m=(x - 0.15, y - 0.15, low - 0.3), max_m=(x + 0.15, y + 0.15, low))
     there = platform_model_of(replace(robot, platform=replace(robot.platform, obstacles=(box,))))
     for way, clear in (([0, 0, 1], True), ([0, 0, -1], False), ([1, 0, 0], False)):
         end = there.home + 0.9 * np.pad(way, (0, 3))
