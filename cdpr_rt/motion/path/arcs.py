@@ -14,6 +14,7 @@ _OFF_m: Final = 2e-5
 _OFF_SHARE: Final = 2e-3
 """By so much a file's rounding may put the end of an arc off its circle; the larger counts."""
 _NOTHING_m: Final = 1e-9
+_LARGEST_m: Final = 1000.0
 
 
 def arc_by_centre(start: FloatArray, end: FloatArray, centre: FloatArray, clockwise: bool) -> Arc:
@@ -51,6 +52,8 @@ def arc_by_radius(start: FloatArray, end: FloatArray, radius: float, clockwise: 
     length = float(np.hypot(*chord))
     if length < _NOTHING_m:
         raise ValueError("R: it ends where it begins; allowed: I and J for a whole circle")
+    if not abs(radius) <= _LARGEST_m:
+        raise ValueError(f"R{1e3 * radius:g} mm; allowed: up to {1e3 * _LARGEST_m:g} mm")
     aside = radius**2 - 0.25 * length**2
     if aside < -max(_OFF_m, _OFF_SHARE * abs(radius)) * abs(radius):
         raise ValueError(

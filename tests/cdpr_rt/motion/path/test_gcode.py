@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cdpr_rt.motion.path.arcs import arc_by_radius
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
 from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
 from cdpr_rt.motion.path.pieces import pieces_of
@@ -138,3 +139,8 @@ def test_any_text_is_read_or_refused(text):
         read(text)
     except PathError as error:
         assert str(error).startswith("part.nc:")
+
+
+def test_an_arc_of_a_radius_beyond_reason_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"allowed: up to 1e\+06 mm"):
+        arc_by_radius(np.zeros(2), np.ones(2), 1e200, True)
