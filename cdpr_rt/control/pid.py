@@ -41,7 +41,7 @@ def _update(
     limit: FloatArray,
     period: float,
     state: FloatArray,
-    overcomes_stiction: bool,
+    most_push: FloatArray,
     standing: FloatArray,
     position: FloatArray,
     reference: FloatArray,
@@ -61,9 +61,17 @@ def _update(
             stiction.start(standing[i], position[i], reference[i])
         slope = (filter_s * state[i, 2] + error - state[i, 1]) / (filter_s + period)
         integral = state[i, 0] + ki * period * error
-        if overcomes_stiction:
+        if most_push[i] > 0.0:
             integral = stiction.step_integral(
-                standing[i], period, kp, ki, state[i, 0], position[i], reference[i], limit[i]
+                standing[i],
+                period,
+                kp,
+                ki,
+                state[i, 0],
+                position[i],
+                reference[i],
+                limit[i],
+                most_push[i],
             )
         u = kp * error + integral + kd * slope
         total = u + known[i]
@@ -85,8 +93,8 @@ class Pid:
 
     The derivative is filtered by a first-order lag (backward difference); integration stops
     while it would drive the torque further beyond its limit. Shapes: `gains` one per axis,
-    `limit_Nm` (n,). With `overcomes_stiction` an axis that friction holds off a set-point which
-    stands is brought there; see `stiction`.
+    `limit_Nm` (n,). With `most_push_Nm` (n,) an axis that friction holds off a set-point which
+    stands is brought there, with so much more torque at most; see `stiction`.
     """
 
     def __init__(
@@ -95,7 +103,7 @@ class Pid:
         limit_Nm: FloatArray,
         period_s: float,
         compensation: Compensation | None = None,
-        overcomes_stiction: bool = False,
+        most_push_Nm: FloatArray | None = None,
     ) -> None:
         self._gains = np.array(
             [
@@ -113,7 +121,7 @@ class Pid:
         self._compensation = compensation
         # integral, last error, filtered slope, how to go on
         self._state = np.zeros((len(gains), 4))
-        self._overcomes_stiction = overcomes_stiction
+        self._most_push = np.zeros(len(gains)) if most_push_Nm is None else np.array(most_push_Nm)
         self._standing = np.zeros((len(gains), stiction.COLUMNS))
         self.effort_Nm = np.zeros(len(gains))
         self.compensation_Nm = np.zeros(len(gains))
@@ -143,7 +151,7 @@ class Pid:
             self._limit,
             self._period_s,
             self._state,
-            self._overcomes_stiction,
+            self._most_push,
             self._standing,
             feedback.position_rad,
             setpoint.position_rad,

@@ -10,6 +10,7 @@ import numpy as np
 from cdpr_profiles import RobotAxis
 from cdpr_rt.control.compensation import AxisCompensation
 from cdpr_rt.control.pid import PidGains
+from cdpr_rt.control.stiction import most_push_Nm
 from cdpr_rt.control.tuning import PidDesign, stand_firm, stiffest_pid, sweep_gain
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.limits import Limits
@@ -39,6 +40,8 @@ class RobotModel:
     """Of the position loops, one an axis."""
     sweep_gain_Nm_rad: FloatArray
     """Of the cogging sweep's proportional controller."""
+    most_push_Nm: FloatArray
+    """The most that the position loops add against stiction."""
     compensation: tuple[AxisCompensation | None, ...] = ()
     """Cogging and friction of each motor where they are known; empty where none is."""
 
@@ -82,5 +85,11 @@ def model_of(
         cable_m_per_rad=cable,
         gains=tuple(designs[pair] for pair in pairs),
         sweep_gain_Nm_rad=np.array([sweep_gain(J, latency) for J, latency in pairs]),
+        most_push_Nm=np.array(
+            [
+                most_push_Nm(axis.winch.motor.rated_torque_Nm, known)
+                for axis, known in zip(axes, compensation or [None] * len(axes), strict=True)
+            ]
+        ),
         compensation=tuple(compensation),
     )

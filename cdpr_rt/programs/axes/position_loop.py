@@ -18,7 +18,7 @@ class PositionLoop:
         if any(axis is not None for axis in model.compensation):
             known = Compensation(list(model.compensation), model.period_s)
         self.controller = Pid(
-            list(model.gains), model.torque_Nm, model.period_s, known, overcomes_stiction=True
+            list(model.gains), model.torque_Nm, model.period_s, known, model.most_push_Nm
         )
         self._cycle = -2
         self._torque_Nm = np.zeros(model.n)

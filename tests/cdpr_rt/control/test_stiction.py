@@ -13,6 +13,7 @@ from cdpr_profiles.catalogue import list_profiles, load_motor
 from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.control.pid import Pid
+from cdpr_rt.control.stiction import most_push_Nm
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.motion.trajectory import Leg
 from cdpr_rt.programs.model import position_loop
@@ -41,7 +42,9 @@ def series() -> list[str]:
 class BareMotor:
     """A motor without load under the loop of `cdpr drive jog` and of the daemon's axes."""
 
-    def __init__(self, winch: Winch, plant: Plant, compensated: bool = False) -> None:
+    def __init__(
+        self, winch: Winch, plant: Plant, compensated: bool = False, limit: float = 0.25
+    ) -> None:
         motor, self.plant = winch.motor, plant.of(winch)
         self._rated_Nm = motor.rated_torque_Nm
         ratings = {name: getattr(motor, name) for name in MotorRatings.__annotations__}
@@ -50,15 +53,16 @@ class BareMotor:
         self._feedback, self._setpoint = AxisFeedback(1), Setpoint(1)
         self._torque, self._permille = np.zeros(1), 0.0
         self._step()
-        known = None
+        known, axis = None, None
         if compensated:
-            stored = profile_of(winch, self.plant, 1).better
-            known = Compensation([stored.compensation(MotorBounds(motor))], PERIOD_S)
+            axis = profile_of(winch, self.plant, 1).better.compensation(MotorBounds(motor))
+            known = Compensation([axis], PERIOD_S)
             self._feedback.index_rad[0] = math.radians(self.plant.encoder.index_deg) + self._offset
             self._feedback.index_known[0] = True
         design = position_loop(motor.rotor_inertia_kg_m2, winch.latency_s, PERIOD_S)
-        most = np.array([0.25 * self._rated_Nm])
-        self._pid = Pid([design.gains], most, PERIOD_S, known, overcomes_stiction=True)
+        most = np.array([limit * self._rated_Nm])
+        push = np.array([most_push_Nm(self._rated_Nm, axis)])
+        self._pid = Pid([design.gains], most, PERIOD_S, known, push)
 
     def _step(self) -> None:
         sample = self._motor.step(PERIOD_S, servo.TORQUE, self._permille)
@@ -82,6 +86,28 @@ class BareMotor:
             errors.append(math.degrees(self._feedback.position_rad[0] - asked))
         return np.array(errors[round((seconds + ramp_s) / PERIOD_S) :])
 
+    def hold(self, off_deg: float, seconds: float) -> float:
+        """Hold the rotor off where it rests; return the last torque asked for, Nm."""
+        held = self._motor.record["angle"][0] + math.radians(off_deg)
+        self._regulate(seconds, held)
+        return float(self._torque[0])
+
+    def let_go(self, seconds: float) -> FloatArray:
+        """Return the angle off the set-point, deg, in each cycle from then on."""
+        return np.degrees(self._regulate(seconds, None))
+
+    def _regulate(self, seconds: float, held: float | None) -> FloatArray:
+        errors = []
+        self._setpoint.velocity_rad_s[:] = self._setpoint.acceleration_rad_s2[:] = 0.0
+        for _ in range(round(seconds / PERIOD_S)):
+            self._pid.update(self._feedback, self._setpoint, self._torque)
+            if held is not None:
+                self._motor.record["angle"], self._motor.record["velocity"] = held, 0.0
+            self._step()
+            self._permille = float(round(1e3 * self._torque[0] / self._rated_Nm))
+            errors.append(self._feedback.position_rad[0] - self._setpoint.position_rad[0])
+        return np.array(errors)
+
 
 @pytest.mark.parametrize("compensated", [False, True])
 @pytest.mark.parametrize("name", series())
@@ -102,3 +128,20 @@ def test_motors_with_other_friction_settle_too(coulomb_Nm: float, breakaway_Nm: 
     for speed_deg_s in (20.0, -90.0):
         settled = motor.jog(speed_deg_s, 1.5, 1.5 * SETTLED_S)[round(SETTLED_S / PERIOD_S) :]
         assert np.abs(settled).max() < SETTLED_deg
+
+
+@pytest.mark.parametrize("compensated", [False, True])
+@pytest.mark.parametrize("name", series())
+def test_a_motor_that_was_held_fast_does_not_jump_when_let_go(name: str, compensated: bool) -> None:
+    winch = replace(load_winch("winch-mpp0923d"), motor=load_motor(name))
+    motor = BareMotor(winch, Plant(), compensated, limit=1.0)
+    motor.jog(20.0, 1.0, SETTLED_S)
+    held_Nm = [motor.hold(off_deg, 1.5) for off_deg in (1.0, 0.0)]
+    rated_Nm = winch.motor.rated_torque_Nm
+    assert abs(held_Nm[0]) < 0.2 * rated_Nm
+    assert abs(held_Nm[1] - held_Nm[0]) < 0.05 * rated_Nm  # it is not wound up
+    after_deg = motor.let_go(1.5 * SETTLED_S)
+    over_10_ms = np.radians(after_deg[10:] - after_deg[:-10]) / (10 * PERIOD_S)
+    assert np.abs(after_deg).max() < 5.0
+    assert np.abs(over_10_ms).max() < 10.0
+    assert np.abs(after_deg[round(SETTLED_S / PERIOD_S) :]).max() < SETTLED_deg

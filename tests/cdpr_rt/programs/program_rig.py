@@ -35,6 +35,7 @@ def rig_model() -> RobotModel:
         cable_m_per_rad=np.array([0.026, -0.026, 0.05]),
         gains=(gains,) * N,
         sweep_gain_Nm_rad=np.full(N, sweep_gain(INERTIA_kg_m2, LATENCY_S)),
+        most_push_Nm=np.full(N, 0.3),
         compensation=(None, None, AxisCompensation(np.zeros((2, 8)), friction, most_Nm=10.0)),
     )
 

@@ -14,6 +14,7 @@ from cdpr_drivers.errors import SdoError
 from cdpr_drivers.robot.session import Session
 from cdpr_profiles import Winch
 from cdpr_rt.control.pid import Pid
+from cdpr_rt.control.stiction import most_push_Nm
 from cdpr_rt.motion.trajectory import Leg
 from cdpr_rt.procedures.winch_operator import Tolerance
 from cdpr_rt.programs.model import position_loop
@@ -187,7 +188,8 @@ def _jog_controller(session: Session) -> Pid:
     # a soft loop lets a rotor with friction stick and slip: by turns at these speeds
     design = position_loop(motor.rotor_inertia_kg_m2, session.winch.latency_s, period)
     most = np.array([_TORQUE_SHARE * motor.rated_torque_Nm])
-    return Pid([design.gains], most, period, overcomes_stiction=True)
+    push = np.array([most_push_Nm(motor.rated_torque_Nm)])
+    return Pid([design.gains], most, period, most_push_Nm=push)
 
 
 @app.command()
