@@ -52,7 +52,8 @@ def _update(
     for i in range(limit.size):
         kp, ki, kd, filter_s = gains[i, 0], gains[i, 1], gains[i, 2], gains[i, 3]
         error = reference[i] - position[i]
-        if state[i, 3] != _RUNNING:  # no error before this one to differentiate
+        begins = state[i, 3] != _RUNNING
+        if begins:  # no error before this one to differentiate
             state[i, 1] = error
             if state[i, 3] == _PRESET:
                 # what the error and the known torque do not account for is the integral's
@@ -61,7 +62,7 @@ def _update(
             stiction.start(standing[i], position[i], reference[i])
         slope = (filter_s * state[i, 2] + error - state[i, 1]) / (filter_s + period)
         integral = state[i, 0] + ki * period * error
-        if most_push[i] > 0.0:
+        if most_push[i] > 0.0 and not begins:
             integral = stiction.step_integral(
                 standing[i],
                 period,
