@@ -12,7 +12,7 @@ import pytest
 from cdpr_profiles import ProfileError, Robot, load_robot
 from cdpr_profiles.calibration.geometry import (
     GeometryCalibration,
-    file_sha256,
+    geometry_sha256,
     load_geometry_calibration,
 )
 from cdpr_profiles.calibration.in_force import (
@@ -37,7 +37,8 @@ def calibration(robot: Robot, version: int = 1, move_m: float = 0.01) -> Geometr
     assert platform is not None
     return GeometryCalibration(
         robot=robot.profile,
-        robot_sha256=file_sha256(robot.path),
+        geometry_sha256=geometry_sha256(robot),
+        simulated=False,
         version=version,
         date=datetime(2026, 3, 4, 5, 6, tzinfo=UTC),
         method="points",
@@ -103,7 +104,10 @@ def test_versions_are_kept_and_undone_one_by_one(robot: Robot) -> None:
 
 def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> None:
     take_over(robot, calibration(robot))
-    robot.path.write_text(robot.path.read_text() + "\n# another winch\n")
+    text = robot.path.read_text()
+    robot.path.write_text(text + "\n# a remark\n")
+    assert calibrated(load_robot(robot.path)).calibration is not None
+    robot.path.write_text(text.replace("home_m = [", "home_m = [0.01 + ", 1))
     with pytest.raises(ProfileError, match=r"has been changed since .* cdpr calibrate undo"):
         calibrated(load_robot(robot.path))
 
@@ -114,7 +118,7 @@ def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> Non
         ({"drum_scales": (1.0, 1.0)}, "drum_scales: 2 entries; allowed: 4"),
         ({"drum_scales": (1.0, 3.0, 1.0, 1.0)}, r"drum_scales\[1\]"),
         ({"home_m": (0.0, 0.0, 0.0)}, "allowed: 2 coordinates"),
-        ({"exit_points_m": ((9.0, 3.0),) * 4}, "more than 0.5 m"),
+        ({"exit_points_m": ((9.0, 3.0),) * 4}, "more than 0.2 m"),
         ({"home_rotation_rad": (0.0, 0.0, 0.0)}, "home_rotation_rad"),
     ],
 )

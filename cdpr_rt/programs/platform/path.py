@@ -132,6 +132,7 @@ class PathProgram(PlatformProgram):
     def _parsed(self, arguments: Mapping[str, Any]) -> _Command:
         keys = CommandArguments(self.name, arguments, _KEYS)
         feed = keys.number("feed", _SLOWEST, 1.0, self._feed or 1.0)
+        self._require_believed()
         if not self._parts.tight:
             raise ProgramError("path: the cables are not tight; run tighten first")
         if set(arguments) == {"feed"}:

@@ -13,6 +13,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach, stopping_position
+from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
 from cdpr_rt.programs.platform.path_store import PathStore
@@ -200,6 +201,11 @@ class PlatformProgram(CommandedProgram):
         """Begin to brake to a standstill."""
         super().stop()
         self._brake()
+
+    def _require_believed(self) -> None:
+        """Raise ProgramError where targets cannot be taken: the geometry may not be believed."""
+        if self._parts.distrust:
+            raise ProgramError(f"{self.name}: {self._parts.distrust}")
 
     @property
     def pose(self) -> FloatArray | None:

@@ -129,10 +129,7 @@ class PoseProgram(PlatformProgram):
         keys = CommandArguments(self.name, arguments, allowed)
         most = float(self._parts.speed[0])
         speed = keys.number("speed_m_s", _SLOWEST_m_s, most, most)
-        if self._parts.distrust:
-            raise ProgramError(
-                f"pose: {self._parts.distrust}; calibrate it or say that it is, and enable again"
-            )
+        self._require_believed()
         if not self._parts.tight:
             raise ProgramError("pose: the cables are not tight; run tighten first")
         if not arguments:

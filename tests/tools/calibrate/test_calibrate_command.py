@@ -13,7 +13,7 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.geometry import file_sha256
+from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.calibration.data import CalibrationData, PoseReading
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
@@ -47,7 +47,8 @@ def data_of(what: MadeUp, path: Path, spoil: Any = None) -> Path:
         )
     data = CalibrationData(
         robot="spatial-8",
-        robot_sha256=file_sha256(robot.path),
+        geometry_sha256=geometry_sha256(robot),
+        simulated=False,
         date=datetime.now(UTC).isoformat(),
         poses=tuple(readings),
     )
@@ -73,7 +74,7 @@ def result(done: Any) -> dict[str, Any]:
 
 
 def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_path: Path) -> None:
-    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data, points = data_of(what, tmp_path / "data.json"), points_of(what, tmp_path / "p.csv")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--points", points, "--json")
     assert done.returncode == 0, done.stderr
@@ -96,7 +97,7 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
 
 
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
-    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = data_of(what, tmp_path / "data.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--json")
     assert done.returncode == 1, done.stderr
@@ -114,7 +115,7 @@ def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
     def slip(lengths: Any) -> None:
         lengths[20:, 6] += 0.015
 
-    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = data_of(what, tmp_path / "data.json", slip)
     points = points_of(what, tmp_path / "p.csv")
     done = cdpr_here(
@@ -137,7 +138,7 @@ def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
     ],
 )
 def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:
-    what = made_up("spatial-8", 45, 12)
+    what = made_up("spatial-8", 45, 12, home_first=True)
     data, points = data_of(what, tmp_path / "data.json"), tmp_path / "p.csv"
     points.write_text(text)
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--points", points)
@@ -146,7 +147,7 @@ def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:
 
 
 def test_bad_data_and_requests_are_refused(tmp_path: Path) -> None:
-    few = data_of(made_up("spatial-8", 9, 12), tmp_path / "few.json")
+    few = data_of(made_up("spatial-8", 9, 12, home_first=True), tmp_path / "few.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", few)
     assert done.returncode == 2 and "15 and more" in done.stderr
     other = cdpr_here("calibrate", "fit", "planar-4", "--data", few)
