@@ -138,8 +138,8 @@ class Outcome:
         )
         if self.verified_left_out:
             lines.append(
-                f"{self.verified_left_out} readings at poses not used count for nothing there: they "
-                "were at fault"
+                f"{self.verified_left_out} readings at poses not used were at fault, and count "
+                "for nothing there"
             )
         return lines + [f"not known: {one.what}; {one.advice}" for one in self.open_directions]
 

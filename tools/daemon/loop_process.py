@@ -125,7 +125,7 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
         lowering=lowering,
         last=None if platform is None else platform.last,
         paths=None if platform is None else platform.paths,
-        before_power=lambda: _look_at_calibration(robot, platform),
+        before_power=lambda: look_at_calibration(robot, platform),
         enable_realtime=enable_realtime,
     )
     warm_up_programs(programs, n, platform)
@@ -133,7 +133,7 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
     return parts
 
 
-def _look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
+def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
     """Have the programs refuse targets where the geometry may not be believed."""
     if platform is None:
         return

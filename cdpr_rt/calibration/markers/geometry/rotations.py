@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-FloatArray = NDArray[np.float64]
+from cdpr_rt.core.exchange import FloatArray
+
 IntArray = NDArray[np.int64]
 
 
