@@ -47,4 +47,6 @@ def test_what_a_simulated_robot_told_moves_no_real_one() -> None:
     refuse_simulated_calibration(found.applied(robot), ["simbus:here"])
     refuse_simulated_calibration(found.applied(robot), ["simbus:"])
     with pytest.raises(ConfigurationError, match="measured on a simulated robot"):
-        refuse_simulated_calibration(found.applied(robot), [f"{robot.buses[0].name}=can0"])
+        refuse_simulated_calibration(
+            found.applied(robot), [f"{robot.buses[0].name}=socketcan:can0"]
+        )

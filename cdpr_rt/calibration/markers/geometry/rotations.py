@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.core.exchange import FloatArray
-
+FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
