@@ -177,6 +177,11 @@ class Robot:
     """Whether it is a single winch, run as a robot of one axis; its file is that of the winch."""
 
     @property
+    def geometry_identity(self) -> str:
+        """Which calibration its geometry is, empty for that of its file."""
+        return "" if self.calibration is None else self.calibration.identity
+
+    @property
     def reference(self) -> str:
         """Reference for `load_robot` from any folder: the robot's name, or its file's path."""
         return reference("winches" if self.is_winch else "robots", self.path)

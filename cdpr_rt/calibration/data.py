@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import file_sha256, write_text
+from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_profiles.reading.reader import Profile, read_json_model
@@ -28,6 +28,8 @@ _AXES = "xyz"
 _STD_mm = 2.0
 _COLUMNS = ("pose", "x_mm", "y_mm", "z_mm", "sigma_mm")
 _FURTHEST_mm = 1e6
+_ROTATION = 1e-4
+_TURNED_rad = 0.2
 
 Numbers = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], ...]
 
@@ -46,13 +48,32 @@ class PoseReading(Profile):
     rotation: tuple[Numbers, ...] | None = None
     rotation_std_rad: float | None = Field(default=None, gt=0)
 
+    @model_validator(mode="after")
+    def _measured_wholly(self) -> PoseReading:
+        if (self.position_m is None) != (self.position_std_m is None):
+            raise ValueError("position_m and position_std_m: allowed: both or none")
+        if (self.rotation is None) != (self.rotation_std_rad is None):
+            raise ValueError("rotation and rotation_std_rad: allowed: both or none")
+        if self.position_m is not None and len(self.position_m) != 3:
+            raise ValueError(f"position_m: {len(self.position_m)} numbers; allowed: 3")
+        if self.rotation is not None:
+            if [len(row) for row in self.rotation] != [3, 3, 3]:
+                raise ValueError("rotation: allowed: 3 rows of 3 numbers")
+            Q = np.array(self.rotation)
+            if np.abs(Q @ Q.T - np.eye(3)).max() > _ROTATION or np.linalg.det(Q) < 0.0:
+                raise ValueError("rotation: is none; allowed: an orthogonal matrix, determinant 1")
+        return self
+
 
 class CalibrationData(Profile):
     """Readings at all poses of a calibration; the first is of the platform at home."""
 
     format: Literal["cdpr-rt geometry data 1"] = "cdpr-rt geometry data 1"
     robot: str
-    robot_sha256: str
+    geometry_sha256: str
+    """Of the robot's files as loaded when the platform was measured."""
+    simulated: bool
+    """Whether it was a simulated robot; what is found then moves no other."""
     date: str
     left_out: tuple[str, ...] = ()
     """Poses that were tried in vain, and why."""
@@ -64,10 +85,10 @@ class CalibrationData(Profile):
 
     def observations(self, robot: Robot, model: PlatformModel) -> Observations:
         """Return the readings for the fit; raises InvalidRequestError where they do not fit."""
-        if self.robot_sha256 != file_sha256(robot.path):
+        if self.geometry_sha256 != geometry_sha256(robot):
             raise InvalidRequestError(
-                f"the data are of another state of {self.robot!r}: {robot.path} has been changed "
-                "since; allowed: the file they were measured with"
+                f"the data are of another state of {self.robot!r}: {robot.path}, or a file of its "
+                "winches, has been changed since; allowed: the files they were measured with"
             )
         if not self.poses:
             raise InvalidRequestError("the data hold no poses; allowed: at least a few")
@@ -79,6 +100,7 @@ class CalibrationData(Profile):
                     f"pose {j + 1} has {counts} lengths, tensions and coordinates; allowed: "
                     f"{(n, n, d)}"
                 )
+        self._require_home_first(model)
         start = model.poses(np.array([reading.target for reading in self.poses]))
         seen = Observations.of_lengths(
             np.array([reading.length_m for reading in self.poses]),
@@ -86,6 +108,16 @@ class CalibrationData(Profile):
             start,
         )
         return self._with_measured(seen, model.positions)
+
+    def _require_home_first(self, model: PlatformModel) -> None:
+        """Raise InvalidRequestError where the first pose, the calibrated home, is another."""
+        off = np.abs(np.array(self.poses[0].target) - model.home)
+        k = model.positions
+        if off[:k].max() > model.platform.home_tolerance_m or (off[k:] > _TURNED_rad).any():
+            raise InvalidRequestError(
+                f"pose 1 was to be at {list(self.poses[0].target)}; allowed: home, "
+                f"{model.home.tolist()}, where the platform stands before it moves"
+            )
 
     def _with_measured(self, seen: Observations, coordinates: int) -> Observations:
         count = seen.poses
@@ -128,9 +160,14 @@ def load_points(path: Path) -> list[MeasuredPoint]:
     ):
         raise ProfileError(path, "line 1", f"allowed: the columns {','.join(_COLUMNS)}")
     names = [name.strip() for name in rows[0]]
-    return [
-        _point(path, k + 2, dict(zip(names, row, strict=False))) for k, row in enumerate(rows[1:])
-    ]
+    return [_point(path, k + 2, _cells(path, k + 2, names, row)) for k, row in enumerate(rows[1:])]
+
+
+def _cells(path: Path, line: int, names: list[str], row: list[str]) -> dict[str, str]:
+    if len(row) > len(names):
+        problem = f"{len(row)} cells; allowed: up to {len(names)}, one for each column"
+        raise ProfileError(path, f"line {line}", problem)
+    return dict(zip(names, row, strict=False))  # what is left out at the end is empty
 
 
 def _point(path: Path, line: int, row: dict[str, str]) -> MeasuredPoint:

@@ -8,10 +8,11 @@ from datetime import UTC, datetime
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import GeometryCalibration, file_sha256
+from cdpr_profiles.calibration.geometry import GeometryCalibration, geometry_sha256
 from cdpr_profiles.platform import Platform
 from cdpr_rt.calibration.faults import Fault, fit_without_faults
 from cdpr_rt.calibration.fit import Fit, fit
@@ -30,7 +31,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.robot_arrays import limits_of
 
-Method = Literal["points", "redundancy", "camera", "points and camera"]
+Method = Literal["points", "redundancy"]
 _EACH = 5
 """One pose in so many is kept from the fit and verifies it."""
 _LEAST_HELD_OUT = 3
@@ -56,6 +57,8 @@ class Outcome:
     verified: Verification
     before: Verification
     """The same by the robot's file, whose lengths are those at the start."""
+    verified_left_out: int
+    """Readings at those poses that were found to be at fault, with all poses, and left out."""
     predicted_3_sigma_mm: float
     """Of a position in the workspace; without measured points, of its shape."""
 
@@ -92,7 +95,16 @@ class Outcome:
                 "poses that the fit had not seen are told no better than by the robot's file: take "
                 "more poses, further apart"
             )
-        return told
+        return told + self._impossible()
+
+    def _impossible(self) -> list[str]:
+        """Return which values cannot be of this robot."""
+        try:
+            faults = calibration_of(self, 1, "", simulated=False).faults(self.robot)
+        except ValidationError as error:
+            return [f"the result is no geometry: {error.errors()[0]['msg']}"]
+        what = "is something of the robot's file wrong, or was pose 1 not home?"
+        return [f"{key}: {problem}: {what}" for key, problem in faults]
 
     def advice(self) -> str:
         """Return what more poses would bring."""
@@ -124,6 +136,11 @@ class Outcome:
             f"{1e3 * self.verified.residual_m:.2f} mm rms (before: "
             f"{1e3 * self.before.residual_m:.2f})"
         )
+        if self.verified_left_out:
+            lines.append(
+                f"{self.verified_left_out} readings at poses not used were at fault, and count "
+                "for nothing there"
+            )
         return lines + [f"not known: {one.what}; {one.advice}" for one in self.open_directions]
 
     def told(self) -> dict[str, Any]:
@@ -145,6 +162,7 @@ class Outcome:
             ],
             "verification": {
                 "poses": self.verified.poses,
+                "readings_left_out": self.verified_left_out,
                 "mean_position_error_mm": _number(self.verified.mean_mm),
                 "worst_position_error_mm": _number(self.verified.worst_mm),
                 "mean_position_error_before_mm": _number(self.before.mean_mm),
@@ -181,7 +199,10 @@ def calibrate(robot: Robot, geometry: CableGeometry, seen: Observations, method:
     k = geometry.coordinates
     three_sigma_mm = 3e3 * float(np.sqrt((predicted[:, :k] ** 2).mean(axis=0).max()))
     open_ones = open_directions(found)
-    return Outcome(robot, found, method, faults, open_ones, verified, before, three_sigma_mm)
+    left_out = int((~other.used).sum())
+    return Outcome(
+        robot, found, method, faults, open_ones, verified, before, left_out, three_sigma_mm
+    )
 
 
 def frame_of(seen: Observations) -> str:
@@ -191,8 +212,10 @@ def frame_of(seen: Observations) -> str:
     return "the exit points of the robot's file, taken together: moved and turned least"
 
 
-def calibration_of(outcome: Outcome, version: int, raw_data: str) -> GeometryCalibration:
-    """Return the file of a calibration."""
+def calibration_of(
+    outcome: Outcome, version: int, raw_data: str, *, simulated: bool, distrusted_before: str = ""
+) -> GeometryCalibration:
+    """Return the file of a calibration; raises ValidationError of pydantic for what is none."""
     robot, found = outcome.robot, outcome.found
     platform = robot.platform
     assert platform is not None  # the fit was of one
@@ -208,7 +231,9 @@ def calibration_of(outcome: Outcome, version: int, raw_data: str) -> GeometryCal
         anchors = _points(kernel[3 : 3 + k].T)
     return GeometryCalibration(
         robot=robot.profile,
-        robot_sha256=file_sha256(robot.path),
+        geometry_sha256=geometry_sha256(robot),
+        simulated=simulated,
+        distrusted_before=distrusted_before,
         version=version,
         date=datetime.now(UTC).replace(microsecond=0),
         method=outcome.method,

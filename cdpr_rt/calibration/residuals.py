@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
 from cdpr_rt.calibration.observations import Observations
 from cdpr_rt.calibration.parameters import ANCHORS, CABLE_ROWS, DRUM, EXIT, OFFSET, CableGeometry
 from cdpr_rt.core.exchange import FloatArray
@@ -202,21 +203,14 @@ def _measured_poses(
     out.residual[:, first : first + 3] = weight * (poses[:, 0] + arm - seen.position_m)
     by_twist = np.zeros((len(poses), 6, 6))
     by_twist[:, :3, :3] = np.eye(3)
-    by_twist[:, :3, 3:] = -_cross(arm)
+    by_twist[:, :3, 3:] = -cross_matrices(arm)
     by_twist[:, :3] *= weight[..., None]
     if np.isfinite(seen.rotation_std_rad).any():
         turn = poses[:, 1:] @ np.swapaxes(seen.rotation, 1, 2)
         phi = Rotation.from_matrix(turn).as_rotvec()
         weight = 1.0 / seen.rotation_std_rad
         out.residual[:, first + 3 :] = weight * phi
-        skew = _cross(phi)
+        skew = cross_matrices(phi)
         # inverse of the left Jacobian of SO(3), to second order
         by_twist[:, 3:, 3:] = weight[..., None] * (np.eye(3) - 0.5 * skew + skew @ skew / 12.0)
     out.by_pose[:, first:] = by_twist[:, :, chosen]
-
-
-def _cross(v: FloatArray) -> FloatArray:
-    """Return [v]× of vectors (N, 3)."""
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return out - np.swapaxes(out, 1, 2)

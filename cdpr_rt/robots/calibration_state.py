@@ -63,7 +63,10 @@ def distrust(robot: str) -> str:
     if state.calibrated:
         return ""
     since = f" since {state.date}" if state.date else ""
-    return f"robot {robot!r} is not calibrated{since}: {state.why}"
+    return (
+        f"robot {robot!r} is not calibrated{since}: {state.why}; calibrate it or say that it is, "
+        "and enable again"
+    )
 
 
 def _mark(robot: str, calibrated: bool, why: str) -> CalibrationState:

@@ -42,6 +42,8 @@ class LastLengths:
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = path
+        self.geometry = ""
+        """Identity of the calibration by which lengths are known, empty for the robot's file."""
         self.lengths: StoppedLengths | None = None
         self.why = "the robot has not been stopped with known lengths yet"
         """Why there are none, where there are none."""
@@ -71,6 +73,12 @@ class LastLengths:
     def _take(self, held: dict[str, Any], n: int, most_m: float) -> None:
         if held["stopped"] is not True:
             self.why = f"{self.path}: the robot was in motion when it was last heard of"
+            return
+        if held.get("geometry", "") != self.geometry:
+            self.why = (
+                f"{self.path}: the robot was stopped with another calibration of its geometry than "
+                "that which is in force"
+            )
             return
         lengths, at_index = (np.array([_length_m(x, most_m) for x in held[key]]) for key in _FIELDS)
         if lengths.shape != (n,) or at_index.shape != (n,) or not (lengths > 0.0).all():
@@ -110,7 +118,8 @@ class LastLengths:
             self.lengths = StoppedLengths(estimate.cable_length_m.copy(), at_index, date, here)
         if self.lengths is not None:
             lengths = {key: _plain(getattr(self.lengths, key)) for key in _FIELDS}
-            self._write({"stopped": True, "date": self.lengths.date, **lengths})
+            told = {"date": self.lengths.date, "geometry": self.geometry}
+            self._write({"stopped": True, **told, **lengths})
 
     def _write(self, held: dict[str, Any]) -> None:
         if self.path is not None:

@@ -42,7 +42,10 @@ class FolderCamera(Camera):
             data = np.frombuffer(path.read_bytes(), np.uint8)
         except OSError as error:
             raise CameraError(f"image {path}: {error.strerror}") from None
-        pixels = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
+        try:
+            pixels = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
+        except cv2.error as error:  # more pixels than the library takes
+            raise CameraError(f"image {path}: cannot be decoded: {error}") from None
         if pixels is None:
             raise CameraError(f"image {path}: cannot be decoded")
         return Image(np.asarray(pixels, np.uint8), self._clock.now_s, None, path.name)

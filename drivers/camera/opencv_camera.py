@@ -10,8 +10,11 @@ from cdpr_rt.core.clock import Clock
 # what is wrong is told by the errors here, not by lines of the library's own on standard error
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
+_STREAMS = ("rtsp://", "rtsps://", "rtmp://", "udp://", "rtp://")
 _STALE = 4
 """Images that a V4L2 device may have waiting from before."""
+_FRESH_S, _MOST_STALE = 0.005, 200
+"""An image for which a stream lets wait so long had not come before."""
 
 
 class OpencvCamera(Camera):
@@ -22,22 +25,22 @@ class OpencvCamera(Camera):
         self.name = f"opencv:{place}"
         self._clock = clock
         self._number = 0
-        self._live = place.isdigit() or place.startswith("/dev/")
+        device = place.isdigit() or place.startswith("/dev/")
+        self._device, self._stream = device, place.lower().startswith(_STREAMS)
         source = int(place) if place.isdigit() else place
         try:
             self._capture = cv2.VideoCapture(source)
         except cv2.error as error:
             raise CameraError(f"camera {self.name}: {error}") from None
         if not self._capture.isOpened():
-            hint = "; `ls /dev/video*` shows those there are" if self._live else ""
+            hint = "; `ls /dev/video*` shows those there are" if device else ""
             raise CameraError(f"camera {self.name} cannot be opened{hint}")
         # by default a driver hands out images from some time before
         self._capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
 
     def grab(self) -> Image:
         """See `Camera.grab`."""
-        for _ in range(_STALE if self._live else 0):
-            self._capture.grab()
+        self._drop_stale()
         there, pixels = self._capture.read()
         if not there or pixels is None:
             raise CameraError(
@@ -47,6 +50,18 @@ class OpencvCamera(Camera):
         self._number += 1
         name = f"image {self._number}"
         return Image(grey(pixels.astype("uint8"), name), self._clock.now_s, None, name)
+
+    def _drop_stale(self) -> None:
+        """Take what had come before; a stream may have any number waiting."""
+        if self._device:
+            for _ in range(_STALE):
+                self._capture.grab()
+        if not self._stream:
+            return
+        for _ in range(_MOST_STALE):
+            asked_s = self._clock.now_s
+            if not self._capture.grab() or self._clock.now_s - asked_s > _FRESH_S:
+                break
 
     def close(self) -> None:
         """See `Camera.close`."""

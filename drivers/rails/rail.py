@@ -139,7 +139,9 @@ def _test_brake(rail: RailProfile, axis: RailAxis, clock: Clock) -> float | None
         if not axis.push(way * check.torque_percent / 100.0):
             return None
         deadline = clock.now_s + check.seconds
-        while clock.now_s < deadline:
+        over = False
+        while not over:
+            over = clock.now_s >= deadline  # the last look is after all of it, however late
             moved = max(moved, abs(axis.position_m() - before))
             if moved > check.allowed_m:
                 break

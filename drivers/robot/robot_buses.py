@@ -54,6 +54,20 @@ def robot_urls(robot: Robot, texts: Sequence[str]) -> dict[str, BusUrl]:
     return urls
 
 
+def refuse_simulated_calibration(robot: Robot, texts: Sequence[str]) -> None:
+    """Raise ConfigurationError where a calibration of a simulated robot would move a real one."""
+    known = robot.calibration
+    if known is None or not known.simulated or asks_for_own_simulator(texts):
+        return
+    real = [str(url) for url in robot_urls(robot, texts).values() if not url.is_simulated]
+    if real:
+        raise ConfigurationError(
+            f"{robot.path}: calibration {known.version} was measured on a simulated robot; "
+            f"allowed: simbus, not {' and '.join(real)}; take it back: "
+            f"cdpr calibrate undo {robot.reference}"
+        )
+
+
 def _given(robot: Robot, names: list[str], texts: Sequence[str]) -> dict[str, str]:
     given: dict[str, str] = {}
     for text in texts:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -12,26 +15,30 @@ from typing import Any, Literal
 from pydantic import Field
 
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.platform import Point
-from cdpr_profiles.reading.bounded_input import read_text
+from cdpr_profiles.platform import Platform, Point
 from cdpr_profiles.reading.reader import Profile, read_toml_model
 from cdpr_profiles.robot import Robot, RobotAxis
 
 _HASH_CHARS = 12
-_MOST_BYTES = 1 << 20
-_FURTHEST_m = 0.5
-"""A calibration that moves an exit point by more is of another robot."""
+_FURTHEST_m, _ANCHOR_m = 0.2, 0.05
+"""A calibration that moves an exit or anchor point by more is of another robot."""
+_TURNED_rad = 0.2
+_DRUM, _ELONGATION = (0.9, 1.1), (0.1, 10.0)
 
 
 class GeometryCalibration(Profile):
     """Exit points, home, drums and elongation of a robot as calibrated; the rest is its file's."""
 
     robot: str
-    robot_sha256: str
-    """Of the robot's file when it was calibrated: one that has been changed is another robot."""
+    geometry_sha256: str
+    """Of what it replaces and scales, as loaded: a robot of which that has changed is another."""
+    simulated: bool
+    """Whether it was measured on a simulated robot: it counts for none on another bus."""
+    distrusted_before: str = ""
+    """Why the geometry before it was not believed when it was taken over, empty where it was."""
     version: int = Field(ge=1)
     date: datetime
-    method: Literal["points", "redundancy", "camera", "points and camera"]
+    method: Literal["points", "redundancy"]
     frame: str
     """What the coordinates are relative to, in words."""
     exit_points_m: tuple[Point, ...]
@@ -41,7 +48,7 @@ class GeometryCalibration(Profile):
     home_rotation_rad: tuple[float, ...]
     drum_scales: tuple[float, ...]
     """Cable paid out by a turn of each motor over what the file says."""
-    elongation_scale: float = Field(gt=0, le=10)
+    elongation_scale: float
     poses: int = Field(ge=1)
     exit_std_m: tuple[float, ...]
     """Predicted standard deviation of each exit point, its worst coordinate."""
@@ -75,18 +82,35 @@ class GeometryCalibration(Profile):
         if len(self.home_rotation_rad) != len(platform.home_rotation_rad):
             problem = f"allowed: {len(platform.home_rotation_rad)} numbers"
             found.append(("home_rotation_rad", problem))
-        if found:
-            return found
-        for i, (here, file) in enumerate(
-            zip(self.exit_points_m, platform.exit_points_m, strict=True)
+        if self.anchor_points_m is not None and len(self.anchor_points_m) != n:
+            found.append(("anchor_points_m", f"{len(self.anchor_points_m)} entries; allowed: {n}"))
+        if self.robot != robot.profile:
+            found.append(("robot", f"value {self.robot!r}; allowed: {robot.profile!r}"))
+        return found or [*self._far_points(platform), *self._far_values(platform)]
+
+    def _far_points(self, platform: Platform) -> Iterator[tuple[str, str]]:
+        """Return what is further from the robot's file than errors of measuring."""
+        exits = list(zip(self.exit_points_m, platform.exit_points_m, strict=True))
+        anchors = zip(self.anchor_points_m or (), platform.anchor_points_m, strict=False)
+        moved_m = min(max(_apart_m(here, file) for here, file in exits), _FURTHEST_m)
+        for key, pairs, most_m in (
+            ("exit_points_m", exits, _FURTHEST_m),
+            ("anchor_points_m", anchors, _ANCHOR_m),
+            ("home_m", [(self.home_m, platform.home_m)], platform.home_tolerance_m + moved_m),
         ):
-            if max(abs(a - b) for a, b in zip(here, file, strict=True)) > _FURTHEST_m:
-                problem = f"more than {_FURTHEST_m:g} m from the robot's file"
-                found.append((f"exit_points_m[{i}]", problem))
-        for i, scale in enumerate(self.drum_scales):
-            if not 0.5 < scale < 2.0:
-                found.append((f"drum_scales[{i}]", f"value {scale:g}; allowed: 0.5 to 2"))
-        return found
+            for i, (here, file) in enumerate(pairs):
+                if not _apart_m(here, file) <= most_m:  # nor what is not a number
+                    yield f"{key}[{i}]", f"more than {most_m:.3g} m from the robot's file"
+
+    def _far_values(self, platform: Platform) -> Iterator[tuple[str, str]]:
+        if not _apart_m(self.home_rotation_rad, platform.home_rotation_rad) <= _TURNED_rad:
+            yield "home_rotation_rad", f"more than {_TURNED_rad:g} rad from the robot's file"
+        values = [(f"drum_scales[{i}]", x, _DRUM) for i, x in enumerate(self.drum_scales)]
+        for key, value, (low, high) in [
+            *values, ("elongation_scale", self.elongation_scale, _ELONGATION),
+        ]:  # fmt: skip
+            if not low <= value <= high:
+                yield key, f"value {value:g}; allowed: {low:g} to {high:g}"
 
     def applied(self, robot: Robot) -> Robot:
         """Return `robot` with this geometry."""
@@ -133,6 +157,7 @@ class GeometryCalibration(Profile):
             "date": self.date.isoformat(),
             "method": self.method,
             "frame": self.frame,
+            "simulated": self.simulated,
             "predicted_3_sigma_mm": self.predicted_3_sigma_mm,
             "verified_mean_mm": self.verified_mean_mm,
             "verified_worst_mm": self.verified_worst_mm,
@@ -144,17 +169,38 @@ def load_geometry_calibration(path: Path) -> GeometryCalibration:
     return read_toml_model(path, GeometryCalibration)
 
 
-def file_sha256(path: Path) -> str:
-    """Return the hash of a file's text; raises ProfileError."""
-    return hashlib.sha256(read_text(path, _MOST_BYTES).encode()).hexdigest()
+def geometry_sha256(robot: Robot) -> str:
+    """Return the hash of what a calibration replaces or scales, as the robot's files have it."""
+    platform = robot.platform
+    points: tuple[Any, ...] = ()
+    if platform is not None:
+        points = (
+            platform.exit_points_m, platform.anchor_points_m, platform.home_m,
+            platform.home_rotation_rad,
+        )  # fmt: skip
+    winches = [
+        (w.drum_radius_m, w.gear_ratio, w.cable.elongation_percent_per_N)
+        for w in (axis.winch for axis in robot.axes)
+    ]
+    return hashlib.sha256(json.dumps([points, winches]).encode()).hexdigest()
 
 
 def write_text(path: Path, text: str) -> None:
-    """Replace a file as a whole; raises ProfileError naming it."""
-    part = path.with_name(path.name + ".part")
+    """Replace a file as a whole, so that power lost leaves the old or the new one.
+
+    Raises ProfileError naming it.
+    """
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
+        with part.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
         part.replace(path)
     except OSError as error:
         raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None
+
+
+def _apart_m(here: Sequence[float], there: Sequence[float]) -> float:
+    return math.dist(here, there)

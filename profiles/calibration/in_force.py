@@ -1,25 +1,30 @@
 """Which calibration of a robot's geometry is in force: found beside its file, taken over, undone.
 
-The one in force is NAME.calibration beside NAME.toml, those before it NAME.calibration.1 and so on;
-of a shipped robot they lie in the user's own folder of robots.
+The one in force is NAME.calibration beside NAME.toml, those before it NAME.calibration.1 and so on,
+those taken back NAME.calibration.undone.2; of a shipped robot they lie in the user's own folder.
 """
 
 from __future__ import annotations
 
+import glob
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from cdpr_profiles.calibration.geometry import (
     GeometryCalibration,
-    file_sha256,
+    geometry_sha256,
     load_geometry_calibration,
     write_text,
 )
+from cdpr_profiles.catalogue import load_robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import is_file
 from cdpr_profiles.reading.places import SHIPPED, user_folder
 from cdpr_profiles.robot import Robot
 
 _SUFFIX = ".calibration"
+_BEFORE, _ALL = r"\.", r"\.(?:undone\.)?"
 
 
 def calibration_file(robot: Robot) -> Path:
@@ -29,42 +34,45 @@ def calibration_file(robot: Robot) -> Path:
     return folder / (robot.path.stem + _SUFFIX)
 
 
+def load_calibrated(robot: str | Path) -> Robot:
+    """Return the robot of a name or file with its calibration in force; raises ProfileError."""
+    return calibrated(load_robot(robot))
+
+
 def calibrated(robot: Robot) -> Robot:
     """Return `robot` with the calibration that is in force, as its file says where there is none.
 
-    Raises ProfileError for one that is damaged, or was made for another state of the robot's file.
+    Raises ProfileError for one that is damaged, or was made for another state of the robot's files.
     """
-    path = calibration_file(robot)
-    if robot.platform is None or robot.is_winch or not is_file(path):
+    found = in_force(robot)
+    if found is None:
         return robot
-    found = load_geometry_calibration(path)
-    if found.robot_sha256 != file_sha256(robot.path):
-        raise ProfileError(
-            path,
-            "robot_sha256",
-            f"{robot.path} has been changed since this calibration of {found.date:%Y-%m-%d %H:%M};"
-            " allowed: calibrate anew, or take the file as it is: cdpr calibrate undo "
-            f"{robot.reference}",
-        )
-    for key, problem in found.faults(robot):
-        raise ProfileError(path, key, problem)
+    _require_of(robot, found, calibration_file(robot))
     return found.applied(robot)
 
 
-def next_version(robot: Robot) -> int:
-    """Return the number that the next calibration of a robot has."""
+def in_force(robot: Robot) -> GeometryCalibration | None:
+    """Return what is in force now, of this state of the robot's files or not; raises ProfileError.
+
+    None where the robot's file counts.
+    """
     path = calibration_file(robot)
-    numbers = [_number(old) for old in path.parent.glob(path.name + ".*")] + [0]
-    if is_file(path):
-        numbers.append(load_geometry_calibration(path).version)
-    return max(numbers) + 1
+    if robot.platform is None or robot.is_winch or not is_file(path):
+        return None
+    return load_geometry_calibration(path)
+
+
+def next_version(robot: Robot) -> int:
+    """Return the number that the next calibration of a robot has; none is used twice."""
+    path = calibration_file(robot)
+    known = in_force(robot)
+    return max(_newest(path), 0 if known is None else known.version) + 1
 
 
 def take_over(robot: Robot, found: GeometryCalibration) -> Path:
     """Put a calibration in force and keep the one before it; raises ProfileError."""
-    for key, problem in found.faults(robot):
-        raise ProfileError(robot.path, key, problem)
     path = calibration_file(robot)
+    _require_of(robot, found, path)
     if is_file(path):
         before = load_geometry_calibration(path)
         write_text(_numbered(path, before.version), before.to_toml())
@@ -75,26 +83,66 @@ def take_over(robot: Robot, found: GeometryCalibration) -> Path:
 def undo(robot: Robot) -> GeometryCalibration | None:
     """Put the calibration before the one in force back; return it, None for the robot's file.
 
-    Raises ProfileError where none is in force.
+    One of another state of the robot's files is passed over. Raises ProfileError where none is in
+    force.
     """
     path = calibration_file(robot)
     if not is_file(path):
         raise ProfileError(path, "", "there is no calibration in force, so none to undo")
-    older = sorted((_number(p), p) for p in path.parent.glob(path.name + ".*") if _number(p))
+    older, before = _last_before(robot, path)
     try:
-        path.replace(path.with_name(path.name + ".undone"))
-        if not older:
-            return None
-        older[-1][1].replace(path)
+        version = load_geometry_calibration(path).version
+    except ProfileError:  # a damaged one is taken back as well
+        version = _newest(path) + 1
+    undone = path.with_name(f"{path.name}.undone.{version}")
+    try:
+        undone.unlink(missing_ok=True)
+        undone.hardlink_to(path)  # it stays in force until the other is in its place
+        if older is None:
+            path.unlink()
+        else:
+            older.replace(path)
     except OSError as error:
         raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None
-    return load_geometry_calibration(path)
+    return before
+
+
+def _require_of(robot: Robot, found: GeometryCalibration, path: Path) -> None:
+    """Raise ProfileError where a calibration is not of this robot as its files are now."""
+    if found.geometry_sha256 != geometry_sha256(robot):
+        raise ProfileError(
+            path,
+            "geometry_sha256",
+            f"{robot.path}, or a file of its winches, has been changed since this calibration of "
+            f"{found.date:%Y-%m-%d %H:%M}; allowed: calibrate anew, or take the files as they are: "
+            f"cdpr calibrate undo {robot.reference}",
+        )
+    for key, problem in found.faults(robot):
+        raise ProfileError(path, key, problem)
+
+
+def _last_before(robot: Robot, path: Path) -> tuple[Path | None, GeometryCalibration | None]:
+    for _, older in sorted(_versions(path, _BEFORE), reverse=True):
+        try:
+            found = load_geometry_calibration(older)
+            _require_of(robot, found, older)
+        except ProfileError:
+            continue
+        return older, found
+    return None, None
 
 
 def _numbered(path: Path, number: int) -> Path:
     return path.with_name(f"{path.name}.{number}")
 
 
-def _number(path: Path) -> int:
-    end = path.name.rpartition(".")[2]
-    return int(end) if end.isdigit() else 0
+def _newest(path: Path) -> int:
+    """Return the highest number of those that are kept, those taken back too; 0 for none."""
+    return max((number for number, _ in _versions(path, _ALL)), default=0)
+
+
+def _versions(path: Path, between: str) -> Iterator[tuple[int, Path]]:
+    """Return numbers and files of the calibrations that are kept beside the one in force."""
+    for old in path.parent.glob(glob.escape(path.name) + ".*"):
+        if match := re.fullmatch(between + r"(\d+)", old.name[len(path.name) :]):
+            yield int(match[1]), old

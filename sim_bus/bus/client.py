@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import re
 import select
 import socket
@@ -25,6 +26,7 @@ _SEND_BUFFER_BYTES = 1 << 22
 _BACKLOG = 64
 _SEND_ATTEMPTS = 500
 _SEND_RETRY_S = 0.0002
+_CLOCK_READINGS, _PUT_OFF_S = 3, 5e-5
 
 
 class Client:
@@ -75,15 +77,11 @@ class Client:
     def _receive_stamped(self, size: int) -> bytes:
         """Return the next packet as `recv` does, and note when it was sent."""
         packet, ancillary, _, _ = self.sock.recvmsg(size, _ANCILLARY_BYTES)
-        now_s = time.monotonic()
         if ancillary:
             seconds, ns = _TIMESPEC.unpack(ancillary[0][2])
-            # the kernel stamps with the clock of the wall; if that was set meanwhile, the packet
-            # counts as sent now at the latest
-            age_s = max(0.0, time.time() - seconds - ns * 1e-9)
-            self.sent_s = now_s - age_s
+            self.sent_s = sent_at(seconds + 1e-9 * ns)
         else:
-            self.sent_s = now_s
+            self.sent_s = time.monotonic()
         return packet
 
     def _send_retrying(self, frame: bytes) -> None:
@@ -98,6 +96,23 @@ class Client:
             else:
                 return
         raise BlockingIOError
+
+
+def sent_at(stamp_s: float) -> float:
+    """Return the time of the monotonic clock at a time of the wall clock, now at the latest.
+
+    The wall clock is read between two readings of the monotonic one, again where this process was
+    put off between them. If the wall clock was set meanwhile, the packet counts as sent now.
+    """
+    shortest_s, sent_s = math.inf, 0.0
+    for _ in range(_CLOCK_READINGS):
+        before_s, wall_s, after_s = time.monotonic(), time.time(), time.monotonic()
+        if after_s - before_s < shortest_s:
+            shortest_s = after_s - before_s
+            sent_s = before_s - max(0.0, wall_s - stamp_s)
+        if shortest_s < _PUT_OFF_S:
+            break
+    return sent_s
 
 
 def _enlarge_buffer(sock: socket.socket) -> None:

@@ -12,7 +12,7 @@ import pytest
 from cdpr_profiles import ProfileError, Robot, load_robot
 from cdpr_profiles.calibration.geometry import (
     GeometryCalibration,
-    file_sha256,
+    geometry_sha256,
     load_geometry_calibration,
 )
 from cdpr_profiles.calibration.in_force import (
@@ -37,18 +37,19 @@ def calibration(robot: Robot, version: int = 1, move_m: float = 0.01) -> Geometr
     assert platform is not None
     return GeometryCalibration(
         robot=robot.profile,
-        robot_sha256=file_sha256(robot.path),
+        geometry_sha256=geometry_sha256(robot),
+        simulated=False,
         version=version,
         date=datetime(2026, 3, 4, 5, 6, tzinfo=UTC),
         method="points",
         frame="the room",
-        exit_points_m=tuple((x + move_m, y) for x, y in platform.exit_points_m),
-        home_m=(platform.home_m[0] + 0.002, platform.home_m[1]),
+        exit_points_m=tuple((x + move_m, *rest) for x, *rest in platform.exit_points_m),
+        home_m=(platform.home_m[0] + 0.002, *platform.home_m[1:]),
         home_rotation_rad=platform.home_rotation_rad,
-        drum_scales=(1.01, 1.0, 0.99, 1.0),
+        drum_scales=(1.01, 1.0, 0.99, *(1.0 for _ in robot.axes[3:])),
         elongation_scale=1.4,
         poses=40,
-        exit_std_m=(0.001,) * 4,
+        exit_std_m=(0.001,) * len(robot.axes),
         predicted_3_sigma_mm=0.5,
         verified_poses=8,
         verified_mean_mm=0.7,
@@ -97,13 +98,17 @@ def test_versions_are_kept_and_undone_one_by_one(robot: Robot) -> None:
     assert held is not None and held.version == 1
     assert undo(robot) is None
     assert calibrated(robot) is robot
+    assert next_version(robot) == 3, "no number is used twice"
     with pytest.raises(ProfileError, match="none to undo"):
         undo(robot)
 
 
 def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> None:
     take_over(robot, calibration(robot))
-    robot.path.write_text(robot.path.read_text() + "\n# another winch\n")
+    text = robot.path.read_text()
+    robot.path.write_text(text + "\n# a remark\n")
+    assert calibrated(load_robot(robot.path)).calibration is not None
+    robot.path.write_text(text.replace("home_m = [0.0,", "home_m = [0.01,", 1))
     with pytest.raises(ProfileError, match=r"has been changed since .* cdpr calibrate undo"):
         calibrated(load_robot(robot.path))
 
@@ -114,8 +119,15 @@ def test_one_of_another_state_of_the_robots_file_is_refused(robot: Robot) -> Non
         ({"drum_scales": (1.0, 1.0)}, "drum_scales: 2 entries; allowed: 4"),
         ({"drum_scales": (1.0, 3.0, 1.0, 1.0)}, r"drum_scales\[1\]"),
         ({"home_m": (0.0, 0.0, 0.0)}, "allowed: 2 coordinates"),
-        ({"exit_points_m": ((9.0, 3.0),) * 4}, "more than 0.5 m"),
+        ({"exit_points_m": ((9.0, 3.0),) * 4}, "more than 0.2 m"),
         ({"home_rotation_rad": (0.0, 0.0, 0.0)}, "home_rotation_rad"),
+        ({"home_rotation_rad": (1000.0,)}, "home_rotation_rad"),
+        ({"home_m": (500.0, 400.0)}, "home_m"),
+        ({"robot": "other"}, "robot: value 'other'"),
+        ({"anchor_points_m": ((7.0, 0.0),) * 4}, r"anchor_points_m\[0\]"),
+        ({"anchor_points_m": ((0.0, 0.0),) * 3}, "3 entries"),
+        ({"elongation_scale": 1e-300}, "elongation_scale"),
+        ({"drum_scales": (0.51, 1.0, 1.0, 1.0)}, r"drum_scales\[0\]"),
     ],
 )
 def test_what_cannot_be_of_the_robot_is_refused(
@@ -145,3 +157,21 @@ def test_that_of_a_shipped_robot_lies_in_the_users_folder(
     assert calibrated(load_robot("planar-4")).calibration is not None
     winch = replace(shipped, is_winch=True)
     assert calibrated(winch) is winch
+
+
+def test_an_older_one_of_another_robot_is_not_put_back(robot: Robot) -> None:
+    take_over(robot, calibration(robot, 1))
+    path = take_over(robot, calibration(robot, 2, 0.02))
+    older = path.with_name(path.name + ".1")
+    older.write_text(older.read_text().replace(calibration(robot).geometry_sha256, "0"))
+    assert undo(robot) is None
+    assert calibrated(robot) is robot
+
+
+def test_that_of_another_name_is_not_taken_for_a_version(tmp_path: Path) -> None:
+    named, other = tmp_path / "a[1].toml", tmp_path / "a1.toml"
+    for path in (named, other):
+        shutil.copy(SHIPPED / "robots" / "planar-4.toml", path)
+    for version in (1, 2):
+        take_over(load_robot(other), calibration(load_robot(other), version))
+    assert next_version(load_robot(named)) == 1

@@ -10,15 +10,21 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.geometry import file_sha256
-from cdpr_profiles.calibration.in_force import next_version, take_over
+from cdpr_profiles.calibration.geometry import GeometryCalibration, geometry_sha256
+from cdpr_profiles.calibration.in_force import in_force, next_version, take_over
 from cdpr_profiles.calibration.in_force import undo as take_back
+from cdpr_profiles.errors import ProfileError
 from cdpr_rt.calibration.data import CalibrationData, load_data, load_points, with_points
 from cdpr_rt.calibration.outcome import Method, Outcome, calibrate, calibration_of
 from cdpr_rt.calibration.parameters import USUAL, CableGeometry, Knowledge
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.procedures.calibration.measure_poses import Measured, measure_poses, read_pose
-from cdpr_rt.robots.calibration_state import mark_calibrated
+from cdpr_rt.procedures.calibration.measure_poses import (
+    Measured,
+    PoseRefusedError,
+    measure_poses,
+    read_pose,
+)
+from cdpr_rt.robots.calibration_state import distrust, mark_calibrated, mark_not_calibrated
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_tools.commands.options import JsonOption, OverwriteOption
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -143,6 +149,7 @@ def undo(robot: _Robot, as_json: JsonOption = False) -> None:
     """
     out = Output(as_json)
     profile = load_robot(robot)
+    _distrust_again(profile)
     before = take_back(profile)
     if before is None:
         out.say(f"{profile.profile}: the geometry of {profile.path} counts from the next start on")
@@ -189,7 +196,7 @@ def _measure(
     from cdpr_tools.calibrate.rig import simulated_rig  # noqa: PLC0415  # slow to load
 
     out.note(f"{robot.profile}: starting the simulated robot ...")
-    measured = Measured()
+    measured, geometry = Measured(), geometry_sha256(robot)
     try:
         with (
             out.progress("poses", float(poses)) as advance,
@@ -197,13 +204,17 @@ def _measure(
                 str(robot.path), plant=plant, scanner=scanner, advance=lambda _: None
             ) as operator,
         ):
-            measured.readings.append(read_pose(operator, operator.tighten()))
+            try:
+                measured.readings.append(read_pose(operator, operator.tighten()))
+            except PoseRefusedError as error:
+                raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
             places = _told(operator.random_places(seed), measured, advance)
             measure_poses(operator, places, poses, measured, out)
     finally:
         data = CalibrationData(
             robot=robot.profile,
-            robot_sha256=file_sha256(robot.path),
+            geometry_sha256=geometry,
+            simulated=True,
             date=datetime.now(UTC).isoformat(timespec="seconds"),
             left_out=tuple(measured.refused),
             poses=tuple(measured.readings),
@@ -243,7 +254,6 @@ def _finish(
         seen = with_points(seen, load_points(points), geometry.coordinates)
     method: Method = "points" if seen.measured.any() else "redundancy"
     outcome = calibrate(robot, geometry, seen, method)
-    found = calibration_of(outcome, next_version(robot), str(folder / _DATA))
     picture = _draw(outcome, folder)
     out.say(*_lines(outcome, data))
     told = {**outcome.told(), "data": str(folder / _DATA), "picture": str(picture)}
@@ -253,14 +263,44 @@ def _finish(
         raise typer.Exit(WorkFailedError.exit_status)
     taken = None
     if not dry_run:
-        path = take_over(robot, found)
-        mark_calibrated(robot.profile, f"calibration {found.version} ({found.identity})")
+        found, path = _take_over(outcome, str(folder / _DATA), data.simulated)
         taken = {**found.summary(), "file": str(path)}
         out.say(
             f"calibration {found.version} ({found.identity}) counts from the next start on: {path}",
             f"take it back: cdpr calibrate undo {robot.reference}",
         )
+        if data.simulated:
+            out.say("it was measured on a simulated robot: the robot does not start with it on any "
+                    "bus other than simbus")  # fmt: skip
     out.result({"ok": True, **told, "in_force": taken})
+
+
+def _take_over(
+    outcome: Outcome, raw_data: str, simulated: bool
+) -> tuple[GeometryCalibration, Path]:
+    """Put a good calibration in force, if the robot can work with it; raises ProfileError."""
+    robot = outcome.robot
+    before = "" if simulated else distrust(robot.profile)
+    found = calibration_of(
+        outcome, next_version(robot), raw_data, simulated=simulated, distrusted_before=before
+    )
+    refuse_impossible(found.applied(robot))
+    path = take_over(robot, found)
+    if not simulated:
+        mark_calibrated(robot.profile, f"calibration {found.version} ({found.identity})")
+    return found, path
+
+
+def _distrust_again(robot: Robot) -> None:
+    """Have the geometry not believed where it was not before the calibration in force."""
+    try:
+        known = in_force(robot)
+    except ProfileError:
+        mark_not_calibrated(robot.profile, "a calibration that cannot be read was taken back")
+        return
+    if known is not None and known.distrusted_before:
+        why = f"calibration {known.version} was taken back; before it: {known.distrusted_before}"
+        mark_not_calibrated(robot.profile, why)
 
 
 def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_profiles import Robot, load_robot
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_tools.commands.options import JsonOption, KeyFileOption, SocketOption, UrlOption
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
@@ -98,7 +99,7 @@ def path(
     assert file is not None  # see above
     if robot is None:
         raise BadInputError("--robot: missing; allowed: a robot's name or file, or --run")
-    _preview(load_robot(robot), file, options, out, picture, keep)
+    _preview(load_calibrated(robot), file, options, out, picture, keep)
 
 
 def _preview(

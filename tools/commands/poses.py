@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
@@ -74,7 +74,7 @@ def poses(
     proved for every place between, not looked at in some. Nothing moves.
     """
     out = Output(as_json)
-    profile = load_robot(robot)
+    profile = load_calibrated(robot)
     if profile.platform is None:
         raise BadInputError(f"{profile.path}: platform: this robot has none; allowed: one with it")
     if out_file is not None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.platform import Platform
 from cdpr_rt.robots import checks
 from cdpr_rt.robots.calibration_state import mark_calibrated
@@ -48,7 +48,7 @@ def show(robot: _Robot, png: _Picture = None, as_json: JsonOption = False) -> No
     Ends with status 2 where something about it is impossible.
     """
     out = Output(as_json)
-    profile = calibrated(load_robot(robot))
+    profile = load_calibrated(robot)
     platform = profile.platform
     if platform is None:
         raise BadInputError(

@@ -11,7 +11,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from cdpr_profiles import Robot, load_robot
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.platform import FURTHEST_m, Platform
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.platform_model import directions_of
@@ -157,7 +158,7 @@ def workspace(
     from cdpr_tools.robots.workspace.told import figures, lines  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
-    profile = load_robot(robot)
+    profile = load_calibrated(robot)
     platform = profile.platform
     if platform is None:
         raise BadInputError(

@@ -15,8 +15,9 @@ from cdpr_drivers.robot.bus_fit import require_fit
 from cdpr_drivers.robot.commissioned import compensation_of, load_profiles, with_commissioned
 from cdpr_drivers.robot.listening_machine import ListeningMachine
 from cdpr_drivers.robot.machine import RobotMachine
-from cdpr_profiles import Robot, load_robot
-from cdpr_profiles.calibration.in_force import calibrated
+from cdpr_drivers.robot.robot_buses import refuse_simulated_calibration
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.in_force import in_force, load_calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
@@ -34,6 +35,7 @@ from cdpr_rt.programs.registry import (
     warm_up_programs,
 )
 from cdpr_rt.robots.calibration_state import distrust
+from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_rt.robots.robot_arrays import described, limits_of, supervised, winches_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
@@ -46,13 +48,17 @@ from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED
 
+_OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon anew"
+
 
 def main() -> int:
     """Run the loop that the launcher has asked for; return the exit status."""
     settings = RunSettings.from_argv()
     block = SharedBlock.attach(settings.block_fd)
     try:
-        robot = calibrated(load_robot(settings.robot))
+        robot = load_calibrated(settings.robot)
+        refuse_impossible(robot)
+        refuse_simulated_calibration(robot, settings.buses)
         robot = with_commissioned(robot, settings.commissioned)
         require_fit(robot)
         machine: Machine
@@ -70,6 +76,7 @@ def main() -> int:
     block.write_description(description(robot, limits, parts))
     if parts.last is not None and robot.platform is not None:
         parts.last.path = state_path("lengths", robot.profile)
+        parts.last.geometry = robot.geometry_identity
         parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
     if parts.paths is not None:
         _open_paths(parts.paths, robot)
@@ -118,7 +125,7 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
         lowering=lowering,
         last=None if platform is None else platform.last,
         paths=None if platform is None else platform.paths,
-        before_power=lambda: _look_at_calibration(robot, platform),
+        before_power=lambda: look_at_calibration(robot, platform),
         enable_realtime=enable_realtime,
     )
     warm_up_programs(programs, n, platform)
@@ -126,9 +133,16 @@ def loop_parts(robot: Robot, limits: Limits, block: SharedBlock) -> LoopParts:
     return parts
 
 
-def _look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
-    if platform is not None:
-        platform.distrust = distrust(robot.profile)
+def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
+    """Have the programs refuse targets where the geometry may not be believed."""
+    if platform is None:
+        return
+    try:
+        known = in_force(robot) == robot.calibration
+    except ProfileError as error:
+        platform.distrust = str(error)
+        return
+    platform.distrust = distrust(robot.profile) if known else _OTHER_CALIBRATION
 
 
 def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:

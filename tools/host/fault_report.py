@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib.metadata import distributions
 
 from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.in_force import calibration_file
 from cdpr_tools.daemon.paths import default_recordings, find_loop_files
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
@@ -47,8 +48,14 @@ def _versions() -> Iterator[str]:
 
 
 def _robot(name: str) -> list[str]:
-    path = load_robot(name).path
-    return [str(path), *path.read_text(encoding="utf-8").splitlines()]
+    robot = load_robot(name)
+    known = calibration_file(robot)
+    files = [robot.path, *([known] if known.is_file() else [])]
+    return [
+        line
+        for path in files
+        for line in (str(path), *path.read_text(encoding="utf-8", errors="replace").splitlines())
+    ]
 
 
 def _last_recording() -> list[str]:

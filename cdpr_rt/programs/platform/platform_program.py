@@ -205,10 +205,7 @@ class PlatformProgram(CommandedProgram):
     def _require_pose(self) -> None:
         """Raise ProgramError where the platform is not to be moved to a pose."""
         if self._parts.distrust:
-            raise ProgramError(
-                f"{self.name}: {self._parts.distrust}; calibrate it or say that it is, and enable "
-                "again"
-            )
+            raise ProgramError(f"{self.name}: {self._parts.distrust}")
         if not self._parts.tight:
             raise ProgramError(f"{self.name}: the cables are not tight; run tighten first")
 

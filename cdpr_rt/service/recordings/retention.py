@@ -15,6 +15,7 @@ BYTES_PER_AXIS: Final = 60.0
 _WRITTEN_S: Final = 60.0
 """A file that was written to within so long may be another daemon's, and stays."""
 _DAY_S: Final = 86400.0
+_GAP_DAYS: Final = 30.0
 
 
 @dataclass(frozen=True)
@@ -27,20 +28,32 @@ class Retention:
     def prune(self, folder: Path, robot: str) -> list[Path]:
         """Remove recordings of this robot beyond the caps, the oldest first; return which.
 
-        Only files that are named as its recordings are looked at. What cannot be removed stays.
+        Only files that are named as its recordings are looked at; the newest stays, and so does
+        what cannot be removed. Ages are between recordings, not from now, and a gap that is longer
+        than `days` and 30 days counts as none: a clock that was wrong and is set takes nothing.
         """
         found = sorted(_recordings(folder, robot), key=lambda one: one[1])
-        now_s, total = time.time(), sum(size for _, _, size in found)
+        total = sum(size for _, _, size in found)
         removed = []
-        for path, written_s, size in found:
-            age_s = now_s - written_s
-            if age_s < _WRITTEN_S or not (age_s > self.days * _DAY_S or total > self.total_bytes):
+        for (path, written_s, size), age_s in zip(found, self._ages(found), strict=True):
+            if path == found[-1][0] or abs(time.time() - written_s) < _WRITTEN_S:
+                continue
+            if age_s <= self.days * _DAY_S and total <= self.total_bytes:
                 continue
             with suppress(OSError):
                 path.unlink()
                 removed.append(path)
                 total -= size
         return removed
+
+    def _ages(self, found: list[tuple[Path, float, int]]) -> list[float]:
+        """Return how much older than the last each is, s."""
+        longest_s = max(self.days, _GAP_DAYS) * _DAY_S
+        ages = [0.0] * len(found)
+        for k in range(len(found) - 2, -1, -1):
+            gap_s = found[k + 1][1] - found[k][1]
+            ages[k] = ages[k + 1] + (gap_s if gap_s <= longest_s else 0.0)
+        return ages
 
 
 def _recordings(folder: Path, robot: str) -> Iterator[tuple[Path, float, int]]:

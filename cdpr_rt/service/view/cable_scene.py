@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,6 +15,7 @@ from foxglove.messages import (
     SceneUpdate,
     Timestamp,
 )
+from scipy.spatial.transform import Rotation
 
 from cdpr_rt.core.exchange import FloatArray
 
@@ -43,7 +43,7 @@ class CableScene:
 
     def update(self, pose: FloatArray, tension_N: FloatArray, stamp: Timestamp) -> SceneUpdate:
         """Return the scene with the platform at `pose` (7,) and these tensions (n,)."""
-        anchors = pose[:3] + self._anchors @ _rotation(pose[3:]).T
+        anchors = pose[:3] + Rotation.from_quat(np.roll(pose[3:], -1)).apply(self._anchors)
         cables = [
             _line([a, b], self._colour(k, float(tension_N[k])))
             for k, (a, b) in enumerate(zip(self._exits, anchors, strict=True))
@@ -60,7 +60,12 @@ class CableScene:
         if not tension_N > self._slack[cable]:
             return _LOOSE
         low, high = self._low[cable], self._high[cable]
-        share = min(max((tension_N - low) / (high - low), 0.0), 1.0)
+        # limits that leave no room between them still tell too little from too much
+        share = (
+            float(np.interp(tension_N, (low, high), (0.0, 1.0)))
+            if low < high
+            else (float(tension_N > high))
+        )
         green = 1.0 - abs(2.0 * share - 1.0)
         return Color(r=max(2.0 * share - 1.0, 0.0), g=green, b=max(1.0 - 2.0 * share, 0.0), a=1.0)
 
@@ -74,18 +79,6 @@ def _in_space(points: Sequence[Sequence[float]]) -> FloatArray:
 def _bounds(values: Sequence[float | None] | None, n: int, otherwise: float) -> list[float]:
     given = list(values or [None] * n)
     return [otherwise if value is None else float(value) for value in given]
-
-
-def _rotation(quaternion: FloatArray) -> FloatArray:
-    """Return the rotation matrix of a quaternion w x y z."""
-    w, x, y, z = quaternion / math.sqrt(float(quaternion @ quaternion))
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _line(points: Sequence[FloatArray], color: Color) -> LinePrimitive:

@@ -37,6 +37,7 @@ def made_up(
     noise_m: float = 0.0,
     identified: tuple[str, ...] = USUAL,
     first: float = 1.0,
+    home_first: bool = False,
 ) -> MadeUp:
     """Return a robot with errors of a normal distribution and its lengths with noise."""
     profile = load_robot(robot)
@@ -54,6 +55,8 @@ def made_up(
     places[:, :k] = rng.uniform(low, high, (poses, k))
     turns = model.size - k
     places[:, k:] = rng.uniform(-1, 1, (poses, turns)) * model.angle_rad * first / np.sqrt(3)
+    if home_first:
+        places[0] = model.home
     tension = rng.uniform(model.low_N, model.high_N, (poses, n))
     exits, anchors = true.kernel_geometry()[:3].T, true.kernel_geometry()[3:6].T
     soft = float(true.compliance()[0])

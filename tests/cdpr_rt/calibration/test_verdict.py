@@ -129,13 +129,16 @@ def test_predicted_deviations_of_poses_are_those_of_trials(robot: str) -> None:
 
 def test_a_calibration_is_verified_on_other_poses_and_becomes_a_file() -> None:
     robot = load_robot("spatial-8")
-    what = made_up("spatial-8", 50, 4, noise_m=2e-4)
+    what = made_up("spatial-8", 50, 4, noise_m=2e-4, home_first=True)
     outcome = calibrate(robot, what.file, measured(what, 1e-3, 2e-3, 8), "points")
     assert outcome.good, outcome.objections()
     assert outcome.verified.poses == 10
     assert outcome.verified.mean_mm < 0.5 * outcome.before.mean_mm
-    found = calibration_of(outcome, 3, "data.json")
+    found = calibration_of(outcome, 3, "data.json", simulated=True)
     assert found.faults(robot) == []
+    soft = replace(outcome.found.geometry, elongation=-2.45)
+    wrong = replace(outcome, found=replace(outcome.found, geometry=soft))
+    assert not wrong.good and "elongation_scale" in wrong.objections()[-1]
     told = found.applied(robot)
     assert told.platform is not None
     scale = told.axes[2].winch.drum_radius_m / robot.axes[2].winch.drum_radius_m

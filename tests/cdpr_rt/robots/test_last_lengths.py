@@ -129,3 +129,11 @@ def test_an_index_tells_what_a_cable_is_off_but_for_whole_turns(
     off = off_index_m(last, LENGTH_m + slip_m, feedback, CABLE_m)
     assert off[0] == pytest.approx(slip_m, abs=1e-9)
     assert np.isnan(off[1:]).all()
+
+
+def test_lengths_by_another_geometry_are_none(path: Path):
+    stopped(path)
+    last = LastLengths(path)
+    last.geometry = "5f3a"
+    last.load(3, 3.0)
+    assert last.lengths is None and "another calibration" in last.why

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import multiprocessing
 import sys
+from multiprocessing.synchronize import Event
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import cv2
@@ -13,6 +16,7 @@ import pytest
 
 from cdpr_drivers.camera.camera import CameraError, grey
 from cdpr_drivers.camera.open_camera import open_camera
+from cdpr_drivers.camera.opencv_camera import OpencvCamera
 from cdpr_rt.core.clock import LockstepClock
 from cdpr_sim_bus.camera.camera_plant import CameraPlant, LensPlant
 from cdpr_sim_bus.camera.camera_server import CameraServer
@@ -91,7 +95,53 @@ def test_an_image_that_is_none_is_named(tmp_path: Path) -> None:
         grey(np.zeros((4, 4, 2), np.uint8), "x")
 
 
-def serve(board: Path, path: Path) -> None:
+class Stream:
+    """Stands for cv2.VideoCapture on a stream: five images wait, each further comes in 40 ms."""
+
+    def __init__(self) -> None:
+        self.now_s, self._taken = 0.0, 0
+
+    isOpened = set = lambda *_: True
+
+    def grab(self) -> bool:
+        self._taken += 1
+        self.now_s += 0.04 if self._taken > 5 else 0.0001
+        return True
+
+    def read(self) -> tuple[bool, Any]:
+        return self.grab(), np.full((4, 4), self._taken, np.uint8)
+
+
+def test_what_a_stream_had_waiting_is_not_taken_for_an_image_of_now() -> None:
+    stream: Any = Stream()
+    with mock.patch.object(cv2, "VideoCapture", lambda _: stream):
+        assert OpencvCamera("rtsp://10.0.0.9/stream", stream).grab().pixels[0, 0] > 5
+
+
+def test_an_image_that_is_too_large_is_named(tmp_path: Path) -> None:
+    write_images(tmp_path, 1)
+    with (
+        mock.patch.object(cv2, "imdecode", side_effect=cv2.error("too many pixels")),
+        open_camera(f"folder:{tmp_path}", LockstepClock()) as camera,
+        pytest.raises(CameraError, match=r"1\.png: cannot be decoded: too many pixels"),
+    ):
+        camera.grab()
+
+
+class Told(io.StringIO):
+    """Standard output of the server; its first line says that it can be reached."""
+
+    def __init__(self, ready: Event) -> None:
+        super().__init__()
+        self._ready = ready
+
+    def flush(self) -> None:
+        if "ready" in self.getvalue():
+            self._ready.set()
+
+
+def serve(board: Path, path: Path, ready: Event) -> None:
+    sys.stdout = Told(ready)
     with PhysicsBoard.attach(board) as shared:
         CameraServer(SimCamera(TINY), shared.platform, path).serve(False, {})
 
@@ -104,13 +154,12 @@ def test_a_simulated_camera_shows_the_boards_platform_until_it_is_unplugged(tmp_
         state = PlatformState(2.5, (0.0, 0.1, 1.5), LEVEL, (0.0,) * 3, (0.0,) * 3)
         platform.publish(state)
         assert platform.state() == state
-        server = multiprocessing.get_context("fork").Process(
-            target=serve, args=(tmp_path / "board", path)
-        )
+        context = multiprocessing.get_context("spawn")  # a fork beside OpenCV's threads may hang
+        ready = context.Event()
+        server = context.Process(target=serve, args=(tmp_path / "board", path, ready))
         server.start()
         clock = LockstepClock()
-        while not path.exists() and server.is_alive():
-            server.join(0.05)
+        assert ready.wait(60.0)
         with open_camera(f"sim:{path}", clock) as camera:
             image = camera.grab()
             assert image is not None

@@ -13,9 +13,10 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_robot
-from cdpr_profiles.calibration.geometry import file_sha256
+from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.calibration.data import CalibrationData, PoseReading
+from cdpr_rt.robots.calibration_state import distrust, mark_not_calibrated
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
 
 
@@ -47,7 +48,8 @@ def data_of(what: MadeUp, path: Path, spoil: Any = None) -> Path:
         )
     data = CalibrationData(
         robot="spatial-8",
-        robot_sha256=file_sha256(robot.path),
+        geometry_sha256=geometry_sha256(robot),
+        simulated=False,
         date=datetime.now(UTC).isoformat(),
         poses=tuple(readings),
     )
@@ -73,10 +75,12 @@ def result(done: Any) -> dict[str, Any]:
 
 
 def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_path: Path) -> None:
-    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data, points = data_of(what, tmp_path / "data.json"), points_of(what, tmp_path / "p.csv")
+    mark_not_calibrated("spatial-8", "rail 1 was moved")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--points", points, "--json")
     assert done.returncode == 0, done.stderr
+    assert distrust("spatial-8") == ""
     told = result(done)
     assert told["good"] and told["frame"].startswith("the room")
     proof = told["verification"]
@@ -90,13 +94,14 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     assert "calibrated 20" in shown.stderr and "cdpr calibrate undo spatial-8" in shown.stderr
     undone = cdpr_here("calibrate", "undo", "spatial-8", "--json")
     assert undone.returncode == 0 and result(undone)["in_force"] is None
+    assert "1 was taken back; before it: " in distrust("spatial-8")
     assert calibrated(robot) is robot
     again = cdpr_here("calibrate", "undo", "spatial-8")
     assert again.returncode == 2 and "none to undo" in again.stderr
 
 
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
-    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = data_of(what, tmp_path / "data.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--json")
     assert done.returncode == 1, done.stderr
@@ -114,7 +119,7 @@ def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
     def slip(lengths: Any) -> None:
         lengths[20:, 6] += 0.015
 
-    what = made_up("spatial-8", 45, 12, noise_m=2e-4)
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = data_of(what, tmp_path / "data.json", slip)
     points = points_of(what, tmp_path / "p.csv")
     done = cdpr_here(
@@ -133,11 +138,12 @@ def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
         ("pose,x_mm,y_mm,z_mm\n1,2,three,4\n", "line 2: y_mm: value 'three'"),
         ("pose,x_mm,y_mm,z_mm\n0,2,3,4\n", "line 2: pose"),
         ("pose,x_mm,y_mm,z_mm,sigma_mm\n1,2,3,4,-1\n", "sigma_mm"),
+        ("pose,x_mm,y_mm,z_mm\n1,2,3,4,5\n", "line 2: 5 cells"),
         ("pose,x_mm,y_mm,z_mm\n99,2,3,4\n", "pose 99; allowed: 1 to 45"),
     ],
 )
 def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:
-    what = made_up("spatial-8", 45, 12)
+    what = made_up("spatial-8", 45, 12, home_first=True)
     data, points = data_of(what, tmp_path / "data.json"), tmp_path / "p.csv"
     points.write_text(text)
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--points", points)
@@ -146,7 +152,7 @@ def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:
 
 
 def test_bad_data_and_requests_are_refused(tmp_path: Path) -> None:
-    few = data_of(made_up("spatial-8", 9, 12), tmp_path / "few.json")
+    few = data_of(made_up("spatial-8", 9, 12, home_first=True), tmp_path / "few.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", few)
     assert done.returncode == 2 and "15 and more" in done.stderr
     other = cdpr_here("calibrate", "fit", "planar-4", "--data", few)
@@ -174,3 +180,23 @@ def test_the_study_has_the_ratio_and_the_table(tmp_path: Path) -> None:
     assert np.mean([row["off"] for row in small]) == pytest.approx(0.0, abs=0.1)
     assert "table 3.1" in done.stderr and "figure 3.7" in done.stderr
     assert matplotlib.image.imread(picture).std() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"position_m": (1.2,), "position_std_m": 0.001}, "1 numbers; allowed: 3"),
+        ({"position_m": (1.0, 2.0, 3.0)}, "both or none"),
+        ({"rotation": ((1.0, 0.0), (0.0, 1.0)), "rotation_std_rad": 0.01}, "3 rows"),
+        ({"rotation": ((2.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)), "rotation_std_rad": 1}, "is none"),
+    ],
+)
+def test_a_reading_that_is_none_is_refused(given: Any, named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        PoseReading(target=(0.0,), length_m=(1.0,), tension_N=(1.0,), **given)
+
+
+def test_the_first_pose_has_to_be_home(tmp_path: Path) -> None:
+    data = data_of(made_up("spatial-8", 20, 12), tmp_path / "data.json")
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data)
+    assert done.returncode == 2 and "allowed: home" in done.stderr

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -48,6 +50,13 @@ file, key, value and what is allowed.
 | mistake | command | answer | exit |
 |---|---|---|---|
 """
+
+
+@pytest.fixture
+def tmp_path() -> Iterator[Path]:
+    """A folder whose name is short enough for that of a socket in it."""
+    with tempfile.TemporaryDirectory(prefix="cdpr-") as folder:
+        yield Path(folder)
 
 
 @pytest.fixture

@@ -5,10 +5,15 @@ from types import SimpleNamespace
 
 import pytest
 
+from cdpr_drivers.errors import ConfigurationError
+from cdpr_drivers.robot.robot_buses import refuse_simulated_calibration
 from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.in_force import load_calibrated, take_over, undo
 from cdpr_profiles.catalogue import list_profiles
+from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_tools.daemon.loop_process import description
+from cdpr_tools.daemon.loop_process import description, look_at_calibration
+from tests.profiles.test_geometry_calibration import calibration
 
 
 @pytest.mark.parametrize("name", list_profiles()["robots"])
@@ -18,3 +23,30 @@ def test_every_shipped_robot_is_described(name: str) -> None:
     assert [axis["name"] for axis in told["axes"]] == [axis.name for axis in robot.axes]
     if robot.platform is not None:
         assert told["platform"]["home_m"] == list(robot.platform.home_m)
+
+
+def test_a_daemon_takes_targets_with_the_calibration_in_force_only(tmp_path, monkeypatch) -> None:
+    for folder in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
+        monkeypatch.setenv(folder, str(tmp_path))
+    before, platform = load_calibrated("planar-4"), SimpleNamespace(distrust="")
+    take_over(before, calibration(before))
+    mark_calibrated("planar-4", "calibration 1")
+    look_at_calibration(before, platform)  # type: ignore[arg-type]
+    assert "start the daemon anew" in platform.distrust
+    now = load_calibrated("planar-4")
+    look_at_calibration(now, platform)  # type: ignore[arg-type]
+    assert platform.distrust == ""
+    undo(before)
+    look_at_calibration(now, platform)  # type: ignore[arg-type]
+    assert "taken over or undone" in platform.distrust
+
+
+def test_what_a_simulated_robot_told_moves_no_real_one() -> None:
+    robot = load_robot("planar-4")
+    found = calibration(robot).model_copy(update={"simulated": True})
+    refuse_simulated_calibration(found.applied(robot), ["simbus:here"])
+    refuse_simulated_calibration(found.applied(robot), ["simbus:"])
+    with pytest.raises(ConfigurationError, match="measured on a simulated robot"):
+        refuse_simulated_calibration(
+            found.applied(robot), [f"{robot.buses[0].name}=socketcan:can0"]
+        )

@@ -10,8 +10,10 @@ from cdpr_here import cdpr_here
 from PIL import Image
 
 from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.in_force import load_calibrated, take_over
 from cdpr_rt.programs.platform.path_store import PathStore, paths_folder
 from cdpr_rt.robots.platform_model import platform_model_of
+from tests.profiles.test_geometry_calibration import calibration
 
 ORIGIN = "--origin=-150 100 1550"
 GCODE = "G21 G90\nG0 X0 Y0 Z0\nG1 X100 F6000\nY100 Z50\nG3 X0 Y100 I-50 J0\nM2\n"
@@ -25,7 +27,10 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    for folder in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
+        monkeypatch.setenv(folder, str(tmp_path))
+    robot = load_robot("spatial-8")
+    take_over(robot, calibration(robot))
     picture = tmp_path / "part.png"
     done = cdpr_here(
         "path", file, "--robot", "spatial-8", ORIGIN, "--picture", picture, "--keep", "--json"
@@ -40,7 +45,7 @@ def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkey
         assert min(image.size) > 500
     store = PathStore()
     store.open(paths_folder("spatial-8"))
-    plan = store.plan(told["plan"], platform_model_of(load_robot("spatial-8")))
+    plan = store.plan(told["plan"], platform_model_of(load_calibrated("spatial-8")))
     assert plan.duration_s == pytest.approx(told["duration_s"])
     assert plan.line[0] == 3 and plan.line[-1] == 5
 

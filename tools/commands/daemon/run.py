@@ -18,8 +18,13 @@ from cdpr_drivers.bus.master_lock import refuse_second_master
 from cdpr_drivers.errors import BusError
 from cdpr_drivers.robot.bus_fit import require_fit
 from cdpr_drivers.robot.commissioned import load_profiles, uncommissioned_text, with_commissioned
-from cdpr_drivers.robot.robot_buses import asks_for_own_simulator, robot_urls
-from cdpr_profiles import Robot, load_robot
+from cdpr_drivers.robot.robot_buses import (
+    asks_for_own_simulator,
+    refuse_simulated_calibration,
+    robot_urls,
+)
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_rt.service.recordings.retention import BYTES_PER_AXIS, Retention, size_text
@@ -136,7 +141,8 @@ def run(
     out = Output(as_json)
     if find_spec("uvicorn") is None:  # said here, before a child fails for want of it
         raise ModuleNotFoundError(name="uvicorn")
-    profile = load_robot(robot)
+    profile = load_calibrated(robot)
+    refuse_simulated_calibration(profile, bus or ())
     for doubt in refuse_impossible(profile):
         out.note(doubt)
     settings = settings_for(

@@ -190,6 +190,7 @@ def test_old_recordings_and_those_beyond_the_size_are_removed_the_oldest_first(
     assert Retention(days=0.0, total_bytes=0.0).prune(tmp_path, "bench") == []
     assert writing.exists() and all(path.exists() for path in others)
 
+    leave("bench-20260102T080000Z-001.mcap", 20.0)
     gone = leave("bench-20260101T080000Z-001.mcap", 40.0)
     recorder = Recorder(block_with_clock(), tmp_path, "bench", retention=Retention(days=30.0))
     recorder.start()
@@ -199,3 +200,14 @@ def test_old_recordings_and_those_beyond_the_size_are_removed_the_oldest_first(
     assert list(reader.cycles()) == []
     told = [event["text"] for event in reader.events]
     assert f"removed 1 old recordings: {gone.name}" in told
+
+
+def test_a_clock_that_was_wrong_and_is_set_takes_no_recording(tmp_path: Path) -> None:
+    now_s = time.time()
+    for k, written_s in enumerate((3600.0, 7200.0, now_s - 7200.0, now_s + 9e8)):
+        path = tmp_path / f"bench-2026010{k + 1}T080000Z-001.mcap"
+        path.write_bytes(bytes(1000))
+        os.utime(path, (written_s, written_s))
+    assert Retention(days=30.0).prune(tmp_path, "bench") == []
+    # the size still counts, and the newest stays whatever it is
+    assert len(Retention(total_bytes=1.0).prune(tmp_path, "bench")) == 3

@@ -42,6 +42,14 @@ def test_cables_lead_to_the_turned_platform_and_are_coloured_by_tension() -> Non
         assert shade in scene
 
 
+def test_limits_without_room_between_them_still_have_colours() -> None:
+    limits = {**LIMITS, "tension_min_N": [50.0] * 3, "tension_max_N": [50.0] * 3}
+    view = CableScene({**DESCRIPTION, "limits": limits})
+    pose, tension = np.array([0.5, 1.5, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([49.0, 50.0, 51.0])
+    scene = view.update(pose, tension, Timestamp(sec=1, nsec=0)).encode()
+    assert colour(0.0, 0.0, 1.0) in scene and colour(1.0, 0.0, 0.0) in scene
+
+
 def test_robots_without_a_platform_have_no_scene() -> None:
     with pytest.raises((KeyError, TypeError)):
         CableScene({"platform": None})

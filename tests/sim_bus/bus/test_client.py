@@ -1,0 +1,27 @@
+"""When a packet was sent, from the kernel's stamp of the wall clock."""
+
+from __future__ import annotations
+
+from unittest import mock
+
+import pytest
+
+from cdpr_sim_bus.bus import client
+
+
+def test_being_put_off_between_the_clocks_makes_no_packet_look_older() -> None:
+    # put off for 0.2 s after the first reading; the second pair lies close together
+    monotonic, wall = [10.0, 10.2, 10.2, 10.20001], [100.2, 100.2]
+    with (
+        mock.patch.object(client.time, "monotonic", side_effect=monotonic),
+        mock.patch.object(client.time, "time", side_effect=wall),
+    ):
+        assert client.sent_at(100.1) == pytest.approx(10.1)
+
+
+def test_a_stamp_of_a_wall_clock_that_was_set_back_is_now() -> None:
+    with (
+        mock.patch.object(client.time, "monotonic", return_value=10.0),
+        mock.patch.object(client.time, "time", return_value=100.0),
+    ):
+        assert client.sent_at(500.0) == 10.0
