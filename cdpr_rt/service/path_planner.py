@@ -29,6 +29,7 @@ class PathPlanner:
         """The last one: `error` says why the robot cannot follow it, `plan` is its name if it can.
         """
         self._task: asyncio.Task[None] | None = None
+        self._cancelled = ""
 
     def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """Begin to plan a file; returns the job. Raises PlannerBusyError while one is planned."""
@@ -38,8 +39,14 @@ class PathPlanner:
             raise PlannerBusyError("another path is being planned")
         number = self.job["number"] + 1
         self.job = {"number": number, "planning": True, "error": None, "plan": None}
+        self._cancelled = ""
         self._task = asyncio.create_task(self._plan(self.work, wanted))
         return self.job
+
+    def cancel(self, why: str) -> None:
+        """Have a path that is being planned not be followed, as a stop was asked for since."""
+        if self.job["planning"]:
+            self._cancelled = why
 
     async def _plan(self, work: Plan, wanted: dict[str, Any]) -> None:
         told: dict[str, Any] = {"error": "planning was ended"}
@@ -49,6 +56,8 @@ class PathPlanner:
                 file.write_text(wanted["text"], encoding="utf-8")
                 status, text = await work(file, wanted)
             told = _read(status, text.replace(str(file), wanted["name"]))
+            if self._cancelled:
+                told = {"error": f"not followed: {self._cancelled} while it was planned"}
         except TimeoutError:  # an OSError too, one without words
             told = {"error": "cannot be planned: takes too long; divide the path"}
         except OSError as error:

@@ -14,7 +14,7 @@ from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.runtime.right import PublishedRight
 from cdpr_rt.service.http.tickets import Tickets
 from cdpr_rt.service.lease import Lease, LeaseError
-from cdpr_rt.service.link import LoopLink, Reply
+from cdpr_rt.service.link import URGENT, LoopLink, Reply
 from cdpr_rt.service.part import Part
 from cdpr_rt.service.path_planner import PathPlanner
 from cdpr_rt.service.rows import newest_row, plain, row_table
@@ -145,6 +145,8 @@ class Service:
             self.events.add("command", f"{do} by {client}")
             self.end_daemon()
             return Reply(True, self.link.ended_how, self.link.state())
+        if do in URGENT:
+            self.planner.cancel(f"{do} by {client}")
         reply = await self.link.command(do, WAIT_S.get(do, _WAIT_S), client=client, **fields)
         if reply is self._noted:
             return reply  # many have asked for the same at once

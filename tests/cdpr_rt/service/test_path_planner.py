@@ -14,7 +14,7 @@ from cdpr_rt.service.path_planner import PathPlanner, PlannerBusyError
 WANTED = {"name": "part.nc", "text": "M2\n"}
 
 
-def planned(status: int, text: str) -> dict[str, Any]:
+def planned(status: int, text: str, stopped: str = "") -> dict[str, Any]:
     planner, seen = PathPlanner(), []
 
     async def work(file: Path, wanted: dict[str, Any]) -> tuple[int, str]:
@@ -26,6 +26,8 @@ def planned(status: int, text: str) -> dict[str, Any]:
         assert planner.begin(WANTED)["planning"]
         with pytest.raises(PlannerBusyError):
             planner.begin(WANTED)
+        if stopped:
+            planner.cancel(stopped)
         while planner.job["planning"]:
             await asyncio.sleep(0)
         return planner.job
@@ -44,6 +46,12 @@ def test_what_cannot_be_followed_is_told_by_the_name_that_was_given():
     job = planned(2, json.dumps({"error": "FILE:3: outside"}))
     assert (job["plan"], job["error"]) == (None, "part.nc:3: outside")
     assert planned(1, "no JSON")["error"] == "planning ended with status 1"
+
+
+def test_a_stop_while_it_is_planned_leaves_nothing_to_follow():
+    job = planned(0, json.dumps({"plan": "ab", "duration_s": 2.0}), "hold by somebody")
+    assert job["plan"] is None
+    assert job["error"] == "not followed: hold by somebody while it was planned"
 
 
 def test_without_the_robot_nothing_is_planned():

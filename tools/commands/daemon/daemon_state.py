@@ -157,6 +157,7 @@ def stop(
 def _end(daemon: Daemon, out: Output) -> None:
     """Ask the daemon to end and wait for it; raises WorkFailedError where it does not."""
     status = daemon.get("/status")
+    had_died = status["state"] == "dead"
     daemon.post("/shutdown")
     told, deadline = Told(out), time.monotonic() + _END_S
     if status["state"] == "active":
@@ -166,7 +167,7 @@ def _end(daemon: Daemon, out: Output) -> None:
             status = daemon.get("/status")
         except NoDaemonError:
             dead = "; its loop had died, the drives stop by themselves without its heartbeat"
-            out.say("stopped, power off" if status["state"] != "dead" else f"ended{dead}")
+            out.say(f"ended{dead}" if had_died else "stopped, power off")
             return
         told(str(status["program"]), status.get("program_progress") or {})
         time.sleep(_WATCH_S)
