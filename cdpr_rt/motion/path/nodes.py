@@ -94,7 +94,9 @@ def _along_pieces(pieces: Pieces) -> tuple[FloatArray, ...]:
     cut_before = np.concatenate([[0.0], pieces.cut[:-1]])
     begins = np.concatenate([[True], pieces.stops[:-1]])
     left = pieces.length - cut_before - pieces.cut
-    count = np.ceil(np.maximum(left / _SPACING_m, np.abs(pieces.angle_rad) / _TURN_rad))
+    straight = pieces.angle_rad == 0.0
+    apart_m = np.where(straight, 2.0 / np.pi, 1.0) * _SPACING_m
+    count = np.ceil(np.maximum(left / apart_m, np.abs(pieces.angle_rad) / _TURN_rad))
     ends = begins | pieces.stops | (pieces.angle_rad != 0.0)
     count = np.maximum(count, np.where(ends, 4, 1)).astype(np.int64)
     count = np.where(left > 1e-9 * pieces.length, count, 0)
@@ -103,10 +105,13 @@ def _along_pieces(pieces: Pieces) -> tuple[FloatArray, ...]:
     i = np.repeat(np.arange(m), given)
     number = np.arange(given.sum()) - np.repeat(np.cumsum(given) - given, given)
     number = number + np.where(begins[i], 0, 1)
-    share = number / np.maximum(count[i], 1)
+    share, before = (
+        _dense_at_ends(np.maximum(place, 0) / np.maximum(count[i], 1), straight[i])
+        for place in (number, number - 1)
+    )
     at = (cut_before[i] + share * left[i]) / pieces.length[i]
     q, first, second = pieces.at(i, at)
-    step = np.where(number == 0, np.nan, left[i] / np.maximum(count[i], 1))
+    step = np.where(number == 0, np.nan, left[i] * (share - before))
     return (
         i.astype(float),
         number.astype(float),
@@ -117,6 +122,14 @@ def _along_pieces(pieces: Pieces) -> tuple[FloatArray, ...]:
         pieces.speed[i],
         (pieces.line[i].astype(float)),
     )
+
+
+def _dense_at_ends(share: FloatArray, straight: BoolArray) -> FloatArray:
+    """Return shares of pieces that are closer to each other at the ends of straight ones.
+
+    A corner's speed holds up to the next node: cut narrowly, it would be that of a long stretch.
+    """
+    return np.where(straight, 0.5 - 0.5 * np.cos(np.pi * share), share)
 
 
 def _corners(pieces: Pieces, scale: FloatArray, positions: int) -> tuple[FloatArray, ...]:
