@@ -75,7 +75,6 @@ def stop_on_signals(told: str = "") -> Iterator[StopRequest]:
     try:
         yield wanted
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if wanted():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
+        # in one step: an interrupt in between would end the interpreter while it takes itself apart
+        signal.signal(signal.SIGINT, signal.SIG_IGN if wanted() else before[signal.SIGINT])
+        signal.signal(signal.SIGTERM, before[signal.SIGTERM])

@@ -7,6 +7,7 @@ import os
 import re
 import resource
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -63,8 +64,17 @@ class Lab:
             time.sleep(0.02)
 
     def state(self) -> int:
-        word = self.node.sdo[0x6041].raw
+        word = self._statusword()
         return int(word & (0x6F if word & 0x20 else 0x4F))
+
+    def _statusword(self) -> int:
+        """Ask for 6041h; what a command has asked before it ended may be answered first."""
+        sdo = self.node.sdo
+        sdo.send_request(struct.pack("<BHB4x", 0x40, 0x6041, 0))
+        while True:
+            index, value = struct.unpack_from("<xHxH", sdo.read_response())
+            if index == 0x6041:
+                return int(value)
 
     def inject_fault(self, sub: int, value: int) -> None:
         self.node.sdo[0x2F00][sub].raw = value
