@@ -3,22 +3,26 @@ PYTHON ?= python3
 VENV := .venv
 STAMP := $(VENV)/.installed
 BIN := $(VENV)/bin
-# one more than there are cores: some tests wait for time-outs
-JOBS ?= $(shell expr $$(nproc) + 1)
+# two more than there are cores: some tests wait for time-outs, or for a kernel that another test compiles
+JOBS ?= $(shell expr $$(nproc) + 2)
 SOAK_MINUTES ?= 10
+# tests that are not about the wall's clock, which one after another runs at the end
+WHICH ?= not alone
 
-.PHONY: demo test tests soak check docs lock clean
+.PHONY: demo test test-all tests soak check docs lock clean
 
 demo: $(STAMP)  ## commission one simulated winch on the embedded bus
 	$(BIN)/cdpr commission winch-mpp0923d --bus simbus: --out out/demo --overwrite
 
-test: $(STAMP)  ## every check and test; needs nothing but Python
-	@$(MAKE) -j 2 check tests
+test: $(STAMP)  ## every check, and the tests but long ones: some minutes
+	@$(MAKE) -j 2 check tests WHICH="not alone and not long"
+
+test-all: $(STAMP)  ## every check and every test; needs nothing but Python
+	@$(MAKE) -j 2 check tests WHICH="not alone"
+	$(BIN)/python -m pytest -m alone $$(grep -rl "mark\.alone" tests --include="test_*.py")
 
 tests: $(STAMP)
-	$(BIN)/python -m pytest -n $(JOBS) --max-worker-restart 0 --dist loadscope --no-loadscope-reorder \
-	  -m "not alone"
-	$(BIN)/python -m pytest -m alone $$(grep -rl "mark\.alone" tests --include="test_*.py")
+	$(BIN)/python -m pytest -n $(JOBS) --max-worker-restart 0 --dist loadscope --no-loadscope-reorder -m "$(WHICH)"
 
 soak: $(STAMP)  ## ten minutes of hours of bus time with eight drives: no leak, no lost frame
 	$(BIN)/cdpr bench soak --hours 24 --wall-minutes $(SOAK_MINUTES)
@@ -41,7 +45,9 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "cdpr-rt needs Python 3.11 or later; name one with: make PYTHON=python3.12 ..." >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install -q --disable-pip-version-check --no-compile --require-hashes -r requirements.lock
+	@# pip would compile on one core, and what nothing here imports
+	@$(BIN)/python -m compileall -qq -j 0 -x '/(ray|tests?)/' $(VENV)/lib || true
 	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib
+import logging
 import sys
 from collections.abc import Callable
 from functools import cache, partial
@@ -9,8 +10,12 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import cgutils, config, types
+from numba.core import cgutils, config, event, types
 from numba.extending import intrinsic
+from typing_extensions import override
+
+COMPILING = logging.getLogger("cdpr.compiling")
+"""Is told, at level INFO, of each kernel of which no machine code is kept on this machine."""
 
 _SETTINGS: Any = config
 _T = TypeVar("_T")
@@ -35,6 +40,32 @@ def _skip_blas() -> None:
 _skip_blas()
 
 
+class _Teller(event.Listener):
+    """Tells of what is compiled for want of machine code that is kept."""
+
+    @override
+    def on_start(self, event: Any) -> None:
+        if event.data["dispatcher"].stats.cache_path is not None:
+            COMPILING.info("%s", event.data["dispatcher"].__name__)
+
+    @override
+    def on_end(self, event: Any) -> None:
+        """Nobody waits for it."""
+
+
+_listen: Callable[[str, event.Listener], None] = event.register
+_listen("numba:compile", _Teller())
+
+
+def _call_template(dispatcher: Any, args: Any, kws: Any) -> Any:
+    """Have `dispatcher` compile one machine code for a number, be it constant or not."""
+    general: Callable[[Any], Any] = types.unliteral
+    template: Callable[..., Any] = type(dispatcher).get_call_template
+    return template(
+        dispatcher, tuple(map(general, args)), {key: general(value) for key, value in kws.items()}
+    )
+
+
 @cache
 def _kernel_cache(folder: Path, folders: frozenset[Path]) -> str:
     """Return a cache directory of `folder` for this state of the kernels' sources in `folders`.
@@ -57,7 +88,10 @@ def jit(function: _F, *, nogil: bool = False) -> _F:
     It may call kernels of its own folder and those that its module imports from others: machine
     code that is kept belongs to the state of all of these.
     """
-    folder = Path(function.__code__.co_filename).parent
+    # by whichever of the paths that lead to it: numba keeps machine code for each by itself
+    source = Path(function.__code__.co_filename).resolve()
+    function.__code__ = function.__code__.replace(co_filename=str(source))
+    folder = source.parent
     called: Any = function.__globals__
     folders = frozenset({folder}).union(
         *(getattr(kernel, "folders", ()) for kernel in called.values())
@@ -69,6 +103,7 @@ def jit(function: _F, *, nogil: bool = False) -> _F:
     finally:
         _SETTINGS.CACHE_DIR = cache_of_all
     compiled.folders = folders
+    compiled.get_call_template = partial(_call_template, compiled)
     return cast(_F, compiled)
 
 

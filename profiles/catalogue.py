@@ -144,11 +144,11 @@ def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
 def _platform(file: RobotFile, axes: Sequence[RobotAxis]) -> Platform | None:
     if file.platform is None:
         return None
-    told = {key: value for key, value in file.platform if value is not None}
+    values = {key: value for key, value in file.platform if value is not None}
     up = (*(0.0 for _ in file.platform.home_m[1:]), 1.0)
-    told.setdefault("clearance_m", max(CLEARANCE_m, _thickest_m(axes)))
+    values.setdefault("clearance_m", max(CLEARANCE_m, _thickest_m(axes)))
     return Platform(
-        **told,
+        **values,
         exit_points_m=tuple(axis.exit_point_m or () for axis in file.axes),
         anchor_points_m=tuple(axis.anchor_point_m or () for axis in file.axes),
         pulley_radius_m=tuple(axis.pulley_radius_m for axis in file.axes),

@@ -124,11 +124,11 @@ def _inertia_faults(
     if len(given) == 6:
         xx, yy, zz, xy, xz, yz = given
         moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    told = ", ".join(f"{moment:.4g}" for moment in moments)
+    shown = ", ".join(f"{moment:.4g}" for moment in moments)
     if not moments.min() > 0.0:
-        yield key, f"principal moments {told}; allowed: all above 0"
+        yield key, f"principal moments {shown}; allowed: all above 0"
     elif len(moments) == 3 and moments[2] > (1.0 + _ROUNDING) * (moments[0] + moments[1]):
-        problem = f"principal moments {told}; allowed: none above the sum of the two others"
+        problem = f"principal moments {shown}; allowed: none above the sum of the two others"
         yield key, problem
     elif math.sqrt(moments.max() / mass_kg) > 0.5 * frame_m:
         problem = (

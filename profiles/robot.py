@@ -126,8 +126,8 @@ class RobotFile(Profile):
 
 
 def default_name(axis: int) -> str:
-    """Return the default name of the axis of this number."""
-    return f"axis {axis}"
+    """Return the name of the axis at this place, from 0, where the file gives none: from 1."""
+    return f"axis {axis + 1}"
 
 
 @dataclass(frozen=True)

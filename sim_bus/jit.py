@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib
+import logging
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -9,7 +10,11 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import config
+from numba.core import config, event, types
+from typing_extensions import override
+
+COMPILING = logging.getLogger("cdpr.compiling")
+"""Is told, at level INFO, of each kernel of which no machine code is kept on this machine."""
 
 _SETTINGS: Any = config
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -31,6 +36,32 @@ def _skip_blas() -> None:
 
 
 _skip_blas()
+
+
+class _Teller(event.Listener):
+    """Tells of what is compiled for want of machine code that is kept."""
+
+    @override
+    def on_start(self, event: Any) -> None:
+        if event.data["dispatcher"].stats.cache_path is not None:
+            COMPILING.info("%s", event.data["dispatcher"].__name__)
+
+    @override
+    def on_end(self, event: Any) -> None:
+        """Nobody waits for it."""
+
+
+_listen: Callable[[str, event.Listener], None] = event.register
+_listen("numba:compile", _Teller())
+
+
+def _call_template(dispatcher: Any, args: Any, kws: Any) -> Any:
+    """Have `dispatcher` compile one machine code for a number, be it constant or not."""
+    general: Callable[[Any], Any] = types.unliteral
+    template: Callable[..., Any] = type(dispatcher).get_call_template
+    return template(
+        dispatcher, tuple(map(general, args)), {key: general(value) for key, value in kws.items()}
+    )
 
 
 def _kernel_cache() -> str:
@@ -57,9 +88,11 @@ def jit(function: _F) -> _F:
     elsewhere = _SETTINGS.CACHE_DIR
     _SETTINGS.CACHE_DIR = _CACHE
     try:
-        return cast(_F, numba.njit(cache=True)(function))
+        compiled: Any = numba.njit(cache=True)(function)
     finally:
         _SETTINGS.CACHE_DIR = elsewhere
+    compiled.get_call_template = partial(_call_template, compiled)
+    return cast(_F, compiled)
 
 
 def bound(kernel: Callable[..., Any], *arrays: Any, then: tuple[Any, ...]) -> Callable[..., Any]:

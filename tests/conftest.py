@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import signal
 import sys
 from collections.abc import Generator
 from typing import Any
@@ -23,7 +25,11 @@ os.environ["XDG_CONFIG_HOME"] = "/nonexistent"
 # tests start hundreds of processes, none of which is to compile all sources anew
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+# a shell's job in the background ignores Ctrl-C, and so would all that it starts
+signal.signal(signal.SIGINT, signal.default_int_handler)
 fork_server.install()
+# the collector would go through all that is imported and collected for tests, again and again
+gc.disable()
 
 # Hypothesis also draws the constants of whatever modules are loaded: these depend on which tests a
 # process has run before, and so would the examples. It has no setting for that.
@@ -46,10 +52,13 @@ class _ByFile(LoadScopeScheduling):
     """
 
     def _split_scope(self, nodeid: str) -> str:
-        file = nodeid.split("::", 1)[0]
-        if "/test_vcan_" in file:
-            return "vcan"
-        return "daemon" if "/hil/test_daemon_" in file or "/test_bench_loop" in file else file
+        if _of_a_daemon(nodeid):
+            return "daemon"
+        return "vcan" if "/test_vcan_" in nodeid else nodeid.split("::", 1)[0]
+
+
+def _of_a_daemon(nodeid: str) -> bool:
+    return "/hil/test_daemon_" in nodeid
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -58,6 +67,18 @@ def pytest_configure(config: pytest.Config) -> None:
         import kernel_locks  # noqa: PLC0415  not for the process that only shares tests out
 
         kernel_locks.install()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with those of daemons: they are the most that one process has to run."""
+    items.sort(key=lambda item: not _of_a_daemon(item.nodeid))
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage from now on, but leave alone what has been made until now."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:

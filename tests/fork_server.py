@@ -4,7 +4,8 @@ To import numba, numpy and what else a command stands on, to load its kernels, a
 apart at its end takes a second of processor time, and the tests start hundreds of commands. A
 process started here is one of its own in all else: arguments, environment, folder, descriptors,
 session and signals are those that `subprocess` was asked for. It does what a process does at its
-end (threads, atexit, what is written) except for freeing its memory piece by piece.
+end (threads, atexit, what is written) except for freeing its memory piece by piece. It is killed
+where the test process dies, and the server with it, without having ended it.
 
 The two processes of a daemon look for their parent, the launcher. It has a server of its own, from
 which it adopts them: for that moment, orphans below it are its children.
@@ -38,7 +39,18 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 _COMMAND = "cdpr_tools.cli"
-_OF_A_LAUNCHER = {"cdpr_tools.daemon.loop_process", "cdpr_tools.daemon.service_process"}
+FORKED = (sys.executable, "-X", "forked", "-c")
+"""The beginning of a command whose words go on with a script, which may be run in such a process,
+and with its arguments. By itself Python takes no notice of the option."""
+_SCRIPT = "-c"
+_LAUNCHER_RIG = "launcher_rig"
+"""A launcher of stand-ins, which PYTHONPATH leads to."""
+_OF_A_LAUNCHER = {
+    "cdpr_tools.daemon.processes.loop_process",
+    "cdpr_tools.daemon.processes.service_process",
+    "stand_in_loop",
+    "stand_in_service",
+}
 _STARTED_BY = [sys.executable, "-P", str(Path(__file__).resolve())]
 _ROOM = " " * 8192
 """A last word of the server's, in whose place go the words of what is forked: /proc shows them."""
@@ -48,7 +60,9 @@ _FINDS_ITS_CHILDREN = "verify"
 """The command that looks for its processes by their environment, which /proc shows as at first."""
 _LAUNCHES = "run"
 """The command whose processes, and their tests, look for their parent."""
-_PR_SET_CHILD_SUBREAPER = 36
+_WHEN_NEEDED = ("httpcore", "rich.markdown", "scipy.signal")
+"""Modules that commands load in the middle of their work."""
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 _SWITCH = "CDPR_TEST_FORKS"
 _MOST_BYTES = 1 << 17
 _OUT_OF_THE_WAY = 200
@@ -98,7 +112,7 @@ class ForkingPopen(_Popen):  # type: ignore[type-arg]
         special = executable, preexec_fn, shell or None, gid, gids, uid
         module = _module_of(words)
         if (
-            module not in ({_COMMAND} | _OF_A_LAUNCHER if _own else {_COMMAND})
+            module not in {_COMMAND, _LAUNCHER_RIG, _SCRIPT} | (_OF_A_LAUNCHER if _own else set())
             or any(value is not None for value in special)
             or umask != -1
             or group != -1
@@ -158,6 +172,8 @@ class ForkingPopen(_Popen):  # type: ignore[type-arg]
 
 def _module_of(words: list[str]) -> str:
     """Return the module that is run, empty where it is something else."""
+    if words[:4] == [*FORKED]:
+        return _SCRIPT
     if words[:2] == [sys.executable, "-P"]:
         words = [words[0], *words[2:]]
     return words[2] if words[:2] == [sys.executable, "-m"] and len(words) > 2 else ""
@@ -183,7 +199,8 @@ _AT_FIRST = _limits()
 
 
 def _of_start(wanted: dict[str, str], name: str) -> bool:
-    return name.startswith(_SPECIAL) and wanted.get(name) != os.environ.get(name)
+    differs = wanted.get(name) != os.environ.get(name)
+    return differs and name.startswith(_SPECIAL) and name != "PYTHONPATH"
 
 
 def install() -> None:
@@ -231,6 +248,8 @@ def _obey(client: socket.socket, selector: selectors.BaseSelector, kernels: Any)
         gc.freeze()
         answer = os.fork()
         if answer == 0:
+            # what a test has started does not outlive it, however it ends
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
             _address[:] = [request["address"]]
             for key in [*selector.get_map().values()]:
                 os.close(key.fd)
@@ -251,10 +270,12 @@ def _received(client: socket.socket) -> tuple[bytes, list[int]]:
 
 
 def _import_all() -> None:
-    for name in ("cdpr_tools.commands", "cdpr_tools.daemon", "cdpr_sim_bus", "cdpr_rt"):
+    for name in ("cdpr_tools", "cdpr_sim_bus", "cdpr_rt"):
         package = importlib.import_module(name)
         for module in pkgutil.walk_packages(package.__path__, f"{name}."):
             importlib.import_module(module.name)
+    for name in _WHEN_NEEDED:
+        importlib.import_module(name)
 
 
 def _serve_launcher(client: socket.socket) -> NoReturn:
@@ -290,9 +311,10 @@ def _become(request: dict[str, Any], descriptors: list[int]) -> NoReturn:
     _be_shown_as(words)
     if request["session"]:
         os.setsid()
-    if arguments[:1] == [_LAUNCHES]:
+    sys.path += request["env"].get("PYTHONPATH", "").split(os.pathsep)
+    if module == _LAUNCHER_RIG or arguments[:1] == [_LAUNCHES]:
         _get_own_server(descriptors)
-    if module == _COMMAND and _FINDS_ITS_CHILDREN not in arguments[:2]:
+    if module in (_COMMAND, _LAUNCHER_RIG) and _FINDS_ITS_CHILDREN not in arguments[:2]:
         install()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.sched_setaffinity(0, request["cores"])
@@ -313,7 +335,10 @@ def _become(request: dict[str, Any], descriptors: list[int]) -> NoReturn:
     sys.argv = [module, *arguments]
     sys.modules.pop(module, None)
     with _quick_end():
-        runpy.run_module(module, run_name="__main__", alter_sys=True)
+        if module == _SCRIPT:
+            exec(sys.argv.pop(1), {"__name__": "__main__"})
+        else:
+            runpy.run_module(module, run_name="__main__", alter_sys=True)
     sys.exit()
 
 

@@ -56,6 +56,18 @@ def test_so_it_is_when_the_callee_is_in_another_folder(tmp_path: Path) -> None:
         assert told(tmp_path, "caller.py") == [found, "1"]
 
 
+def test_machine_code_is_kept_once_by_whichever_path_its_source_is_found(tmp_path: Path) -> None:
+    (tmp_path / "itself").mkdir()
+    (tmp_path / "itself" / "kernels_callee.py").write_text(CALLEE.format(added=1.0))
+    (tmp_path / "linked").symlink_to("itself")
+    ask = (
+        "from kernels_callee import inner; inner(1.0); print(sum(inner.stats.cache_hits.values()))"
+    )
+    for name, found in (("itself", "0"), ("linked", "1")):
+        folder = str(tmp_path / name)
+        assert told(tmp_path, "-c", f"import sys; sys.path.insert(0, {folder!r}); {ask}") == [found]
+
+
 def test_the_simulators_kernels_have_a_cache_for_each_state_of_them(tmp_path: Path) -> None:
     package = tmp_path / "cdpr_sim_bus"
     shutil.copytree(Path(cdpr_sim_bus.__file__).resolve().parent, package)

@@ -16,6 +16,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_sim_bus.errors import BusSetupError, SimulatorError
 from cdpr_tools.command_group import group_of
+from cdpr_tools.compiling import tell_of_compiling
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED, CommandError
 
 MODULES = {
@@ -67,16 +68,16 @@ MODULES = {
     "bus.bus": {
         "bus": "Look at a CAN bus.",
     },
-    "calibrate": {
+    "calibration.calibrate": {
         "calibrate": "Calibrate a robot's geometry, drums and elongation.",
     },
-    "camera": {
+    "calibration.camera": {
         "camera": "Cameras: images, and intrinsics.",
     },
     "cogging": {
         "cogging": "Cogging: sweep, fit, validate, report.",
     },
-    "drive.drive": {
+    "drive.group": {
         "drive": "One drive on the bus.",
     },
     "io": {
@@ -85,13 +86,13 @@ MODULES = {
     "log": {
         "log": "The daemon's recordings: what is in them, as tables and pictures.",
     },
-    "markers": {
+    "calibration.markers": {
         "markers": "Printed markers: sheets, and maps of them.",
     },
-    "poses": {
+    "robot.poses": {
         "poses": "Draw poses that a robot reaches straight from home, or from another place.",
     },
-    "path": {
+    "robot.path": {
         "path": "Look at a path before it is followed, follow it, take it up again.",
     },
     "profiles": {
@@ -100,7 +101,7 @@ MODULES = {
     "rail": {
         "rail": "The rails on which winches stand.",
     },
-    "robot": {
+    "robot.group": {
         "robot": "Describe a cable robot, look at it, try it.",
     },
     "sim.sim": {
@@ -176,6 +177,7 @@ def exit_status(error: BaseException) -> int:
 
 def main() -> None:
     """Run the command line; a known error is one line on standard error, never a traceback."""
+    tell_of_compiling()
     try:
         app(standalone_mode=True)
     except (CommandError, ControlError, DriverError, ProfileError, SimulatorError) as error:

@@ -74,8 +74,8 @@ def _ray(address: str) -> Iterator[Runner]:
                 try:
                     yield ray.get(result)
                 except ray.exceptions.RayError as error:
-                    told = str(error).strip().splitlines()[-1]
-                    raise WorkFailedError(f"--cluster {address}: {told}") from error
+                    reason = str(error).strip().splitlines()[-1]
+                    raise WorkFailedError(f"--cluster {address}: {reason}") from error
 
         yield run
     finally:

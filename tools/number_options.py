@@ -36,12 +36,13 @@ def numbers(option: str, text: str, names: Sequence[str], unit: str, factor: flo
     """Return the numbers of an option in SI, one for each name; raises BadInputError."""
     allowed = f"{' '.join(names).upper()} in {unit}"
     words = text.split()
+    for word in words:
+        if not _is_number(word):
+            raise BadInputError(f"{option} {text}: {word!r} is no number; allowed: {allowed}")
     if len(words) != len(names):
-        raise BadInputError(f"{option} {text}: {len(words)} numbers; allowed: {allowed}")
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        raise BadInputError(f"{option} {text}: allowed: {allowed}") from None
+        many = "1 number" if len(words) == 1 else f"{len(words)} numbers"
+        raise BadInputError(f"{option} {text}: {many}; allowed: {len(names)}, {allowed}")
+    values = [float(word) for word in words]
     if not all(map(math.isfinite, values)):
         raise BadInputError(f"{option} {text}: allowed: finite numbers, {allowed}")
     return [factor * value for value in values]

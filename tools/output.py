@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 _SLOW_S = 2.0
+_TELL_S = (2.0, 5.0)
+"""Where nothing can be drawn over again: when work is first told of to go on, then how often."""
 
 
 def _plain(value: Any) -> Any:
@@ -60,24 +71,81 @@ class Output:
 
     @contextmanager
     def progress(self, what: str, total_s: float) -> Iterator[Advance]:
-        """Show a bar over `total_s` seconds of bus time while the block runs.
+        """Show how far it is over `total_s` seconds of bus time while the block runs.
 
-        On a terminal only: elsewhere nothing could be drawn over again.
+        A bar on a terminal; elsewhere, where nothing can be drawn over again, a line now and then.
         """
-        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-        shown = total_s >= _SLOW_S and self.notes.is_interactive
-        bar = Progress(*columns, console=self.notes, transient=True, disable=not shown)
-        with bar:
-            yield Advance(bar, bar.add_task(what, total=total_s))
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+        )
+        with self._shown(columns, Advance(what, total_s), total_s >= _SLOW_S) as advance:
+            yield advance
+
+    @contextmanager
+    def stage(self, what: str) -> Iterator[None]:
+        """Say at once what is being done, and that it still is while the block runs."""
+        if not self.notes.is_interactive:
+            self.note(f"{what} ...")
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        with self._shown(columns, Advance(what, None), True):
+            yield
+
+    @contextmanager
+    def _shown(self, columns: Any, advance: Advance, shown: bool) -> Iterator[Advance]:
+        if not shown:
+            yield advance
+        elif self.notes.is_interactive:
+            with Progress(*columns, console=self.notes, transient=True) as bar:
+                task = bar.add_task(advance.what, total=advance.total)
+                advance.on_change = lambda: bar.update(task, completed=advance.done)
+                yield advance
+        else:
+            with self._told_now_and_then(advance):
+                yield advance
+
+    @contextmanager
+    def _told_now_and_then(self, advance: Advance) -> Iterator[None]:
+        over = threading.Event()
+
+        def tell() -> None:
+            wait_s, again_s = _TELL_S
+            while not over.wait(wait_s):
+                self.note(advance.text())
+                wait_s = again_s
+
+        teller = threading.Thread(target=tell, daemon=True)
+        teller.start()
+        try:
+            yield
+        finally:
+            over.set()
+            teller.join()
 
 
 class Advance:
-    """Moves a progress bar; call it with the seconds of bus time that have passed."""
+    """How far work has come; call it with the seconds of bus time that have passed."""
 
-    def __init__(self, bar: Progress, task: TaskID) -> None:
-        self._bar = bar
-        self._task = task
+    def __init__(self, what: str, total: float | None) -> None:
+        self.what, self.total, self.done = what, total, 0.0
+        self.on_change: Callable[[], None] = lambda: None
+        self._begun_s = time.monotonic()
 
     def __call__(self, time_s: float) -> None:
-        """Show that `time_s` seconds are done."""
-        self._bar.update(self._task, completed=time_s)
+        """Take it that `time_s` seconds are done."""
+        self.done = time_s
+        self.on_change()
+
+    def text(self) -> str:
+        """Return in words how far it is, and how long it may still take."""
+        elapsed_s = time.monotonic() - self._begun_s
+        if not self.total:
+            return f"{self.what}: for {elapsed_s:.0f} s now"
+        share = self.done / self.total
+        if share <= 0.0:
+            return f"{self.what}: 0 %"
+        left_s = elapsed_s * (1.0 / min(share, 1.0) - 1.0)
+        left = f"{left_s:.0f} s" if left_s < 100.0 else f"{left_s / 60.0:.0f} min"
+        return f"{self.what}: {100.0 * share:.0f} %, about {left} left"

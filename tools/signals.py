@@ -21,8 +21,8 @@ class StopRequest:
     switched off.
     """
 
-    def __init__(self, told: str = "") -> None:
-        self._told = told
+    def __init__(self, notice: str = "") -> None:
+        self._notice = notice
         self._times = 0
         self._interrupts = True
         self.energised = False
@@ -39,10 +39,10 @@ class StopRequest:
     def note(self, _number: int, _frame: FrameType | None) -> None:
         """Take a signal."""
         self._times += 1
-        told = _TOLD if self.energised else self._told
-        if self._times == 1 and told and self._interrupts:
+        notice = _TOLD if self.energised else self._notice
+        if self._times == 1 and notice and self._interrupts:
             # printing is not allowed to interrupt itself
-            os.write(sys.stderr.fileno(), f"{told}\n".encode())
+            os.write(sys.stderr.fileno(), f"{notice}\n".encode())
         if self._times > 1 and self._interrupts:
             self._interrupts = False
             raise KeyboardInterrupt
@@ -63,13 +63,13 @@ def interrupted_by_sigterm() -> Iterator[None]:
 
 
 @contextmanager
-def stop_on_signals(told: str = "") -> Iterator[StopRequest]:
+def stop_on_signals(notice: str = "") -> Iterator[StopRequest]:
     """Yield what tells whether the user wants an end; asked a second time it is an interrupt.
 
-    `told` is said at the first request. After a Ctrl-C in the block further ones change nothing:
+    `notice` is said at the first request. After a Ctrl-C in the block further ones change nothing:
     the command ends already.
     """
-    wanted = StopRequest(told)
+    wanted = StopRequest(notice)
     numbers = (signal.SIGINT, signal.SIGTERM)
     before = {number: signal.signal(number, wanted.note) for number in numbers}
     try:

@@ -82,13 +82,13 @@ def simulated_errors(
         Q = turn.as_matrix() @ poses[:, 1:]
         told = rho - rho[0] + rng.normal(0.0, 1.0, rho.shape) * noise.length_m
         points = p[:, None] + np.einsum("jab,ib->jia", Q, anchors_m)
-        a, offset = _solve(points, told, exits_m, rho[0])
+        a, offset = solve_thesis(points, told, exits_m, rho[0])
         exit_squares += float(((a - exits_m) ** 2).mean())
         offset_squares += float(((offset - rho[0]) ** 2).mean())
     return Errors(float(np.sqrt(exit_squares / draws)), float(np.sqrt(offset_squares / draws)))
 
 
-def _solve(
+def solve_thesis(
     points: FloatArray, told: FloatArray, exits_m: FloatArray, offset_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return exit points (n, 3) and initial lengths (n,) that minimise (3.20), from a start.

@@ -14,34 +14,40 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import GeometryCalibration, geometry_sha256
 from cdpr_profiles.platform import Platform
-from cdpr_rt.calibration.faults import Fault, fit_without_faults
-from cdpr_rt.calibration.fit import Fit, fit
-from cdpr_rt.calibration.observations import Observations
-from cdpr_rt.calibration.parameters import DRUM, CableGeometry
-from cdpr_rt.calibration.verdict import (
+from cdpr_rt.calibration.camera.camera_faults import UNDECIDED, map_faults, told_right
+from cdpr_rt.calibration.camera.camera_start import camera_start
+from cdpr_rt.calibration.estimation.faults import Fault, fit_without_faults, parameter_faults
+from cdpr_rt.calibration.estimation.fit import Fit, fit
+from cdpr_rt.calibration.estimation.parameters import DRUM, CableGeometry
+from cdpr_rt.calibration.markers.map_fit import MapFit
+from cdpr_rt.calibration.readings.camera_data import Images
+from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.calibration.verification.held_out import LEAST_POSES, Unused, held_out, hold_out
+from cdpr_rt.calibration.verification.more_poses import MORE, with_more_poses
+from cdpr_rt.calibration.verification.verdict import (
     OpenDirection,
-    Verification,
+    camera_table,
     open_directions,
     parameter_table,
     predicted_std,
     require_enough,
-    verify,
 )
+from cdpr_rt.calibration.verification.verification import Verification
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.robot_arrays import limits_of
 
-Method = Literal["points", "redundancy"]
-_EACH = 5
-"""One pose in so many is kept from the fit and verifies it."""
-_LEAST_HELD_OUT = 3
+Method = Literal["points", "redundancy", "camera"]
 _GRID = 4
 _WANTED_mm_PER_m = 0.3
 """1.5 mm for 5 m of frame, 3 sigma."""
 _MOST_OVER_WANTED = 3.0
 """What is known worse than so many times what is wanted is not taken over."""
+_LESS_CONTRADICTION = 0.5
 _MISFIT = 9.0
 _SLACK_SHARE = 0.5
+_LEAST_POINTS = 3
+_LEAST_FACTOR = 0.05
 _MOST_LEFT_OUT = 0.1
 
 
@@ -58,9 +64,14 @@ class Outcome:
     before: Verification
     """The same by the robot's file, whose lengths are those at the start."""
     verified_left_out: int
-    """Readings at those poses that were found to be at fault, with all poses, and left out."""
+    """Readings at those poses of cables that hung slack, or next to a slip, which are left out."""
     predicted_3_sigma_mm: float
     """Of a position in the workspace; without measured points, of its shape."""
+    with_more_3_sigma_mm: float
+    """The same with ten more poses that tell as much as those so far."""
+    known_room: bool
+    """Whether anything was measured in the room: points, or places of markers."""
+    unused: Unused
 
     @property
     def good(self) -> bool:
@@ -77,10 +88,17 @@ class Outcome:
                 f"lengths disagree {math.sqrt(found.variance_factor):.1f} times as much as they "
                 "should: something moves that is taken to be fixed (an anchor, a pulley, a frame)"
             )
+        told += [fault.text for fault in self.faults if fault.text.startswith(UNDECIDED)]
+        if found.corner_factor > _MISFIT:
+            told.append(
+                f"corners fit {math.sqrt(found.corner_factor):.1f} times worse together with the "
+                "cables than by themselves: the camera moved on the platform, or the platform "
+                "while images were taken"
+            )
         left_out = [fault for fault in self.faults if fault.kind in ("outlier", "slack", "jump")]
         if len(left_out) > _MOST_LEFT_OUT * found.seen.used.size:
             told.append(f"{len(left_out)} readings contradict the others: measure anew")
-        most_mm = _MOST_OVER_WANTED * _wanted_mm(self.robot)
+        most_mm = _MOST_OVER_WANTED * wanted_mm(self.robot)
         if self.predicted_3_sigma_mm > most_mm:
             told.append(
                 f"positions would be known to {self.predicted_3_sigma_mm:.1f} mm only (3 sigma, "
@@ -95,7 +113,29 @@ class Outcome:
                 "poses that the fit had not seen are told no better than by the robot's file: take "
                 "more poses, further apart"
             )
+        if self.method == "camera" and self.verified.kind == "none":
+            told.append(
+                "no three of the poses not used show two markers of the map, so nothing verifies "
+                "it: take more poses, or lay more sheets"
+            )
+        if self._is_insignificant():
+            told.append(
+                f"the file's geometry is off by {self.before.mean_mm:.2f} mm here, less than the "
+                f"{self.predicted_3_sigma_mm:.2f} mm that this calibration is uncertain by, and "
+                "lengths contradict each other hardly less than by the file, which may be right "
+                "already: take more poses, or larger markers"
+            )
         return told + self._impossible()
+
+    def _is_insignificant(self) -> bool:
+        """Return whether the camera tells too little to know better than the robot's file.
+
+        What lengths contradict each other by does not depend on how good the camera's map is.
+        """
+        verified, before = self.verified, self.before
+        contradicts_less = verified.residual_m < _LESS_CONTRADICTION * before.residual_m
+        within = before.mean_mm < self.predicted_3_sigma_mm
+        return verified.by_camera and within and not contradicts_less
 
     def _impossible(self) -> list[str]:
         """Return which values cannot be of this robot."""
@@ -108,28 +148,45 @@ class Outcome:
 
     def advice(self) -> str:
         """Return what more poses would bring."""
-        poses, sigma = self.found.seen.poses, self.predicted_3_sigma_mm
-        more = max(10, poses // 4)
-        then = sigma * math.sqrt(poses / (poses + more))
-        return f"{more} more poses would bring {sigma:.2f} mm to {then:.2f} mm (3 sigma, predicted)"
+        return (
+            f"{MORE} more poses would bring {self.predicted_3_sigma_mm:.2f} mm to "
+            f"{self.with_more_3_sigma_mm:.2f} mm (3 sigma, predicted)"
+        )
+
+    @property
+    def gain_of_more(self) -> float:
+        """What ten more poses would take off, relative."""
+        return 1.0 - self.with_more_3_sigma_mm / max(self.predicted_3_sigma_mm, 1e-9)
 
     def verdict(self) -> list[str]:
         """Return the calibration in words."""
-        lines = [fault.text for fault in self.faults]
         against = self.objections()
+        lines = [fault.text for fault in self.faults if fault.text not in against]
         lines += [f"NOT GOOD: {text}" for text in against]
-        wanted = _wanted_mm(self.robot)
+        wanted = wanted_mm(self.robot)
         if not against:
             enough = self.predicted_3_sigma_mm <= wanted
             lines.append(
                 f"positions are known to {self.predicted_3_sigma_mm:.2f} mm (3 sigma, predicted)"
                 + (": good" if enough else f", {wanted:.2f} mm wanted: {self.advice()}")
             )
+        lines += self.proof()
+        return lines + [f"not known: {one.what}; {one.advice}" for one in self.open_directions]
+
+    def proof(self) -> list[str]:
+        """Return in words how it does at the poses that verify it."""
+        lines = []
         if self.verified.errors_m.size:
             lines.append(
                 f"verified on {len(self.verified.errors_m)} poses not used: mean "
-                f"{self.verified.mean_mm:.2f} mm, worst {self.verified.worst_mm:.2f} mm off what "
-                f"was measured (before: {self.before.mean_mm:.2f} and {self.before.worst_mm:.2f})"
+                f"{self.verified.mean_mm:.2f} mm, worst {self.verified.worst_mm:.2f} mm off "
+                f"{self.verified.reference} (by the robot's file: {self.before.mean_mm:.2f} and "
+                f"{self.before.worst_mm:.2f})"
+            )
+        if self.verified.turn_errors_rad.size:
+            lines.append(
+                f"orientations there: mean {self.verified.mean_deg:.2f} deg off (before: "
+                f"{self.before.mean_deg:.2f})"
             )
         lines.append(
             f"lengths at poses not used contradict each other by "
@@ -138,10 +195,10 @@ class Outcome:
         )
         if self.verified_left_out:
             lines.append(
-                f"{self.verified_left_out} readings at poses not used were at fault, and count "
-                "for nothing there"
+                f"{self.verified_left_out} readings at poses not used are of slack cables, or next "
+                "to a slip, and count for nothing there"
             )
-        return lines + [f"not known: {one.what}; {one.advice}" for one in self.open_directions]
+        return lines
 
     def told(self) -> dict[str, Any]:
         """Return everything for JSON."""
@@ -153,7 +210,9 @@ class Outcome:
             "converged": self.found.converged,
             "variance_factor": self.found.variance_factor,
             "predicted_3_sigma_mm": self.predicted_3_sigma_mm,
-            "frame": frame_of(self.found.seen),
+            "with_10_more_poses_3_sigma_mm": self.with_more_3_sigma_mm,
+            "frame": frame_of(self),
+            "corner_factor": self.found.corner_factor,
             "parameters": parameter_table(self.found),
             "faults": [fault.told() for fault in self.faults],
             "open": [
@@ -166,9 +225,14 @@ class Outcome:
                 "mean_position_error_mm": _number(self.verified.mean_mm),
                 "worst_position_error_mm": _number(self.verified.worst_mm),
                 "mean_position_error_before_mm": _number(self.before.mean_mm),
+                "mean_orientation_error_deg": _number(self.verified.mean_deg),
+                "mean_orientation_error_before_deg": _number(self.before.mean_deg),
+                "reference": self.verified.kind,
+                "by": self.verified.reference,
                 "length_residual_mm": 1e3 * self.verified.residual_m,
                 "length_residual_before_mm": 1e3 * self.before.residual_m,
             },
+            "camera": camera_table(self.found),
         }
 
 
@@ -176,39 +240,89 @@ def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def calibrate(robot: Robot, geometry: CableGeometry, seen: Observations, method: Method) -> Outcome:
+def calibrate(
+    robot: Robot,
+    geometry: CableGeometry,
+    seen: Observations,
+    method: Method,
+    images: Images | None = None,
+) -> Outcome:
     """Return the calibration that observations support; raises InvalidRequestError for too few.
 
-    It is fitted without one pose in five first, which verify it, then with all of them.
+    With images it is fitted together with camera and markers. It is fitted to all poses, with what
+    is at fault left out, and anew without one pose in five, which verify it: these count for
+    nothing there, not even to find what is at fault.
     """
-    held = np.arange(seen.poses) % _EACH == _EACH - 1
-    if held.sum() < _LEAST_HELD_OUT:
+    if seen.poses < LEAST_POSES:
         raise InvalidRequestError(
-            f"{seen.poses} poses; allowed: {_EACH * _LEAST_HELD_OUT} and more, of which one in "
-            f"{_EACH} verifies what the others tell"
+            f"{seen.poses} poses; allowed: {LEAST_POSES} and more, some of which verify what the "
+            "others tell"
         )
-    require_enough(geometry, seen.some(~held))
+    held = held_out(seen.poses)
     slack = _SLACK_SHARE * np.asarray(limits_of(robot).slack_N, float)
-    found, faults = fit_without_faults(geometry, seen, slack)
-    clean = replace(found.seen, start=found.poses)
-    part = fit(geometry, clean.some(~held))
-    other = clean.some(held)
-    verified = verify(part.geometry, part.jumps_m, other)
-    before = verify(geometry, np.zeros(len(other.jumps)), other)
-    predicted = predicted_std(found, _grid(geometry), relative=not seen.measured.any())
-    k = geometry.coordinates
-    three_sigma_mm = 3e3 * float(np.sqrt((predicted[:, :k] ** 2).mean(axis=0).max()))
-    open_ones = open_directions(found)
-    left_out = int((~other.used).sum())
-    return Outcome(
-        robot, found, method, faults, open_ones, verified, before, left_out, three_sigma_mm
+    known_room = bool(seen.measured.sum() >= _LEAST_POINTS)
+    first_map: MapFit | None = None
+    weighed = geometry
+    if images is None:
+        base = seen
+        require_enough(geometry, base.some(~held))
+        found, faults = fit_without_faults(geometry, base, slack)
+    else:
+        start = camera_start(geometry, seen, images.setup, images.sightings)
+        base = start.seen
+        require_enough(geometry, base.some(~held))
+        found, faults = fit_without_faults(geometry, base, slack, start.camera)
+        known_room = known_room or start.known_room
+        found, wrong = told_right(geometry, found, start.map)
+        weighed = _with_noise_seen(found)
+        found = fit(
+            weighed, replace(found.seen, start=found.poses), start=found.geometry,
+            camera=found.camera,
+        )  # fmt: skip
+        readings = [one for one in faults if one.kind not in ("drum", "elongation")]
+        of_map = map_faults(start.map, images.sightings)
+        told = {(one.kind, one.cable) for one in wrong}
+        others = [one for one in parameter_faults(found) if (one.kind, one.cable) not in told]
+        faults = [*of_map, *readings, *wrong, *others]
+        first_map = start.map
+    unused = hold_out(geometry, weighed, base, slack, found, first_map, images)
+    verified, before = unused.verified(), unused.before(geometry)
+    sigma_mm, with_more_mm = (
+        _three_sigma_mm(one, known_room) for one in (found, with_more_poses(found))
     )
+    left_out = int((~unused.seen.used).sum())
+    return Outcome(
+        robot, found, method, faults, open_directions(found), verified, before, left_out,
+        sigma_mm, with_more_mm, known_room, unused,
+    )  # fmt: skip
 
 
-def frame_of(seen: Observations) -> str:
+def _three_sigma_mm(found: Fit, known_room: bool) -> float:
+    """Return what positions in the workspace are known to, the worst coordinate's rms."""
+    geometry = found.geometry
+    predicted = predicted_std(found, _grid(geometry), relative=not known_room)
+    return 3e3 * float(np.sqrt((predicted[:, : geometry.coordinates] ** 2).mean(axis=0).max()))
+
+
+def _with_noise_seen(found: Fit) -> CableGeometry:
+    """Return the robot's file with readings as good as the camera has found them to be.
+
+    What encoders and torques were taken to be uncertain by is a guess for all robots; poses by
+    the camera leave enough over to know it, and weigh lengths against corners rightly.
+    """
+    share = math.sqrt(min(max(found.variance_factor, _LEAST_FACTOR), 1.0))
+    known = found.geometry.knowledge
+    known = replace(known, length_m=share * known.length_m, tension_N=share * known.tension_N)
+    nothing = np.zeros_like(found.geometry.cable)
+    return replace(found.geometry, knowledge=known, cable=nothing, elongation=0.0)
+
+
+def frame_of(outcome: Outcome) -> str:
     """Return in words what the identified coordinates are relative to."""
-    if seen.measured.sum() >= 3:
+    if outcome.found.seen.measured.sum() >= _LEAST_POINTS:
         return "the room in which the platform was measured"
+    if outcome.known_room:
+        return "the room in which places of markers are known"
     return "the exit points of the robot's file, taken together: moved and turned least"
 
 
@@ -237,7 +351,7 @@ def calibration_of(
         version=version,
         date=datetime.now(UTC).replace(microsecond=0),
         method=outcome.method,
-        frame=frame_of(found.seen),
+        frame=frame_of(outcome),
         exit_points_m=_points(kernel[:k].T),
         anchor_points_m=anchors,
         home_m=home_m,
@@ -279,7 +393,7 @@ def _grid(geometry: CableGeometry) -> FloatArray:
     return geometry.model.poses(places)
 
 
-def _wanted_mm(robot: Robot) -> float:
+def wanted_mm(robot: Robot) -> float:
     """Return what is wanted of positions, by the longest side of the box around exit points."""
     assert robot.platform is not None
     frame_m = float(np.ptp(np.array(robot.platform.exit_points_m), axis=0).max())

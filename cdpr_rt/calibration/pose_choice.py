@@ -7,12 +7,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_rt.calibration.estimation.parameters import CABLE_ROWS, CableGeometry, Kind, Knowledge
+from cdpr_rt.calibration.estimation.residuals import lengths_told, linearise
+from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.robots.platform_model import PlatformModel
 
 EXIT_m = OFFSET_m = 0.1
 """What exit points and initial lengths are taken to be uncertain by before: a tape's measure."""
 LENGTH_m, POSITION_m, ROTATION_rad = 1e-3, 5e-3, 5e-3
 """Standard deviations of what is measured at a pose: lengths, and by a camera the pose."""
+HAND_EYE_m, HAND_EYE_rad = 0.1, 0.2
+"""Of the camera's place on its platform before."""
+_AT_ONCE = 64
 
 
 def spread(positions: FloatArray, arms: FloatArray, count: int) -> IntArray:
@@ -32,29 +39,65 @@ def spread(positions: FloatArray, arms: FloatArray, count: int) -> IntArray:
     return np.array(taken)
 
 
-def informative(
-    exits_m: FloatArray, anchors_m: FloatArray, poses: FloatArray, count: int
-) -> IntArray:
-    """Return which `count` of the poses (m, 4, 3) tell most of exit points and initial lengths.
+def informative(geometry: CableGeometry, poses: FloatArray, count: int) -> IntArray:
+    """Return which `count` of the poses (m, 4, 3) tell most of a geometry, by cables and camera.
 
-    Greedily D-optimal: each raises log det of the information most. A pose tells of cable i, after
-    Tremblay (thesis), eqs. (3.16), (3.40), as length: u δa + δρ_0 = u δp + (Q b × u) δr - δΔρ, with
-    u the unit vector from exit point a to anchor point b. So the information about its four
-    unknowns grows by (u, 1) (u, 1)' over the variance of the right-hand side.
+    Greedily D-optimal: each raises log det of the information most, beside those before. That of
+    a pose is R^T R, see `pose_rows`. What a pose adds falls as others are taken, so that only those
+    are looked at anew that may still be the best (Minoux, 1978).
     """
-    rows = information_rows(exits_m, anchors_m, poses)
-    n = rows.shape[1]
-    inverse = np.tile(np.diag([EXIT_m**2] * 3 + [OFFSET_m**2]), (n, 1, 1))
-    left, taken = np.ones(len(rows), bool), []
+    rows = pose_rows(geometry, poses)
+    covariance = np.eye(rows.shape[2])
+    most, taken = np.full(len(rows), np.inf), []
     for _ in range(count):
-        seen = np.einsum("mia,iab,mib->mi", rows, inverse, rows)
-        gains = np.where(left, np.log1p(seen).sum(axis=1), -np.inf)
-        taken.append(int(gains.argmax()))
-        left[taken[-1]] = False
-        for i, row in enumerate(rows[taken[-1]]):
-            told = inverse[i] @ row
-            inverse[i] -= np.outer(told, told) / (1.0 + row @ told)
+        fresh = np.zeros(len(rows), bool)
+        while not fresh[best := int(most.argmax())]:
+            stale = np.flatnonzero(~fresh & (most > -np.inf))
+            chosen = stale[np.argsort(-most[stale])[:_AT_ONCE]]
+            most[chosen], fresh[chosen] = _gains(rows[chosen], covariance), True
+        taken.append(best)
+        most[best] = -np.inf
+        told = covariance @ rows[best].T
+        inner = np.eye(rows.shape[1]) + rows[best] @ told
+        covariance = covariance - told @ np.linalg.solve(inner, told.T)
     return np.array(taken)
+
+
+def _gains(rows: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return by how much each pose's rows (m, r, P) raise log det, (m,)."""
+    inner = np.eye(rows.shape[1]) + rows @ covariance @ np.swapaxes(rows, 1, 2)
+    return np.asarray(np.linalg.slogdet(inner)[1])
+
+
+def pose_rows(geometry: CableGeometry, poses: FloatArray) -> FloatArray:
+    """Return what lengths and a camera tell at poses (m, 4, 3), R (m, n + 6, P).
+
+    The parameters are those of `geometry` and then the camera's place on the platform, in units of
+    what is known of them before. With derivatives J_x by the pose, which is unknown, and J_p by
+    the parameters, R = (1 - J_x (J_x^T J_x)^-1 J_x^T) J_p. The camera tells its own pose.
+    """
+    m, n, size, free = len(poses), geometry.n, geometry.size, list(geometry.free)
+    tension = np.tile(0.5 * (geometry.model.low_N + geometry.model.high_N), (m, 1))
+    seen = Observations.of_lengths(lengths_told(geometry, poses, tension), tension, poses)
+    at = linearise(geometry, seen, poses, np.zeros(0))
+    sigma = np.repeat([POSITION_m, ROTATION_rad], 3)[:, None]
+    by_pose = np.zeros((m, n + 6, len(free)))
+    by_pose[:, :n] = at.by_pose[:, :n]
+    by_pose[:, n:] = (np.eye(6) / sigma)[:, free]
+    rows = np.zeros((m, n + 6, size + 6))
+    rows[:, :n, :size] = at.by_parameter[:, :n] * geometry.known_std()
+    rows[:, n : n + 3, size : size + 3] = poses[:, 1:] * (HAND_EYE_m / POSITION_m)
+    rows[:, n + 3 :, size + 3 :] = poses[:, 1:] * (HAND_EYE_rad / ROTATION_rad)
+    across = np.swapaxes(by_pose, 1, 2)
+    return np.asarray(rows - by_pose @ np.linalg.solve(across @ by_pose, across @ rows))
+
+
+def cable_geometry(model: PlatformModel) -> CableGeometry:
+    """Return what poses are to tell of a robot: exit points, offsets and drums of rigid cables."""
+    none = np.zeros(model.kinematics.n)
+    start = np.zeros((none.size, CABLE_ROWS))
+    kinds: tuple[Kind, ...] = ("exit", "offset", "drum")
+    return CableGeometry(model, none, none, kinds, Knowledge(EXIT_m, OFFSET_m), start)
 
 
 def predicted_deviation_m(exits_m: FloatArray, anchors_m: FloatArray, poses: FloatArray) -> float:

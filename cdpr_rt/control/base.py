@@ -13,7 +13,11 @@ class Controller(Protocol):
     effort_Nm: FloatArray
     """What the feedback loop asked for in this cycle, (n,)."""
     compensation_Nm: FloatArray
-    """What was added from knowledge of the motor, (n,)."""
+    """What was added from knowledge of the motor, or of its cable's tension, (n,)."""
+    motor_loss_Nm: FloatArray
+    """The part of it that is known of the motor's cogging and friction, (n,)."""
+    cogging_Nm: FloatArray
+    """The part of that that averages to nothing over a turn of the motor, (n,)."""
 
     def reset(self) -> None:
         """Forget the past, before a motion starts."""
@@ -27,7 +31,7 @@ class Idle:
 
     def __init__(self, n: int) -> None:
         self.effort_Nm = np.zeros(n)
-        self.compensation_Nm = np.zeros(n)
+        self.compensation_Nm = self.motor_loss_Nm = self.cogging_Nm = np.zeros(n)
 
     def reset(self) -> None:
         """Nothing is remembered."""

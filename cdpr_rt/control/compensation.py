@@ -1,4 +1,4 @@
-"""Torque known beforehand from the motor's profile: cogging by table, and friction."""
+"""Feed-forward torque from the motor's profile: cogging by table, and friction."""
 
 from __future__ import annotations
 
@@ -59,8 +59,30 @@ class AxisCompensation:
 
 
 @jit
+def _observe(
+    state: FloatArray, pole: float, period: float, deviation: float
+) -> tuple[float, float]:
+    """Return the deviation from the set-point and its rate as one axis' tracking observer has them.
+
+    Its `pole` is in the z-plane; with 0.0 they are the deviation read, and 0.0.
+    """
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_DEVIATION] = deviation
+        state[_DRIFT] = 0.0
+    if pole <= 0.0:
+        return deviation, 0.0
+    state[_DEVIATION] += period * state[_DRIFT]
+    innovation = deviation - state[_DEVIATION]
+    state[_DEVIATION] += (1.0 - pole * pole) * innovation
+    state[_DRIFT] += (1.0 - pole) * (1.0 - pole) / period * innovation
+    return state[_DEVIATION], state[_DRIFT]
+
+
+@jit
 def _torque(
     tables: FloatArray,
+    means: FloatArray,
     parameters: FloatArray,
     state: FloatArray,
     period: float,
@@ -71,34 +93,23 @@ def _torque(
     reference: FloatArray,
     speed: FloatArray,
     out: FloatArray,
+    cogging: FloatArray,
 ) -> None:
     size = tables.shape[2]
     for i in range(out.size):
         if parameters[i, _AVAILABLE] == 0.0 or not index_known[i]:
-            state[i, _FADE] = 0.0
-            state[i, _STARTED] = 0.0
-            out[i] = 0.0
+            state[i, _FADE] = state[i, _STARTED] = 0.0
+            out[i] = cogging[i] = 0.0
             continue
         state[i, _FADE] = min(1.0, state[i, _FADE] + fade_step)
         velocity = speed[i]
-        deviation = position[i] - reference[i]
-        pole = parameters[i, _OBSERVER_POLE]
-        if state[i, _STARTED] == 0.0:
-            state[i, _STARTED] = 1.0
-            state[i, _DEVIATION] = deviation
-            state[i, _DRIFT] = 0.0
-        moving = velocity
-        if pole > 0.0:
-            state[i, _DEVIATION] += period * state[i, _DRIFT]
-            surprise = deviation - state[i, _DEVIATION]
-            state[i, _DEVIATION] += (1.0 - pole * pole) * surprise
-            state[i, _DRIFT] += (1.0 - pole) * (1.0 - pole) / period * surprise
-            deviation = state[i, _DEVIATION]
-            moving += state[i, _DRIFT]
+        deviation, drift = _observe(
+            state[i], parameters[i, _OBSERVER_POLE], period, position[i] - reference[i]
+        )
+        moving = velocity + drift
         angle = reference[i] + deviation + moving * parameters[i, _LOOK_AHEAD] - index[i]
         moving = max(moving, 0.0) if velocity >= 0.0 else min(moving, 0.0)
-        turns = angle / TWO_PI
-        place = (turns - math.floor(turns)) * size
+        place = (angle / TWO_PI - math.floor(angle / TWO_PI)) * size
         low = int(place)
         part = place - low
         low %= size
@@ -106,6 +117,8 @@ def _torque(
         forward = (1.0 - part) * tables[i, 0, low] + part * tables[i, 0, high]
         backward = (1.0 - part) * tables[i, 1, low] + part * tables[i, 1, high]
         side = min(max(velocity / parameters[i, _BLEND], -1.0), 1.0)
+        periodic = 0.5 * (1.0 + side) * (forward - means[i, 0])
+        periodic += 0.5 * (1.0 - side) * (backward - means[i, 1])
         fall = moving / parameters[i, _STRIBECK_SPEED]
         stribeck = math.exp(-fall * fall)
         forward += parameters[i, _COULOMB_FORWARD] + parameters[i, _STRIBECK_FORWARD] * stribeck
@@ -119,6 +132,7 @@ def _torque(
         elif total < -most:
             total = -most
         out[i] = state[i, _FADE] * total
+        cogging[i] = state[i, _FADE] * min(max(periodic, -most), most)
 
 
 def _row(axis: AxisCompensation, period_s: float) -> list[float]:
@@ -161,7 +175,10 @@ class Compensation:
             if axis is not None:
                 self._tables[i] = axis.table_Nm
                 self._parameters[i] = _row(axis, period_s)
+        self._means = self._tables.mean(axis=2)
         self._state = np.zeros((n, _STATES))
+        self.cogging_Nm = np.zeros(n)
+        """The part of the torque last written that averages to nothing over a turn, (n,)."""
         self.available: BoolArray = self._parameters[:, _AVAILABLE] != 0.0
         """Which axes have a profile, (n,); until its index is known nothing comes of it."""
         self._period_s = period_s
@@ -195,15 +212,7 @@ class Compensation:
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""
         _torque(
-            self._tables,
-            self._parameters,
-            self._state,
-            self._period_s,
-            self._fade_step,
-            feedback.position_rad,
-            feedback.index_rad,
-            feedback.index_known,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            out,
-        )
+            self._tables, self._means, self._parameters, self._state, self._period_s,
+            self._fade_step, feedback.position_rad, feedback.index_rad, feedback.index_known,
+            setpoint.position_rad, setpoint.velocity_rad_s, out, self.cogging_Nm,
+        )  # fmt: skip

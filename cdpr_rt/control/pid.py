@@ -1,7 +1,8 @@
-"""PID position controller with derivative filter, anti-windup and a term known beforehand."""
+"""PID position controller with derivative filter, anti-windup and feed-forward torque."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,8 +11,15 @@ import numpy as np
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 
-# what an axis' last state says: how it goes on
-_RUNNING, _PRESET = 1.0, 2.0
+# the last state of an axis: whether its controller runs, or what its integral begins with
+_RUNNING, _BUMPLESS_START = 1.0, 2.0
+# speed and share of motion that an axis follows are smoothed over so long, the share kept so long
+# after the motion: friction goes on creeping while the rotor comes to rest
+_SPEED_S, _FOLLOWS_S, _KEPT_S = 0.05, 0.05, 1.0
+# slower set-points count as standing: a reading that flickers by a count would follow them
+_STANDS_RAD_S = 0.05
+# a larger error adds no more: it is a load's that swings, not what friction and cogging leave
+_MOST_FOLLOWING_RAD = math.radians(1.0)
 
 
 @dataclass(frozen=True)
@@ -22,16 +30,37 @@ class PidGains:
     integral_Nm_rad_s: float
     derivative_Nms_rad: float
     derivative_filter_s: float
+    following_Nm_rad_s: float = 0.0
+    """Added to the integral gain by the share of the set-point's motion that the axis follows."""
 
 
 class Compensation(Protocol):
-    """A torque known before the error appears: cogging and friction of each motor."""
+    """A feed-forward torque: cogging and friction of each motor."""
+
+    cogging_Nm: FloatArray
+    """The part of the torque last written that averages to nothing over a turn, (n,)."""
 
     def reset(self) -> None:
         """Forget the past."""
 
     def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
         """Write the torque to add, (n,), Nm."""
+
+
+@jit
+def _follow(state: FloatArray, period: float, position: float, speed: float) -> float:
+    """Return the share of the set-point's speed that an axis follows, 0 to 1; `state` is (3,).
+
+    It is none for an axis that something holds, whatever the set-point does.
+    """
+    state[1] += ((position - state[0]) / period - state[1]) * period / (_SPEED_S + period)
+    state[0] = position
+    if abs(speed) > _STANDS_RAD_S:
+        share = min(max(state[1] / speed, 0.0), 1.0)
+        state[2] += (share - state[2]) * period / (_FOLLOWS_S + period)
+    else:
+        state[2] -= state[2] * period / (_KEPT_S + period)
+    return float(state[2])
 
 
 @jit
@@ -42,7 +71,8 @@ def _update(
     state: FloatArray,
     position: FloatArray,
     reference: FloatArray,
-    known: FloatArray,
+    speed: FloatArray,
+    feedforward: FloatArray,
     effort: FloatArray,
     torque: FloatArray,
 ) -> None:
@@ -51,20 +81,26 @@ def _update(
         error = reference[i] - position[i]
         if state[i, 3] != _RUNNING:  # no error before this one to differentiate
             state[i, 1] = error
-            if state[i, 3] == _PRESET:
-                # what the error and the known torque do not account for is the integral's
-                state[i, 0] -= (kp + ki * period) * error + known[i]
+            state[i, 4] = position[i]
+            state[i, 5] = state[i, 6] = 0.0
+            if state[i, 3] == _BUMPLESS_START:
+                # what the error and the feed-forward torque do not account for is the integral's
+                state[i, 0] -= (kp + ki * period) * error + feedforward[i]
             state[i, 3] = _RUNNING
         slope = (filter_s * state[i, 2] + error - state[i, 1]) / (filter_s + period)
         integral = state[i, 0] + ki * period * error
+        if gains[i, 4] > 0.0:
+            share = _follow(state[i, 4:], period, position[i], speed[i])
+            near = min(max(error, -_MOST_FOLLOWING_RAD), _MOST_FOLLOWING_RAD)
+            integral += share * gains[i, 4] * period * near
         u = kp * error + integral + kd * slope
-        total = u + known[i]
+        total = u + feedforward[i]
         limited = min(max(total, -limit[i]), limit[i])
         if limited != total and (total - limited) * error > 0.0:
             # the integrator would only push further into the limit: keep it where it was
             integral = state[i, 0]
             u = kp * error + integral + kd * slope
-            limited = min(max(u + known[i], -limit[i]), limit[i])
+            limited = min(max(u + feedforward[i], -limit[i]), limit[i])
         state[i, 0] = integral
         state[i, 1] = error
         state[i, 2] = slope
@@ -76,8 +112,9 @@ class Pid:
     """PID on position plus an optional compensation, saturated (Tremblay, figure 1.8).
 
     The derivative is filtered by a first-order lag (backward difference); integration stops
-    while it would drive the torque further beyond its limit. Shapes: `gains` one per axis,
-    `limit_Nm` (n,).
+    while it would drive the torque further beyond its limit. While an axis follows a set-point that
+    moves, and shortly after, the integral may be quicker, so that it keeps up with cogging and
+    friction; an axis that is held follows nothing. Shapes: `gains` one per axis, `limit_Nm` (n,).
     """
 
     def __init__(
@@ -94,6 +131,7 @@ class Pid:
                     g.integral_Nm_rad_s,
                     g.derivative_Nms_rad,
                     g.derivative_filter_s,
+                    g.following_Nm_rad_s,
                 )
                 for g in gains
             ]
@@ -101,10 +139,11 @@ class Pid:
         self._limit = np.array(limit_Nm, float)
         self._period_s = period_s
         self._compensation = compensation
-        # integral, last error, filtered slope, how to go on
-        self._state = np.zeros((len(gains), 4))
+        # integral, last error, filtered slope, whether it runs; position, speed, share followed
+        self._state = np.zeros((len(gains), 7))
         self.effort_Nm = np.zeros(len(gains))
-        self.compensation_Nm = np.zeros(len(gains))
+        self.compensation_Nm = self.motor_loss_Nm = np.zeros(len(gains))
+        self.cogging_Nm = np.zeros(len(gains)) if compensation is None else compensation.cogging_Nm
 
     def reset(self) -> None:
         """Start anew: integral and slope zero."""
@@ -120,20 +159,14 @@ class Pid:
         """
         self.reset()
         self._state[:, 0] = torque_Nm
-        self._state[:, 3] = _PRESET
+        self._state[:, 3] = _BUMPLESS_START
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write the limited sum of PID and compensation."""
         if self._compensation is not None:
             self._compensation.torque(feedback, setpoint, self.compensation_Nm)
         _update(
-            self._gains,
-            self._limit,
-            self._period_s,
-            self._state,
-            feedback.position_rad,
-            setpoint.position_rad,
-            self.compensation_Nm,
-            self.effort_Nm,
+            self._gains, self._limit, self._period_s, self._state, feedback.position_rad,
+            setpoint.position_rad, setpoint.velocity_rad_s, self.compensation_Nm, self.effort_Nm,
             torque_Nm,
-        )
+        )  # fmt: skip

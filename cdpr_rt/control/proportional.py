@@ -36,7 +36,7 @@ class Proportional:
         self._gain = np.array(gain_Nm_rad, float)
         self._limit = np.array(limit_Nm, float)
         self.effort_Nm = np.zeros_like(self._gain)
-        self.compensation_Nm = np.zeros_like(self._gain)
+        self.compensation_Nm = self.motor_loss_Nm = self.cogging_Nm = np.zeros_like(self._gain)
 
     def reset(self) -> None:
         """Nothing is remembered."""
@@ -44,10 +44,6 @@ class Proportional:
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write the limited proportional torque."""
         _update(
-            self._gain,
-            self._limit,
-            feedback.position_rad,
-            setpoint.position_rad,
-            self.effort_Nm,
+            self._gain, self._limit, feedback.position_rad, setpoint.position_rad, self.effort_Nm,
             torque_Nm,
-        )
+        )  # fmt: skip

@@ -53,19 +53,19 @@ class Cycle:
         """CLOCK_MONOTONIC when this cycle's SYNC went out."""
         self.elapsed_s = device.period_s
         """From the last SYNC to this one; one period where cycles begin, or run in lockstep."""
-        self._first = True
+        self._no_elapsed_yet = True
         self._deadline_s = 0.0
-        self._fresh = True
+        self._no_deadline_yet = True
 
     def begin(self) -> None:
         """Tell that no cycles have run for a while: the next one is not late by it."""
-        self._fresh = self._first = True
+        self._no_deadline_yet = self._no_elapsed_yet = True
 
     def exchange(self) -> int:
         """Wait for the deadline, send SYNC, take in the answers; return how many axes answered."""
         if not self.device.lockstep:
             self._await_deadline()
-        self._take_time()
+        self._measure_elapsed()
         self.device.sync()
         return self.device.receive()
 
@@ -93,11 +93,11 @@ class Cycle:
                 return reason
         return ""
 
-    def _take_time(self) -> None:
+    def _measure_elapsed(self) -> None:
         device, now_ns = self.device, time.monotonic_ns()
-        steady = self._first or device.lockstep
+        steady = self._no_elapsed_yet or device.lockstep
         self.elapsed_s = device.period_s if steady else (now_ns - self.began_ns) * 1e-9
-        self.began_ns, self._first = now_ns, False
+        self.began_ns, self._no_elapsed_yet = now_ns, False
 
     def _await_deadline(self) -> None:
         period, clock = self.device.period_s, self.device.clock
@@ -106,9 +106,9 @@ class Cycle:
         if now < self._deadline_s:
             clock.sleep_until(self._deadline_s)
             now = clock.now_s
-        elif self._fresh:
+        elif self._no_deadline_yet:
             self._deadline_s = now
-        self._fresh = False
+        self._no_deadline_yet = False
         self.late_s = now - self._deadline_s
         if self.late_s > _TOO_LATE_SHARE * period:
             self._deadline_s = now  # a new time base: the next cycles are not run in a hurry

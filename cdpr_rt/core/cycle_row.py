@@ -35,11 +35,16 @@ class Field:
     status: bool = False
     """Whether the status shows it of each axis; it shows all that there is once a cycle."""
     live: bool = False
-    """Whether the live view shows it: angles in degrees, times in ms, the longest of each."""
+    """Whether the live view shows it: angles in degrees, wall times in ms, the longest of each."""
     metric: str = ""
-    """What Prometheus calls it, without prefix; "" where it is no metric."""
+    """What Prometheus calls it, without prefix: wall times are histograms; "" where it is none."""
     labels: type[LoopState] | type[Reaction] | None = None
     """What its numbers stand for."""
+
+    @property
+    def is_wall_time(self) -> bool:
+        """Whether it is a duration by the wall's clock, in seconds."""
+        return self.wall and self.kind == "<f8"
 
 
 def _listed(members: type[IntEnum], word: str) -> str:
@@ -103,6 +108,8 @@ SCALAR_FIELDS: Final = (
         "<f8",
         "last_program.stream_age_s",
         "age of the newest sample of the set-point stream; null without",
+        live=True,
+        metric="stream_age_seconds",
     ),
     Field(
         "stream_buttons",

@@ -96,7 +96,8 @@ def _update(
     position: FloatArray,
     torque: FloatArray,
     valid: BoolArray,
-    inner: FloatArray,
+    loss: FloatArray,
+    cogging: FloatArray,
     elapsed: float,
 ) -> None:
     for i in range(position.size):
@@ -104,8 +105,8 @@ def _update(
         own["elapsed"] += elapsed
         if not valid[i]:
             continue
-        # a measured friction of the winch has the motor's in it
-        outer = torque[i] - (inner[i] if winch[3, i] == 0.0 else 0.0)
+        # a measured friction of the winch has the motor's in it, but not its cogging
+        outer = torque[i] - (loss[i] if winch[3, i] == 0.0 else cogging[i])
         if own["started"] == 0.0:
             own["position"], own["torque"] = position[i], outer
             own["started"], velocity[i] = 1.0, 0.0
@@ -165,6 +166,8 @@ class Estimator:
         sensor_of_axis: Any = None,
     ) -> None:
         self.estimate = AxisEstimate(n)
+        self.origins_lost = 0
+        """How often lengths were forgotten: whether angles still count from the same origins."""
         self._period_s = period_s
         self._winch = (winches or WinchArrays.bare(n)).table()
         self.estimate.cable_m_per_rad[:] = self._winch[0]
@@ -173,7 +176,7 @@ class Estimator:
         sensors = range(n) if sensor_of_axis is None else sensor_of_axis
         self._sensor_of = np.array(sensors, np.int64)
         self._nothing = np.zeros(n)
-        self._taken: tuple[Any, Any] = (None, None)
+        self._taken: tuple[Any, Any, Any] = (None, None, None)
         """Whose arrays the kernel is bound to."""
         self._update: Callable[..., None] = _update
 
@@ -186,6 +189,11 @@ class Estimator:
         self.estimate.tension_measured[:] = False
         self.estimate.sensor_ok[:] = True
 
+    @property
+    def position_rad(self) -> FloatArray:
+        """The motors' angles as last heard, (n,)."""
+        return np.asarray(self._past["position"])
+
     def set_lengths(self, position_rad: FloatArray, length_m: FloatArray) -> None:
         """Take the cables to have `length_m` (n,) at the motor angles; nan leaves one as it is."""
         for i, length in enumerate(length_m):
@@ -196,6 +204,7 @@ class Estimator:
 
     def forget_lengths(self) -> None:
         """Take no length for known any more, such as after the drives have lost their origins."""
+        self.origins_lost += 1
         self._past["length_at_zero"] = np.nan
         self.estimate.length_known[:] = False
 
@@ -204,32 +213,31 @@ class Estimator:
         feedback: AxisFeedback,
         tension: TensionFeedback | None = None,
         elapsed_s: float = 0.0,
-        inner_Nm: FloatArray | None = None,
+        motor_loss_Nm: FloatArray | None = None,
+        cogging_Nm: FloatArray | None = None,
     ) -> None:
         """Take in this cycle's feedback and the tensions as last read.
 
-        `elapsed_s` is from the last SYNC to this one, where it was not one period; `inner_Nm` (n,)
-        is the part of the torque that the motors' own cogging and friction take up.
+        `elapsed_s` is from the last SYNC to this one, where it was not one period; `motor_loss_Nm`
+        (n,) is the part of the torque that the motors' own cogging and friction take up,
+        `cogging_Nm` (n,) what cogging alone does.
         """
-        told = self.estimate
-        told.elapsed_s = elapsed_s or self._period_s
-        inner_Nm = self._nothing if inner_Nm is None else inner_Nm
+        estimate = self.estimate
+        estimate.elapsed_s = elapsed_s or self._period_s
+        loss = self._nothing if motor_loss_Nm is None else motor_loss_Nm
+        cogging = self._nothing if cogging_Nm is None else cogging_Nm
         taken = self._taken
-        if feedback is not taken[0] or inner_Nm is not taken[1]:
-            self._bind(feedback, inner_Nm)
-        self._update(told.elapsed_s)
+        if feedback is not taken[0] or loss is not taken[1] or cogging is not taken[2]:
+            self._bind(feedback, loss, cogging)
+        self._update(estimate.elapsed_s)
         if tension is not None:
             _take_sensors(
-                self._sensor_of,
-                tension.tension_N,
-                tension.valid,
-                told.tension_N,
-                told.tension_measured,
-                told.sensor_ok,
-            )
+                self._sensor_of, tension.tension_N, tension.valid, estimate.tension_N,
+                estimate.tension_measured, estimate.sensor_ok,
+            )  # fmt: skip
 
-    def _bind(self, feedback: AxisFeedback, inner_Nm: FloatArray) -> None:
-        self._taken = feedback, inner_Nm
+    def _bind(self, feedback: AxisFeedback, loss: FloatArray, cogging: FloatArray) -> None:
+        self._taken = feedback, loss, cogging
         self._update = bound(
             _update,
             self._winch,
@@ -240,6 +248,7 @@ class Estimator:
             feedback.position_rad,
             feedback.torque_Nm,
             feedback.valid,
-            inner_Nm,
+            loss,
+            cogging,
             then=(0.0,),
         )

@@ -57,6 +57,7 @@ class Setpoint:
         self.position_rad: FloatArray = np.zeros(n)
         self.velocity_rad_s: FloatArray = np.zeros(n)
         self.acceleration_rad_s2: FloatArray = np.zeros(n)
+        self.arrays = (self.position_rad, self.velocity_rad_s, self.acceleration_rad_s2)
 
 
 class AxisDevice(Protocol):

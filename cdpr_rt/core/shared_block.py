@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from cdpr_rt.core.cycle_row import Row, cycle_dtype
 from cdpr_rt.errors import ControlError
 
-MAGIC: Final = 0x63647072_72743032
+MAGIC: Final = 0x63647072_72743033
 MOST_AXES: Final = 16
 # other processors let a reader see a counter before what it counts
 _IN_ORDER: Final = ("x86_64", "i686", "i386")
@@ -33,6 +33,9 @@ SAMPLES: Final = 64
 # who shortened the file would kill everybody who reads behind its end (SIGBUS)
 _SEALS: Final = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
+PATH: Final = np.dtype([("name", "S32"), ("time_s", "<f8"), ("over", "<i8")])
+"""A planned path, up to what time of it the platform has come, and whether nothing is left of it.
+"""
 _COUNTERS: Final = np.dtype(
     [
         ("magic", "<u8"),
@@ -44,9 +47,9 @@ _COUNTERS: Final = np.dtype(
         ("start_realtime_ns", "<i8"),
         ("loop_alive_ns", "<i8"),  # CLOCK_MONOTONIC of the loop's last turn, cycling or not
         ("service_alive_ns", "<i8"),  # of the service's last turn, 0 before the first
-        ("right_number", "<u8"),  # grows with every taking of the right to move
-        ("right_until_ns", "<i8"),  # until when the newest taking holds, 0 where it has ended
-        ("mover", "<u8"),  # number of the taking on whose behalf the loop moves, 0 for nobody's
+        ("right_number", "<u8"),  # grows with every grant of the right to move
+        ("right_until_ns", "<i8"),  # until when the newest grant holds, 0 where it has ended
+        ("mover", "<u8"),  # number of the grant on whose behalf the loop moves, 0 for nobody's
         ("rows", "<u8"),  # rows written since the beginning
         ("recorded", "<u8"),  # of them, those that are safe in the recording
         ("description", "<u8"),  # versions of the texts; odd while one is being written
@@ -59,6 +62,7 @@ _COUNTERS: Final = np.dtype(
         ("replies", "<u8"),
         ("replies_taken", "<u8"),
         ("samples", "<u8"),
+        ("path", PATH),  # the loop's
     ]
 )
 SAMPLE: Final = np.dtype(
@@ -71,7 +75,7 @@ SAMPLE: Final = np.dtype(
         ("scale", "<f8"),
         ("buttons", "<u4"),
         ("session", "<u4"),
-        ("right", "<u8"),  # number of the taking of the right to move under which it came
+        ("right", "<u8"),  # number of the grant of the right to move under which it came
     ]
 )
 """One sample of the set-point stream; `sequence` only grows within a session."""

@@ -26,6 +26,10 @@ class LoopState(IntEnum):
         return self.name.lower()
 
 
+CUT_SHORT: Final = "the power was taken at once while the loop was ending"
+"""The reason of a fault that an impatient launcher, or user, has made."""
+
+
 class Transition(IntEnum):
     """What an operator may ask for."""
 

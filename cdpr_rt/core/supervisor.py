@@ -34,7 +34,7 @@ _PAST: Final = np.dtype(
         ("torque", "<f8"),  # as passed on in the last cycle
         ("missed", "<f8"),  # consecutive
         ("in_window", "<f8"),
-        ("turn", "<i8"),  # where in the window the last cycle is
+        ("window_index", "<i8"),  # where in the window the last cycle is
         ("stale", "<f8"),
         ("low_s", "<f8"),  # since the tension was last sufficient
         ("slack_s", "<f8"),
@@ -42,10 +42,10 @@ _PAST: Final = np.dtype(
         ("may_be_low", "<f8"),  # whether it was since enabling, or since this was told last
         ("may_be_slack", "<f8"),
         ("mean_N", "<f8"),  # its tension, low-passed
-        ("heard", "<f8"),  # how often its angle was since enabling, up to 2
-        ("heard_rad", "<f8"),  # when it was last
-        ("pace_rad_s", "<f8"),  # how fast it turned then
-        ("unheard_s", "<f8"),  # for how long it was not
+        ("valid_count", "<f8"),  # valid angles since enabling, up to 2
+        ("valid_rad", "<f8"),  # the last valid angle
+        ("velocity_rad_s", "<f8"),  # then
+        ("invalid_s", "<f8"),  # since the last valid angle
     ]
 )
 _VERDICT: Final = np.dtype(
@@ -95,10 +95,10 @@ def _watch_answers(
 ) -> None:
     missed = 0 if valid else 1
     # where this cycle's flag goes, that of one window ago still is
-    past["turn"] = turn = (past["turn"] + 1) % window.shape[0]
+    past["window_index"] = index = (past["window_index"] + 1) % window.shape[0]
     past["missed"] = 0.0 if valid else past["missed"] + 1.0
-    past["in_window"] += missed - window[turn, i]
-    window[turn, i] = missed
+    past["in_window"] += missed - window[index, i]
+    window[index, i] = missed
     past["stale"] = 0.0 if fair else past["stale"] + 1.0
     if past["missed"] > lim["missed_cycles"]:
         _judge(verdict, reactions, _MISSED, i, past["missed"], lim["missed_cycles"])
@@ -112,15 +112,15 @@ def _watch_answers(
 def _watch_jumps(
     i: int, lim: Any, past: Any, reactions: Any, verdict: Any, elapsed: float, position: float
 ) -> None:
-    past["unheard_s"] += elapsed
-    step = position - past["heard_rad"]
-    jump = step - past["pace_rad_s"] * past["unheard_s"]
-    possible = lim["speed_rad_s"] * past["unheard_s"] + _JUMP_rad
-    if past["heard"] == 2.0 and abs(jump) > possible:
+    past["invalid_s"] += elapsed
+    step = position - past["valid_rad"]
+    jump = step - past["velocity_rad_s"] * past["invalid_s"]
+    possible = lim["speed_rad_s"] * past["invalid_s"] + _JUMP_rad
+    if past["valid_count"] == 2.0 and abs(jump) > possible:
         _judge(verdict, reactions, _ENCODER_JUMP, i, jump, possible)
-    past["pace_rad_s"] = step / past["unheard_s"] if past["heard"] else 0.0
-    past["heard"] = min(past["heard"] + 1.0, 2.0)
-    past["heard_rad"], past["unheard_s"] = position, 0.0
+    past["velocity_rad_s"] = step / past["invalid_s"] if past["valid_count"] else 0.0
+    past["valid_count"] = min(past["valid_count"] + 1.0, 2.0)
+    past["valid_rad"], past["invalid_s"] = position, 0.0
 
 
 @jit
@@ -228,7 +228,7 @@ def _check(
         fair = alive[i] and rate_ok[i]
         _watch_answers(i, lim, own, reactions, verdict, valid[i], fair, window)
         if not valid[i]:
-            own["unheard_s"] += elapsed
+            own["invalid_s"] += elapsed
             continue
         _watch_jumps(i, lim, own, reactions, verdict, elapsed, position[i])
         winding_in = -velocity[i] * np.sign(cable_m_per_rad[i])
@@ -256,7 +256,7 @@ class Supervisor:
 
     def __init__(self, limits: Limits, n: int, period_s: float, names: Sequence[str] = ()) -> None:
         self.limits = limits
-        self._names = tuple(names) or tuple(f"axis {i}" for i in range(n))
+        self._names = tuple(names) or tuple(f"axis {i + 1}" for i in range(n))
         self._limits = np.zeros(n, _LIMITS)
         for name in _FIGURES:
             self._limits[name] = getattr(limits, name)
@@ -379,8 +379,8 @@ class Supervisor:
         limit = self.limit
         if self._told or not limit:
             return self._told
-        told = limit.text.format(limit.factor * self.value, limit.factor * self.allowed)
-        return told if self.axis < 0 else f"{self._names[self.axis]}: {told}"
+        text = limit.text.format(limit.factor * self.value, limit.factor * self.allowed)
+        return text if self.axis < 0 else f"{self._names[self.axis]}: {text}"
 
     def details(self) -> dict[str, Any] | None:
         """Return the same for a program, None where nothing was exceeded."""

@@ -61,34 +61,38 @@ class TensionExchange:
 
     def publish(self, cable: int, tension_N: float, time_s: float, fault: TensionFault) -> None:
         """Store one reading; a reading with a fault keeps its value for who wants to look."""
-        told = self.feedback
-        told.tension_N[cable] = tension_N
-        told.time_s[cable] = time_s
+        feedback = self.feedback
+        feedback.tension_N[cable] = tension_N
+        feedback.time_s[cable] = time_s
         self._fault[cable] = fault
 
     def update(self) -> None:
         """Bring `feedback` up to date; for the cycle: no array made."""
-        told = self.feedback
-        np.subtract(self._clock.now_s, told.time_s, out=told.age_s)
-        np.copyto(told.fault, self._fault)
-        np.greater(told.age_s, self.stale_after_s, out=self._stale)
+        feedback = self.feedback
+        np.subtract(self._clock.now_s, feedback.time_s, out=feedback.age_s)
+        np.copyto(feedback.fault, self._fault)
+        np.greater(feedback.age_s, self.stale_after_s, out=self._stale)
         # before the first reading the fault says so, and age is without end
-        np.logical_and(self._stale, np.isfinite(told.age_s, out=told.valid), out=self._stale)
-        np.putmask(told.fault, self._stale, TensionFault.STALE)
-        np.equal(told.fault, TensionFault.NONE, out=told.valid)
+        np.logical_and(
+            self._stale, np.isfinite(feedback.age_s, out=feedback.valid), out=self._stale
+        )
+        np.putmask(feedback.fault, self._stale, TensionFault.STALE)
+        np.equal(feedback.fault, TensionFault.NONE, out=feedback.valid)
 
     def reason(self) -> str:
         """Return why the tensions cannot be relied on, after `update`, or an empty text."""
-        told = self.feedback
-        if told.valid.all():
+        feedback = self.feedback
+        if feedback.valid.all():
             return ""
-        i = int(np.argmin(told.valid))
-        fault = TensionFault(int(told.fault[i]))
+        i = int(np.argmin(feedback.valid))
+        fault = TensionFault(int(feedback.fault[i]))
         text = f"{self.cables[i]}: tension sensor: {fault.label}"
         if fault is TensionFault.STALE:
-            return f"{text}, last read {told.age_s[i]:.2f} s ago, {self.stale_after_s:g} s allowed"
+            return (
+                f"{text}, last read {feedback.age_s[i]:.2f} s ago, {self.stale_after_s:g} s allowed"
+            )
         if fault is TensionFault.OVER_RANGE:
-            return f"{text} ({told.tension_N[i]:.1f} N)"
+            return f"{text} ({feedback.tension_N[i]:.1f} N)"
         return text
 
 

@@ -25,11 +25,11 @@ def _turn(
     pose: FloatArray,
     last: FloatArray,
     target: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
     goal: FloatArray,
 ) -> None:
     """Write the target's rotation, turned as the hand was about the room's axes `about`."""
-    delta, vector, here, there = room[0], room[1], room[2], room[3]
+    delta, vector, here, there = scratch[0], scratch[1], scratch[2], scratch[3]
     multiply(pose[3:], last[3:], True, delta)
     to_rotation_vector(delta, here[:3])
     vector[:] = there[:] = 0.0
@@ -45,6 +45,21 @@ def _turn(
 
 
 @jit
+def _limit_turn(k: int, angle: float, target: FloatArray, goal: FloatArray) -> int:
+    """Keep the rotation vector in `goal` within `angle`, or what it is beyond that already."""
+    turned = had = 0.0
+    for i in range(k, goal.size):
+        turned += goal[i] ** 2
+        had += target[i] ** 2
+    turned, most = math.sqrt(turned), max(angle, math.sqrt(had))
+    if not turned > most:
+        return FREE
+    for i in range(k, goal.size):
+        goal[i] *= most / turned
+    return AT_EDGE
+
+
+@jit
 def lead(
     scale: float,
     pose: FloatArray,
@@ -57,7 +72,7 @@ def lead(
     acceleration: FloatArray,
     position: FloatArray,
     target: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
     goal: FloatArray,
 ) -> int:
     """Write into `goal` the target (d,) moved as the hand was since `last`; return what limits it.
@@ -65,13 +80,13 @@ def lead(
     The coordinates (k,) move by `scale` times the hand's displacement, within the box from `low` to
     `high`; the rotation vector (d - k,) turns with it, within `angle`. `pose` and `last` are the
     hand's poses (7,), the last one is overwritten; `about` (d - k,) which axes are turned about;
-    `room` (4, 4) is overwritten.
+    `scratch` (4, 4) is overwritten.
     """
     k, up, edge = low.size, low.size - 1, FREE
     stands = position[up] < low[up] - _BELOW_m
     goal[:] = target
     if about.size > 0 and not stands:
-        _turn(k, about, pose, last, target, room, goal)
+        _turn(k, about, pose, last, target, scratch, goal)
     for i in range(k):
         moved = scale * (pose[i] - last[i])
         # on its stand the platform is not dragged sideways
@@ -90,13 +105,4 @@ def lead(
         if goal[i] < least or goal[i] > most:
             edge = max(edge, AT_EDGE)
             goal[i] = min(max(goal[i], least), most)
-    turned = had = 0.0
-    for i in range(k, goal.size):
-        turned += goal[i] ** 2
-        had += target[i] ** 2
-    turned, most = math.sqrt(turned), max(angle, math.sqrt(had))
-    if turned > most:
-        edge = max(edge, AT_EDGE)
-        for i in range(k, goal.size):
-            goal[i] *= most / turned
-    return edge
+    return max(edge, _limit_turn(k, angle, target, goal))

@@ -268,20 +268,10 @@ def receive(
         row[SCALE] = scale[slot]
         row[BUTTONS] = buttons[slot]
         _accept(
-            sequence[slot],
-            session[slot],
-            1e-9 * np.float64(sent_ns[slot]),
-            row,
-            most_m_s,
-            most_rad_s,
-            scalars[NOW] - scalars[ARRIVED] > silence_s,
-            played,
-            times,
-            sequences,
-            rows,
-            scalars,
-            counts,
-        )
+            sequence[slot], session[slot], 1e-9 * np.float64(sent_ns[slot]), row, most_m_s,
+            most_rad_s, scalars[NOW] - scalars[ARRIVED] > silence_s, played, times, sequences,
+            rows, scalars, counts,
+        )  # fmt: skip
 
 
 @jit

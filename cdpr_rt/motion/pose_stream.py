@@ -123,16 +123,9 @@ class PoseStream:
     def _receive(self, first: int, last: int) -> None:
         settings = self._settings
         playback.receive(
-            first,
-            last,
-            *self._fields,
-            int(self._mover[0]),
-            settings.fastest_m_s,
-            settings.fastest_rad_s,
-            settings.silence_s,
-            self._row,
-            *self._state,
-        )
+            first, last, *self._fields, int(self._mover[0]), settings.fastest_m_s,
+            settings.fastest_rad_s, settings.silence_s, self._row, *self._state,
+        )  # fmt: skip
 
     @property
     def epoch(self) -> int:

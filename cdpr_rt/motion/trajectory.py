@@ -1,4 +1,4 @@
-"""Set-points over time: a leg with a trapezoidal velocity profile."""
+"""Set-points over time: a move with a trapezoidal velocity profile."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _fill(
 
 
 class Motion(Protocol):
-    """A set-point over time, such as a `Leg`."""
+    """A set-point over time, such as a `TrapezoidalMove`."""
 
     duration_s: float
 
@@ -50,10 +50,10 @@ class Motion(Protocol):
         """Write the set-point at `time_s` after the start."""
 
     def brake(self, time_s: float) -> Motion:
-        """Return the motion that, entered at half its time, stops from the state at `time_s`."""
+        """Return the motion whose second half stops from the state at `time_s`; skip its first."""
 
 
-class Leg:
+class TrapezoidalMove:
     """A move of n axes at constant velocity, with a linear velocity ramp before and after.
 
     Parameters: `start_rad` (n,) and `velocity_rad_s` (n,), signed; `cruise_s` seconds at full
@@ -77,31 +77,25 @@ class Leg:
         self.duration_s = self.cruise_s + 2.0 * self.ramp_s + settle_s
 
     def fill(self, time_s: float, setpoint: Setpoint) -> None:
-        """Write the set-point at `time_s` after the leg's start."""
+        """Write the set-point at `time_s` after the move's start."""
         _fill(
-            time_s,
-            self.start_rad,
-            self.velocity_rad_s,
-            self.ramp_s,
-            self.cruise_s,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            setpoint.acceleration_rad_s2,
-        )
+            time_s, self.start_rad, self.velocity_rad_s, self.ramp_s, self.cruise_s,
+            *setpoint.arrays,
+        )  # fmt: skip
 
     def end_rad(self) -> FloatArray:
-        """Return where the leg ends, (n,)."""
+        """Return where the move ends, (n,)."""
         return self.start_rad + self.velocity_rad_s * (self.cruise_s + self.ramp_s)
 
-    def brake(self, time_s: float) -> Leg:
-        """Return the leg that, entered at its time `ramp_s`, stops from the motion at `time_s`."""
+    def brake(self, time_s: float) -> TrapezoidalMove:
+        """Return the move whose second ramp, from `ramp_s` on, stops the motion at `time_s`."""
         now = Setpoint(self.start_rad.size)
         self.fill(time_s, now)
         start = now.position_rad - 0.5 * self.ramp_s * now.velocity_rad_s
-        return Leg(start, now.velocity_rad_s, 0.0, self.ramp_s)
+        return TrapezoidalMove(start, now.velocity_rad_s, 0.0, self.ramp_s)
 
 
-class Hold(Leg):
+class Hold(TrapezoidalMove):
     """Standing still at `position_rad` (n,) for `duration_s`."""
 
     def __init__(self, position_rad: FloatArray, duration_s: float) -> None:

@@ -15,7 +15,7 @@ from cdpr_rt.core.exchange import BoolArray, FloatArray
 from cdpr_rt.core.rawlog import RawLog, RawLogWriter, column_names
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.identification import SweepData
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.runtime.operating import Operator
 
 
@@ -33,11 +33,11 @@ class Pass:
     with_ramps: bool = False
     """Whether speeding up and slowing down count too, as they must to tell the inertia."""
 
-    def leg(self, start_rad: FloatArray) -> Leg:
+    def move(self, start_rad: FloatArray) -> TrapezoidalMove:
         """Return the set-point of n axes that start at `start_rad` (n,)."""
         cruise = (self.lead_in_rad + self.distance_rad) / abs(self.speed_rad_s)
         speed = np.full(np.shape(start_rad), self.speed_rad_s)
-        return Leg(start_rad, speed, cruise, self.ramp_s)
+        return TrapezoidalMove(start_rad, speed, cruise, self.ramp_s)
 
     def duration_s(self) -> float:
         """Return how long the pass takes."""
@@ -82,8 +82,8 @@ def run_pass(
     }
     log = RawLogWriter(path, column_names(device.n), meta)
     try:
-        leg = what.leg(device.feedback.position_rad)
-        operator.follow(controller, leg, log, on_progress)
+        move = what.move(device.feedback.position_rad)
+        operator.follow(controller, move, log, on_progress)
     finally:
         log.close()
     return path

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol
 
 from cdpr_rt.control.base import Controller
@@ -34,11 +34,24 @@ class Program(Protocol):
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque, (n,) each, as the last cycle left them."""
 
-    def check(self, arguments: Mapping[str, Any]) -> None:
-        """Raise ProgramError where `command` would, of a program that need not run."""
+    def preparation(self, arguments: Mapping[str, Any]) -> Callable[[], None] | None:
+        """Return what has to be done before a command with these arguments, None for nothing.
+
+        It may take its time, as reading a file does, and is called in another thread; what it
+        raises refuses the command.
+        """
+
+    def check(self, arguments: Mapping[str, Any]) -> Any:
+        """Return what `apply` takes; raises ProgramError for what is refused, and changes nothing.
+
+        The program need not run.
+        """
+
+    def apply(self, checked: Any) -> None:
+        """Apply a command that has been checked since the last cycle."""
 
     def command(self, arguments: Mapping[str, Any]) -> None:
-        """Apply a command; raises ProgramError and changes nothing then."""
+        """Check a command and apply it; raises ProgramError and changes nothing then."""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write this cycle's set-point and torques, (n,) each, in place."""

@@ -57,9 +57,7 @@ class IdleProgram(ProgramDefaults):
             self._period_s,
             self._first,
             feedback.position_rad,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            setpoint.acceleration_rad_s2,
+            *setpoint.arrays,
         )
         self._first = False
         self._loop.update(feedback, setpoint, torque_Nm)

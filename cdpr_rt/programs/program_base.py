@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from cdpr_rt.core.exchange import FloatArray
@@ -16,13 +16,20 @@ class ProgramDefaults:
 
     name: str
 
-    def check(self, arguments: Mapping[str, Any]) -> None:
+    def preparation(self, _arguments: Mapping[str, Any]) -> Callable[[], None] | None:
+        """Return None: commands need nothing to be done before."""
+        return None
+
+    def check(self, arguments: Mapping[str, Any]) -> Any:
         """Raise ProgramError for any argument."""
         CommandArguments(self.name, arguments, ())
 
+    def apply(self, checked: Any) -> None:
+        """Change nothing."""
+
     def command(self, arguments: Mapping[str, Any]) -> None:
-        """Raise ProgramError where `check` does."""
-        self.check(arguments)
+        """Check a command and apply it; raises ProgramError where `check` does."""
+        self.apply(self.check(arguments))
 
     @property
     def rest_s(self) -> float:
@@ -63,17 +70,21 @@ class CommandedProgram(ProgramDefaults):
     _stopping = False
     _at_rest = True
 
-    def check(self, arguments: Mapping[str, Any]) -> None:
-        """Raise ProgramError where `command` would, of a program that need not run."""
-        self._parsed(arguments)
+    def check(self, arguments: Mapping[str, Any]) -> Any:
+        """Return what `apply` takes; raises ProgramError for what is refused."""
+        return self._parsed(arguments)
+
+    def apply(self, checked: Any) -> None:
+        """Apply a command that has been checked."""
+        self._at_rest = False
+        self._take(checked)
 
     def command(self, arguments: Mapping[str, Any]) -> None:
-        """Apply a command; raises ProgramError and changes nothing then."""
-        parsed = self._parsed(arguments)
+        """Check a command and apply it; raises ProgramError and changes nothing then."""
+        checked = self.check(arguments)
         if self._stopping:
             raise ProgramError(f"{self.name}: it is being stopped; start it anew")
-        self._at_rest = False
-        self._take(parsed)
+        self.apply(checked)
 
     def stop(self) -> None:
         """Begin to brake to a standstill."""

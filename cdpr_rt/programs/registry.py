@@ -21,36 +21,34 @@ from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import RobotModel
 from cdpr_rt.programs.platform.lower import LowerProgram
-from cdpr_rt.programs.platform.path import PathProgram
+from cdpr_rt.programs.platform.paths.path import PathProgram
 from cdpr_rt.programs.platform.platform_axes import PlatformHold, PlatformIdle, PlatformJog
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.pose import PoseProgram
-from cdpr_rt.programs.platform.pretension import PretensionProgram
+from cdpr_rt.programs.platform.tightening.pretension import PretensionProgram
 from cdpr_rt.robots.platform_control import platform_control
-from cdpr_rt.robots.platform_model import platform_model
+from cdpr_rt.robots.platform_model import platform_model_of
 
 _WARM_UP_CYCLES = 5
 
 
 def platform_parts(
-    robot: Robot, limits: Limits, model: RobotModel, estimator: Estimator
+    robot: Robot, limits: Limits, model: RobotModel, estimator: Estimator, *, learns: bool = True
 ) -> PlatformParts | None:
     """Return what the programs of a platform share; None where there is none.
 
+    `learns`: of motors that were not commissioned, friction and cogging are learnt in motion.
     Raises GeometryError where its tensions have no bounds to hold it by.
     """
-    platform = robot.platform
-    if platform is None:
+    if robot.platform is None:
         return None
-    low, high = (
-        np.broadcast_to(bound, (model.n,)).astype(float)
-        for bound in (limits.tension_min_N, limits.tension_max_N)
-    )
     known = None
     if any(axis is not None for axis in model.compensation):
         known = Compensation(list(model.compensation), model.period_s)
-    of_platform = platform_model(platform, low, high)
-    control = platform_control(of_platform, robot.axes, model.torque_Nm, model.period_s, known)
+    of_platform = platform_model_of(robot)
+    control = platform_control(
+        of_platform, robot.axes, model.torque_Nm, model.period_s, known, learns=learns
+    )
     return PlatformParts(
         of_platform, control, estimator, model.period_s, known, limits.lengths_disagree_m
     )

@@ -12,7 +12,7 @@ from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.loop_design import loop_model_of
+from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.rigid_body import in_space, is_point
 from cdpr_rt.robots.robot_arrays import limits_of
@@ -139,7 +139,7 @@ def _not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatA
     if not math.isfinite(reserve):
         return f"{where} {_singular(statics)}"
     needed = ", ".join(f"{value:.0f}" for value in statics.tensions_N(position_m, turn_rad))
-    allowed = f"{statics.low_N.min():g} to {statics.high_N.max():g} N are allowed"
+    allowed = f"{statics.low_N.min():g} to {statics.model.left_by_torque_N.max():g} N are allowed"
     if reserve < 0.0:
         text = f"{where} the cables would need {needed} N; {allowed}"
     else:
@@ -171,7 +171,8 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     most, mass_kg = platform.acceleration_m_s2, platform.mass_kg
 
     def helps(platform: Platform, low_N: FloatArray) -> bool:
-        changed = PlatformStatics(platform_model(platform, low_N, statics.high_N))
+        bounds = (low_N, statics.high_N, statics.model.left_by_torque_N)
+        changed = PlatformStatics(platform_model(platform, *bounds))
         return bool(changed.is_target(position_m, turn_rad))
 
     for share in _SHARES if turn_rad.any() else ():
@@ -194,6 +195,14 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     return "only a place further inside the exit points helps"
 
 
+def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
+    """Return the greatest tensions (n,), N, with which the platform stands in its box."""
+    points = statics.points()
+    taken = points[statics.is_target(points)]
+    held_N = statics.least_tensions_N(taken, reserve_N=statics.model.reserve_N)
+    return np.asarray(held_N.max(axis=0, initial=0.0))
+
+
 def _motors(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     limits, platform = limits_of(robot), statics.platform
     arm_m = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
@@ -208,11 +217,7 @@ def _motors(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
         )
         yield Finding("limits.tension_max_N", text, impossible=True)
     rated_Nm = np.array([axis.winch.motor.rated_torque_Nm for axis in robot.axes])
-    points = statics.points()
-    taken = points[statics.is_target(points)]
-    held_N = statics.least_tensions_N(taken, reserve_N=statics.model.reserve_N).max(
-        axis=0, initial=0.0
-    )
+    held_N = standing_tensions_N(statics)
     i = int((held_N * arm_m / rated_Nm).argmax())
     if held_N[i] * arm_m[i] > rated_Nm[i]:
         text = (
@@ -270,10 +275,10 @@ def _turning(statics: PlatformStatics) -> Iterator[Finding]:
 
 def _loop(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
     try:
-        loop = loop_model_of(statics.model, robot.axes, robot.sync_period_s)
+        loop = designed_loop(statics.model, robot.axes, robot.sync_period_s)
     except GeometryError:
         return  # said of the tensions
-    slowest_Hz = min(there.slowest_rad_s for there in loop.margins(loop.design())) / math.tau
+    slowest_Hz = loop.slowest_rad_s / math.tau
     if slowest_Hz < _SLOW_Hz:
         text = (
             f"a stable loop moves the platform's slowest mode at {slowest_Hz:.2g} Hz, so that it "
@@ -294,15 +299,20 @@ def _swinging(platform: Platform) -> Iterator[Finding]:
         yield Finding("platform.controlled", text, impossible=False)
 
 
-def _standing(statics: PlatformStatics) -> Iterator[Finding]:
-    """Look whether a turned platform meets, at the bottom of its box, what it stands on at home."""
+def lower_when_turned_m(statics: PlatformStatics) -> float:
+    """Return how much lower than at home the lowest anchor point of a turned platform may be, m."""
     platform, up = statics.platform, statics.model.positions - 1
     angle = platform.workspace_angle_rad
     b = np.array([in_space(point) for point in platform.anchor_points_m])
     b = b @ statics.model.home_pose.Q.T
-    height = b[:, up]
-    aside = np.linalg.norm(b[:, :up], axis=1)
-    lower_m = float(height.min() - (math.cos(angle) * height - math.sin(angle) * aside).min())
+    height, aside = b[:, up], np.linalg.norm(b[:, :up], axis=1)
+    return float(height.min() - (math.cos(angle) * height - math.sin(angle) * aside).min())
+
+
+def _standing(statics: PlatformStatics) -> Iterator[Finding]:
+    """Look whether a turned platform meets, at the bottom of its box, what it stands on at home."""
+    platform, up = statics.platform, statics.model.positions - 1
+    angle, lower_m = platform.workspace_angle_rad, lower_when_turned_m(statics)
     above_m = platform.workspace_min_m[up] - platform.home_m[up]
     if angle > 0.0 and lower_m > above_m:
         text = (

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from cdpr_rt.control.base import Controller
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray
 from cdpr_rt.robots.kinematics.pose import Pose
 
 
@@ -99,11 +99,42 @@ class PlatformControl(Controller, Protocol):
         """Where the platform is, (7,): x y z, quaternion w x y z."""
 
     @property
+    def swing_rad(self) -> float:
+        """By how much a platform that no cable keeps from turning may swing to and fro; else 0."""
+
+    @property
+    def swing_m(self) -> float:
+        """By how much an anchor point of such a platform may swing to and fro; else 0."""
+
+    @property
     def free_lengths_m(self) -> FloatArray:
         """Lengths of the cables without tension, as the motors' angles have them."""
 
+    @property
+    def learnt_Nm(self) -> FloatArray | None:
+        """Friction and cogging of each motor as learnt in motion, (2, n); None: nothing is."""
+
+    def forget_motors(self) -> None:
+        """Forget what was learnt of the motors, as where their encoders have begun anew."""
+
+    def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None:
+        """Hold the cables' tensions by readings (n,), kept up to date by others, where valid."""
+
+    @property
+    def cell_trouble(self) -> str:
+        """Which load cell is off and by how much, an empty text for none; kept once it is told."""
+
+    def trust_cells(self) -> None:
+        """Forget which load cell was off."""
+
     def begin(self, feedback: AxisFeedback) -> None:
         """Take the motors to stand where they are, and the platform where its cables have it."""
+
+    def observe(self, feedback: AxisFeedback) -> None:
+        """Bring the estimate of the platform's pose up to date, by one cycle."""
+
+    def clear_compensation(self) -> None:
+        """Have it said that nothing is added, while a program drives the winches itself."""
 
     def stand_still(self) -> None:
         """Have the set-point stand where the platform is."""
@@ -119,6 +150,19 @@ class PlatformControl(Controller, Protocol):
 
     def stands(self, position: FloatArray) -> bool:
         """Return whether the platform can be held, and accelerated, at a position."""
+
+    def nears(self, position: FloatArray) -> int:
+        """Return a pair of things in contact on a short straight way from the set-point, -1: none.
+
+        Cables, platform and boxes of the frame, by the clearance of the robot's file; what is in
+        contact at the set-point already may leave.
+        """
+
+    def touches(self, position: FloatArray) -> int:
+        """Return a pair of things in contact at a position, nearer than at the set-point."""
+
+    def contact(self, pair: int) -> str:
+        """Return in words that a pair is in contact."""
 
     def feasible(self, position: FloatArray) -> str:
         """Return why the platform cannot stand at a position, an empty text where it can."""

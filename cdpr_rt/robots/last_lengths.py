@@ -16,6 +16,7 @@ from cdpr_rt.core.exchange import AxisFeedback, FloatArray
 from cdpr_rt.state_file import StateFileError, read_state, write_state
 
 _FIELDS = ("cable_length_m", "cable_at_index_m")
+_FLAGS = ("fallen", "displaced")
 _MOST_OF_LONGEST = 2.0
 """A platform that was let down anywhere has its cables paid out further than in use."""
 
@@ -49,6 +50,8 @@ class LastLengths:
         """Why there are none, where there are none."""
         self.displaced = False
         """Whether the platform has been let go since, other than at home."""
+        self.fallen = False
+        """Whether it hung, or may have, when the power was taken at once or a drive was lost."""
 
     def load(self, n: int, longest_m: float) -> None:
         """Read the file of a robot with n axes; one that is damaged leaves none.
@@ -63,17 +66,22 @@ class LastLengths:
             if held is not None:
                 self._take(held, n, most_m)
         except StateFileError as error:
-            self.why = str(error)
+            self.why, self.fallen = str(error), True
         except (KeyError, TypeError, ValueError):
             self.why = (
                 f"{self.path}: is damaged: lengths of {n} cables are wanted, in metres, up to "
                 f"{most_m:.4g}"
             )
+            self.fallen = True
 
     def _take(self, held: dict[str, Any], n: int, most_m: float) -> None:
         if held["stopped"] is not True:
             self.why = f"{self.path}: the robot was in motion when it was last heard of"
+            self.fallen = True
             return
+        self.fallen, self.displaced = (held.get(key, False) is not False for key in _FLAGS)
+        if not held.keys() & set(_FIELDS):
+            return  # it was never tightened
         if held.get("geometry", "") != self.geometry:
             self.why = (
                 f"{self.path}: the robot was stopped with another calibration of its geometry than "
@@ -116,10 +124,15 @@ class LastLengths:
             date = datetime.now(UTC).isoformat(timespec="seconds")
             here = feedback.position_rad.copy()
             self.lengths = StoppedLengths(estimate.cable_length_m.copy(), at_index, date, here)
+        table: dict[str, Any] = {
+            "stopped": True,
+            "fallen": self.fallen,
+            "displaced": self.displaced,
+        }
         if self.lengths is not None:
-            lengths = {key: _plain(getattr(self.lengths, key)) for key in _FIELDS}
-            told = {"date": self.lengths.date, "geometry": self.geometry}
-            self._write({"stopped": True, **told, **lengths})
+            table |= {"date": self.lengths.date, "geometry": self.geometry}
+            table |= {key: _plain(getattr(self.lengths, key)) for key in _FIELDS}
+        self._write(table)
 
     def _write(self, held: dict[str, Any]) -> None:
         if self.path is not None:

@@ -18,9 +18,12 @@ def platform_control(
     torque_Nm: FloatArray,
     period_s: float,
     compensation: Compensation | None = None,
+    *,
+    learns: bool = True,
 ) -> PlatformControl:
     """Return the control of a platform; raises GeometryError where there is none.
 
-    `torque_Nm` (n,) is what the motors may be asked for.
+    `torque_Nm` (n,) is what the motors may be asked for; of motors that `compensation` does not
+    know, what they take up is learnt in motion where it `learns`.
     """
-    return CableControl(model, axes, torque_Nm, period_s, compensation)
+    return CableControl(model, axes, torque_Nm, period_s, compensation, learns=learns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.interference.interference import Interference
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.kinematics.pose_setpoint import place_all
@@ -43,6 +45,8 @@ class PlatformModel:
     """Bounds of the tensions, (n,)."""
     reserve_N: float
     """What the control keeps from them."""
+    left_by_torque_N: FloatArray
+    """What of the upper bounds motors can pull with beside turning themselves, (n,)."""
 
     @property
     def positions(self) -> int:
@@ -63,6 +67,13 @@ class PlatformModel:
     def home_pose(self) -> Pose:
         """The pose at home."""
         return _home_pose(self.platform)
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """The corners (8, 3) of the box around the anchor points, in the platform's frame."""
+        anchors = self.kinematics.geometry[ANCHOR:RADIUS].T
+        ends = np.array([anchors.min(axis=0), anchors.max(axis=0)])
+        return np.array([ends[pick, range(3)] for pick in itertools.product((0, 1), repeat=3)])
 
     @property
     def speed(self) -> FloatArray:
@@ -88,8 +99,7 @@ class PlatformModel:
     @property
     def wrench_scale(self) -> FloatArray:
         """What of each controlled direction counts as much as 1 N: 1, and for moments an arm, m."""
-        arm = max(float(np.linalg.norm(self.platform.anchor_points_m, axis=1).max()), _LEAST_ARM_m)
-        return self._each(1.0, arm)
+        return self._each(1.0, _arm_m(self.platform))
 
     def weight(self) -> FloatArray:
         """Return the wrench of gravity on the platform at home's orientation, (d,)."""
@@ -104,8 +114,9 @@ class PlatformModel:
     ) -> CableWorkspace:
         """Return where the platform is held while it is accelerated along all directions.
 
-        By default as targets are: as much as the file has it, with the control's reserve. Where
-        targets may be turned there is as much of the angular acceleration; inertia is as at home.
+        By default as targets are: as much as the file has it, with the control's reserve. Tensions
+        are within their bounds and what the motors' torque leaves of them. Where targets may be
+        turned there is as much of the angular acceleration; inertia is as at home.
         """
         platform = self.platform
         wanted = platform.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
@@ -123,7 +134,7 @@ class PlatformModel:
             self.about_mass,
             weight,
             self.low_N,
-            self.high_N,
+            self.left_by_torque_N,
             self.wrench_scale,
             self.reserve_N if reserve_N is None else reserve_N,
             in_space(platform.centre_of_mass_m),
@@ -160,19 +171,25 @@ class PlatformModel:
         given = np.asarray(positions, float)
         q = np.zeros((len(given), self.size))
         q[:, : given.shape[1]] = given
-        poses, room = np.zeros((len(q), 4, 3)), np.zeros((4, 3))
+        poses, scratch = np.zeros((len(q), 4, 3)), np.zeros((4, 3))
         directions = np.array(self.kinematics.directions)
-        place_all(q, directions, self.home_pose.array, room, poses)
+        place_all(q, directions, self.home_pose.array, scratch, poses)
         return poses
 
     def _each(self, linear: float, angular: float) -> FloatArray:
         return np.array([linear if i < 3 else angular for i in self.kinematics.directions])
 
 
-def platform_model(platform: Platform, low_N: FloatArray, high_N: FloatArray) -> PlatformModel:
+def platform_model(
+    platform: Platform,
+    low_N: FloatArray,
+    high_N: FloatArray,
+    left_by_torque_N: FloatArray | None = None,
+) -> PlatformModel:
     """Return the model of a platform whose cables' tensions have these bounds, (n,).
 
-    Raises GeometryError for a geometry that no robot has.
+    Motors leave all of them unless `left_by_torque_N` (n,) says less. Raises GeometryError for a
+    geometry that no robot has.
     """
     low, high = np.array(low_N, float), np.array(high_N, float)
     anchors = np.array(platform.anchor_points_m)
@@ -187,7 +204,8 @@ def platform_model(platform: Platform, low_N: FloatArray, high_N: FloatArray) ->
         )
         for centre in (0.0, np.array(platform.centre_of_mass_m))
     )
-    without = PlatformModel(platform, kinematics, about_mass, low, high, 0.0)
+    left = high if left_by_torque_N is None else np.array(left_by_torque_N)
+    without = PlatformModel(platform, kinematics, about_mass, low, high, 0.0, left)
     box = np.array([platform.workspace_min_m, platform.workspace_max_m])
     middle = without.poses(box.mean(axis=0)[None])
     margin_N = float(without.workspace(0.0).margins(middle)[0][0])
@@ -203,7 +221,22 @@ def platform_model_of(robot: Robot) -> PlatformModel:
         np.broadcast_to(bound, (n,)).astype(float)
         for bound in (limits.tension_min_N, limits.tension_max_N)
     )
-    return platform_model(robot.platform, low, high)
+    return platform_model(robot.platform, low, high, _left_by_torque(robot, high))
+
+
+def _left_by_torque(robot: Robot, high_N: FloatArray) -> FloatArray:
+    """Return upper bounds (n,) of tensions: what the motors can hold beside turning themselves."""
+    platform = robot.platform
+    assert platform is not None  # asked for by who has one
+    torque_Nm = np.asarray(limits_of(robot).torque_Nm)
+    per_rad = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
+    rotor = np.array([axis.winch.motor.rotor_inertia_kg_m2 for axis in robot.axes])
+    k, d = len(platform.home_m), len(directions_of(platform))
+    fastest = np.sqrt(k) * platform.acceleration_m_s2
+    if d > k:
+        fastest += _arm_m(platform) * np.sqrt(d - k) * platform.angular_acceleration_rad_s2
+    left = (torque_Nm - rotor * fastest / per_rad) / per_rad
+    return np.asarray(np.minimum(high_N, left))
 
 
 def directions_of(platform: Platform) -> tuple[int, ...]:
@@ -211,6 +244,10 @@ def directions_of(platform: Platform) -> tuple[int, ...]:
     names = DIRECTIONS[len(platform.home_m)]
     places = SPATIAL if len(names) == len(SPATIAL) else (0, 1, 5)
     return tuple(i for name, i in zip(names, places, strict=True) if name in platform.controlled)
+
+
+def _arm_m(platform: Platform) -> float:
+    return max(float(np.linalg.norm(platform.anchor_points_m, axis=1).max()), _LEAST_ARM_m)
 
 
 def _home_pose(platform: Platform) -> Pose:

@@ -42,7 +42,7 @@ def can_lower(robot: Robot) -> bool:
 
 def limits_of(robot: Robot) -> Limits:
     """Return the limits of a robot's axes, those without a figure in its file filled in."""
-    axes, told = robot.axes, robot.limits
+    axes, file = robot.axes, robot.limits
 
     def each(values: tuple[float, ...] | None, otherwise: FloatArray | float) -> FloatArray:
         if values is None:
@@ -50,30 +50,30 @@ def limits_of(robot: Robot) -> Limits:
         return np.broadcast_to(np.array(values), (len(axes),)).astype(float)
 
     motors = [axis.winch.motor for axis in axes]
-    torque_Nm = each(told.torque_Nm, np.array([motor.rated_torque_Nm for motor in motors]))
+    torque_Nm = each(file.torque_Nm, np.array([motor.rated_torque_Nm for motor in motors]))
     speed = RATED_SPEED_SHARE * np.array([motor.rated_speed_rad_s for motor in motors])
     strength = np.array([axis.winch.cable.breaking_force_N for axis in axes])
     measured_N = math.inf
     if robot.tension_sensors is not None:
         measured_N = load_tension_sensors(robot.tension_sensors).stop_above_N
-    least_N = each(told.tension_min_N, -math.inf)
-    following = each(told.following_error_rad, math.inf)
-    if robot.platform is not None and "following_error_rad" not in told.model_fields_set:
+    least_N = each(file.tension_min_N, -math.inf)
+    following = each(file.following_error_rad, math.inf)
+    if robot.platform is not None and "following_error_rad" not in file.model_fields_set:
         cable_m = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
         following = np.maximum(following, FOLLOWING_m / np.abs(cable_m))
-    figures: dict[str, Any] = {key: one for key, one in told if isinstance(one, int | float)}
+    figures: dict[str, Any] = {key: one for key, one in file if isinstance(one, int | float)}
     figures.setdefault("lengths_disagree_m", _disagreement_m(robot.platform))
     return Limits(
         torque_Nm=torque_Nm,
-        torque_rate_Nm_s=each(told.torque_rate_Nm_s, torque_Nm / TORQUE_RISE_S),
-        speed_rad_s=each(told.speed_rad_s, speed),
+        torque_rate_Nm_s=each(file.torque_rate_Nm_s, torque_Nm / TORQUE_RISE_S),
+        speed_rad_s=each(file.speed_rad_s, speed),
         following_error_rad=following,
-        cable_length_min_m=each(told.cable_length_min_m, -math.inf),
-        cable_length_max_m=each(told.cable_length_max_m, math.inf),
+        cable_length_min_m=each(file.cable_length_min_m, -math.inf),
+        cable_length_max_m=each(file.cable_length_max_m, math.inf),
         tension_min_N=least_N,
-        tension_max_N=np.minimum(each(told.tension_max_N, strength / CABLE_SAFETY), measured_N),
-        slack_N=each(told.slack_N, SLACK_SHARE * least_N),
-        reactions=reactions_of(told.reactions, lowers=can_lower(robot)),
+        tension_max_N=np.minimum(each(file.tension_max_N, strength / CABLE_SAFETY), measured_N),
+        slack_N=each(file.slack_N, SLACK_SHARE * least_N),
+        reactions=reactions_of(file.reactions, lowers=can_lower(robot)),
         **figures,
     )
 
@@ -124,15 +124,15 @@ def winches_of(axes: Sequence[RobotAxis]) -> WinchArrays:
 
 def described(limits: Limits, n: int) -> dict[str, Any]:
     """Return limits for a robot's description: arrays over the axes, None where there is none."""
-    told: dict[str, Any] = {}
+    table: dict[str, Any] = {}
     for name in limits.__dataclass_fields__:
         value = getattr(limits, name)
         if name != "reactions":
             each = np.broadcast_to(value, (n,)) if isinstance(value, np.ndarray) else value
-            told[name] = _finite(each)
+            table[name] = _finite(each)
     wanted = DEFAULT_REACTIONS | dict(limits.reactions)
-    told["reactions"] = {limit.key: reaction.label for limit, reaction in wanted.items()}
-    return told
+    table["reactions"] = {limit.key: reaction.label for limit, reaction in wanted.items()}
+    return table
 
 
 def _finite(value: Any) -> Any:

@@ -77,11 +77,6 @@ class CableWorkspace:
     def _way(self) -> _Pass:
         return self._pass(len(SHARES), 0.0)
 
-    def with_wrenches(self, wrenches: FloatArray) -> CableWorkspace:
-        """Return the same for other wrenches (k, d), without a reserve."""
-        low, high = self.low - self.reserve_N, self.high + self.reserve_N
-        return CableWorkspace(self.kinematics, wrenches, low, high, self._scale, 0.0, self._centre)
-
     def margins(self, poses: FloatArray, most_N: float = math.inf) -> tuple[FloatArray, FloatArray]:
         """Return margins (m,), at most `most_N`, and the worst wrenches' tensions (m, n).
 
@@ -127,12 +122,15 @@ class CableWorkspace:
     def stands(self, pose: Pose) -> bool:
         """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
         self._one.poses[0] = pose.array
-        self._one.run()
+        self._one.run_margins()
         return bool(self._one.margins[0] >= 0.0)
 
     def feasible(self, pose: Pose) -> str:
         """Return why the platform is not held at a pose, an empty text where it is."""
-        return "" if self.stands(pose) else self._missing(self._one, 0)
+        if self.stands(pose):
+            return ""
+        self._one.run()
+        return self._missing()
 
     def first_obstacle(self, poses: FloatArray) -> tuple[Pose, str] | None:
         """Return the first of the poses (33, 4, 3) of a way that is not held, and why; or None.
@@ -140,39 +138,30 @@ class CableWorkspace:
         A start that is not held is left first. The pose is overwritten by the next call.
         """
         self._way.poses[:] = poses
-        self._way.run()
+        self._way.run_margins()
         held = self._way.margins >= 0.0
         first = int(held.argmax()) if held.any() else len(held) - 1
         if held[first:].all():
             return None
         k = first + int(held[first:].argmin())
         self._there.array[:] = poses[k]
-        return self._there, self._missing(self._way, k)
+        return self._there, self.feasible(self._there)
 
     def _pass(self, m: int, most_N: float) -> _Pass:
-        return _Pass(
-            self.kinematics, self.wrenches, self._scale, self._bounds, self._centre, m, most_N
-        )
+        return _Pass(self, m, most_N)
 
-    def _missing(self, tried: _Pass, k: int) -> str:
-        margin_N = float(tried.margins[k])
-        why = missing(margin_N, tried.tensions[k], self.low, self.high)
+    def _missing(self) -> str:
+        margin_N = float(self._one.margins[0])
+        why = missing(margin_N, self._one.tensions[0], self.low, self.high)
         return f"{why} (with a reserve of {self.reserve_N:.1f} N)" if self.reserve_N else why
 
 
 class _Pass:
     """Margins and tensions of m poses at once, with the arrays that it takes to compute them."""
 
-    def __init__(
-        self,
-        kinematics: Kinematics,
-        wrenches: FloatArray,
-        scale: FloatArray,
-        bounds: FloatArray,
-        centre: FloatArray,
-        m: int,
-        most_N: float,
-    ) -> None:
+    def __init__(self, workspace: CableWorkspace, m: int, most_N: float) -> None:
+        kinematics, wrenches = workspace.kinematics, workspace.wrenches
+        centre, sets, generators, scale, bounds = workspace.arrays
         (k, d), n = wrenches.shape, kinematics.n
         self.poses = np.zeros((m, 4, 3))
         self._centre, self._aside, self._centred = centre, np.zeros((m, 3)), self.poses
@@ -181,25 +170,42 @@ class _Pass:
         self.margins, self.tensions = np.zeros(m), np.zeros((m, n))
         self._kinematics, self.matrices = kinematics, np.zeros((m, d, n))
         spaces, particular = np.zeros((m, n + 1, n)), np.zeros((m, k, n))
-        null_directions, room = np.zeros(m, np.int64), np.zeros((4, max(n, 8), max(n, 8)))
+        null_directions, scratch = np.zeros(m, np.int64), np.zeros((4, max(n, 8), max(n, 8)))
         self._null_spaces = bound(
             null_spaces, self.matrices, wrenches, scale, bounds,
-            spaces, particular, null_directions, np.zeros((d, n + 1)), room,
+            spaces, particular, null_directions, np.zeros((d, n + 1)), scratch,
         )  # fmt: skip
         self._write_margins = bound(
             write_margins, spaces, particular, null_directions, bounds, most_N,
-            self.margins, self.tensions, np.zeros((4, n)), room,
+            self.margins, self.tensions, np.zeros((4, n)), scratch,
         )  # fmt: skip
+        self._circuits = None
+        if n - d <= MOST_NULL_DIRECTIONS:
+            self._circuits = bound(
+                write_circuit_margins, self.matrices, sets, generators, scale, bounds, 0.0,
+                self.margins, np.zeros((len(sets), n)), spaces[0], np.zeros((d, n + 1)), scratch,
+            )  # fmt: skip
 
     def run(self) -> None:
         """Write margins and tensions of `poses`."""
+        self._write_matrices()
+        self._null_spaces()
+        self._write_margins()
+
+    def run_margins(self) -> None:
+        """Write margins of `poses`, right in their signs; in closed form up to d + 2 cables."""
+        if self._circuits is None:
+            self.run()
+            return
+        self._write_matrices()
+        self._circuits()
+
+    def _write_matrices(self) -> None:
         if self._centred is not self.poses:
             self._centred[:] = self.poses
             np.matmul(self.poses[:, 1:], self._centre, out=self._aside)
             self._centred[:, 0] += self._aside
         self._kinematics.wrench_matrices(self._centred, self.matrices)
-        self._null_spaces()
-        self._write_margins()
 
 
 def missing(margin_N: float, tension_N: FloatArray, low_N: FloatArray, high_N: FloatArray) -> str:
@@ -208,7 +214,7 @@ def missing(margin_N: float, tension_N: FloatArray, low_N: FloatArray, high_N: F
         return "the cables cannot hold one direction, whatever their tensions"
     i = int(np.argmax(np.maximum(low_N - tension_N, tension_N - high_N)))
     return (
-        f"cable {i} would need {tension_N[i]:.1f} N, {low_N[i]:g} to {high_N[i]:g} N allowed: "
+        f"cable {i + 1} would need {tension_N[i]:.1f} N, {low_N[i]:g} to {high_N[i]:g} N allowed: "
         f"{-margin_N:.1f} N outside"
     )
 

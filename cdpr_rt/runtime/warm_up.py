@@ -13,7 +13,7 @@ from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.core.tension import TensionFeedback
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 
 
 def warm_up(n: int, period_s: float) -> None:
@@ -29,7 +29,7 @@ def warm_up(n: int, period_s: float) -> None:
         Proportional(ones, ones),
         Pid(gains, ones, period_s, Compensation([None] * n, period_s)),
     )
-    leg = Leg(np.zeros(n), np.zeros(n), 0.0, period_s)
+    leg = TrapezoidalMove(np.zeros(n), np.zeros(n), 0.0, period_s)
     for controller in controllers:
         leg.fill(0.0, setpoint)
         controller.update(feedback, setpoint, torque)
@@ -40,7 +40,7 @@ def warm_up_supervision(estimator: Estimator, supervisor: Supervisor, n: int) ->
     """Compile the kernels of both, which are made for n axes; they are reset afterwards."""
     feedback = AxisFeedback(n)
     feedback.valid[:] = True
-    estimator.update(feedback, TensionFeedback(n), inner_Nm=np.zeros(n))
+    estimator.update(feedback, TensionFeedback(n), motor_loss_Nm=np.zeros(n))
     supervisor.check(feedback, estimator.estimate, Setpoint(n), np.zeros(n))
     supervisor.compare_lengths(0.0)
     estimator.reset()

@@ -33,14 +33,14 @@ class Renewed:
     """What a token has renewed: the taking it belongs to, and for how long at a time."""
 
     number: int
-    """Of the taking; what is asked for with it counts under this taking only."""
+    """Of the grant; what is asked for with it counts under this grant only."""
     ttl_s: float
 
 
 class Lease:
     """Given to one client under a token; any thread may use it.
 
-    `right` tells the loop the number of the taking and the instant (CLOCK_MONOTONIC) until which it
+    `right` tells the loop the number of the grant and the instant (CLOCK_MONOTONIC) until which it
     holds. The loop compares that instant with its own clock: it needs nobody to tell it that the
     holder, or this whole process, has fallen silent.
     """
@@ -75,7 +75,7 @@ class Lease:
             return self._token
 
     def renew(self, token: str | None) -> Renewed:
-        """Extend it by its whole time; return the number of its taking and that time.
+        """Extend it by its whole time; return the number of its grant and that time.
 
         Raises LeaseError where `token` is not, or is no longer, that of the holder.
         """

@@ -94,8 +94,8 @@ class LoopLink:
             return ""
         status = self.status()
         # the launcher sees the exit status and writes it down in the loop's place
-        told = str(status.get("reason", "")) if status.get("state") == DEAD else ""
-        return told or "the loop has died"
+        reason = str(status.get("reason", "")) if status.get("state") == DEAD else ""
+        return reason or "the loop has ended"
 
     def silent_s(self) -> float:
         """Return how long ago the loop turned last, 0 before its first turn."""

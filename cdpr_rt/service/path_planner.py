@@ -49,21 +49,21 @@ class PathPlanner:
             self._cancelled = why
 
     async def _plan(self, work: Plan, wanted: dict[str, Any]) -> None:
-        told: dict[str, Any] = {"error": "planning was ended"}
+        answer: dict[str, Any] = {"error": "planning was ended"}
         try:
             with tempfile.TemporaryDirectory(prefix="cdpr-path-") as folder:
                 file = Path(folder) / wanted["name"]
                 file.write_text(wanted["text"], encoding="utf-8")
                 status, text = await work(file, wanted)
-            told = _read(status, text.replace(str(file), wanted["name"]))
+            answer = _read(status, text.replace(str(file), wanted["name"]))
             if self._cancelled:
-                told = {"error": f"not followed: {self._cancelled} while it was planned"}
+                answer = {"error": f"not followed: {self._cancelled} while it was planned"}
         except TimeoutError:  # an OSError too, one without words
-            told = {"error": "cannot be planned: takes too long; divide the path"}
+            answer = {"error": "cannot be planned: takes too long; divide the path"}
         except OSError as error:
-            told = {"error": f"cannot be planned: {error.strerror}"}
+            answer = {"error": f"cannot be planned: {error.strerror}"}
         finally:
-            self.job = {**told, "number": self.job["number"], "planning": False}
+            self.job = {**answer, "number": self.job["number"], "planning": False}
             self.job.setdefault("plan", None)
             self.job.setdefault("error", None)
 
@@ -71,11 +71,11 @@ class PathPlanner:
 def _read(status: int, text: str) -> dict[str, Any]:
     """Return what the process has told."""
     try:
-        told = json.loads(text)
+        answer = json.loads(text)
     except ValueError:
-        told = None
-    if not isinstance(told, dict):
-        return {"error": f"planning ended with status {status}"}
+        answer = None
+    if not isinstance(answer, dict):
+        return {"error": f"planning ended with status {status}: out of memory? divide the path"}
     if status:
-        return {"error": str(told.get("error", "refused"))}
-    return told
+        return {"error": str(answer.get("error", "refused"))}
+    return answer

@@ -31,6 +31,7 @@ WAIT_S: Final = {
     "disable": 30.0,
     "acknowledge": 60.0,
     "shutdown": 30.0,
+    "program": 15.0,
 }
 """How long a reply may take; all others come within a few cycles."""
 _WAIT_S = 3.0
@@ -161,7 +162,7 @@ class Service:
     def status(self) -> dict[str, Any]:
         """Return everything at a glance, as `models.Status`."""
         link = self.link
-        told = link.status()
+        of_loop = link.status()
         row = newest_row(self.block)
         counters = self.block.counters
         return {
@@ -170,10 +171,10 @@ class Service:
             "read_only": False,
             "lockstep": False,
             "notices": [],
-            **told,
+            **of_loop,
             "robot": self.robot,
             "state": link.state(),
-            "reason": link.ended_how or str(told.get("reason", "")),
+            "reason": link.ended_how or str(of_loop.get("reason", "")),
             "loop": {
                 "pid": int(counters["loop_pid"][0]),
                 "alive": not link.dead and int(counters["loop_pid"][0]) != 0,

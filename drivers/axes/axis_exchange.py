@@ -184,7 +184,7 @@ class AxisExchange:
 
     def _begin_cycling(self) -> None:
         """Take over the master's heartbeat and forget what came while no cycles ran."""
-        self.network.claim_cycle()
+        self.network.hand_heartbeat_to_cycle()
         self._heartbeat_at_s = 0.0  # the last one between cycles may be a whole period ago
         for axis in self.axes:
             if has_deadline(axis):

@@ -314,17 +314,9 @@ class _BusMonitor:
     def _decode(self, last: int) -> int:
         layout = self._layout
         return codec.decode(
-            self._rx.bytes,
-            layout.slots,
-            layout.fields,
-            STATE_TABLE,
-            self.ints,
-            self._floats,
-            self._words,
-            self._flags,
-            self._others,
-            last,
-        )
+            self._rx.bytes, layout.slots, layout.fields, STATE_TABLE, self.ints, self._floats,
+            self._words, self._flags, self._others, last,
+        )  # fmt: skip
 
     def end_cycle(self) -> None:
         """Count who was silent, irregular or without heartbeat."""

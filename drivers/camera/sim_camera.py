@@ -40,16 +40,16 @@ class SimulatedCamera(Camera):
             header = self._answers.readline(_MOST_HEADER)
             if not header:
                 raise ConnectionResetError("the connection has ended")
-            told = parse_json(header, self.name)
-            if "error" in told:
-                raise CameraError(f"camera {self.name}: {told['error']}")
-            height, width, size = (int(told[key]) for key in ("height", "width", "bytes"))
+            answer = parse_json(header, self.name)
+            if "error" in answer:
+                raise CameraError(f"camera {self.name}: {answer['error']}")
+            height, width, size = (int(answer[key]) for key in ("height", "width", "bytes"))
             if size != height * width or not 0 < size <= _MOST_PIXELS:
                 raise ValueError(f"{width} x {height} pixels in {size} bytes")
             data = self._answers.read(size)
             if len(data) < size:
                 raise ConnectionResetError("the connection has ended")
-            number, time_s = int(told["number"]), float(told["time_s"])
+            number, time_s = int(answer["number"]), float(answer["time_s"])
         except OSError as error:
             raise CameraError(
                 f"camera {self.name} gives no image any more: {error.strerror or error}; is it "

@@ -16,7 +16,7 @@ from cdpr_rt.core.clock import Clock
 
 _MASTER, _SLAVE = 0x7E5, 0x7E4
 _NMT, _HEARTBEAT = 0x000, 0x700
-_EXACT = 0x7FF | EFF_FLAG | RTR_FLAG
+_EXACT_ID_MASK = 0x7FF | EFF_FLAG | RTR_FLAG
 _ANY_NODE = 0x780 | EFF_FLAG | RTR_FLAG
 _RESET_COMMUNICATION = 130
 _SETTLE_S = 0.005
@@ -42,7 +42,7 @@ class LssLink(BusMember):
         self._lost: BusError | None = None
         self._clients: dict[int, SdoClient] = {}
         self._answering: set[int] = set()
-        heard = [(_SLAVE, _EXACT), (ANSWER, _ANY_NODE), (_HEARTBEAT, _ANY_NODE)]
+        heard = [(_SLAVE, _EXACT_ID_MASK), (ANSWER, _ANY_NODE), (_HEARTBEAT, _ANY_NODE)]
         super().__init__(url, clock, heard)
         self._settle_s = _SETTLE_S
 

@@ -23,7 +23,7 @@ from cdpr_rt.core.clock import Clock
 
 _SYNC, _EMCY, _HEARTBEAT = 0x080, 0x080, 0x700
 _FUNCTION, _NODE = 0x780, 0x07F
-_EXACT = 0x7FF | EFF_FLAG | RTR_FLAG
+_EXACT_ID_MASK = 0x7FF | EFF_FLAG | RTR_FLAG
 _RPDO_TIMEOUT = 0x8250
 _START, _ENTER_PRE_OPERATIONAL, _RESET_NODE, _RESET_COMMUNICATION = 1, 128, 129, 130
 _LOOK_S = 0.1
@@ -43,9 +43,9 @@ class CanNetwork(BusMember, ObjectAccess):
     """Acyclic side of a CANopen master on one bus; it waits by `clock` only.
 
     While no cycles run it produces the master's heartbeat and watches those of the nodes, whenever
-    somebody waits; `claim_cycle` hands both duties to the cycle, so that a hung loop is silent and
-    the drives stop. It has the only port on the bus: a cycle uses `reader` as well. Raises BusError
-    when the bus cannot be opened.
+    somebody waits; `hand_heartbeat_to_cycle` hands both duties to the cycle, so that a hung loop is
+    silent and the drives stop. It has the only port on the bus: a cycle uses `reader` as well.
+    Raises BusError when the bus cannot be opened.
     """
 
     def __init__(
@@ -57,9 +57,9 @@ class CanNetwork(BusMember, ObjectAccess):
         heartbeat_s: float,
     ) -> None:
         ids = list(node_ids)
-        self._filters = [(base + node, _EXACT) for node in ids for base in (_EMCY, ANSWER)]
-        self._filters += [(_HEARTBEAT + node, _EXACT) for node in (*ids, master_node_id)]
-        self._filters.append((_SYNC, _EXACT))
+        self._filters = [(base + node, _EXACT_ID_MASK) for node in ids for base in (_EMCY, ANSWER)]
+        self._filters += [(_HEARTBEAT + node, _EXACT_ID_MASK) for node in (*ids, master_node_id)]
+        self._filters.append((_SYNC, _EXACT_ID_MASK))
         self.log = EmergencyLog()
         self.emergencies = self.log.kept
         self.alarm_text = ""
@@ -112,7 +112,7 @@ class CanNetwork(BusMember, ObjectAccess):
 
     def set_extra_filters(self, identifiers: Iterable[int]) -> None:
         """Receive these identifiers too, in place of those of an earlier call; raises BusError."""
-        self.reader.set_filters([*self._filters, *((i, _EXACT) for i in identifiers)])
+        self.reader.set_filters([*self._filters, *((i, _EXACT_ID_MASK) for i in identifiers)])
 
     def take_frame(self, frame: memoryview) -> None:
         """Process one frame; one that is no valid CANopen message is ignored."""
@@ -256,7 +256,7 @@ class CanNetwork(BusMember, ObjectAccess):
 
     # -- heartbeat of the master
 
-    def claim_cycle(self) -> None:
+    def hand_heartbeat_to_cycle(self) -> None:
         """Hand the master's heartbeat to the cycle, so that it stops with a hung cycle."""
         self.cycling = True
 

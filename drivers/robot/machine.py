@@ -139,7 +139,7 @@ class RobotMachine:
         """Go on as a robot without the axes that have not booted; raises MachineError."""
         if not self._optional:
             raise MachineError(
-                "; ".join(f"axis {i}: {reason}" for i, reason in absent.items())
+                "; ".join(f"{self.robot.axes[i].name}: {reason}" for i, reason in absent.items())
                 + " (the daemon runs all axes of a robot or none)"
             )
         present = [i for i in range(len(self.robot.axes)) if i not in absent]

@@ -158,7 +158,9 @@ def boot_notes(
     for i, report in booted.items():
         axis = robot.axes[i]
         notes.append(_lacking_guards(f"bus {axis.bus} node {axis.node_id}", report))
-    notes += [f"axis {i} (optional) is left out: {reason}" for i, reason in absent.items()]
+    notes += [
+        f"{robot.axes[i].name} (optional) is left out: {reason}" for i, reason in absent.items()
+    ]
     return [note for note in notes if note]
 
 

@@ -207,7 +207,9 @@ def _loop_of(
     track, limp = TrackProgram(n, period_s), ZeroTorqueProgram(n)
     parts = LoopParts(
         programs={IDLE: limp, HOLD: limp, track.name: track},
-        supervisor=Supervisor(_limits(robot, tolerance), n, period_s),
+        supervisor=Supervisor(
+            _limits(robot, tolerance), n, period_s, [axis.name for axis in robot.axes]
+        ),
         estimator=Estimator(n, period_s),
         enable_realtime=lambda: stack.enter_context(paced_realtime()),
     )

@@ -38,7 +38,7 @@ class GeometryCalibration(Profile):
     """Why the geometry before it was not believed when it was taken over, empty where it was."""
     version: int = Field(ge=1)
     date: datetime
-    method: Literal["points", "redundancy"]
+    method: Literal["points", "redundancy", "camera"]
     frame: str
     """What the coordinates are relative to, in words."""
     exit_points_m: tuple[Point, ...]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.reading.bounded_input import is_file, path_of
+from cdpr_profiles.reading.bounded_input import is_file, path_of, read_toml
 from cdpr_profiles.reading.reader import closest
 
 Kind = Literal[
@@ -16,6 +16,15 @@ Kind = Literal[
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 SHIPPED = Path(__file__).resolve().parents[1]
+_OWN_KEYS: dict[Kind, str] = {
+    "motors": "torque_constant_Nm_per_Arms",
+    "drives": "eds",
+    "cables": "breaking_force_kgf",
+    "winches": "drum_radius_m",
+    "robots": "axes",
+    "tension_sensors": "amplifier",
+}
+"""A key that all files of a kind have, and those of no other."""
 SERIES = ".series.toml"
 """How the file of a whole series of motors or cables ends, which is no profile itself."""
 
@@ -63,11 +72,28 @@ def unknown_profile(
 ) -> ProfileError:
     """Return the error for a name that no profile has; `more` names what else is allowed."""
     known = {path.stem for path in profile_files(kind)} | set(more)
+    text, folder = str(name), beside if beside is not None else Path()
     if beside is not None:
-        known |= {path.stem for path in beside.glob("*.toml")}
-    suggestion = closest(str(name), known)
+        known |= {path.stem for path in beside.glob("*.toml") if _is_of(kind, path)}
+    one = kind.removesuffix("es" if kind == "winches" else "s").replace("_", " ")
+    if is_file(path_of(folder, text)):
+        problem = f"{text!r} is no {one}'s file (TOML, its name ends in .toml)"
+        return ProfileError(kind, "", f"{problem}; allowed: {', '.join(sorted(known))}")
+    problem = f"no profile named {text!r}"
+    if (ending := Path(text).suffix) and not ending[1:].isdigit():
+        problem = f"no such file: {text!r}"
+        known |= {path.name for path in folder.glob("*.toml") if _is_of(kind, path)}
+    suggestion = closest(text, known)
     hint = f"did you mean {suggestion!r}?" if suggestion else f"allowed: {', '.join(sorted(known))}"
-    return ProfileError(kind, "", f"no profile named {str(name)!r}; {hint} (or a path to a file)")
+    return ProfileError(kind, "", f"{problem}; {hint} (or a path to a file)")
+
+
+def _is_of(kind: Kind, path: Path) -> bool:
+    """Whether a TOML file is of this kind, as far as its keys tell."""
+    try:
+        return kind not in _OWN_KEYS or _OWN_KEYS[kind] in read_toml(path)
+    except ProfileError:
+        return False
 
 
 def reference(kind: Kind, path: Path) -> str:

@@ -57,9 +57,9 @@ def read_toml_model(path: Path, model: type[_M]) -> _M:
     return validated(path, read_toml(path), model)
 
 
-def read_json_model(path: Path, model: type[_M]) -> _M:
+def read_json_model(path: Path, model: type[_M], most_bytes: int = MOST_JSON_BYTES) -> _M:
     """Return a JSON file as an instance of `model`; raises ProfileError as `read_toml_model`."""
-    text = read_text(path, MOST_JSON_BYTES)
+    text = read_text(path, most_bytes)
     parse_json(text, path)
     try:
         return model.model_validate_json(text)

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.reading.bounded_input import read_toml
+from cdpr_profiles.reading.reader import Profile, validated
 
 _Length_m = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 _Angle_deg = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -133,6 +134,20 @@ class BoardPlant(Profile):
     rotation_deg: Turn = (0.0, 0.0, 0.0)
 
 
+class CameraFaultPlant(Profile):
+    """What goes wrong with the camera for a while, counted in images that it is asked for."""
+
+    kind: Literal["dark", "defocus", "unplugged"]
+    from_image: Annotated[int, Field(ge=0)]
+    images: Annotated[int, Field(ge=1)] = 1
+    blur_px: Annotated[float, Field(gt=0.0, le=100.0)] = 8.0
+    """Standard deviation of what a point is spread over, where it is out of focus."""
+
+    def holds(self, image: int) -> bool:
+        """Return whether it is so at an image, counted from 0."""
+        return self.from_image <= image < self.from_image + self.images
+
+
 class CameraPlant(Profile):
     """The truth about a simulated camera and what it sees, which no controller may read."""
 
@@ -149,11 +164,14 @@ class CameraPlant(Profile):
     markers: Annotated[tuple[MarkerPlant, ...], Field(max_length=512)] = ()
     occluders: Annotated[tuple[OccluderPlant, ...], Field(max_length=64)] = ()
     board: BoardPlant | None = None
+    faults: Annotated[tuple[CameraFaultPlant, ...], Field(max_length=64)] = ()
 
     @classmethod
     def load_file(cls, path: str | Path) -> CameraPlant:
-        """Read such a file; raises ProfileError."""
-        return read_toml_model(Path(path), cls)
+        """Read such a file, or [camera] of a robot's plant file; raises ProfileError."""
+        table = read_toml(Path(path))
+        own = table.get("camera", table)
+        return validated(Path(path), own if isinstance(own, dict) else table, cls)
 
 
 DEFAULT_SCENE = (GridPlant(),)

@@ -7,7 +7,8 @@ A client sends lines of JSON and gets one line of JSON for each:
                       and so many bytes after it: grey levels, row by row
     anything else     {"error": "..."}
 
-`time_s` is bus time in the middle of the exposure.
+A client is hung up on while the camera is unplugged by its plant. `time_s` is bus time in the
+middle of the exposure.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ class CameraServer:
                 line, _, rest = heard.partition(b"\n")
                 heard[:] = rest
                 client.sendall(self._answer(bytes(line)))
-        except OSError:  # it has gone
+        except OSError:  # it has gone, or the camera has
             data = b""
         if not data or len(heard) > _MOST_REQUEST:
             self._drop(client)
@@ -129,6 +130,8 @@ class CameraServer:
         state = self._platform.state()
         if state is None:
             return b'{"error": "no platform moves on this physics board"}\n'
+        if self._camera.skip_unplugged():
+            raise ConnectionResetError
         number = self._camera.taken
         pixels = self._camera.grab(state).tobytes()
         header = {**size, "time_s": state.time_s, "number": number, "bytes": len(pixels)}

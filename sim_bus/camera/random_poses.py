@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_sim_bus.physics_board import PlatformState
-from cdpr_sim_bus.robot.platform_record import rotation_of
+from cdpr_sim_bus.robot.logs.platform_record import rotation_of
 
 _STILL = (0.0, 0.0, 0.0)
 

@@ -69,6 +69,20 @@ def look(
 
 
 @jit
+def _corners(
+    sheet: Any, texture: Any, origins: Any, turns: Any, ray: Any, right: Any, down: Any
+) -> tuple[float, float]:
+    """Return the least and the most that a pixel's corners see."""
+    lowest, highest = math.inf, -math.inf
+    for k in range(4):
+        a, b = (k % 2) - 0.5, (k // 2) - 0.5
+        x, y = ray[0] + a * right[0] + b * down[0], ray[1] + a * right[1] + b * down[1]
+        seen = look(sheet, texture, origins, turns, x, y, 0.0)
+        lowest, highest = min(lowest, seen), max(highest, seen)
+    return lowest, highest
+
+
+@jit
 def draw_sheet(
     image: Any,
     region: Any,
@@ -100,14 +114,9 @@ def draw_sheet(
             xv = (rays[down, j, 0] - rays[up, j, 0]) / (down - up)
             yv = (rays[down, j, 1] - rays[up, j, 1]) / (down - up)
             if not moving:
-                lowest, highest = math.inf, -math.inf
-                for k in range(4):
-                    a, b = (k % 2) - 0.5, (k // 2) - 0.5
-                    seen = look(
-                        sheet, texture, origins, turns, x + a * xu + b * xv, y + a * yu + b * yv,
-                        0.0,
-                    )  # fmt: skip
-                    lowest, highest = min(lowest, seen), max(highest, seen)
+                lowest, highest = _corners(
+                    sheet, texture, origins, turns, (x, y), (xu, yu), (xv, yv)
+                )
                 if highest < 0.0:
                     continue
                 if highest - lowest < _FLAT:

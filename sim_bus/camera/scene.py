@@ -19,7 +19,7 @@ from cdpr_sim_bus.camera.camera_plant import (
     PrintPlant,
 )
 from cdpr_sim_bus.errors import SimulatorError
-from cdpr_sim_bus.robot.platform_record import rotation_of
+from cdpr_sim_bus.robot.logs.platform_record import rotation_of
 
 FloatArray = NDArray[np.float64]
 _TEXELS = 24

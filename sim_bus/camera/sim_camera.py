@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_sim_bus.camera.camera_plant import CameraPlant
+from cdpr_sim_bus.camera.camera_plant import CameraFaultPlant, CameraPlant
 from cdpr_sim_bus.camera.lens import ray_table, seen_at
 from cdpr_sim_bus.camera.render_kernel import draw_sheet
 from cdpr_sim_bus.camera.scene import Sheet, build_scene
 from cdpr_sim_bus.physics_board import PlatformState
-from cdpr_sim_bus.robot.platform_record import rotation_of
+from cdpr_sim_bus.robot.logs.platform_record import rotation_of
 
 FloatArray = NDArray[np.float64]
 _STILL_px = 0.02
@@ -52,6 +52,16 @@ class SimCamera:
         self._offsets = np.ascontiguousarray(steps)
         self._light = self._light_field()
 
+    def skip_unplugged(self) -> bool:
+        """Return whether it is unplugged at the next image, which is not taken then."""
+        unplugged = bool(self._faults("unplugged"))
+        self.taken += unplugged
+        return unplugged
+
+    def _faults(self, kind: str) -> list[CameraFaultPlant]:
+        """Return what is wrong with the next image, as far as it is of a kind."""
+        return [one for one in self.plant.faults if one.kind == kind and one.holds(self.taken)]
+
     def camera_pose(self, platform: PlatformState) -> Pose:
         """Return where the camera is on a platform."""
         mount = self.plant.mount
@@ -78,11 +88,13 @@ class SimCamera:
             self._draw(image, self.sheets[k], pose)
         self._occlude(image, pose)
         image = 1.0 / light.paper_to_black + image * (1.0 - 1.0 / light.paper_to_black)
-        sigma = float(np.hypot(self.plant.lens.blur_px, self.defocus_px))
+        blurs = [one.blur_px for one in self._faults("defocus")]
+        sigma = float(np.linalg.norm([self.plant.lens.blur_px, self.defocus_px, *blurs]))
         if sigma > 0.0:
             image = np.asarray(cv2.GaussianBlur(image, (0, 0), sigma))
+        dark = self.dark or bool(self._faults("dark"))
         self.taken += 1
-        return self._exposed(image)
+        return self._exposed(image, 0.01 if dark else 1.0)
 
     def _draw(self, image: FloatArray, sheet: Sheet, pose: Pose) -> None:
         place, sensor = sheet.place(self.taken), self.plant.sensor
@@ -145,11 +157,11 @@ class SimCamera:
         fall = 1.0 - light.vignetting * (u * u + v * v) / 2.0
         return np.asarray(light.white * fall * (1.0 + 0.5 * light.gradient * u))
 
-    def _exposed(self, image: FloatArray) -> NDArray[np.uint8]:
-        """Return grey levels with light, noise and steps."""
+    def _exposed(self, image: FloatArray, share: float) -> NDArray[np.uint8]:
+        """Return grey levels with a share of the light, noise and steps."""
         sensor = self.plant.sensor
         chance = np.random.default_rng([self.plant.seed, 12, self.taken])
-        level = image * self._light * (0.01 if self.dark else 1.0)
+        level = image * self._light * share
         sigma = np.sqrt(sensor.noise**2 + sensor.shot_noise**2 * level / 255.0)
         level = level + sigma * chance.standard_normal(level.shape, dtype=np.float32)
         return np.rint(level).clip(0, 255).astype(np.uint8)

@@ -65,6 +65,8 @@ class Axis:
         """Gives the target of every step anew, where a mode follows an object."""
         self.time = 0.0
         self.flags = 0
+        self.cell_off_N = 0.0
+        """What the cable's load cell shows beyond the tension."""
         self.position_offset = 0
         self._lowest, self._highest = -math.inf, math.inf
         self.clipped = False

@@ -46,7 +46,8 @@ class BoardLink:
         axis = self._axis
         angle, speed = axis.sample[4], axis.sample[5]
         self._power_on = axis.kind != servo.OFF
-        self._board.publish(axis.time, float(self._tension[0]), angle, speed, self._power_on)
+        shown_N = float(self._tension[0]) + axis.cell_off_N
+        self._board.publish(axis.time, shown_N, angle, speed, self._power_on)
 
     def publish_power(self) -> None:
         """Publish where power has changed, as bus time may stand still for long afterwards."""

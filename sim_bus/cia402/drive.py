@@ -39,9 +39,9 @@ from cdpr_sim_bus.physics_board import BoardAxis
 from cdpr_sim_bus.record_file import NO_SYNC
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import RobotMember
+from cdpr_sim_bus.robot.logs.truth_log import TruthLog
 from cdpr_sim_bus.robot.motor_state import MotorRatings, Transmission
 from cdpr_sim_bus.robot.plant import Plant
-from cdpr_sim_bus.robot.truth_log import TruthLog
 
 TICK_S = 1e-3
 """Longest step between two ticks of the state machine."""

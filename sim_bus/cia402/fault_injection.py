@@ -14,7 +14,7 @@ from cdpr_sim_bus.frame import pack_frame
 
 _RAISE_FAULT, _DROP_TPDOS, _REFUSE_MODES, _SHOW_MODE, _MUTE_HEARTBEAT = 1, 2, 3, 4, 5
 _FALL_SILENT, _DOUBLE_TPDOS, _DELAY_TPDOS, _BABBLE, _VANISH_IN_SDO = 6, 7, 8, 9, 10
-_JUMP, _CUT_CABLE, _SLIP = 11, 12, 13
+_JUMP, _CUT_CABLE, _SLIP, _CELL_OFF = 11, 12, 13, 14
 _COUNTED = (_DROP_TPDOS, _DOUBLE_TPDOS, _DELAY_TPDOS, _VANISH_IN_SDO)
 _DEFAULT_TPDO = (0x180, 0x280, 0x380, 0x480)
 _ERROR_CONTROL, _SDO_ANSWER, _EMCY = 0x700, 0x580, 0x080
@@ -55,6 +55,7 @@ class FaultInjection:
             _JUMP: self._jump,
             _CUT_CABLE: self._cut_cable,
             _SLIP: self._slip,
+            _CELL_OFF: self._set_cell_off,
         }
         writers |= {sub: self._counter(sub) for sub in _COUNTED}
         for sub, writer in writers.items():
@@ -158,6 +159,9 @@ class FaultInjection:
     def _slip(self, millimetres: Value) -> None:
         if millimetres and not self._axis.slip_cable(int(millimetres) * 1e-3):
             raise SdoAbort(Abort.HARDWARE_ERROR)
+
+    def _set_cell_off(self, newton: Value) -> None:
+        self._axis.cell_off_N = float(newton)
 
     def _mute(self, on: Value) -> None:
         self._muted = bool(on)

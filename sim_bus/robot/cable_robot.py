@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_sim_bus.robot import servo
+from cdpr_sim_bus.robot.logs.platform_record import RobotShape, build_platform
 from cdpr_sim_bus.robot.motor import sample_of
 from cdpr_sim_bus.robot.motor_state import LOAD_KINDS, MOTOR_DTYPE, MotorArray, Transmission
-from cdpr_sim_bus.robot.platform_record import RobotShape, build_platform
 from cdpr_sim_bus.robot.robot_motion import run_together, update_ends
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
@@ -44,6 +44,7 @@ class CableRobot:
         self._rng = np.random.default_rng([plant.seed, 1])
         self._transmissions = list(transmissions)
         self._weights = list(shape.weights_N_m)
+        self._slips = sorted(plant.cables.slips, key=lambda slip: slip.at_s)
         self.platform = build_platform(shape, plant, n, self._rng)
         # have it compiled now, before the clock runs
         run_together(self.motors, self.platform, 0.0, self.kinds, self.targets, self._flags)
@@ -91,6 +92,9 @@ class CableRobot:
         while until - now > _SAME_TIME_S:
             now = min(until, now + _LONGEST_STEP_S) if until - now > 1.5e-3 else until
             run_together(self.motors, self.platform, now, self.kinds, self.targets, self._flags)
+        while self._slips and self._slips[0].at_s <= now:
+            due = self._slips.pop(0)
+            self.slip(due.cable - 1, due.slip_m)
         flags, self._flags[i] = int(self._flags[i]), 0
         return sample_of(self.motors[i : i + 1], flags)
 

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from cdpr_profiles.reading.reader import Profile, read_toml_model
 from cdpr_profiles.winch import Winch
+from cdpr_sim_bus.camera.camera_plant import CameraPlant
 from cdpr_sim_bus.robot.plant import CoggingTerm, LoadPlant, Plant
 
 Vector = tuple[Annotated[float, Field(ge=-1000.0, le=1000.0)], ...]
@@ -43,6 +44,17 @@ class GeometryPlant(Profile):
     anchor_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
 
 
+class SlipPlant(Profile):
+    """A cable that slips through its fastening on the drum, once."""
+
+    cable: Annotated[int, Field(ge=1, le=64)]
+    """Its number, from 1."""
+    at_s: Annotated[float, Field(ge=0.0, le=1e6)]
+    """Bus time."""
+    slip_m: Annotated[float, Field(ge=-1.0, le=1.0)]
+    """How much longer it is then."""
+
+
 class CablesPlant(Profile):
     """The cables and what winds them."""
 
@@ -63,6 +75,7 @@ class CablesPlant(Profile):
     """Dry friction of gear and drum without tension, on the motor side."""
     friction_share: Annotated[float, Field(ge=0.0, le=0.9)] = 0.02
     """Further dry friction, as a share of the torque that the tension exerts."""
+    slips: Annotated[tuple[SlipPlant, ...], Field(max_length=64)] = ()
 
 
 class WindingPlant(Profile):
@@ -140,6 +153,8 @@ class RobotPlant(Profile):
     floor: FloorPlant = FloorPlant()
     variation: VariationPlant = VariationPlant()
     scanner: ScannerPlant = ScannerPlant()
+    camera: CameraPlant = CameraPlant()
+    """What the platform carries, where the robot is simulated with a camera."""
     motor: Plant = Plant()
     motors: tuple[Plant, ...] = ()
 
@@ -162,6 +177,9 @@ class RobotPlant(Profile):
         for key, values in {**errors, "cables.drum_radius_errors": radii, "motors": motors}.items():
             if values and len(values) != n:
                 raise ValueError(f"{key}: {len(values)} entries; allowed: {n}, one for each axis")
+        for k, slip in enumerate(self.cables.slips):
+            if slip.cable > n:
+                raise ValueError(f"cables.slips[{k}].cable: {slip.cable}; allowed: 1 to {n}")
         points: dict[str, Vector | None] = {
             "platform.centre_of_mass_m": self.platform.centre_of_mass_m,
             "start.position_m": self.start.position_m,

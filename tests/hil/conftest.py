@@ -1,4 +1,4 @@
-"""Run the tests marked `vcan` on a real vcan0, in a guest kernel where this machine has none.
+"""All tests here are `long`; those marked `vcan` run on a real vcan0, in a guest kernel if need be.
 
 In the second case one boot runs all of them, by a pytest of its own inside, whose reports are
 replayed here test by test. Without a guest they are reported as skipped, with the reason.
@@ -24,6 +24,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         first = items.index(here[0])
         here.sort(key=lambda item: not item.get_closest_marker("vcan"))
         items[first : first + len(here)] = here
+    for item in here:
+        item.add_marker("long")
     for item in items:
         if item.get_closest_marker("vcan") and not _runs_here():
             item.add_marker(pytest.mark.timeout(0))

@@ -36,8 +36,8 @@ def happened(daemon: RealDaemon) -> str:
 
 
 def events(daemon: RealDaemon) -> list[tuple[str, str]]:
-    told = daemon.http.get("/events", params={"most": 512}).json()["events"]
-    return [(event["kind"], event["text"]) for event in told]
+    events = daemon.http.get("/events", params={"most": 512}).json()["events"]
+    return [(event["kind"], event["text"]) for event in events]
 
 
 @contextmanager

@@ -9,8 +9,10 @@ import select
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +44,7 @@ NAME, PERIOD_S = "slow-2", 0.01
 PATIENCE_S = 60.0
 # the first start on a machine compiles the loop's kernels and the physics
 START_S = 300.0
+_RIGHT_S = 10.0
 _names = itertools.count()
 
 
@@ -89,9 +92,8 @@ class RealDaemon:
     ) -> None:
         self.socket = folder / "control.sock"
         self.at = ("--socket", str(self.socket))
-        transport = httpx.HTTPTransport(uds=str(self.socket))
-        self.http = httpx.Client(transport=transport, base_url="http://localhost", timeout=20.0)
-        self._errors = (folder / "errors").open("w+")
+        self.http = self.connection()
+        self._errors = folder / "errors"
         self.robot = robot or write_robot(folder, period_s, limits)
         self._simulator: OwnSimulator | None = None
         if paced:
@@ -99,14 +101,15 @@ class RealDaemon:
             self._simulator = OwnSimulator(str(self.robot), bus, paced=True)
         asked = ("run", str(self.robot), "--bus", bus, *self.at)
         command = [sys.executable, "-P", "-m", "cdpr_tools.cli", *asked]
-        self.process = subprocess.Popen(
-            [*command, *options],
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            text=True,
-            env={**os.environ, **(env or {})},
-            cwd=cwd,
-        )
+        with self._errors.open("w") as errors:
+            self.process = subprocess.Popen(
+                [*command, *options],
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                env={**os.environ, **(env or {})},
+                cwd=cwd,
+            )
         self.bus = f"simbus:own-{self.process.pid}" if bus == "simbus:" else bus
         try:
             self.ready: dict[str, Any] = json.loads(self._first_line())["ready"]
@@ -116,40 +119,44 @@ class RealDaemon:
             self.end()
             raise
 
+    def connection(self) -> httpx.Client:
+        """Return another connection to its control interface."""
+        transport = httpx.HTTPTransport(uds=str(self.socket))
+        return httpx.Client(transport=transport, base_url="http://localhost", timeout=20.0)
+
     def _first_line(self) -> str:
         assert self.process.stdout is not None
-        told, _, _ = select.select([self.process.stdout], [], [], START_S)
-        line = self.process.stdout.readline() if told else ""
+        readable, _, _ = select.select([self.process.stdout], [], [], START_S)
+        line = self.process.stdout.readline() if readable else ""
         assert line, self.errors()
         return line
 
     def errors(self) -> str:
-        """Return what it has said on standard error so far."""
-        self._errors.seek(0)
-        return self._errors.read()
+        """Return what it has said on standard error so far, or until it ended."""
+        return self._errors.read_text()
 
     def status(self) -> dict[str, Any]:
         """Return what the control interface tells, an empty table where nobody answers."""
         try:
-            told: dict[str, Any] = self.http.get("/status").json()
+            status: dict[str, Any] = self.http.get("/status").json()
         except (httpx.HTTPError, ValueError):
             return {}
-        return told
+        return status
 
     def wait_for(self, state: str) -> dict[str, Any]:
         """Wait until the loop is in a state; return the status."""
-        told: dict[str, Any] = {}
+        status: dict[str, Any] = {}
 
         def there() -> bool:
-            nonlocal told
-            told = self.status()
-            return told.get("state") == state
+            nonlocal status
+            status = self.status()
+            return status.get("state") == state
 
         try:
             until(there)
         except AssertionError:
-            raise AssertionError(f"not {state}: {told}; {self.errors()}") from None
-        return told
+            raise AssertionError(f"not {state}: {status}; {self.errors()}") from None
+        return status
 
     def children(self) -> dict[str, int]:
         """Return the processes of loop, service and simulator, those of them that live."""
@@ -176,8 +183,35 @@ class RealDaemon:
             self.process.communicate()
         if self._simulator is not None:
             self._simulator.stop()
-        self._errors.close()
         return self.process.returncode
+
+
+@contextmanager
+def held_right(daemon: RealDaemon, client: str) -> Iterator[httpx.Headers]:
+    """Yield the headers of the right to move; it is renewed, then the axes hold and it is released.
+
+    It expires by the wall's clock, but an unpaced robot's time waits for the loop: what takes it a
+    second may take a busy machine longer than the right lasts.
+    """
+    taken = daemon.http.post("/control", json={"client": client, "ttl_s": _RIGHT_S})
+    assert taken.status_code == 200, taken.text
+    headers = httpx.Headers({"X-Control-Token": taken.json()["token"]})
+    over = threading.Event()
+
+    def renew() -> None:
+        with daemon.connection() as own:
+            while not over.wait(0.2 * _RIGHT_S):
+                own.put("/control", headers=headers)
+
+    renewing = threading.Thread(target=renew)
+    renewing.start()
+    try:
+        yield headers
+    finally:
+        over.set()
+        renewing.join()
+    assert daemon.http.post("/hold", json={"client": client}).status_code == 200
+    assert daemon.http.delete("/control", headers=headers).status_code == 200
 
 
 def cdpr(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

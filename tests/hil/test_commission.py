@@ -121,10 +121,32 @@ def test_a_motor_that_runs_away_under_the_usual_gain(slower: Path, tmp_path: Pat
     assert ratios["peak_pid_effort"] > 3
 
 
-def test_an_odd_motor_of_a_robot(tmp_path: Path) -> None:
+NOTHING_UNKNOWN = {
+    "[friction]": "[friction]\nangle_share = 0.0",
+    "[encoder]": "[encoder]\neccentricity_rad = 0.0\ninterpolation_error = 0.0",
+    "seed = 11": "seed = 11\n[ripple]\nsixth = 0.0\ntwelfth = 0.0\n"
+    "[drive]\nfeedback_jitter_s = 0.0",
+}
+"""Of all that the identification has no term for."""
+MORE_UNKNOWN = {
+    "[friction]": "[friction]\nangle_share = 0.06",
+    "[encoder]": "[encoder]\neccentricity_rad = 3e-4\ninterpolation_error = 0.04",
+    "seed = 11": "seed = 11\n[ripple]\nsixth = 0.01\ntwelfth = 0.005\n"
+    "[drive]\nfeedback_jitter_s = 4e-5",
+}
+"""Twice as much of it as a simulated motor has otherwise."""
+
+
+@pytest.mark.parametrize(
+    "changed", [NOTHING_UNKNOWN, MORE_UNKNOWN], ids=["nothing-unknown", "more-unknown"]
+)
+def test_an_odd_motor_of_a_robot(tmp_path: Path, changed: dict[str, str]) -> None:
     plant = tmp_path / "robot.toml"
     odd = (PLANTS / "slots-offset-asymmetric-odd-encoder.toml").read_text()
-    plant.write_text(re.sub(r"(?m)^(\[+)", r"\1motor.", odd))
+    for key, text in changed.items():
+        odd = odd.replace(key, text)
+    seed, tables = odd.split("\n", 1)
+    plant.write_text(seed + "\n" + re.sub(r"(?m)^(\[+)", r"\1motor.", tables))
     robot = tmp_path / "planar-3-slower.toml"
     shipped = (SHIPPED / "robots" / "planar-3.toml").read_text()
     robot.write_text(shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004"))
@@ -135,5 +157,5 @@ def test_an_odd_motor_of_a_robot(tmp_path: Path) -> None:
     result = told["axes"]["upper right"]
     assert set(result["identification"]["orders"]) >= {4, 24}
     ratios = result["validation"]["better"]["ratios"]
-    assert ratios["rms_position_error"] > 2
+    assert ratios["rms_position_error"] > 3
     assert ratios["peak_pid_effort"] > 3

@@ -65,9 +65,7 @@ def description(daemon: RealDaemon) -> Any:
     return schemathesis.openapi.from_dict(described)
 
 
-FUZZED = settings(
-    max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck)
-)
+FUZZED = settings(max_examples=8, suppress_health_check=list(HealthCheck))
 
 
 def resident_B(pid: int) -> int:
@@ -168,7 +166,7 @@ def test_no_wish_of_the_holder_ends_the_loop(quick: RealDaemon) -> None:
 
     with holding(quick) as headers:
 
-        @settings(max_examples=80, deadline=None, derandomize=True)
+        @settings(max_examples=80)
         @given(program=st.sampled_from([*programs, "none"]), first=WISHES, then=WISHES)
         def wish(program: str, first: dict[str, Any], then: dict[str, Any]) -> None:
             if program == "idle":  # its torque is zero: what hangs on the cable falls

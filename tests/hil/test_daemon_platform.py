@@ -10,10 +10,15 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from daemon_rig import RealDaemon, cdpr, until
 
 import cdpr_profiles
+from cdpr_profiles import load_robot
+from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.estimation.residuals import lengths_told
+from cdpr_rt.calibration.readings.data import load_data
 from cdpr_rt.robots.calibration_state import mark_not_calibrated
 
 PERIOD_S = 0.004
@@ -78,7 +83,7 @@ def test_a_platform_from_its_stand_and_back_onto_it(daemon: RealDaemon) -> None:
 
     for command, named in (
         (("move", "--to", "0", "9000"), "--to 0 9000: y 9000 mm; allowed: 1400 to 2400 mm"),
-        (("move", "--to", "0.3", "2.0"), "--to 0.3 2.0: y 2 mm; allowed: 1400 to 2400 mm"),
+        (("move", "--to", "0.3", "2.0"), "were metres typed? In mm: --to 300 2000"),
         (("move", "--to", "0", "1600", "lower=5"), "not together with axes"),
         (("move", "--rotate", "5"), "--rotate 5: no angle of this platform is controlled"),
         (("tighten", "--from", "home"), "tighten --from home: the cables are tight already"),
@@ -152,4 +157,27 @@ def test_a_platform_is_turned_as_it_is_typed(turning: RealDaemon) -> None:
     status, why = refused(turning, "move", "--rotate", "20")
     assert status == 2
     assert "--rotate 20: 20 deg from the orientation at home; allowed: up to 15 deg" in why
+    told(turning, "lower")
+
+
+def test_poses_at_which_it_stands_are_read_for_a_calibration(
+    turning: RealDaemon, tmp_path: Path
+) -> None:
+    read = ("calibrate", "read", "--out", str(tmp_path / "cal"))
+    status, why = refused(turning, *read)
+    assert (status, "not held on its cables" in why) == (1, True)
+    told(turning, "tighten")
+    assert told(turning, *read)["pose"] == 1
+    told(turning, "move", "--to", "150", "1500", "--rotate", "4")
+    assert told(turning, *read)["pose"] == 2
+    told(turning, "lower")
+    told(turning, "tighten", "--from", "home")
+    told(turning, *read)
+    data = load_data(tmp_path / "cal" / "data.json")
+    assert data.simulated and len(data.poses) == 3 and data.restarts == (2,)
+    geometry = CableGeometry.of(load_robot(str(turning.robot)))
+    there = geometry.model.poses(np.array([[0.15, 1.5, math.radians(4.0)]]))
+    tension_N = np.array([data.poses[1].tension_N])
+    lengths_m = lengths_told(geometry, there, tension_N)[0]
+    assert data.poses[1].length_m == pytest.approx(lengths_m.tolist(), abs=0.005)
     told(turning, "lower")

@@ -15,6 +15,8 @@ import pytest
 from daemon_rig import RealDaemon, alive, cdpr, until
 from mcap.reader import make_reader
 
+from cdpr_tools.daemon.loop_file import LoopFile
+
 POWERED = 0x0004  # statusword: operation enabled
 
 
@@ -98,15 +100,30 @@ def test_a_loop_that_is_killed_is_reported_and_nobody_feeds_the_watchdog(
 ) -> None:
     children = daemon.children()
     os.kill(children["loop"], signal.SIGKILL)
+    until(lambda: "the loop has died: killed by signal 9" in daemon.status()["reason"])
     told = daemon.wait_for("dead")
-    assert "the loop has died: killed by signal 9" in told["reason"]
     assert not told["loop"]["alive"]
     assert "STATUS=dead: the loop has died: killed by signal 9" in manager.heard(1.0)
     assert "WATCHDOG=1" not in manager.heard(1.0)
     assert daemon.http.post("/hold", json={}).status_code == 503
     assert daemon.children()["service"] == children["service"]
+    for command in ("ack", "enable", "hold"):
+        refused = cdpr(command, *daemon.at)
+        assert refused.returncode == 1
+        assert (
+            "killed by signal 9; its drives had been told to have no power; next: `cdpr stop`"
+            in refused.stderr
+        )
+    shown = cdpr("status", *daemon.at).stdout
+    assert "next: `cdpr stop`" in shown and "what follows is of" in shown
     stopped = cdpr("stop", *daemon.at)  # ends what is left, and is no error where nothing is
-    assert (stopped.returncode, "its loop had died" in stopped.stdout) == (0, True)
+    assert (
+        stopped.returncode,
+        "its loop had died: its drives had been told to have no power" in stopped.stdout,
+    ) == (
+        0,
+        True,
+    )
     assert daemon.process.wait(30.0) == 1
     assert cdpr("stop", *daemon.at).stdout == "nothing runs\n"
     assert daemon.end() == 1
@@ -135,3 +152,16 @@ def test_a_launcher_that_is_killed_takes_everything_along_in_order(tmp_path: Pat
     # the motors lost their power in cycles that are recorded, the last of all
     assert any(word & POWERED for word in chain(*words))
     assert not any(word & POWERED for word in words[-1])
+
+
+def test_a_loop_that_ends_is_not_taken_for_a_process_of_another_kind(tmp_path: Path) -> None:
+    # one that is forked has no interpreter to take apart at its end
+    daemon = RealDaemon(tmp_path, "--no-record", env={"CDPR_TEST_FORKS": "0"})
+    found = LoopFile.read(LoopFile.beside(daemon.socket))
+    daemon.process.terminate()
+    while found.runs():
+        time.sleep(0.001)
+    while alive(found.pid):  # its interpreter takes a while to end
+        assert not found.runs()
+        time.sleep(0.001)
+    assert daemon.end() == 0

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_rig import RealDaemon, until
+from daemon_rig import RealDaemon, held_right, until
 from hostile_proxy import hostile
 from typer.testing import CliRunner
 
@@ -58,14 +58,13 @@ def daemon(folder: Path) -> Iterator[RealDaemon]:
 def start_up(daemon: RealDaemon) -> None:
     """Give power and tighten the cables; back as soon as it may be led."""
     wish: dict[str, Any] = {"client": "start-up"}
-    token = daemon.http.post("/control", json={**wish, "ttl_s": 10.0}).json()["token"]
-    headers = {"X-Control-Token": token}
-    for path, more in (("/enable", {}), ("/program", {"program": "tighten"})):
-        answer = daemon.http.post(path, json={**wish, **more}, headers=headers)
-        assert answer.status_code == 200, answer.text
-    until(lambda: daemon.status()["program_progress"].get("tight"))
-    assert daemon.http.post("/hold", json=wish).status_code == 200
-    assert daemon.http.delete("/control", headers=headers).status_code == 200
+    # after a loop that was killed nobody else can know that the simulated platform is at home
+    tighten = {"program": "tighten", "wanted": {"from": "home"}}
+    with held_right(daemon, wish["client"]) as headers:
+        for path, more in (("/enable", {}), ("/program", tighten)):
+            answer = daemon.http.post(path, json={**wish, **more}, headers=headers)
+            assert answer.status_code == 200, answer.text
+        until(lambda: daemon.status()["program_progress"].get("tight"))
 
 
 def port_of(daemon: RealDaemon) -> int:

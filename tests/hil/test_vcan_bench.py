@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from cdpr_drivers.bus import BusUrl
-from cdpr_tools.bench.bus import OwnAccess, _on_vcan
+from cdpr_tools.bench.cyclic.bus import OwnAccess, _on_vcan
 from cdpr_tools.output import Output
 
 pytestmark = pytest.mark.vcan
 
 
 def test_frames_on_vcan_are_measured_both_ways() -> None:
-    told = _on_vcan(1000, Output(as_json=True))
+    told = _on_vcan(200, Output(as_json=True))
     assert told["url"] == "socketcan:vcan0"
     for way in ("ours", "python-can"):
         assert told[way]["frames_per_s"] > 100

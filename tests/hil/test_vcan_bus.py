@@ -12,6 +12,7 @@ from cdpr_drivers.bus.adapters.socketcan import open_socketcan
 from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError
 
+CYCLES = 300
 pytestmark = pytest.mark.vcan
 
 FRAME = struct.Struct("=IB3x8s")
@@ -96,17 +97,17 @@ def _answer_each_sync(count: int) -> None:
     port.close()
 
 
-def test_a_thousand_cycles_between_two_processes_lose_nothing():
+def test_cycles_between_two_processes_lose_nothing():
     port = open_socketcan(BusUrl.parse("socketcan:vcan0"), None)
     port.settimeout(20.0)
-    slave = multiprocessing.get_context("spawn").Process(target=_answer_each_sync, args=(1000,))
+    slave = multiprocessing.get_context("fork").Process(target=_answer_each_sync, args=(CYCLES,))
     slave.start()
     buffer = bytearray(16)
     sync = FRAME.pack(0x080, 0, b"")
     try:
         port.recv_into(buffer)
         assert FRAME.unpack(buffer)[0] == 0x701
-        for k in range(1000):
+        for k in range(CYCLES):
             port.send(sync)
             port.recv_into(buffer)
             can_id, length, data = FRAME.unpack(buffer)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Iterator
 
 import pytest
+from fork_server import FORKED
 
 from cdpr_drivers.bus import BusUrl, FrameBuffer, open_port, open_python_can
 from cdpr_drivers.bus.frames import FRAME
@@ -39,9 +39,7 @@ serve([Node()], "socketcan:vcan0", until_stdin_ends=True)
 
 @pytest.fixture
 def simulator() -> Iterator[subprocess.Popen[bytes]]:
-    process = subprocess.Popen(
-        [sys.executable, "-c", SIMULATOR], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
+    process = subprocess.Popen([*FORKED, SIMULATOR], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert process.stdout is not None
     assert b"ready" in process.stdout.readline()
     yield process

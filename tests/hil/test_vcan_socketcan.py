@@ -12,7 +12,6 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 import termios
 import time
 import tty
@@ -22,6 +21,7 @@ import can
 import pytest
 import serial
 import vcan_replay
+from fork_server import FORKED
 
 from cdpr_drivers.bus import BusHealth, BusState, BusUrl, bus_gone, open_port, open_python_can
 from cdpr_drivers.bus.adapters.socketcan import SocketCanPort
@@ -242,7 +242,7 @@ serve([Node()], "simbus:kernel-slcan", until_stdin_ends=True, slcan=True)
 
 def test_the_kernels_own_driver_takes_the_simulated_adapter_for_a_real_one() -> None:
     simulator = subprocess.Popen(
-        [sys.executable, "-c", SIMULATOR], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [*FORKED, SIMULATOR], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert simulator.stdout is not None
     ready = json.loads(simulator.stdout.readline())["ready"]

@@ -14,7 +14,7 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.control.proportional import Proportional
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_tools.composition.session import open_robot
 from cdpr_tools.output import Output
 
@@ -81,7 +81,7 @@ def test_four_drives_on_each_of_two_interfaces(
         start = device.feedback.position_rad.copy()
         speed = np.linspace(-3.0, 3.0, 8)
         controller = Proportional(np.full(8, 3.0), np.full(8, 1.5))
-        session.follow(controller, Leg(start, speed, 0.2, 0.05))
+        session.follow(controller, TrapezoidalMove(start, speed, 0.2, 0.05))
         np.testing.assert_allclose(device.feedback.position_rad - start, 0.25 * speed, atol=0.15)
         assert np.all(device.feedback.valid)
         assert device.missed == 0

@@ -16,6 +16,8 @@ from vcan_guest import NoGuestError
 REPOSITORY = Path(__file__).parents[2]
 GUEST_CACHE = REPOSITORY / "build" / "vcan-guest"
 REPORTS_VARIABLE = "CDPR_VCAN_REPORTS"
+# memory that is given back comes in again page by page, and a page fault is dear in a guest kernel
+_KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30)}
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ def run_in_guest(names: Sequence[str]) -> Outcome:
             REPORTS_VARIABLE: str(written),
             "HOME": os.environ.get("HOME", "/root"),
             "PYTHONDONTWRITEBYTECODE": "1",
+            **_KEEP_MEMORY,
         }
         try:
             guest = vcan_guest.obtain(GUEST_CACHE)

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_profiles import ProfileError, load_motor
@@ -100,7 +100,6 @@ JSON = st.recursive(
 )
 
 
-@settings(derandomize=True, deadline=None)
 @given(JSON)
 def test_json_that_is_sound_means_what_it_always_meant(value: object) -> None:
     assert parse_json(json.dumps(value), "x") == value

@@ -258,7 +258,7 @@ JUNK = st.text(max_size=12) | st.sampled_from(
 )
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300)
 @given(data=st.data())
 def test_no_text_whatsoever_raises_anything_else(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

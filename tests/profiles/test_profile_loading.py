@@ -52,8 +52,6 @@ FILES: dict[Path, type[Profile]] = {
     SHIPPED / "rails" / "rail-modbus.toml": RailProfile,
 }
 repeatable = settings(
-    derandomize=True,
-    deadline=None,
     max_examples=60,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
@@ -276,6 +274,21 @@ def test_unknown_names_are_answered_with_the_likely_one():
         cdpr_profiles.load_winch("winch-mpp923d")
     with pytest.raises(ProfileError, match="allowed: generic-cia402"):
         cdpr_profiles.load_drive("zzz")
+
+
+def test_of_files_beside_only_those_of_the_kind_are_named(tmp_path: Path):
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "mine"\n')
+    (tmp_path / "broken.toml").write_text("= 1")
+    mine = (SHIPPED / "winches" / "winch-300n.toml").read_text()
+    (tmp_path / "my-winch.toml").write_text(mine)
+    with pytest.raises(ProfileError, match="allowed: my-winch, winch-1kn") as caught:
+        cdpr_profiles.load_winch("zzz", tmp_path)
+    assert "pyproject" not in str(caught.value) and "broken" not in str(caught.value)
+    with pytest.raises(ProfileError, match=r"no such file: 'my-winch\.tml'; did you mean"):
+        cdpr_profiles.load_winch("my-winch.tml", tmp_path)
+    (tmp_path / "notes.md").write_text("# Notes")
+    with pytest.raises(ProfileError, match=r"'notes\.md' is no winch's file"):
+        cdpr_profiles.load_winch("notes.md", tmp_path)
 
 
 def test_a_motor_with_ratings_only_says_so():

@@ -8,22 +8,20 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 
+from fork_server import FORKED
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cdpr_sim_bus.frame import pack_frame
 
 LAW = settings(
-    derandomize=True,
     max_examples=6,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 GO = struct.Struct("<8sdd")
@@ -36,10 +34,10 @@ from pathlib import Path
 import numpy as np
 from cdpr_profiles import load_winch
 from cdpr_sim_bus.robot.cable_robot import CableRobot
-from cdpr_sim_bus.robot.platform_record import RobotShape
+from cdpr_sim_bus.robot.logs.platform_record import RobotShape
 from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
 from cdpr_sim_bus.fleet import FleetBus, serve_fleet
-from cdpr_sim_bus.robot.pose_log import PoseLog
+from cdpr_sim_bus.robot.logs.pose_log import PoseLog
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from dataclasses import replace
 
@@ -99,7 +97,7 @@ class Bus:
 def simulator(log: Path) -> Iterator[tuple[subprocess.Popen[bytes], list[Bus]]]:
     name = f"same-{os.getpid()}-{next(_names)}"
     process = subprocess.Popen(
-        [sys.executable, "-c", SIMULATOR, name, str(log)],
+        [*FORKED, SIMULATOR, name, str(log)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )

@@ -17,7 +17,7 @@ import numpy as np
 import cdpr_profiles
 from cdpr_drivers.robot.session import Session
 from cdpr_rt.control.proportional import Proportional
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_tools.output import Output
 
 OUT = Output(as_json=True)
@@ -110,4 +110,4 @@ def hold(
     speed = np.zeros(n) if speed_rad_s is None else np.array(speed_rad_s, float)
     start = session.device.feedback.position_rad.copy()
     controller = Proportional(np.full(n, gain_Nm_rad), np.full(n, 1.5))
-    session.follow(controller, Leg(start, speed, seconds - 0.2, 0.1))
+    session.follow(controller, TrapezoidalMove(start, speed, seconds - 0.2, 0.1))

@@ -1,14 +1,16 @@
-"""Progress bars: drawn on a terminal, silent in a file or pipe."""
+"""Progress: a bar on a terminal, a line now and then in a file or pipe."""
 
 from __future__ import annotations
 
 import io
 import os
 import pty
+import time
 from contextlib import redirect_stderr, suppress
 
 import pytest
 
+from cdpr_tools import output
 from cdpr_tools.output import Output
 
 
@@ -23,6 +25,27 @@ def test_no_bar_and_no_blank_line_in_a_pipe() -> None:
     with redirect_stderr(errors):
         _work()
     assert errors.getvalue() == ""
+
+
+def test_what_takes_longer_is_told_in_a_pipe_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(output, "_TELL_S", (0.01, 0.01))
+    out, errors = Output(as_json=True), io.StringIO()
+
+    def until(text: str) -> None:
+        while text not in errors.getvalue():
+            time.sleep(0.005)
+
+    with redirect_stderr(errors):
+        with out.stage("winding"):
+            assert errors.getvalue() == "winding ...\n"
+            until("winding: for 0 s now")
+        with out.progress("turns", 10.0) as advance:
+            until("turns: 0 %")
+            advance(5.0)
+            until("turns: 50 %, about 0 s left")
+    told = errors.getvalue()
+    time.sleep(0.05)
+    assert errors.getvalue() == told
 
 
 def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:

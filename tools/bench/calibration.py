@@ -11,10 +11,10 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
-from cdpr_rt.calibration.fit import fit
-from cdpr_rt.calibration.observations import Observations
-from cdpr_rt.calibration.parameters import EXIT, OFFSET, CableGeometry
-from cdpr_rt.calibration.residuals import lengths_told
+from cdpr_rt.calibration.estimation.fit import fit
+from cdpr_rt.calibration.estimation.parameters import EXIT, OFFSET, CableGeometry
+from cdpr_rt.calibration.estimation.residuals import lengths_told
+from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.bench.timing import timed
 

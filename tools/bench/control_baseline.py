@@ -13,18 +13,19 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles import RobotAxis
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform.loop_design import LoopGains
+from cdpr_rt.robots.platform.loop_design import LoopGains, latency_s
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.rigid_body import in_space, inertia_kg_m2
 
 _G_m_s2 = 9.80665
 _OBSERVER_rad_s, _RATIO = 2.0 * math.pi * 400.0, 0.55
-_REGULATOR, _MOST, _BREAKING, _STUCK_m_s, _DEAD_m, _CALM_S = 0.25, 0.3, 6.0, 0.002, 6e-5, 0.02
+_REGULATOR, _MOST, _BREAKING, _STUCK_m_s, _DEAD_m, _CALM_S = 0.25, 0.3, 20.0, 0.002, 6e-5, 0.02
+_POLE_rad_s, _USUAL, _WRENCH, _NOISE, _ODD = 19.0, (0.04, 0.03, 0.03), 0.25, 0.09, 0.08
 _FAST, _SLOW, _LIFT_S, _SHAPING_S, _STRETCHING = 0.85, 0.5, 0.05, 0.06, 0.2
 
 
 class BaselineCableControl:
-    """What `CableControl.update` computes, without compensation, where tensions exist.
+    """What `CableControl.update` computes, of motors that are not known, where tensions exist.
 
     For eyes as exit points, and the least tensions.
     """
@@ -61,6 +62,7 @@ class BaselineCableControl:
         self.stretch = np.ones(n)
         self.integral, self.calm_twist = np.zeros(d), np.zeros(d)
         self.awake, self.share = 0.0, 1.0
+        self.learning = _Learning(axes, self.scale, model.reserve_N, period_s)
         self.position, self.velocity, self.acceleration = (
             model.home.copy(),
             np.zeros(d),
@@ -89,11 +91,15 @@ class BaselineCableControl:
         error = np.concatenate([wanted - self.p, Rotation.from_matrix(Q @ self.Q.T).as_rotvec()])
         M, known = self._body(v_d, a_d)
         force = self._force(J, M[np.ix_(self.chosen, self.chosen)], error, v_d, twist)
+        late = self.theta + latency_s(self.T) * self.omega
+        learnt = self.learning.update(
+            J, self.mass, v_d[self.chosen] - twist, force, late, setpoint.velocity_rad_s
+        )
         t, carried, N = self._split(-J.T, known[self.chosen], force)
         self.stretched_by = self.stretched_by + _STRETCHING * (carried - self.stretched_by)
-        pull = t + self.gains.loose_N_s_m * N @ (N.T @ (self.c * self.omega))
+        pull = t + self.gains.null_damping_N_s_m * N @ (N.T @ (self.c * self.omega))
         effort = self.rotor * setpoint.acceleration_rad_s2 - self.c * pull
-        torque_Nm[:] = np.clip(effort, -self.limit, self.limit)
+        torque_Nm[:] = np.clip(effort + learnt, -self.limit, self.limit)
 
     def _cables(self, p: FloatArray, Q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return lengths (n,) and J (n, 6), eqs. (3.2), (3.10)."""
@@ -191,7 +197,7 @@ class BaselineCableControl:
         self, J: FloatArray, M_p: FloatArray, error: FloatArray, v_d: FloatArray, twist: FloatArray
     ) -> FloatArray:
         gains, A = self.gains, J.T @ J
-        M = M_p + gains.rotor_kg * A
+        self.mass = M = M_p + gains.rotor_kg * A
         D = np.linalg.inv(
             np.linalg.inv(2.0 * _RATIO * gains.bandwidth_rad_s * M)
             + np.linalg.inv(gains.damping_N_s_m * A)
@@ -242,6 +248,71 @@ class BaselineCableControl:
         f[-1] = 1.0
         r = E @ nnls(E, f)[0] - f
         return np.asarray(nearest - N @ (r[:-1] / r[-1]))
+
+
+class _Learning:
+    """Friction and cogging of the motors: a Kalman filter over the platform's motion."""
+
+    def __init__(
+        self, axes: Sequence[RobotAxis], scale: FloatArray, reserve_N: float, period_s: float
+    ) -> None:
+        n, d = len(axes), len(scale)
+        rated = np.array([axis.winch.motor.rated_torque_Nm for axis in axes])
+        self.g = np.array([axis.winch.cable_m_per_motor_rad for axis in axes])
+        self.pairs = np.array([axis.winch.motor.pole_pairs for axis in axes])
+        force_N = float((rated / np.abs(self.g)).mean())
+        self.sigma = np.concatenate([np.outer(rated, _USUAL).ravel(), _WRENCH * force_N * scale])
+        self.keep = 1.0 - period_s / np.repeat([600.0, 30.0], [3 * n, d])
+        self.noise = _NOISE * force_N * scale
+        self.most = np.minimum(_ODD * rated, reserve_N / 3.0 * np.abs(self.g))
+        self.settling = round(0.3 / period_s)
+        self.share = period_s * _POLE_rad_s / (1.0 + period_s * _POLE_rad_s)
+        self.x, self.P = np.zeros(3 * n + d), np.diag(self.sigma**2)
+        self.phi, self.u, self.k = np.zeros((n, 3)), np.zeros(n), 0
+        self.low = [self.phi, self.u, np.zeros(d), np.zeros(d)]
+        self.last = np.zeros((n, d)), np.zeros((d, d)), np.zeros(d), np.zeros(d)
+
+    def update(
+        self, J: FloatArray, M: FloatArray, v: FloatArray, F: FloatArray, angle: FloatArray,
+        speed: FloatArray,
+    ) -> FloatArray:  # fmt: skip
+        """Take in the last cycle; return the torques (n,) against what was learnt."""
+        self._take(*self.last)
+        self.last = J, M, v, F
+        w = self.x[: 3 * len(self.g)].reshape(-1, 3)
+        turned = self.pairs * angle
+        sign = np.clip(speed / 0.1, -1.0, 1.0)
+        self.phi = np.column_stack([sign, np.sin(turned), np.cos(turned)])
+        size = np.maximum(np.linalg.norm(w[:, 1:], axis=1), self.most)
+        wave = (w[:, 1:] * self.phi[:, 1:]).sum(axis=1) * self.most / size
+        self.u = 0.95 * w[:, 0] * sign + wave
+        return np.asarray(self.u)
+
+    def _take(self, J: FloatArray, M: FloatArray, v: FloatArray, F: FloatArray) -> None:
+        new = [self.phi, self.u, F, v]
+        self.settling = max(self.settling - 1, 0)
+        if self.settling:
+            self.low = [np.zeros_like(self.phi), np.zeros_like(self.u), np.zeros_like(F), v]
+        else:
+            self.low = [a + self.share * (b - a) for a, b in zip(self.low, new, strict=True)]
+        phi, u, force, calm = self.low
+        n, d, k = len(u), len(F), self.k
+        moving = not self.settling and bool((np.abs(phi[:, 0]) > 0.5).any())
+        keep = np.where(moving | (np.arange(len(self.x)) >= 3 * n), self.keep, 1.0)
+        self.x, self.P = keep * self.x, np.outer(keep, keep) * self.P
+        self.P += np.diag((1.0 - keep**2) * self.sigma**2)
+        if moving:
+            lever = J[:, k] / self.g
+            h = np.concatenate([(lever[:, None] * phi).ravel(), np.eye(d)[k]])
+            S = h @ self.P @ h + self.noise[k] ** 2
+            off = force[k] + _POLE_rad_s * M[k] @ (v - calm) + lever @ u - h @ self.x
+            if off**2 < 9.0 * S:
+                gain = self.P @ h / S
+                self.x, self.P = self.x + gain * off, self.P - np.outer(gain, gain) * S
+            w = self.x[: 3 * n].reshape(n, 3)
+            w[:, 0] = np.clip(w[:, 0], 0.0, self.most)
+            w[:, 1:] = np.clip(w[:, 1:], -self.most[:, None], self.most[:, None])
+            self.k = (k + 1) % d
 
 
 def _cross_matrix(x: FloatArray) -> FloatArray:

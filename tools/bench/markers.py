@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
-from cdpr_rt.calibration.markers.images.detection import MarkerDetector, Sighting
+from cdpr_rt.calibration.markers.images.detection import MarkerDetector
 from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map
 from cdpr_rt.calibration.markers.marker_map import MarkerMap, best_fit, difference
+from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_sim_bus.camera.camera_plant import CameraPlant
 from cdpr_sim_bus.camera.random_poses import Box, random_poses
 from cdpr_sim_bus.camera.scene import Sheet

@@ -18,7 +18,7 @@ from cdpr_drivers.robot.session import Session
 from cdpr_profiles import Robot
 from cdpr_rt.control.proportional import Proportional
 from cdpr_rt.errors import ControlError
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_tools.composition.session import open_robot
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
@@ -180,7 +180,9 @@ class Soak:
     def _leg(self, seconds: float) -> None:
         start = self.session.device.feedback.position_rad.copy()
         cruise_s = max(0.0, seconds - 2.0 * _RAMP_S)
-        self.session.follow(self._controller, Leg(start, self._speed, cruise_s, _RAMP_S))
+        self.session.follow(
+            self._controller, TrapezoidalMove(start, self._speed, cruise_s, _RAMP_S)
+        )
         self._speed = -self._speed
 
     def _sample(self) -> None:

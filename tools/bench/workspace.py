@@ -85,7 +85,7 @@ def _others(workspace: CableWorkspace, poses: FloatArray) -> dict[str, dict[str,
         methods["pycapacity"] = lambda p: _by_pycapacity(workspace, p)
     margins = workspace.capacity_margins(poses)
     clear, ours_us = np.abs(margins) > _NEAR_N, 0.0
-    told = {}
+    others = {}
     for name, method in methods.items():
         method(poses[:2])
         begun = time.process_time()
@@ -93,8 +93,8 @@ def _others(workspace: CableWorkspace, poses: FloatArray) -> dict[str, dict[str,
         us = 1e6 * (time.process_time() - begun) / len(poses)
         ours_us = ours_us or us
         otherwise = int(((held != (margins >= 0.0)) & clear).sum())
-        told[name] = {"us": us, "times": us / ours_us, "otherwise": otherwise}
-    return told
+        others[name] = {"us": us, "times": us / ours_us, "otherwise": otherwise}
+    return others
 
 
 def _by_osqp(workspace: CableWorkspace, poses: FloatArray) -> Held:

@@ -18,7 +18,7 @@ from cdpr_rt.calibration.error_model import Errors, Noise, predicted_errors, sim
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above
+from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, legend_beside_title
 
 COUNTS: Final = (6, 10, 20, 50, 100, 150, 200, 300, 400)
 SHARES: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
@@ -194,6 +194,6 @@ def draw(path: Path, rows: list[dict[str, Any]]) -> None:
                   ms=4, label=name)  # fmt: skip
     last.set(xscale="log", xlabel="noise / that of table 3.1", ylabel="trial over model (%)")
     last.axhspan(-10, 10, color="#888888", alpha=0.12)
-    last.legend(loc="upper left")
+    legend_beside_title(last)
     legend_above(figure, axes[0])
     figure.savefig(path, format="png")

@@ -47,7 +47,7 @@ def in_typed_words(do: Callable[[], _T], names: Sequence[str]) -> _T:
     try:
         return do()
     except (BadInputError, WorkFailedError) as error:
-        told = typed_refusal(str(error), names)
-        if told == str(error):
+        refusal = typed_refusal(str(error), names)
+        if refusal == str(error):
             raise
-        raise BadInputError(told) from None
+        raise BadInputError(refusal) from None

@@ -15,6 +15,8 @@ import httpx
 
 from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.reading.bounded_input import parse_json
+from cdpr_profiles.reading.places import reference
+from cdpr_tools.client.dead_loop import DEAD, death_text
 from cdpr_tools.daemon.paths import find_sockets, is_trusted, unsearched_folders
 from cdpr_tools.daemon.settings import read_key
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -120,7 +122,9 @@ class Daemon:
         message = str(answer.get("error", response.reason_phrase))
         if response.status_code in _BAD_INPUT:
             raise BadInputError(message)
-        raise WorkFailedError(message + _remedy(message, str(answer.get("state"))))
+        if answer.get("state") == DEAD:
+            raise WorkFailedError(death_text(self.get("/status")))
+        raise WorkFailedError(message + remedy(message, str(answer.get("state"))))
 
 
 def _user() -> str:
@@ -130,7 +134,7 @@ def _user() -> str:
         return f"#{os.getuid()}"
 
 
-def _remedy(message: str, state: str) -> str:
+def remedy(message: str, state: str) -> str:
     """Return the remedy to be appended to a refusal in this state, "" where there is none."""
     if "not in state" not in message or state not in _REMEDIES:
         return ""
@@ -200,7 +204,19 @@ def open_daemon(
     with httpx.Client(
         transport=transport, base_url="http://daemon", timeout=timeout, verify=False
     ) as http:
-        yield Daemon(http, str(path))
+        daemon = Daemon(http, str(path))
+        if robot is not None and robot.endswith(".toml"):
+            _require_file(daemon, Path(robot).resolve())
+        yield daemon
+
+
+def _require_file(daemon: Daemon, path: Path) -> None:
+    """Raise BadInputError where a daemon runs another robot than that of a file of its name."""
+    runs = str(daemon.get("/description").get("reference"))
+    if runs not in (reference("robots", path), reference("winches", path)):
+        raise BadInputError(
+            f"--robot {path}: the daemon of this name runs {runs}; allowed: that file, or --socket"
+        )
 
 
 def _trusted(path: Path) -> Path:
@@ -210,6 +226,11 @@ def _trusted(path: Path) -> Path:
         if not is_trusted(path, owner):
             raise BadInputError(f"--socket {path}: was put there by user {owner}, not by you")
     return path
+
+
+def answers(robot: str | None, unix: Path | None) -> bool:
+    """Whether a daemon of the robot, of any, or at this socket, can be connected to."""
+    return any(map(_is_alive, find_sockets(robot) if unix is None else [unix]))
 
 
 def _only_socket(robot: str | None) -> Path:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from cdpr_tools.client.client import Daemon, HeldRight
+from cdpr_tools.client.dead_loop import DEAD, death_text
 from cdpr_tools.client.status_text import (
     in_millimetres,
     place_text,
@@ -30,9 +31,15 @@ def require_program(daemon: Daemon, name: str) -> dict[str, Any]:
     """Return the status; raises WorkFailedError where the program does not run any more."""
     status = daemon.get("/status")
     if status["state"] != "active" or status["program"] != name:
-        why = status["reason"] or _last_command(daemon)
-        raise WorkFailedError(f"{name} was ended: {why} ({status['state']})")
+        raise WorkFailedError(f"{name} was ended: {ended_text(daemon, status)} ({status['state']})")
     return status
+
+
+def ended_text(daemon: Daemon, status: dict[str, Any]) -> str:
+    """Return why a program does not run any more."""
+    if status["state"] == DEAD:
+        return death_text(status)
+    return str(status["reason"] or _last_command(daemon))
 
 
 def _last_command(daemon: Daemon) -> str:
@@ -52,7 +59,7 @@ def await_end(
 
     How it goes on, and what holds it back meanwhile, is told in `out`.
     """
-    deadline, told = time.monotonic() + seconds, Told(out)
+    deadline, notes = time.monotonic() + seconds, ProgressNotes(out)
     while not stop_requested() and time.monotonic() < deadline:
         time.sleep(RENEW_S)
         control.renew()
@@ -60,7 +67,7 @@ def await_end(
         progress = require_program(control.daemon, name).get("program_progress", {})
         if progress.get("trouble") and progress.get("done") != 1.0:
             raise WorkFailedError(f"{name}: {in_millimetres(progress['trouble'])}")
-        told(name, progress)
+        notes(name, progress)
         if is_done(progress):
             return progress
     return None
@@ -71,7 +78,7 @@ def is_done(progress: dict[str, Any]) -> bool:
     return progress.get("done") == 1.0 and progress.get("leg") == progress.get("legs")
 
 
-class Told:
+class ProgressNotes:
     """Says how a motion goes on, each thing once: its stages, what holds it back, its progress."""
 
     def __init__(self, out: Output | None) -> None:
@@ -139,17 +146,17 @@ def finish(
         figures["trouble"] = trouble
         out.say(in_millimetres(str(trouble)))
     if status["state"] != "active":
-        raise WorkFailedError(f"{status['reason'] or 'the power was taken'} ({status['state']})")
+        raise WorkFailedError(f"{ended_text(daemon, status)} ({status['state']})")
     if status.get("reacting", "none") != "none":
-        raise WorkFailedError(f"{status['reason']} ({status['reacting']} under way)")
+        raise WorkFailedError(f"{ended_text(daemon, status)} ({status['reacting']} under way)")
     if stopped:
         raise WorkFailedError("stopped on request; the axes hold where they are")
     angles = {axis["name"]: axis.get("position_rad") for axis in status["axes"]}
-    told = {"state": status["state"], "program": status["program"], "position_rad": angles}
+    there = {"state": status["state"], "program": status["program"], "position_rad": angles}
     progress = status.get("program_progress") or {}
     keys = ("position_m", "rotation_rad", "trouble")
-    told |= {key: progress[key] for key in keys if progress.get(key)}
-    out.result({"ok": True, **told, **figures})
+    there |= {key: progress[key] for key in keys if progress.get(key)}
+    out.result({"ok": True, **there, **figures})
 
 
 def _where(status: dict[str, Any], where: str) -> list[str]:

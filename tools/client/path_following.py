@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import re
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from cdpr_profiles.reading.bounded_input import read_text
-from cdpr_tools.client.client import Daemon, HeldRight, open_daemon
-from cdpr_tools.client.motion import RENEW_S, finish, require_program
-from cdpr_tools.client.status_text import in_millimetres
+from cdpr_rt.motion.path.reading import require_kind
+from cdpr_tools.client.client import Daemon, HeldRight, open_daemon, remedy
+from cdpr_tools.client.motion import RENEW_S, TELL_S, ended_text, finish
+from cdpr_tools.client.starting import await_start
+from cdpr_tools.client.status_text import (
+    GO_ON,
+    in_millimetres,
+    left_text,
+    percent_text,
+    place_text,
+    stage_text,
+)
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.paths.options import PathOptions
@@ -18,7 +28,9 @@ from cdpr_tools.paths.times import time_text
 from cdpr_tools.signals import stop_on_signals
 
 _MOST_BYTES: Final = 1 << 20
-_TOLD_EVERY_S: Final = 5.0
+_NOT_IN_NAMES: Final = re.compile(r"[^A-Za-z0-9_. -]")
+_NAME_CHARS: Final = 48
+BACK: Final = "`cdpr path --back MM` steps back"
 
 
 @dataclass(frozen=True)
@@ -34,16 +46,17 @@ class Where:
 def follow(where: Where, out: Output, file: Path, options: PathOptions, feed: float) -> None:
     """Have the daemon plan a file's path, and follow it to its end."""
     body: dict[str, Any] = {
-        "name": file.name,
+        "name": plain_name(file),
         "text": read_text(file, _MOST_BYTES),
         "blend_mm": options.blend_mm,
-        "ignore": options.ignore,
+        "ignore": " ".join(options.ignored()),
         "origin_mm": options.origin_mm,
     }
     with open_daemon(*_four(where)) as daemon:
-        _require_platform(daemon)
-        out.note(f"{file.name}: planning ...")
-        planned = _planned(daemon, body)
+        _require_platform(daemon, out)
+        require_held(daemon.get("/status"))
+        with out.stage(f"{file.name}: planning"):
+            planned = _planned(daemon, body)
         out.say(
             f"{file.name}: {planned['length_m']:.3f} m in {time_text(planned['duration_s'])}, "
             f"{planned['gain']:.1f} times as fast as at one speed throughout"
@@ -52,10 +65,17 @@ def follow(where: Where, out: Output, file: Path, options: PathOptions, feed: fl
         _run(daemon, out, wanted, planned_s=planned["duration_s"])
 
 
+def plain_name(file: Path) -> str:
+    """Return a file's name as a daemon takes it; raises PathError where it is no path's."""
+    suffix = require_kind(file)
+    stem = _NOT_IN_NAMES.sub("-", file.stem).lstrip("-_. ")[:_NAME_CHARS]
+    return f"{stem or 'path'}{suffix}"
+
+
 def take_up(where: Where, out: Output, back_mm: float | None, feed: float) -> None:
     """Go on with the path that was left, or step back along it."""
     with open_daemon(*_four(where)) as daemon:
-        _require_platform(daemon)
+        _require_platform(daemon, out)
         wanted: dict[str, Any] = {"resume": True, "feed": feed}
         if back_mm is not None:
             wanted = {"back_m": 1e-3 * back_mm, "feed": feed}
@@ -89,9 +109,20 @@ def _four(where: Where) -> tuple[str | None, Path | None, str | None, Path | Non
     return where.robot, where.socket, where.url, where.key_file
 
 
-def _require_platform(daemon: Daemon) -> None:
+def _require_platform(daemon: Daemon, out: Output) -> None:
+    await_start(daemon, out)
     if "path" not in daemon.get("/description").get("programs", []):
         raise BadInputError("path: only for robots whose platform is moved as a whole")
+
+
+def require_held(status: dict[str, Any]) -> None:
+    """Raise WorkFailedError where a path could not be followed: before it is planned for that."""
+    state = str(status["state"])
+    if state != "active":
+        refusal = f"path: not in state {state}; allowed in active"
+        raise WorkFailedError(refusal + remedy(refusal, state))
+    if (status.get("program_progress") or {}).get("tight") is False:
+        raise WorkFailedError("path: the cables are not tight; `cdpr tighten` first")
 
 
 def _run(daemon: Daemon, out: Output, wanted: dict[str, Any], **figures: Any) -> None:
@@ -100,18 +131,22 @@ def _run(daemon: Daemon, out: Output, wanted: dict[str, Any], **figures: Any) ->
         try:
             control.post("/program", {"program": "path", "wanted": wanted})
         except (BadInputError, WorkFailedError) as error:
-            raise type(error)(in_millimetres(str(error))) from None
+            raise type(error)(_as_typed(str(error))) from None
         watch = _Watch(control, out)
-        while ended is None and not stop_requested():
+        while ended is None and not watch.paused and not stop_requested():
             time.sleep(RENEW_S)
             ended = watch.look()
-        control.hold()
-    told = (ended or {}).get("path") or {}
-    if waiting := told.get("waiting"):
-        out.say(f"line {told['line']}: {waiting}; `cdpr path --resume` goes on")
+        if not watch.paused:
+            control.hold()
+    if watch.paused:
+        out.say(watch.paused)
+        figures["paused"] = True
+    progress = (ended or {}).get("path") or {}
+    if waiting := progress.get("waiting"):
+        out.say(f"line {progress['line']}: {waiting}; {GO_ON}")
     if stop_requested():
-        out.note("held on the path; `cdpr path --resume` goes on, `cdpr path --back MM` steps back")
-    figures |= {"path": told} if told else {}
+        out.note(f"held on the path; {GO_ON}, {BACK}")
+    figures |= {"path": progress} if progress else {}
     finish(daemon, out, stop_requested(), ended, **figures)
 
 
@@ -120,7 +155,9 @@ class _Watch:
 
     def __init__(self, control: HeldRight, out: Output) -> None:
         self._control, self._out = control, out
-        self._told_s = time.monotonic()
+        self.paused = ""
+        """Where and by whom it was paused, empty until then."""
+        self._told_s, self._stage = time.monotonic(), ""
 
     def look(self) -> dict[str, Any] | None:
         """Return the progress once nothing more comes by itself, else None.
@@ -128,25 +165,54 @@ class _Watch:
         Raises WorkFailedError where the program was ended, or cannot go on.
         """
         self._control.renew()
-        progress: dict[str, Any]
-        progress = require_program(self._control.daemon, "path").get("program_progress", {})
+        status = self._control.daemon.get("/status")
+        progress: dict[str, Any] = status.get("program_progress") or {}
         path = progress.get("path") or {}
+        if status["state"] != "active" or status["program"] != "path":
+            why = ended_text(self._control.daemon, status)
+            if status["program"] != "hold" or not path or status["reason"]:
+                raise WorkFailedError(
+                    f"path was ended: {why} ({status['state']}); once the robot is well, {GO_ON}"
+                )
+            self.paused = f"{left_text(path)}, paused by {why}; {GO_ON}, {BACK}"
+            return None
         if progress.get("trouble") and progress.get("done") != 1.0:
             raise WorkFailedError(f"path: {in_millimetres(progress['trouble'])}")
         over = progress.get("done") == 1.0 and path.get("time_s") == path.get("duration_s")
-        now_s = time.monotonic()
-        if now_s - self._told_s >= _TOLD_EVERY_S and path and not over:
-            self._told_s = now_s
-            self._out.note(progress_text(path))
+        if path and not over:
+            self._tell(progress, path)
         stands = path.get("waiting") in ("stepped back", "the path waits here")
         return progress if over or stands else None
+
+    def _tell(self, progress: dict[str, Any], path: dict[str, Any]) -> None:
+        """Say what has begun, and now and then how far it has come."""
+        stage, before, now_s = stage_text("path", path), self._stage, time.monotonic()
+        if stage != before:
+            self._out.note(f"{stage} ...")
+        elif now_s - self._told_s < TELL_S:
+            return
+        else:
+            on_it = path["stage"] == "path"
+            self._out.note(progress_text(path) if on_it else place_text(progress))
+        self._stage, self._told_s = stage, now_s
+
+
+def _as_typed(refusal: str) -> str:
+    """Return a refusal of the program in the words of the command line."""
+    words = {
+        "path: resume: ": "--resume: ",
+        "path: back_m: ": "--back: ",
+        "allowed: plan": "allowed: --run with a path's FILE",
+    }
+    for key, typed in words.items():
+        refusal = refusal.replace(key, typed)
+    return in_millimetres(refusal)
 
 
 def progress_text(path: dict[str, Any]) -> str:
     """Return how far a path has come."""
-    share = path["time_s"] / max(path["duration_s"], 1e-9)
     left_s = (path["duration_s"] - path["time_s"]) / max(path["feed"], 0.01)
     return (
-        f"{path['name']}: {100.0 * share:.0f} %, line {path['line']}, "
+        f"{path['name']}: {percent_text(path)}, line {path['line']}, "
         f"{time_text(left_s)} left at {100.0 * path['feed']:.0f} % feed"
     )

@@ -93,12 +93,12 @@ class PlatformMove:
         """Return where a relative motion leads to."""
         from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to load
 
-        told = daemon.get("/status").get("program_progress") or {}
-        here = told.get("target_m") or told.get("position_m")
+        progress = daemon.get("/status").get("program_progress") or {}
+        here = progress.get("target_m") or progress.get("position_m")
         if not here:
             raise BadInputError("--relative: it is not known where the platform is; tighten first")
         about = [_ANGLES[name] for name in turns]
-        turned = told.get("target_rotation_rad") or told.get("rotation_rad") or []
+        turned = progress.get("target_rotation_rad") or progress.get("rotation_rad") or []
         from_home = Rotation.from_rotvec(_in_space(turned, about))
         at_home = platform.get("home_rotation_rad") or (0.0,)
         axes = from_home * Rotation.from_rotvec(
@@ -125,7 +125,16 @@ class PlatformMove:
                 raise BadInputError(
                     f"--to {self.to}: {leads}{name} {1e3 * value:.6g} mm; allowed: "
                     f"{1e3 * low:g} to {1e3 * high:g} mm, the workspace"
+                    f"{'' if self.relative else self._in_metres(to, platform)}"
                 )
+
+    @staticmethod
+    def _in_metres(to: Sequence[float], platform: dict[str, Any]) -> str:
+        """Return a hint where what was typed fits the workspace as metres, else an empty text."""
+        box = zip(to, platform["workspace_min_m"], platform["workspace_max_m"], strict=True)
+        if not all(low <= 1e3 * value <= high for value, low, high in box):
+            return ""
+        return f"; were metres typed? In mm: --to {' '.join(f'{1e6 * x:g}' for x in to)}"
 
     def _check_angle(self, rotate: Sequence[float], platform: dict[str, Any]) -> None:
         angle, most = math.hypot(*rotate), float(platform.get("workspace_angle_rad", 0.0))

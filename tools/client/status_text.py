@@ -11,6 +11,9 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from cdpr_tools.client.dead_loop import DEAD, power_text
+
+GO_ON = "`cdpr path --resume` goes on"
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _PLACE = re.compile(r"\bat ((?:-?\d+\.\d+, )+-?\d+\.\d+) m\b")
 _TURN = re.compile(r"\bturned by ((?:-?\d+\.\d+(?:, )?)+) rad\b")
@@ -24,6 +27,9 @@ _STAGES = {
     ("lower", "home"): "taking the platform home, above its stand",
     ("lower", "down"): "letting the platform down",
     ("lower", "fade"): "letting the cables go loose",
+    ("path", "set out"): "coming to rest before the path",
+    ("path", "to the path"): "moving to where the path is taken up",
+    ("path", "path"): "following the path",
 }
 """What a program is doing in each of its stages."""
 _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
@@ -40,17 +46,23 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     first = Text.assemble(
         f"{status['robot']}: ",
         (state, f"bold {_COLOURS.get(state, 'yellow')}"),
-        f", program {status['program']}" if status["program"] else "",
+        f", program {status['program']}" if status["program"] and state != DEAD else "",
         "".join(f", {word}" for word in how),
     )
     lines = [first]
     if status["reason"]:
         lines.append(Text(f"reason: {status['reason']}", style="yellow"))
-    told = [text for text in (platform_text(status), tightness_text(status)) if text]
-    if told:
-        lines.append(Text("; ".join(told)))
-    if text := compensation_text(status["axes"]):
-        lines.append(Text(text))
+    if state == DEAD:
+        return [*lines, *_of_dead(status)]
+    texts = [text for text in (platform_text(status), tightness_text(status)) if text]
+    if texts:
+        lines.append(Text("; ".join(texts)))
+    path = (status.get("program_progress") or {}).get("path")
+    if path and status["program"] == "hold" and path["time_s"] < path["duration_s"]:
+        lines.append(Text(f"{left_text(path)}; {GO_ON}"))
+    for text in (compensation_text(status["axes"]), learnt_text(status)):
+        if text:
+            lines.append(Text(text))
     control = status["control"]
     if control["held"]:
         lines.append(Text(f"moved by {control['client']}"))
@@ -76,6 +88,17 @@ def _lines(status: dict[str, Any]) -> list[Text]:
     return lines
 
 
+def _of_dead(status: dict[str, Any]) -> list[Text]:
+    """Return what is known of a robot whose control loop has died, and what to do next."""
+    place = place_text(status.get("program_progress") or {})
+    last = f"; {place} then, where it is now is not known" if place else ""
+    return [
+        Text(power_text(status)),
+        Text("next: `cdpr stop` ends what is left of the daemon, `cdpr run` starts it anew"),
+        Text(f"what follows is of {status['loop']['silent_s']:.0f} s ago{last}", style="dim"),
+    ]
+
+
 def platform_text(status: dict[str, Any]) -> str:
     """Return where the platform is and what is in its way, an empty text of robots without."""
     progress = status.get("program_progress") or {}
@@ -86,6 +109,27 @@ def platform_text(status: dict[str, Any]) -> str:
     found = (progress.get(key) for key in ("missing", "held_back", "trouble"))
     words += [in_millimetres(text) for text in found if text]
     return "; ".join(words)
+
+
+def learnt_text(status: dict[str, Any]) -> str:
+    """Return what is reckoned of motors that were not commissioned, an empty text for nothing."""
+    progress = status.get("program_progress") or {}
+    parts = []
+    for what in ("friction", "cogging"):
+        learnt = progress.get(f"learnt_{what}_Nm") or [0.0]
+        if max(learnt) > 0.0:
+            parts.append(f"{what} {min(learnt):.3f} to {max(learnt):.3f} Nm")
+    return f"reckoned of the motors: {', '.join(parts)}" if parts else ""
+
+
+def left_text(path: dict[str, Any]) -> str:
+    """Return where a path was left that can be taken up again."""
+    return f"path {path['name']} left at {percent_text(path)}, line {path['line']}"
+
+
+def percent_text(path: dict[str, Any]) -> str:
+    """Return how much of a path is done."""
+    return f"{100.0 * path['time_s'] / max(path['duration_s'], 1e-9):.0f} %"
 
 
 def place_text(progress: dict[str, Any]) -> str:
@@ -114,6 +158,8 @@ def _place(progress: dict[str, Any], of: str = "") -> str:
 def stage_text(program: str, progress: dict[str, Any]) -> str:
     """Return what a program that goes by stages is doing, an empty text for others."""
     stage = str(progress.get("stage") or "")
+    if stage == "home" and progress.get("blind"):  # nobody knows the way there
+        stage = "down"
     return _STAGES.get((program, stage), stage)
 
 
@@ -141,11 +187,11 @@ def _listed(values: Iterable[float], factor: float, digits: int) -> str:
     return ", ".join(f"{factor * value:z.{digits}f}" for value in values)
 
 
-def _recording(told: dict[str, Any]) -> str:
-    if not told.get("recording"):
-        return f"nothing is recorded: {told.get('error') or 'ended'}"
-    lost = f", {told['lost_rows']} cycles lost" if told.get("lost_rows") else ""
-    return f"recording {told['file']}, {told['bytes'] / 1e6:.1f} MB{lost}"
+def _recording(recording: dict[str, Any]) -> str:
+    if not recording.get("recording"):
+        return f"nothing is recorded: {recording.get('error') or 'ended'}"
+    lost = f", {recording['lost_rows']} cycles lost" if recording.get("lost_rows") else ""
+    return f"recording {recording['file']}, {recording['bytes'] / 1e6:.1f} MB{lost}"
 
 
 def _axes(status: dict[str, Any]) -> Table:

@@ -184,6 +184,11 @@ def prepare(folder: Path, overwrite: bool) -> Paths:
     paths = Paths(folder)
     raw = paths.raw_folder
     refuse_loss(folder, raw, overwrite)
+    if folder.is_dir() and any(folder.iterdir()) and not raw.is_dir() and not overwrite:
+        raise BadInputError(
+            f"--out {folder}: holds other things; choose a new folder, or put a commissioning "
+            "beside them with --overwrite"
+        )
     if raw.is_dir() and any(raw.iterdir()):
         shutil.rmtree(raw)
         for path in (paths.run, paths.results, paths.page, paths.profile, paths.truth):

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from cdpr_tools.commands.options import JsonOption, OverwriteOption
-from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError
+from cdpr_tools.errors import FAILED, BadInputError
 from cdpr_tools.host.host_checks import Finding, look_around
 from cdpr_tools.output import Output
 
@@ -44,6 +44,8 @@ def doctor(
         raise BadInputError("--robot: only with --report")
     if report is not None and report.exists() and not overwrite:
         raise BadInputError(f"--report {report}: is there already; replace it with --overwrite")
+    if report is not None and not report.parent.is_dir():
+        raise BadInputError(f"--report {report}: allowed: a file in a folder that is there")
     findings = list(look_around())
     for f in findings:
         out.say(*lines_of(f))
@@ -55,7 +57,7 @@ def doctor(
         try:
             report.write_text(fault_report(found, robot or []), encoding="utf-8")
         except OSError as error:
-            raise WorkFailedError(f"{report}: cannot be written: {error.strerror}") from error
+            raise BadInputError(f"--report {report}: {error.strerror}") from error
         out.say(f"report: {report}; look through it before you send it")
     ok = all(f.level != "problem" for f in findings)
     out.result({"ok": ok, "findings": [asdict(f) for f in findings], "report": report})

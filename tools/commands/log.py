@@ -7,13 +7,12 @@ from typing import Annotated
 
 import typer
 
-from cdpr_tools.commands.options import JsonOption
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.commands.options import JsonOption, written_as
 from cdpr_tools.output import Output
 from cdpr_tools.recordings.export import check_target, export
 from cdpr_tools.recordings.picture import FIELDS, draw
 from cdpr_tools.recordings.selection import Selection, fields_of, files_of
-from cdpr_tools.recordings.summary import summarise, told
+from cdpr_tools.recordings.summary import summarise, summary_lines
 
 app = typer.Typer(
     name="log",
@@ -40,7 +39,7 @@ def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
     results = []
     for path in files_of(files):
         results.append(summarise(path, out))
-        out.say(*told(results[-1], _EVENTS_SHOWN))
+        out.say(*summary_lines(results[-1], _EVENTS_SHOWN))
     out.result({"ok": True, "recordings": results})
 
 
@@ -70,7 +69,12 @@ def export_command(
 def plot(
     files: _FilesArgument,
     target: Annotated[
-        Path | None, typer.Option("--out", help="A name ending in .png; beside FILE by default.")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="A name ending in .png; beside FILE by default.",
+            callback=written_as(".png"),
+        ),
     ] = None,
     axis: Annotated[list[str] | None, typer.Option(help="Only this axis; may be repeated.")] = None,
     from_s: _FromOption = 0.0,
@@ -80,8 +84,6 @@ def plot(
     """Draw motion, torques, tensions and the timing of the cycles into a picture."""
     out = Output(as_json)
     path = target or files_of(files)[0].with_suffix(".png")
-    if path.suffix != ".png":
-        raise BadInputError(f"--out {path}: allowed: a name that ends in .png")
     selection = Selection(files, FIELDS, from_s, until_s)
     with out.progress(path.name, selection.reading_s) as selection.advance:
         rows = draw(selection, axis, path)

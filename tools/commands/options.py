@@ -2,12 +2,42 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cdpr_rt.procedures.commissioning.finding_index import Index
+from cdpr_tools.errors import BadInputError
+
+
+def written_as(*endings: str) -> Callable[[typer.CallbackParam, Path | None], Path | None]:
+    """Return the callback of an option that names a file to write, whose name ends in one of these.
+
+    What could not be written at the end is refused before the work: BadInputError.
+    """
+
+    def checked(param: typer.CallbackParam, value: Path | None) -> Path | None:
+        if value is None:
+            return None
+        typed = f"{param.opts[0]} {value}"
+        if value.suffix.lower() not in endings:
+            raise BadInputError(f"{typed}: allowed: a name that ends in {', '.join(endings)}")
+        if value.is_dir() or not value.parent.is_dir() or not os.access(value.parent, os.W_OK):
+            raise BadInputError(f"{typed}: allowed: a file in a folder that can be written to")
+        return value
+
+    return checked
+
+
+PngOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--png", metavar="FILE", help="Draw it into NAME.png.", callback=written_as(".png")
+    ),
+]
 
 WinchArgument = Annotated[
     str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")

@@ -1,1 +1,1 @@
-"""Commissioning of winches: procedure, files, results."""
+"""Commissioning at the terminal: all motors of a robot in turn, and the table of results."""

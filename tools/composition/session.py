@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from cdpr_drivers.bus import BusUrl
@@ -23,6 +24,7 @@ from cdpr_profiles.eds.dictionary import load_dictionary
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_rt.procedures.winch_operator import Tolerance
 from cdpr_rt.runtime.realtime import one_core
+from cdpr_rt.runtime.warm_up import warm_up
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError
@@ -90,8 +92,8 @@ def open_winch(
     require_fit(winch)
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
-        bus, pid = _find_bus(stack, winch, url, out, plant, truth_log)
         robot = robot_of_winch(winch)
+        bus, pid = _find_bus(stack, winch, url, out, plant, truth_log, _compiled(robot))
         axis = replace(robot.axes[0], winch=winch)  # whose drive waits as long as its profile says
         robot = replace(robot, axes=(axis,), master_heartbeat_s=_heartbeat_s(winch))
         session = stack.enter_context(
@@ -123,7 +125,7 @@ def open_robot(
         pid = None
         if asks_for_own_simulator(buses):
             out.note(f"starting simulated drives: {len(robot.axes)} ...")
-            buses, pid = _own_simulator(stack, robot.reference)
+            buses, pid = _own_simulator(stack, robot.reference, meanwhile=_compiled(robot))
         session = stack.enter_context(booted(robot, buses, stop_requested, safety_io))
         stack.callback(stop_requested.closing)  # before the power is taken
         session.simulator_pid = pid
@@ -141,6 +143,11 @@ def _prepare(session: Session, stop_requested: StopRequest, out: Output, reset: 
         out.note(f"{session.machine.safety}: {CLOSED}")
 
 
+def _compiled(robot: Robot) -> Callable[[], None]:
+    """Return what compiles the master's cycle: worth doing while a simulator compiles physics."""
+    return partial(warm_up, len(robot.axes), robot.sync_period_s)
+
+
 def _heartbeat_s(winch: Winch) -> float:
     """Return how often the master is heard within what the drive tolerates."""
     return winch.drive.heartbeat_consumer_s / HEARTBEATS_IN_TOLERANCE
@@ -153,11 +160,15 @@ def _find_bus(
     out: Output,
     plant: Path | None,
     truth_log: Path | None = None,
+    meanwhile: Callable[[], None] | None = None,
 ) -> tuple[BusUrl, int | None]:
-    """Return the winch's bus, and the process of its simulator where one was to be started."""
+    """Return the winch's bus, and the process of its simulator where one was to be started.
+
+    What is to be done `meanwhile` is done while that starts.
+    """
     if url.starts_own_simulator:
         out.note("starting the simulated drive ...")
-        (bus,), pid = _own_simulator(stack, winch.reference, plant, truth_log)
+        (bus,), pid = _own_simulator(stack, winch.reference, plant, truth_log, meanwhile)
         return open_bus(bus), pid
     if plant is not None:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
@@ -165,10 +176,14 @@ def _find_bus(
 
 
 def _own_simulator(
-    stack: ExitStack, reference: str, plant: Path | None = None, truth_log: Path | None = None
+    stack: ExitStack,
+    reference: str,
+    plant: Path | None = None,
+    truth_log: Path | None = None,
+    meanwhile: Callable[[], None] | None = None,
 ) -> tuple[list[str], int]:
     bus = f"simbus:own-{os.getpid()}"
-    simulator = OwnSimulator(reference, bus, plant, truth_log)
+    simulator = OwnSimulator(reference, bus, plant, truth_log, meanwhile=meanwhile)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return [bus], simulator.process.pid

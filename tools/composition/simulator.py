@@ -3,86 +3,70 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import select
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import IO
 
+from cdpr_tools.compiling import NOTICE
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
-# the first start on a machine compiles the physics
-_START_TIMEOUT_S = 180.0
+# the first start on a machine compiles the physics, a slow one for minutes
+_START_TIMEOUT_S = 600.0
 # one that is only held up completes its logs
 _STOP_TIMEOUT_S = 60.0
 
 _numbers = count(1)
 
 
-class OwnSimulator:
-    """A running `cdpr sim up`; leaves when its standard input closes, so also when we die.
+class _OwnProcess:
+    """A command of ours that runs until its standard input closes, so also when we die."""
 
-    Where the environment has CDPR_SIM_FRAME_LOG=FILE, it logs all frames there, those of further
-    simulators of this process in FILE with -2, -3 and so on at the end of its name.
-    """
+    def __init__(self, *command: str, meanwhile: Callable[[], None] | None = None) -> None:
+        """Run it, and wait until it is ready; raises BadInputError and WorkFailedError as it does.
 
-    def __init__(
-        self,
-        winch: str,
-        bus: str,
-        plant: Path | None = None,
-        truth_log: Path | None = None,
-        nodes: int = 1,
-        board: Path | None = None,
-        paced: bool = False,
-        detached: bool = False,
-        scanner: Path | None = None,
-    ) -> None:
-        command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "sim", "up", winch, "--bus", bus]
-        command += ["--paced" if paced else "--lockstep", "--exit-with-stdin"]
-        command += ["--nodes", str(nodes)]
-        if detached:
-            command.append("--detached")
-        if plant is not None:
-            command += ["--plant", str(plant)]
-        if truth_log is not None:
-            command += ["--truth-log", str(truth_log)]
-        if scanner is not None:
-            command += ["--scanner", str(scanner)]
-        if board is not None:
-            command += ["--board", str(board)]
-        if log := os.environ.get("CDPR_SIM_FRAME_LOG"):
-            command += ["--frame-log", str(_numbered(Path(log), next(_numbers)))]
-        self.bus = bus
+        It says that it is ready in one line of JSON: `ready`. What is to be done `meanwhile` is
+        done here while it starts.
+        """
         self.process = subprocess.Popen(
-            command,
+            [sys.executable, "-P", "-m", "cdpr_tools.cli", *command, "--exit-with-stdin"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             start_new_session=True,  # a Ctrl-C at the terminal is ours to handle, not its
         )
         try:
-            self._await_ready()
+            if meanwhile is not None:
+                meanwhile()
+            self.ready = self._await_ready()
         except BaseException:
             self.stop()
             raise
 
-    def _await_ready(self) -> None:
-        out = self._pipe(self.process.stdout)
-        deadline = time.monotonic() + _START_TIMEOUT_S
+    def _await_ready(self) -> str:
+        out, errors = self._pipe(self.process.stdout), self._pipe(self.process.stderr)
+        deadline, output = time.monotonic() + _START_TIMEOUT_S, ""
+        heard = [out, errors]
         while time.monotonic() < deadline:
-            ready, _, _ = select.select([out], [], [], 0.1)
-            if ready:
-                if os.read(out.fileno(), 4096):
-                    return
+            ready, _, _ = select.select(heard, [], [], 0.1)
+            if errors in ready:
+                if not (text := os.read(errors.fileno(), 4096).decode(errors="replace")):
+                    heard = [out]
+                output = _without_notices(output + text)
+            if out in ready:
+                if ready_line := os.read(out.fileno(), 4096):
+                    return ready_line.decode()
                 break
-        errors = self._pipe(self.process.stderr)
         if self.process.poll() is None and time.monotonic() >= deadline:
             raise WorkFailedError(f"the simulator was not ready within {_START_TIMEOUT_S:g} s")
-        message = errors.read().decode(errors="replace").strip().removeprefix("cdpr: ")
+        message = _without_notices(output + errors.read().decode(errors="replace"))
+        message = message.strip().removeprefix("cdpr: ")
         kind = (
             BadInputError if self.process.wait() == BadInputError.exit_status else WorkFailedError
         )
@@ -99,7 +83,7 @@ class OwnSimulator:
         return self._pipe(self.process.stdin).fileno()
 
     def stop(self) -> None:
-        """End the simulator; what it logs is complete afterwards."""
+        """End it; what it logs is complete afterwards."""
         with contextlib.suppress(OSError):
             self._pipe(self.process.stdin).close()
         try:
@@ -109,6 +93,75 @@ class OwnSimulator:
             self.process.wait()
         for pipe in (self.process.stdout, self.process.stderr):
             self._pipe(pipe).close()
+
+
+class OwnLoadCells(_OwnProcess):
+    """A running `cdpr sim tension`, on the cables of the physics board of a simulator."""
+
+    def __init__(self, sensors: str, board: Path) -> None:
+        super().__init__("sim", "tension", sensors, "--board", str(board))
+        self.port = str(json.loads(self.ready)["ready"]["port"])
+        """Where its serial line is."""
+
+
+class OwnSimulator(_OwnProcess):
+    """A running `cdpr sim up`.
+
+    Where the environment has CDPR_SIM_FRAME_LOG=FILE, it logs all frames there, those of further
+    simulators of this process in FILE with -2, -3 and so on at the end of its name.
+    """
+
+    def __init__(
+        self,
+        winch: str,
+        bus: str,
+        plant: Path | None = None,
+        truth_log: Path | None = None,
+        nodes: int = 1,
+        board: Path | None = None,
+        paced: bool = False,
+        detached: bool = False,
+        scanner: Path | None = None,
+        camera: Path | None = None,
+        meanwhile: Callable[[], None] | None = None,
+    ) -> None:
+        command = ["sim", "up", winch, "--bus", bus, "--paced" if paced else "--lockstep"]
+        command += ["--nodes", str(nodes)]
+        if detached:
+            command.append("--detached")
+        if plant is not None:
+            command += ["--plant", str(plant)]
+        if truth_log is not None:
+            command += ["--truth-log", str(truth_log)]
+        if scanner is not None:
+            command += ["--scanner", str(scanner)]
+        if board is not None:
+            command += ["--board", str(board)]
+        if camera is not None:
+            command += ["--camera", str(camera)]
+        if log := os.environ.get("CDPR_SIM_FRAME_LOG"):
+            command += ["--frame-log", str(_numbered(Path(log), next(_numbers)))]
+        self.bus = bus
+        super().__init__(*command, meanwhile=meanwhile)
+
+
+class OwnCamera(_OwnProcess):
+    """A running `cdpr sim camera`, on the platform of a physics board."""
+
+    def __init__(self, socket: Path, board: Path, plant: Path | None) -> None:
+        more = () if plant is None else ("--plant", str(plant))
+        super().__init__("sim", "camera", str(socket), "--board", str(board), *more)
+
+
+def _without_notices(output: str) -> str:
+    """Return what is told besides that kernels are compiled, which is passed on by whole lines."""
+    kept = ""
+    for line in output.splitlines(keepends=True):
+        if line.startswith(NOTICE) and line.endswith("\n"):
+            print(line, end="", file=sys.stderr, flush=True)
+        else:
+            kept += line
+    return kept
 
 
 def _numbered(path: Path, number: int) -> Path:

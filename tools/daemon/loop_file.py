@@ -88,7 +88,7 @@ class LoopFile(BaseModel):
         return found
 
     def open(self) -> int | None:
-        """Return a pidfd of the process, None where it has ended.
+        """Return a pidfd of the process, None where it has ended or its loop has turned last.
 
         Raises WorkFailedError where it is another user's, or `POWER_OFF_SIGNAL` would end it.
         """
@@ -97,10 +97,11 @@ class LoopFile(BaseModel):
         except ProcessLookupError:
             return None
         # looked at while the pidfd holds the process
-        is_it, obeys = started(self.pid) == self.started, self._obeys()
-        if is_it and obeys:
+        is_it = started(self.pid) == self.started
+        if is_it and self._does_with_signal("SigCgt"):
             return pidfd
-        ended = not is_it or bool(select.select([pidfd], [], [], 0.0)[0])
+        ending = self._does_with_signal("SigIgn")  # a loop ignores it once it has turned last
+        ended = not is_it or ending or bool(select.select([pidfd], [], [], 0.0)[0])
         os.close(pidfd)
         if ended:
             return None
@@ -115,15 +116,15 @@ class LoopFile(BaseModel):
         os.close(pidfd)
         return True
 
-    def _obeys(self) -> bool:
-        """Whether the process is all its user's and has a handler for the signal."""
+    def _does_with_signal(self, what: str) -> bool:
+        """Whether the process is all its user's and catches (SigCgt) or ignores (SigIgn) it."""
         try:
             lines = Path(f"/proc/{self.pid}/status").read_text().splitlines()
         except OSError:
             return False
         fields = dict(line.split(":\t", 1) for line in lines if ":\t" in line)
-        caught = int(fields["SigCgt"], 16) >> (POWER_OFF_SIGNAL - 1) & 1
-        return set(fields["Uid"].split()) == {str(self.uid)} and bool(caught)
+        does = int(fields[what], 16) >> (POWER_OFF_SIGNAL - 1) & 1
+        return set(fields["Uid"].split()) == {str(self.uid)} and bool(does)
 
 
 def started(pid: int) -> int:

@@ -11,6 +11,7 @@ from cdpr_tools.errors import BadInputError
 
 LOOP_SUFFIX: Final = ".loop"
 SOCKET_SUFFIX: Final = ".sock"
+LAUNCHER_SUFFIX: Final = ".launcher"
 _FOLDER = "cdpr-rt"
 _SYSTEM = Path("/run") / _FOLDER
 
@@ -45,6 +46,11 @@ def find_loop_files(robot: str | None = None) -> list[Path]:
     return _find(robot, LOOP_SUFFIX)
 
 
+def find_launcher_files(robot: str | None = None) -> list[Path]:
+    """Return the files that name the launchers of daemons, found as sockets are."""
+    return _find(robot, LAUNCHER_SUFFIX)
+
+
 def unsearched_folders() -> str:
     """Return in words where daemons were not looked for though some may be there."""
     own, reasons = _runtime_folder(), []
@@ -64,6 +70,8 @@ def is_trusted(path: Path, owner: int) -> bool:
 
 
 def _find(robot: str | None, suffix: str) -> list[Path]:
+    if robot is not None and robot.endswith(".toml"):  # the file whose short name the daemon has
+        robot = Path(robot).stem
     found = []
     # only root makes folders in /run: the owner of ours is the daemons' user
     for folder, owner in ((_runtime_folder(), os.geteuid()), (_SYSTEM, None)):

@@ -17,7 +17,7 @@ from cdpr_tools.experiment.model.plants import PerfectRobot
 from cdpr_tools.experiment.path import plane_of, targets_m
 from cdpr_tools.experiment.session import MARK
 from cdpr_tools.experiment.trial import Condition, run_trial
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation.recorded import Recorded
 
 Points = NDArray[np.void]
 POINT: Final = np.dtype(
@@ -57,10 +57,10 @@ def _points_of_path(recorded: Recorded, path: dict[str, Any]) -> Points:
     points = np.zeros(len(found), POINT)
     plane = list(plane_of(recorded.directions.k))
     true_m, setpoint_m = recorded.true_m[:, plane], recorded.setpoint_m[:, plane]
-    for point, row, told in zip(points, found, path["points"], strict=True):
-        look = slice(*(recorded.row(cycle) + end for end, cycle in enumerate(told["look_cycles"])))
-        _fill(point, condition, told)
-        target = targets[told["target"]]
+    for point, row, entry in zip(points, found, path["points"], strict=True):
+        look = slice(*(recorded.row(cycle) + end for end, cycle in enumerate(entry["look_cycles"])))
+        _fill(point, condition, entry)
+        target = targets[entry["target"]]
         point["error_m"] = true_m[row] - target
         point["judged_m"] = true_m[look].mean(axis=0) - target
         point["hand_m"] = setpoint_m[row] - setpoint_m[look].mean(axis=0)
@@ -83,18 +83,18 @@ def points_of_perfect_robot(
     trial = run_trial(robot, condition, targets, operator, station, seed)
     true_m = np.array(robot.track_m)
     points = np.zeros(len(trial.points), POINT)
-    for point, told in zip(points, trial.points, strict=True):
-        _fill(point, condition.as_dict(), told)
-        target = targets[told["target"]]
-        look = slice(told["look_cycles"][0], told["look_cycles"][1] + 1)
-        point["error_m"] = true_m[told["cycle"]] - target
+    for point, entry in zip(points, trial.points, strict=True):
+        _fill(point, condition.as_dict(), entry)
+        target = targets[entry["target"]]
+        look = slice(entry["look_cycles"][0], entry["look_cycles"][1] + 1)
+        point["error_m"] = true_m[entry["cycle"]] - target
         point["judged_m"] = true_m[look].mean(axis=0) - target
         point["hand_m"] = point["error_m"] - point["judged_m"]
     return points
 
 
-def _fill(point: Any, condition: dict[str, Any], told: dict[str, Any]) -> None:
+def _fill(point: Any, condition: dict[str, Any], entry: dict[str, Any]) -> None:
     for name in ("place", "scale", "round_trip_s", "repeat"):
         point[name] = condition[name]
     for name in ("target", "begun_s", "pressed_s", "tries"):
-        point[name] = told[name]
+        point[name] = entry[name]

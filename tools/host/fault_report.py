@@ -13,7 +13,7 @@ from cdpr_profiles.calibration.in_force import calibration_file
 from cdpr_tools.daemon.paths import default_recordings, find_loop_files
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
-from cdpr_tools.recordings.summary import summarise, told
+from cdpr_tools.recordings.summary import summarise, summary_lines
 
 _EVENTS = 40
 _PACKAGES = (
@@ -65,6 +65,6 @@ def _last_recording() -> list[str]:
     if not found:
         return [f"none in {folder}"]
     try:
-        return list(told(summarise(found[-1], Output(as_json=True)), _EVENTS))
+        return list(summary_lines(summarise(found[-1], Output(as_json=True)), _EVENTS))
     except BadInputError as error:
         return [str(error)]

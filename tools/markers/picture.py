@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patheffects import withStroke
 
-import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_rt.calibration.markers.map_fit import MapFit
+from cdpr_tools.report.style import legend_beside_title
 
 _CAMERA, _REFERENCE = "#444444", "#d1581a"
 
@@ -42,7 +42,7 @@ def draw_map(fit: MapFit, path: Path) -> None:
     top.plot(*cameras[:, :2].T, "+", ms=5, color=_CAMERA, label="camera")
     top.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="marker map")
     top.autoscale_view()
-    top.legend(loc="upper right")
+    legend_beside_title(top)
     bar = figure.colorbar(shades, ax=top, shrink=0.8)
     bar.set_label("place known to (mm, 1 sigma)")
     bar.outline.set_visible(False)
@@ -64,5 +64,5 @@ def draw_map(fit: MapFit, path: Path) -> None:
     low.plot(away[placed], 1e3 * np.sqrt(variance[:, 2]), "s", ms=4, label="across it")
     low.set(xlabel=f"distance from marker {fit.fixed[0]} (m)", ylabel="known to (mm, 1 sigma)")
     low.set_ylim(bottom=0.0)
-    low.legend(loc="upper left")
+    legend_beside_title(low)
     figure.savefig(path, format="png")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -10,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 
 import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
@@ -24,36 +26,65 @@ _AXES: Final = (
 )  # fmt: skip
 _WIDE_in: Final = 7.4
 _MOST_POINTS: Final = 5000
+_SMALL: Final = 0.5
+"""A path smaller than this share of the box of targets is drawn enlarged as well."""
+
+
+@dataclass(frozen=True)
+class _View:
+    """Two coordinates of the room, and whether only the path or all of the box is shown."""
+
+    across: int
+    up: int
+    enlarged: bool
 
 
 def draw_path(shown: Preview, robot: Robot, file: Path) -> None:
     """Write the picture as PNG; raises OSError.
 
-    The path from above and from the front, coloured by its speed, in the box of targets; below it
-    speed and tensions over time. What is in the way is marked.
+    The path from above and from the front, coloured by its speed, in the box of targets and, where
+    it is small there, enlarged; below it speed and tensions over time. What is in the way is
+    marked.
     """
-    k = shown.planner.model.positions
-    views = [(0, 1)] if k == 2 else [(0, 1), (0, 2)]
+    views = _views(shown)
     timed = shown.plan.timed is not None
     rows = 1 + 2 * timed
-    figure = Figure(figsize=(_WIDE_in, 3.6 + 2.3 * (rows - 1)), layout="constrained")
+    figure = Figure(
+        figsize=(max(_WIDE_in, 3.5 * len(views)), 3.9 + 2.3 * (rows - 1)), layout="constrained"
+    )
     grid = figure.add_gridspec(rows, len(views), height_ratios=[3.6] + [2.3] * (rows - 1))
-    for column, view in enumerate(views):
-        _draw_view(figure, figure.add_subplot(grid[0, column]), shown, view, column == 0)
+    drawn = [figure.add_subplot(grid[0, column]) for column in range(len(views))]
+    for ax, view in zip(drawn, views, strict=True):
+        _draw_view(ax, shown, view)
+    drawn[0].set_title(Path(shown.plan.path.source).name)
+    handles, labels = drawn[0].get_legend_handles_labels()
     if timed:
+        bar = figure.colorbar(drawn[-1].collections[0], ax=drawn, shrink=0.8)
+        bar.set_label("speed (mm/s)")
+        bar.outline.set_visible(False)
         speed, tension = (figure.add_subplot(grid[row, :]) for row in (1, 2))
         _draw_speed(speed, shown)
         _draw_tensions(tension, shown, robot)
-        handles, labels = tension.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=5)
+        more_handles, more_labels = tension.get_legend_handles_labels()
+        handles, labels = handles + more_handles, labels + more_labels
+    figure.legend(handles, labels, loc="outside lower center", ncols=6)
     figure.savefig(file, format="png")
 
 
-def _draw_view(
-    figure: Figure, ax: Axes, shown: Preview, view: tuple[int, int], named: bool
-) -> None:
+def _views(shown: Preview) -> list[_View]:
+    """Return what is drawn: the planes, each with all of the box or enlarged."""
+    platform = shown.planner.platform
+    low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
+    size = np.ptp(shown.plan.nodes.q[:, : len(low)], axis=0)
+    small = bool((size < _SMALL * (high - low)).all() and size.any()) and shown.obstacle is None
+    if len(low) == 2:
+        return [_View(0, 1, False), *[_View(0, 1, True)] * small]
+    return [*[_View(0, 1, False)] * small, _View(0, 1, small), _View(0, 2, small)]
+
+
+def _draw_view(ax: Axes, shown: Preview, view: _View) -> None:
     plan, platform = shown.plan, shown.planner.platform
-    i, j = view
+    i, j = view.across, view.up
     low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
     ax.add_patch(
         Rectangle((low[i], low[j]), high[i] - low[i], high[j] - low[j], fill=False, ec=_BOX,
@@ -71,24 +102,20 @@ def _draw_view(
         )
         parts.set_array(1e3 * speed[:-1])
         ax.add_collection(parts)
-        if not named or len(low) == 2:
-            bar = figure.colorbar(parts, ax=ax, shrink=0.8)
-            bar.set_label("speed (mm/s)")
-            bar.outline.set_visible(False)
     ax.plot(*plan.nodes.q[0, [i, j]], "o", ms=5, color=_STOP, label="beginning")
     if shown.obstacle is not None:
         ax.plot(*shown.obstacle.position[[i, j]], "x", ms=11, mew=2.5, color=_WRONG,
                 label=f"line {shown.obstacle.line}: cannot be there")  # fmt: skip
-    every = np.vstack([place, [low[[i, j]]], [high[[i, j]]]])
+    every = place if view.enlarged else np.vstack([place, [low[[i, j]]], [high[[i, j]]]])
     margin = 0.05 * float(np.ptp(every, axis=0).max())
     ax.set(
         xlim=(every[:, 0].min() - margin, every[:, 0].max() + margin),
         ylim=(every[:, 1].min() - margin, every[:, 1].max() + margin),
         xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal",
     )  # fmt: skip
-    if named:
-        ax.legend(loc="best")
-        ax.set(title=Path(plan.path.source).name)
+    ax.xaxis.set_major_locator(MaxNLocator(5))
+    if view.enlarged:
+        ax.set_title("enlarged")
 
 
 def _draw_speed(ax: Axes, shown: Preview) -> None:
@@ -106,9 +133,10 @@ def _draw_tensions(ax: Axes, shown: Preview, robot: Robot) -> None:
     t = _times(shown)[tensions.sample]
     for i, axis in enumerate(robot.axes):
         colour = _AXES[i % len(_AXES)]
-        ax.plot(*decimated(t, tensions.tension_N[:, i]), color=colour, lw=0.9, label=axis.name)
+        ax.plot(*decimated(t, tensions.tension_N[:, i]), color=colour, lw=1.2, label=axis.name)
     for bound in (tensions.low_N.max(), tensions.high_N.min()):
-        ax.axhline(bound, color=_BOUND, ls="--", lw=1.0)
+        # below the tensions, which may be at a bound all the time
+        ax.axhline(bound, color=_BOUND, ls="--", lw=1.0, zorder=1)
     ax.plot([], [], color=_BOUND, ls="--", lw=1.0, label="planned within")
     ax.set(ylabel="tension (N)", xlabel="time (s)")
 

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import Robot
+from cdpr_profiles.reading.bounded_input import read_text as read_bounded
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.motion.path.reading import read_path
+from cdpr_rt.motion.path.reading import MOST_BYTES, read_path
 from cdpr_rt.procedures.path.planning import Advance, Obstacle, PathPlan, PathPlanner
 from cdpr_rt.procedures.path.tensions import PathTensions, path_tensions
 from cdpr_rt.procedures.path.unit_slips import size_note
-from cdpr_rt.programs.platform.path_store import paths_folder, write_plan
+from cdpr_rt.programs.platform.paths.path_progress import paths_folder
+from cdpr_rt.programs.platform.paths.path_store import write_plan
 from cdpr_tools.paths.options import PathOptions
 from cdpr_tools.paths.times import time_text
 
@@ -33,6 +35,7 @@ class Preview:
 
 def preview(robot: Robot, file: Path, options: PathOptions, advance: Advance) -> Preview:
     """Plan a file's path for a robot; raises PathError, ProfileError and BadInputError."""
+    read_bounded(file, MOST_BYTES)  # a missing file is told before anything is compiled
     planner = PathPlanner(robot)
     advance("reading", 0.0)
     settings = options.settings(planner.model.positions)
@@ -40,7 +43,7 @@ def preview(robot: Robot, file: Path, options: PathOptions, advance: Advance) ->
     tensions, obstacle = None, plan.obstacle
     if plan.timed is not None:
         advance("tensions along the path", 0.8)
-        tensions = path_tensions(planner.model, plan.timed, planner.high_N)
+        tensions = path_tensions(planner.model, plan.timed)
         if not tensions.carried.all():
             sample = int(tensions.sample[int((~tensions.carried).argmax())])
             obstacle = Obstacle(
@@ -65,7 +68,7 @@ def keep(shown: Preview, robot: Robot) -> str:
 def figures(shown: Preview) -> dict[str, Any]:
     """Return a preview's figures for JSON."""
     plan, timed, tensions = shown.plan, shown.plan.timed, shown.tensions
-    told: dict[str, Any] = {
+    table: dict[str, Any] = {
         "file": plan.path.source,
         "moves": len(plan.path.moves),
         "length_m": plan.nodes.length_m,
@@ -74,14 +77,14 @@ def figures(shown: Preview) -> dict[str, Any]:
     }
     if shown.obstacle is not None:
         k = shown.planner.model.positions
-        told["obstacle"] = {
+        table["obstacle"] = {
             "line": shown.obstacle.line,
             "position_m": shown.obstacle.position[:k].tolist(),
             "rotation_rad": shown.obstacle.position[k:].tolist(),
             "text": shown.obstacle.text,
         }
     if timed is not None:
-        told |= {
+        table |= {
             "duration_s": timed.duration_s,
             "constant_limit_s": plan.constant_s,
             "gain": plan.constant_s / timed.duration_s,
@@ -89,15 +92,15 @@ def figures(shown: Preview) -> dict[str, Any]:
             "slowed_moves": plan.slowed,
         }
     if tensions is not None:
-        told |= {
+        table |= {
             "tension_min_N": tensions.tension_N.min(axis=0).tolist(),
             "tension_max_N": tensions.tension_N.max(axis=0).tolist(),
             "tension_low_N": tensions.low_N.tolist(),
             "tension_high_N": tensions.high_N.tolist(),
         }
     if shown.note:
-        told["note"] = shown.note
-    return told
+        table["note"] = shown.note
+    return table
 
 
 def _top_speed(shown: Preview) -> float:
@@ -107,22 +110,21 @@ def _top_speed(shown: Preview) -> float:
     return float(np.linalg.norm(timed.samples[:, 1, :k], axis=1).max())
 
 
-def lines(shown: Preview, robot: Robot, told: dict[str, Any]) -> list[str]:
+def lines(shown: Preview, robot: Robot, table: dict[str, Any]) -> list[str]:
     """Return a preview for people."""
-    text = [
-        f"{told['file']}: {told['moves']} moves, {told['length_m']:.3f} m, {told['stops']} stops"
-    ]
+    length = f"{table['length_m']:.3f} m"
+    text = [f"{table['file']}: {table['moves']} moves, {length}, {table['stops']} stops"]
     if shown.note:
         text.append(f"mind: {shown.note}")
     if shown.plan.timed is not None:
         text += [
-            f"duration {time_text(told['duration_s'])}, fastest "
-            f"{1e3 * told['top_speed_m_s']:.0f} mm/s",
+            f"duration {time_text(table['duration_s'])}, fastest "
+            f"{1e3 * table['top_speed_m_s']:.0f} mm/s",
             f"at one speed and acceleration that all of it bears: "
-            f"{time_text(told['constant_limit_s'])}, {told['gain']:.1f} times as long",
+            f"{time_text(table['constant_limit_s'])}, {table['gain']:.1f} times as long",
         ]
-    if told.get("slowed_moves"):
-        text.append(f"mind: {told['slowed_moves']} moves want more speed than the robot has")
+    if table.get("slowed_moves"):
+        text.append(f"mind: {table['slowed_moves']} moves want more speed than the robot has")
     tensions = shown.tensions
     if tensions is not None:
         text.append("tensions, N:        least   most   planned within")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from textwrap import fill
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,8 +19,9 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.recordings.reasons import Reasons, is_fault
 from cdpr_tools.recordings.selection import ELAPSED, Selection
-from cdpr_tools.report.style import decimated, legend_above
+from cdpr_tools.report.style import decimated, legend_above, legend_beside_title
 
 FIELDS = (
     "setpoint_rad", "position_rad", "velocity_rad_s", "torque_sent_Nm", "tension_N",
@@ -28,8 +32,12 @@ _COLOURS = (
     "#2f6fb0", "#d1581a", "#3b8f5a", "#7a3fa0", "#1f8a8a", "#b03a5b", "#8a6d1f", "#8a8f98",
 )  # fmt: skip
 _TENSION = "tension (N)"
+_STRIP_in, _PANEL_in, _NARROW_in, _WIDE_in = 0.25, 1.7, 7.4, 12.0
+_PATH_ROWS: Final = 2
+_LETTERS_PER_in: Final = 13
+"""Of what is told below the picture, in a line."""
 _MOST_TOLD, _PATH_POINTS = 8, 3000
-_LETTER = 0.012
+_LETTER = 0.015
 """Share of the picture's width that a letter takes."""
 _MOVED = 1e-6
 """A coordinate that differs by less over a recording is none of its robot's, m or rad."""
@@ -72,59 +80,92 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
     panels = [one for one in panels if np.isfinite(one[1][:, chosen]).any()]
     poses = pose_curves(columns)
     dot = "." if columns[ELAPSED].size == 1 else None
-    figure, (strip, *timed), path_ax = _grid(len(panels) + len(poses) + 1, bool(poses))
-    for ax, (label, values) in zip(timed, panels, strict=False):
+    beside = bool(poses and panels)
+    grid = _Grid.of(len(panels), len(poses) + 1) if beside else _Grid.of(len(panels) + 1, 0)
+    for ax, (label, values) in zip(grid.timed, panels, strict=False):
         for k in chosen:
             colour, line = _COLOURS[k % len(_COLOURS)], "-" if k < len(_COLOURS) else "--"
             x, y = decimated(columns[ELAPSED], values[:, k])
             ax.plot(x, y, color=colour, ls=line, marker=dot, label=_as_it_is(names[k]))
-        ax.set_ylabel(label)
+        ax.set_ylabel(label.replace(" (", "\n("))
         if label == _TENSION:
             _draw_limits(ax, description, chosen)
-    for ax, (label, curves) in zip(timed[len(panels) :], poses.items(), strict=False):
-        ax.set_ylabel(label)
+    for ax, (label, curves) in zip(grid.timed[len(panels) :], poses.items(), strict=False):
+        ax.set_ylabel(label.replace(" (", "\n("))
         _draw_pose(ax, columns[ELAPSED], curves, dot)
-    if path_ax is not None:
-        _draw_path(path_ax, columns)
-    _draw_times(timed[-1], columns)
-    for ax in (strip, *timed):
-        _shade(ax, columns)
-    draw_programs(strip, columns, description.get("programs", []))
-    happened = faults_of(selection.readers, columns)
-    for after_s, _ in happened:
-        for ax in (strip, *timed):
-            ax.axvline(after_s, color="#b3261e", lw=0.9)
-    told = [f"{after_s:.3f} s: {text}" for after_s, text in happened[:_MOST_TOLD]]
-    timed[-1].set_xlabel("\n".join(["bus time since the first cycle (s)", *map(_as_it_is, told)]))
+    if grid.path is not None:
+        _draw_path(grid.path, columns)
+    _draw_times(grid.timed[-1], columns)
+    _draw_what_happened(grid, selection, columns)
     if dot is None:
-        timed[-1].set_xlim(columns[ELAPSED][0], columns[ELAPSED][-1])
+        grid.timed[-1].set_xlim(columns[ELAPSED][0], columns[ELAPSED][-1])
     if panels:
-        legend_above(figure, timed[0])
-    figure.align_ylabels()
+        legend_above(grid.figure, grid.timed[0])
+    grid.figure.align_ylabels()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, format="png")
+        grid.figure.savefig(path, format="png")
     except OSError as error:
         raise WorkFailedError(f"{path}: cannot be written: {error.strerror or error}") from error
     return int(columns["state"].size)
 
 
-def _grid(rows: int, with_path: bool) -> tuple[Figure, list[Axes], Axes | None]:
-    """Return a figure with a strip and `rows` panels over one time, and one for the path."""
-    heights = [0.25, *[1.75] * rows, *[3.0] * with_path]
-    figure = Figure(figsize=(7.4, sum(heights)), layout="constrained")
-    places = figure.add_gridspec(len(heights), 1, height_ratios=heights)
-    timed = [figure.add_subplot(places[0])]
-    timed += [figure.add_subplot(places[k], sharex=timed[0]) for k in range(1, rows + 1)]
-    for ax in timed[:-1]:
-        ax.tick_params(labelbottom=False)
-    return figure, timed, figure.add_subplot(places[rows + 1]) if with_path else None
+def _draw_what_happened(grid: _Grid, selection: Selection, columns: Columns) -> None:
+    """Name the programs, shade what was not active, and tell when and why faults came."""
+    for ax in (*grid.strips, *grid.timed):
+        _shade(ax, columns)
+    for strip in grid.strips:
+        draw_programs(strip, columns, selection.readers[-1].description.get("programs", []))
+    happened = faults_of(selection.readers, columns)
+    for after_s, _ in happened:
+        for ax in (*grid.strips, *grid.timed):
+            ax.axvline(after_s, color="#b3261e", lw=0.9)
+    told = [f"{after_s:.3f} s: {text}" for after_s, text in happened[:_MOST_TOLD]]
+    if told:
+        letters = int(_LETTERS_PER_in * grid.figure.get_figwidth())
+        lines = [fill(text, letters, subsequent_indent="    ") for text in told]
+        text = "\n".join(map(_as_it_is, lines))
+        grid.figure.supxlabel(text, x=0.01, ha="left", fontsize="medium")
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Where things are drawn: panels over one time, each column of them below a strip."""
+
+    figure: Figure
+    strips: list[Axes]
+    timed: list[Axes]
+    """From the top left downward, then the right column."""
+    path: Axes | None
+    """The platform's path, below the right column."""
+
+    @classmethod
+    def of(cls, left: int, right: int) -> _Grid:
+        """Return one with so many panels in the left and the right column, which may be none."""
+        rows = max(left, right + _PATH_ROWS if right else 0)
+        width = _WIDE_in if right else _NARROW_in
+        figure = Figure(figsize=(width, _STRIP_in + _PANEL_in * rows), layout="constrained")
+        heights = [_STRIP_in, *[_PANEL_in] * rows]
+        places = figure.add_gridspec(1 + rows, 2 if right else 1, height_ratios=heights)
+        strips: list[Axes] = []
+        timed: list[Axes] = []
+        for column, count in enumerate((left, right)[: 2 if right else 1]):
+            first = strips[0] if strips else None
+            strips.append(figure.add_subplot(places[0, column], sharex=first))
+            below = range(1, 1 + count)
+            timed += [figure.add_subplot(places[k, column], sharex=strips[0]) for k in below]
+            for ax in (strips[-1], *timed[-count:-1]):
+                ax.tick_params(labelbottom=False)
+            timed[-1].set_xlabel("bus time since the first cycle (s)")
+        path = figure.add_subplot(places[1 + right :, 1]) if right else None
+        return cls(figure, strips, timed, path)
 
 
 def draw_programs(ax: Axes, columns: Columns, names: Sequence[str]) -> None:
     """Name the program that runs at each moment, where there is room for it."""
     elapsed, program = columns[ELAPSED], columns["program"]
     ax.set_yticks([])
+    ax.tick_params(bottom=False)
     ax.grid(visible=False)
     whole_s = elapsed[-1] - elapsed[0]
     edges = [0, *(np.flatnonzero(np.diff(program)) + 1), program.size]
@@ -138,19 +179,25 @@ def draw_programs(ax: Axes, columns: Columns, names: Sequence[str]) -> None:
 
 
 def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tuple[float, str]]:
-    """Return when a limit made the loop react, and when its state became a fault, with words."""
-    found = []
-    for reader in readers:
-        for event in reader.events:
-            of_row = "reaction" in event and "cycle" in event
-            if not of_row or not (
-                event["reaction"] > Reaction.CLAMP or "state fault" in event["text"]
-            ):
-                continue
-            stamp_ns = event["log_time_ns"] - reader.offset_ns
-            if columns["stamp_ns"][0] <= stamp_ns <= columns["stamp_ns"][-1]:
-                after_s = float(np.interp(stamp_ns, columns["stamp_ns"], columns[ELAPSED]))
-                found.append((after_s, str(event["text"])))
+    """Return when a limit made the loop react, and when its state became a fault, with words.
+
+    The loop's reason is told with the first of what it has led to.
+    """
+    stamped = [
+        (event["log_time_ns"] - reader.offset_ns, event)
+        for reader in readers
+        for event in reader.events
+    ]
+    first_ns, last_ns = columns["stamp_ns"][0], columns["stamp_ns"][-1]
+    shown = [one for one in stamped if first_ns <= one[0] <= last_ns and is_fault(one[1])]
+    reactions = [at_ns for at_ns, event in shown if event["reaction"] > Reaction.CLAMP]
+    found, reasons, last = [], Reasons(stamped), ""
+    for at_ns, event in shown:
+        later = [other_ns for other_ns in reactions if other_ns > at_ns]
+        told = reasons.after(at_ns, min(later, default=math.inf))
+        reason, last = "" if told == last else told, told or last
+        after_s = float(np.interp(at_ns, columns["stamp_ns"], columns[ELAPSED]))
+        found.append((after_s, str(event["text"]) + (f": {reason}" if reason else "")))
     return found
 
 
@@ -174,7 +221,7 @@ def _draw_path(ax: Axes, columns: Columns) -> None:
     ax.set_xlabel("x (mm)")
     ax.set_ylabel(f"{'xyz'[upward]} (mm)")
     ax.set_aspect("equal", adjustable="datalim")
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=2)
+    legend_beside_title(ax, 2)
 
 
 def _flat(values: FloatArray) -> bool:
@@ -190,7 +237,7 @@ def _draw_pose(ax: Axes, elapsed: FloatArray, curves: Curves, dot: str | None) -
     for (name, (is_there, wanted)), colour in zip(curves.items(), _COLOURS, strict=False):
         ax.plot(*decimated(elapsed, is_there), color=colour, marker=dot, label=name)
         ax.plot(*decimated(elapsed, wanted), color=colour, ls="--", lw=0.8)
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=3)
+    legend_beside_title(ax, 3)
 
 
 def pose_curves(columns: Columns) -> dict[str, Curves]:
@@ -245,8 +292,8 @@ def _draw_times(ax: Axes, columns: Columns) -> None:
         ax.plot(
             *decimated(columns[ELAPSED], 1e3 * columns[name]), color=colour, label=label, lw=0.8
         )
-    ax.set_ylabel("of a cycle (ms)")
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=3)
+    ax.set_ylabel("of a cycle\n(ms)")
+    legend_beside_title(ax, 3)
 
 
 def _shade(ax: Axes, columns: Columns) -> None:

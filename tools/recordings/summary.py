@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.core.states import LoopState
-from cdpr_rt.service.recordings.recording_reader import Columns
+from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.output import Output
+from cdpr_tools.recordings.reasons import Reasons, is_fault, is_reason
 from cdpr_tools.recordings.selection import ELAPSED, Selection
 
 _FIELDS = (
@@ -25,6 +28,7 @@ _FIELDS = (
     "late_cycles",
     "missed",
     "program",
+    "reaction",
     "position_rad",
     "pose",
     "pose_setpoint",
@@ -82,13 +86,32 @@ class _Count:
         program, active = rows["program"], rows["state"] == LoopState.ACTIVE
         elapsed = rows[ELAPSED] - self.first_s
         kind = np.where(active, program.astype(int), -1)
+        reacts = (rows["reaction"] > Reaction.CLAMP) | (rows["state"] == LoopState.FAULT)
         ends = [*np.flatnonzero(np.diff(kind)), kind.size - 1]
         for begin, end in zip([0, *(k + 1 for k in ends)], ends, strict=False):
+            found = np.flatnonzero(reacts[begin : end + 1])
+            stamps_ns = rows["stamp_ns"][begin + found[:1]]
             if not self.runs or self.runs[-1]["program"] != kind[begin]:
-                self.runs.append({"program": int(kind[begin]), "from_s": float(elapsed[begin])})
+                reaction = bool(reacts[begin])  # it belongs to what ends the run before
+                if self.runs and reaction:
+                    self._cut_short(stamps_ns)
+                at_s = float(elapsed[begin])
+                self.runs.append(
+                    {"program": int(kind[begin]), "from_s": at_s, "reaction": reaction}
+                )
+            self._cut_short(stamps_ns)
             last = {name: rows[name][end].tolist() for name in ("pose", "pose_setpoint")}
             angles = rows["position_rad"][end].tolist()
             self.runs[-1] |= {"until_s": float(elapsed[end]), "position_rad": angles, **last}
+
+    def _cut_short(self, stamps_ns: FloatArray) -> None:
+        """Note when the last run was cut short, unless it is part of a reaction, or there is none.
+
+        Takes the stamps of rows with a reaction.
+        """
+        run = self.runs[-1]
+        if stamps_ns.size and not run["reaction"]:
+            run.setdefault("cut_ns", int(stamps_ns[0]))
 
     def when_s(self, stamp_ns: float) -> float:
         """Return the recording's time, as `cdpr log plot` counts it, at one of the wall's clock."""
@@ -133,47 +156,79 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         "axes": reader.axes,
         "period_s": reader.description.get("period_s"),
         **count.result(),
-        "runs": _named_runs(count.runs, reader.description.get("programs", [])),
+        "runs": _named_runs(count.runs, reader),
         "events": sorted(reader.events, key=lambda event: int(event["log_time_ns"])),
     }
 
 
-def _named_runs(runs: list[dict[str, Any]], programs: Sequence[str]) -> list[dict[str, Any]]:
-    """Return what ran with power, by the names of the programs."""
+def _named_runs(runs: list[dict[str, Any]], reader: RecordingReader) -> list[dict[str, Any]]:
+    """Return what ran with power, by the names of the programs, and why it was cut short."""
+    programs = reader.description.get("programs", [])
+    reasons = Reasons((event["log_time_ns"] - reader.offset_ns, event) for event in reader.events)
+    cuts = [run["cut_ns"] for run in runs if "cut_ns" in run]
+    found: list[dict[str, Any]] = []
+    for run in runs:
+        number, cut_ns = run["program"], run.get("cut_ns")
+        named = programs[number] if 0 <= number < len(programs) else str(number)
+        told = {**run, "program": named}
+        if cut_ns is not None:
+            later = [other for other in cuts if other > cut_ns]
+            why = reasons.after(cut_ns, min(later, default=math.inf)) or "a fault"
+            # where the power is taken at once the idle program has the last cycles
+            cut = found[-1] if found and named == "idle" else told
+            cut.setdefault("cut_short_by", why)
+        found.append(told)
     return [
-        {**run, "program": programs[number] if number < len(programs) else str(number)}
-        for run in runs
-        if (number := run["program"]) >= 0
+        {key: value for key, value in one.items() if key != "cut_ns"}
+        for run, one in zip(runs, found, strict=True)
+        if run["program"] >= 0
     ]
 
 
 def _run_text(run: dict[str, Any], axes: Sequence[str]) -> str:
-    """Return when a program ran and where the platform, or the axes, were at its end."""
+    """Return when a program ran, what cut it short, and where platform or axes were at its end."""
     pose, wanted = np.array(run["pose"], float), np.array(run["pose_setpoint"], float)
     if np.isfinite(pose).all():
         size = 3 if pose[2] else 2  # in a plane its third coordinate is none
         at = ", ".join(f"{x:z.1f}" for x in 1e3 * pose[:size])
         where = f"platform at {at} mm"
         if np.isfinite(wanted).all():
-            where += f", {1e3 * float(np.linalg.norm(pose[:3] - wanted[:3])):.1f} mm off its target"
+            off_mm = 1e3 * float(np.linalg.norm(pose[:3] - wanted[:3]))
+            where += f", {off_mm:.1f} mm from its target"
     else:
         angles = np.degrees(np.array(run["position_rad"], float))
         where = ", ".join(f"{name} {x:.1f}" for name, x in zip(axes, angles, strict=False)) + " deg"
     time = f"{run['from_s']:10.3f} s to {run['until_s']:9.3f} s"
-    return f"  {time}  {run['program']}: ended with {where}"
+    why = f"cut short: {run['cut_short_by']}; then" if "cut_short_by" in run else "ended,"
+    return f"  {time}  {run['program']}: {why} {where}"
+
+
+def _chosen(events: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]:
+    """Return at most so many events: faults and their reasons first, then the newest others."""
+    wrong = [k for k, event in enumerate(events) if is_reason(event) or is_fault(event)][-most:]
+    others = [k for k in range(len(events)) if k not in wrong]
+    kept = {*wrong, *others[len(others) - (most - len(wrong)) :]}
+    return [event for k, event in enumerate(events) if k in kept]
 
 
 def worth_telling(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return events without who may move, what is refused over and over being told once."""
+    """Return events without who may move and which program runs, which the motions tell.
+
+    What is refused over and over is told once.
+    """
     found: list[dict[str, Any]] = []
     for event in events:
-        if event.get("kind") == "control":
+        if event.get("kind") == "control" or _is_change_of_program(event):
             continue
         if found and _alike(event["text"], found[-1]["text"]):
             found[-1]["times"] += 1
             continue
         found.append({**event, "times": 1})
     return found
+
+
+def _is_change_of_program(event: dict[str, Any]) -> bool:
+    return "cycle" in event and re.fullmatch(r"program \S+", event["text"]) is not None
 
 
 def _alike(text: str, last: str) -> bool:
@@ -183,7 +238,7 @@ def _alike(text: str, last: str) -> bool:
     return text == last
 
 
-def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
+def summary_lines(figures: dict[str, Any], most_events: int) -> Sequence[str]:
     """Return the figures of one file as lines for people."""
     end = {
         "closed": "",
@@ -215,9 +270,10 @@ def told(figures: dict[str, Any], most_events: int) -> Sequence[str]:
         lines.append(f"  ({len(runs) - most_events} earlier motions are in --json)")
     lines += [_run_text(run, figures["axes"]) for run in runs[-most_events:]]
     events = worth_telling(figures["events"])
-    if len(events) > most_events:
-        lines.append(f"  ({len(events) - most_events} earlier events are in --json)")
-    for event in events[-most_events:]:
+    shown = _chosen(events, most_events)
+    if len(events) > len(shown):
+        lines.append(f"  ({len(events) - len(shown)} more events are in --json)")
+    for event in shown:
         at = f"{event['after_s']:10.3f} s" if event["after_s"] is not None else " " * 12
         times = f" ({event['times']} times alike)" if event["times"] > 1 else ""
         lines.append(f"  {at}  {event['text']}{times}")

@@ -24,6 +24,7 @@ from cdpr_tools.report.style import (
     data_uri,
     decimated,
     legend_above,
+    legend_beside_title,
 )
 
 _WIDE_SPREAD = 30.0
@@ -136,7 +137,7 @@ def spectrum(
     right.set(xlabel="number of orders", ylabel="error on held-back turns (mNm)", title="Choice")
     right.set_yscale("log")
     _log_labels(right.yaxis)
-    right.legend()
+    legend_beside_title(right)
     return data_uri(figure)
 
 

@@ -60,6 +60,14 @@ def legend_above(figure: Figure, *axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper left", ncols=4)
 
 
+def legend_beside_title(ax: Axes, columns: int = 3) -> None:
+    """Name what is labelled in `ax` at the right in its title's line, where it hides nothing."""
+    ax.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=columns,
+        handlelength=1.2, columnspacing=1.0, fontsize=8.0,
+    )  # fmt: skip
+
+
 def data_uri(figure: Figure) -> str:
     """Return the figure as the text of an image source that needs no file beside the page."""
     buffer = io.BytesIO()

@@ -20,8 +20,20 @@ KINDS = {
     "spatial-8": "a platform in space, 8 cables from above and below: pulled tight from all sides",
 }
 """By name: what it is, and why it takes so many cables."""
+SKETCH = r"""
+planar-3       planar-4       point-4        suspended-6, -8   spatial-8
+o         o    o         o    o         o    o  o     o  o     o  o     o  o
+ \       /      \       /      \       /      \  \   /  /       \  \   /  /
+  \#####/        \#####/        \     /         \#####/           \#####/
+   #####          #####          \   /           #####             #####
+     |           /     \           *                            /  /   \  \
+     o          o       o                                       o  o     o  o
+"""
+"""What they look like: o winches, # platforms."""
 _BUS_DRIVES = 4
 """What a bus of 1 Mbit/s carries at 1 kHz."""
+_APART_m = 0.15
+"""Least distance of two exit points that are proposed: two winches side by side."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +86,26 @@ class Kind:
         """Greatest distance of two anchor points."""
         return max(math.dist(*pair) for pair in combinations(self.platform.anchor_points_m, 2))
 
-    def exit_m(self, i: int, frame_m: tuple[float, ...]) -> tuple[float, ...]:
-        """Return exit point `i` with the frame stretched to another size, to the mm."""
-        point = self.platform.exit_points_m[i]
-        ways = zip(point, frame_m, self.frame_m, strict=True)
-        return tuple(round(x * wanted / usual, 3) + 0.0 for x, wanted, usual in ways)
+    def exits_m(self, frame_m: tuple[float, ...]) -> list[tuple[float, ...]]:
+        """Return the exit points with the frame stretched to another size, to the mm.
+
+        Where two would come too near to each other, they go apart within the frame.
+        """
+        exits = np.array(self.platform.exit_points_m) * np.array(frame_m) / self.frame_m
+        low, high = exits.min(axis=0), exits.max(axis=0)
+        for i, j in combinations(range(self.cables), 2):
+            way = exits[j] - exits[i]
+            if (distance := float(np.linalg.norm(way))) < _APART_m:
+                pair = 0.5 * (exits[i] + exits[j]) + np.outer([-0.5, 0.5], way) * (
+                    _APART_m / distance
+                )
+                pair += np.maximum(low - pair.min(axis=0), 0.0)
+                exits[[i, j]] = pair + np.minimum(high - pair.max(axis=0), 0.0)
+        return [tuple(round(float(x), 3) + 0.0 for x in point) for point in exits]
+
+    def scale(self, frame_m: tuple[float, ...]) -> float:
+        """Return how much larger the frame is than the shipped robot's, by its least stretch."""
+        return min(wanted / usual for wanted, usual in zip(frame_m, self.frame_m, strict=True))
 
 
 def kind_of(name: str) -> Kind:

@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drivers.robot.commissioned import folder_called
-from cdpr_profiles import ProfileError, Robot, load_robot
+from cdpr_profiles import ProfileError, Robot, Winch, load_robot
 from cdpr_profiles.platform import Platform
+from cdpr_profiles.reading.reader import closest
 from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.checks import lower_when_turned_m, refuse_impossible, standing_tensions_N
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.statics import Box, PlatformStatics
 from cdpr_tools.errors import BadInputError
@@ -31,6 +33,7 @@ Ask = Callable[[Question, str, str], str]
 """Takes a question, its default and what was wrong with the last answer; returns the answer."""
 _STAND_SHARE = 0.1
 """Of the height in which targets could be taken, what is left between the stand and the box."""
+_SHRUNK = np.linspace(1.0, 0.5, 26)
 
 
 def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
@@ -39,68 +42,97 @@ def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
     What is in `given` is not asked; raises BadInputError for what is wrong there.
     """
     first = kind_question()
-    told: Answers = {first.key: _answer(first, {}, given, ask)}
-    kind = told["kind"]
+    answers: Answers = {first.key: _answer(first, {}, given, ask)}
+    kind = answers["kind"]
     asked = questions(path.parent, path.stem, kind)
     nowhere = (0.0,) * kind.size
     last = [q.key for q in places(kind, nowhere, nowhere, proposed_stand)]
     known = [first.key, *(q.key for q in asked), *last]
     for key in given:
         if key not in known:
-            raise BadInputError(f"--set {key}: no such question; allowed: {', '.join(known)}")
+            near = closest(key, known)
+            hint = f"did you mean {near!r}?" if near else f"allowed: {', '.join(known)}"
+            raise BadInputError(f"--set {key}: no such question; {hint}")
     for question in asked:
-        told[question.key] = _answer(question, told, given, ask)
-    for question in places(kind, *proposed_box(told), proposed_stand):
-        told[question.key] = _answer(question, told, given, ask)
-    return told
+        answers[question.key] = _answer(question, answers, given, ask)
+    for question in places(kind, *proposed_box(answers), proposed_stand):
+        answers[question.key] = _answer(question, answers, given, ask)
+    return answers
 
 
-def _answer(question: Question, told: Answers, given: Mapping[str, str], ask: Ask) -> object:
-    default, problem = question.default(told), ""
+def _answer(question: Question, answers: Answers, given: Mapping[str, str], ask: Ask) -> object:
+    default, problem = question.default(answers), ""
     while True:
         text = given.get(question.key)
         if text is None:
             text = ask(question, default, problem)
         try:
-            return question.read(text, told)
+            return question.read(text, answers)
         except AnswerError as error:
             problem = f"value {text!r}; {error}"
             if question.key in given:
                 raise BadInputError(f"--set {question.key}: {problem}") from None
 
 
-def proposed_box(told: Answers) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def proposed_box(answers: Answers) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the largest box of targets that the cables can hold, to the cm, or one to begin with.
 
-    A tenth of it is left below for the stand.
+    Below it a tenth is left for the stand, and what a turned platform is lower. It is smaller where
+    the motors would not bear it for long.
     """
-    exits = np.array([told[f"exit_{i + 1}_m"] for i in range(told["kind"].cables)])
+    exits = np.array([answers[f"exit_{i + 1}_m"] for i in range(answers["kind"].cables)])
     least, most = exits.min(axis=0), exits.max(axis=0)
     if least[-1] > 0.5 * most[-1]:
         least[-1] = 0.0  # all cables come from above: it is held down to the floor
     middle, size = 0.5 * (least + most), most - least
     around = Box(_point(least), _point(most))
-    found = _statics_of(told, around).largest_box(around)
+    found = _statics_of(answers, around).largest_box(around)
     if found is not None:
-        up = np.eye(len(size))[-1]
-        low = np.array(found.low_m) + _STAND_SHARE * up * (found.high_m[-1] - found.low_m[-1])
+        whole_m = found.high_m[-1] - found.low_m[-1]
+        gap_m = max(_STAND_SHARE * whole_m, _lower_when_turned_m(answers, found))
+        low = np.array(found.low_m) + gap_m * np.eye(len(size))[-1]
         low, high = np.ceil(100.0 * low) / 100.0, np.floor(100.0 * np.array(found.high_m)) / 100.0
         if (low < high).all():
-            return _point(low), _point(high)
+            return _bearable(answers, low, high)
     aside = np.maximum(0.1 * size, 0.05)
     return _point(middle - aside), _point(middle + aside)
 
 
-def proposed_stand(told: Answers) -> tuple[float, ...]:
+def _lower_when_turned_m(answers: Answers, box: Box) -> float:
+    """Return how far above its stand the platform may be turned, to the cm."""
+    return math.ceil(100.0 * lower_when_turned_m(_statics_of(answers, box))) / 100.0
+
+
+def _bearable(
+    answers: Answers, low: FloatArray, high: FloatArray
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the box, shrunk until the motors bear for long to hold the platform all over it."""
+    winch: Winch = answers["winch"][1]
+    rated_N = winch.motor.rated_torque_Nm / abs(winch.cable_m_per_motor_rad)
+    for share in _SHRUNK:
+        aside = 0.5 * (1.0 - share) * (high - low)
+        aside[-1] *= 2.0
+        least = low + aside * (np.arange(low.size) < low.size - 1)
+        box = Box(_point(np.round(least, 2)), _point(np.round(high - aside, 2)))
+        if standing_tensions_N(_statics_of(answers, box)).max() <= rated_N:
+            return box.low_m, box.high_m
+    return _point(low), _point(high)
+
+
+def proposed_stand(answers: Answers) -> tuple[float, ...]:
     """Return a place under the middle of the box of targets.
 
     A platform that is free to turn has it where the cables turn it least: where they turn it they
     might tip it on its stand, and lengths learnt there are wrong by that.
     """
-    low, high = np.array(told["low_m"]), np.array(told["high_m"])
-    below = low[-1] - _STAND_SHARE / (1.0 - _STAND_SHARE) * (high[-1] - low[-1])
-    statics = _statics_of(told, Box(told["low_m"], told["high_m"]))
-    middle = np.array([*(0.5 * (low + high))[:-1], math.ceil(100.0 * below) / 100.0])
+    low, high = np.array(answers["low_m"]), np.array(answers["high_m"])
+    below_m = _STAND_SHARE / (1.0 - _STAND_SHARE) * (high[-1] - low[-1])
+    box = Box(answers["low_m"], answers["high_m"])
+    statics = _statics_of(answers, box)
+    below = low[-1] - max(math.floor(100.0 * below_m) / 100.0, _lower_when_turned_m(answers, box))
+    # to the cm, towards the room's zero: in its middle, where the box is but for half a cm
+    aside = np.trunc(np.round(50.0 * (low + high)[:-1], 6)) / 100.0
+    middle = np.array([*aside, below])
     if not statics.turns:
         return _point(middle)
     xs = np.linspace(low[0], high[0], 41)
@@ -112,28 +144,28 @@ def proposed_stand(told: Answers) -> tuple[float, ...]:
     return _point(places[int(np.round(turned, 2).argmin())])
 
 
-def _statics_of(told: Answers, box: Box) -> PlatformStatics:
+def _statics_of(answers: Answers, box: Box) -> PlatformStatics:
     low_N, high_N = (
-        np.full(told["kind"].cables, told[f"tension_{end}_N"]) for end in ("min", "max")
+        np.full(answers["kind"].cables, answers[f"tension_{end}_N"]) for end in ("min", "max")
     )
-    return PlatformStatics(platform_model(_platform_of(told, box), low_N, high_N))
+    return PlatformStatics(platform_model(_platform_of(answers, box), low_N, high_N))
 
 
-def _platform_of(told: Answers, box: Box) -> Platform:
-    cables = range(told["kind"].cables)
+def _platform_of(answers: Answers, box: Box) -> Platform:
+    cables = range(answers["kind"].cables)
     return Platform(
-        mass_kg=told["mass_kg"],
+        mass_kg=answers["mass_kg"],
         home_m=_point(0.5 * (np.array(box.low_m) + box.high_m)),
         home_tolerance_m=0.05,
         workspace_min_m=box.low_m,
         workspace_max_m=box.high_m,
-        speed_m_s=told["speed_m_s"],
-        acceleration_m_s2=told["acceleration_m_s2"],
-        exit_points_m=tuple(told[f"exit_{i + 1}_m"] for i in cables),
-        anchor_points_m=tuple(told[f"anchor_{i + 1}_m"] for i in cables),
-        workspace_angle_rad=told.get("angle_deg", 0.0),
-        angular_speed_rad_s=told.get("angular_speed_deg_s", 0.0),
-        angular_acceleration_rad_s2=told.get("angular_acceleration_deg_s2", 0.0),
+        speed_m_s=answers["speed_m_s"],
+        acceleration_m_s2=answers["acceleration_m_s2"],
+        exit_points_m=tuple(answers[f"exit_{i + 1}_m"] for i in cables),
+        anchor_points_m=tuple(answers[f"anchor_{i + 1}_m"] for i in cables),
+        workspace_angle_rad=answers.get("angle_deg", 0.0),
+        angular_speed_rad_s=answers.get("angular_speed_deg_s", 0.0),
+        angular_acceleration_rad_s2=answers.get("angular_acceleration_deg_s2", 0.0),
     )
 
 
@@ -141,13 +173,13 @@ def _point(point_m: FloatArray) -> tuple[float, ...]:
     return tuple(float(x) for x in point_m)
 
 
-def write_robot(told: Answers, path: Path) -> Robot:
+def write_robot(answers: Answers, path: Path) -> Robot:
     """Write what was answered into a new file and return the robot that it describes.
 
     Raises BadInputError where there is such a file already or none can be written, ProfileError
-    for what contradicts itself; there is no file then.
+    for what contradicts itself or cannot work; there is no file then.
     """
-    text = text_of(told)
+    text = text_of(answers)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -156,52 +188,54 @@ def write_robot(told: Answers, path: Path) -> Robot:
     except OSError as error:
         raise BadInputError(f"{path}: {error.strerror}") from None
     try:
-        return load_robot(path)
+        robot = load_robot(path)
+        refuse_impossible(robot)
+        return robot
     except ProfileError:
         path.unlink()
         raise
 
 
-def text_of(told: Answers) -> str:
+def text_of(answers: Answers) -> str:
     """Return the answers as a robot's file, with comments."""
-    winch, _ = told["winch"]
-    kind, names = told["kind"], axis_names(told)
+    winch, _ = answers["winch"]
+    kind, names = answers["kind"], axis_names(answers)
     on_each = -(-kind.cables // kind.buses)
     axes = [
         _AXIS.format(
             name=_quoted(names[i]),
             winch=_quoted(winch),
             bus=i // on_each,
-            node=told["nodes"][i],
-            commissioned=_quoted(f"motors/{folder_called(names[i], told['nodes'][i])}"),
-            exit=_array(told[f"exit_{i + 1}_m"]),
-            anchor=_array(told[f"anchor_{i + 1}_m"]),
+            node=answers["nodes"][i],
+            commissioned=_quoted(f"motors/{folder_called(names[i], answers['nodes'][i])}"),
+            exit=_array(answers[f"exit_{i + 1}_m"]),
+            anchor=_array(answers[f"anchor_{i + 1}_m"]),
         )
         for i in range(kind.cables)
     ]
-    buses = [told["bus"], told.get("bus_2")]
+    buses = [answers["bus"], answers.get("bus_2")]
     turning = ""
-    if told.get("angle_deg", 0.0) > 0.0:
+    if answers.get("angle_deg", 0.0) > 0.0:
         turning = _TURNING.format(
-            angle=round(told["angle_deg"], 6),
-            degrees=f"{math.degrees(told['angle_deg']):.3g}",
-            speed=round(told["angular_speed_deg_s"], 6),
-            acceleration=round(told["angular_acceleration_deg_s2"], 6),
+            angle=round(answers["angle_deg"], 6),
+            degrees=f"{math.degrees(answers['angle_deg']):.3g}",
+            speed=round(answers["angular_speed_deg_s"], 6),
+            acceleration=round(answers["angular_acceleration_deg_s2"], 6),
         )
     head = _HEAD.format(
-        name=_quoted(told["name"]),
+        name=_quoted(answers["name"]),
         what=KINDS[kind.name],
         axes="x to the right, y upward" if kind.size == 2 else "z upward",
         buses="".join(
             _BUS.format(number=i, url=_quoted(url)) for i, url in enumerate(buses[: kind.buses])
         ),
         turning=turning,
-        speed_limit=_speed_limit(told),
-        home=_array(told["home_m"]),
-        low=_array(told["low_m"]),
-        high=_array(told["high_m"]),
+        speed_limit=_speed_limit(answers),
+        home=_array(answers["home_m"]),
+        low=_array(answers["low_m"]),
+        high=_array(answers["high_m"]),
         **{
-            key: f"{float(told[key])!r}"
+            key: f"{float(answers[key])!r}"
             for key in (
                 "mass_kg",
                 "speed_m_s",
@@ -215,11 +249,11 @@ def text_of(told: Answers) -> str:
     return "\n".join(_aligned(line) for line in (head + "".join(axes)).splitlines()) + "\n"
 
 
-def _speed_limit(told: Answers) -> str:
+def _speed_limit(answers: Answers) -> str:
     """Return the shipped robot's limit of the motors' speed as a line, where its winch is taken."""
-    robot = told["kind"].robot
+    robot = answers["kind"].robot
     most = robot.limits.speed_rad_s
-    if most is None or told["winch"][0] != robot.axes[0].winch.profile:
+    if most is None or answers["winch"][0] != robot.axes[0].winch.profile:
         return ""
     return f"speed_rad_s = {most[0]!r}\n"
 

@@ -13,12 +13,17 @@ from matplotlib.ticker import MaxNLocator
 import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
+from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of, view_of
 
 _CABLE, _PLATFORM, _TARGETS = "#444444", "#d1581a", "#7a3fa0"
 _WIDE_in = 7.4
 _NAMES = "xyz"
 
+# of their extent: exit points closer than this have names that would touch
+_CLOSE = 0.1
+
+_LOOKS, _PAD = 4, 3.0
 _FINE, _COARSE = (121, 95), (41, 31)
 
 _View = tuple[int, int]
@@ -26,7 +31,12 @@ _View = tuple[int, int]
 
 
 def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
-    """Write the picture of a robot as PNG; raises OSError.
+    """Write the picture of a robot as PNG; raises OSError."""
+    figure_of(robot, platform).savefig(path, format="png")
+
+
+def figure_of(robot: Robot, platform: Platform) -> Figure:
+    """Return the picture of a robot.
 
     A robot in space is seen from the front, from the side and from above, cut through the middle of
     the box of targets. The workspace that tensions allow is coloured by how far they can stay from
@@ -48,7 +58,25 @@ def draw_robot(robot: Robot, platform: Platform, path: Path) -> None:
     all_axes[0].set(title=robot.name)
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    figure.savefig(path, format="png")
+    for _ in range(_LOOKS):
+        if _has_room(figure, all_axes[-1]):
+            break
+    return figure
+
+
+def _has_room(figure: Figure, ax: Axes) -> bool:
+    """Whether the names at exit points are within what is shown, outside of which are its numbers.
+
+    Where not, it is widened: it gets smaller by that and the names do not.
+    """
+    figure.draw_without_rendering()
+    names = np.array([text.get_window_extent().padded(_PAD).get_points() for text in ax.texts])
+    around = ax.transData.inverted().transform(names.reshape(-1, 2))
+    low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
+    least, most = around.min(axis=0, initial=np.inf), around.max(axis=0, initial=-np.inf)
+    ax.set_xlim(min(low[0], least[0]), max(high[0], most[0]))
+    ax.set_ylim(min(low[1], least[1]), max(high[1], most[1]))
+    return bool((least >= low).all() and (most <= high).all())
 
 
 def _draw_workspace(
@@ -71,7 +99,7 @@ def _draw_workspace(
     if still.max() > 0.0:
         levels = MaxNLocator(9).tick_values(0.0, float(still.max()))
         filled = ax.contourf(xs, ys, still, levels, cmap="YlGnBu", alpha=0.75)
-        bar = figure.colorbar(filled, ax=ax, shrink=0.8, format="%.0f")
+        bar = figure.colorbar(filled, ax=ax, shrink=0.8, format="%g")
         bar.set_label("distance of all tensions\nfrom their limits, at rest (N)")
         bar.outline.set_visible(False)
     if moving.max() > 0.0:
@@ -82,12 +110,10 @@ def _draw_workspace(
 def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> None:
     all_exits, home = np.array(platform.exit_points_m), np.array(platform.home_m)[list(view)]
     exits, anchors = all_exits[:, view], home + np.array(platform.anchor_points_m)[:, view]
-    middle = exits.mean(axis=0)
     for axis, a, b in zip(robot.axes, exits, anchors, strict=True):
         ax.plot(*zip(a, b, strict=True), color=_CABLE, lw=1.2)
-        away = (0, 9) if a[1] >= middle[1] else (0, -17)
         if view == (0, 1):  # from the front names would lie on each other
-            ax.annotate(axis.name, a, xytext=away, textcoords="offset points", ha="center")
+            _name(ax, axis.name, a, exits)
     ax.plot([], [], color=_CABLE, lw=1.2, label="cables, at rest")
     ax.plot(*exits.T, "s", ms=6, color=_CABLE, label="exit points")
     around = np.argsort(np.arctan2(*(anchors - anchors.mean(axis=0)).T[::-1]))
@@ -100,4 +126,20 @@ def _draw_machine(ax: Axes, robot: Robot, platform: Platform, view: _View) -> No
             (low[0], low[1]), width, height, fill=False, ec=_TARGETS, lw=1.4, ls="--",
             label="box of targets",
         )
+    )  # fmt: skip
+
+
+def _name(ax: Axes, name: str, exit_m: FloatArray, exits_m: FloatArray) -> None:
+    """Write a name beside its exit point: outward, and aside from another that is close by."""
+    away = exits_m - exit_m
+    apart = np.linalg.norm(away, axis=1)
+    apart[apart == 0.0] = np.inf
+    nearest = apart.argmin()
+    up = float(exit_m[1] - exits_m[:, 1].mean())
+    beside = apart[nearest] <= _CLOSE * np.ptp(exits_m, axis=0).max()
+    right = -float(away[nearest, 0]) if beside else 0.0
+    ax.annotate(
+        name, tuple(exit_m), xytext=(7.0 * np.sign(right), 9.0 if up >= 0.0 else -9.0),
+        textcoords="offset points", va="bottom" if up >= 0.0 else "top",
+        ha="center" if right == 0.0 else "left" if right > 0.0 else "right",
     )  # fmt: skip

@@ -21,6 +21,10 @@ _TORQUE_RESERVE = 0.85
 """Share of the torque that tensions may take; the rest is for friction and for control."""
 
 
+_FARTHEST_m = 100.0
+"""Of a point from the frame's zero."""
+
+
 class AnswerError(ValueError):
     """An answer that cannot be; the text says what is allowed."""
 
@@ -52,85 +56,120 @@ def kind_question() -> Question:
 
 def questions(folder: Path, name: str, kind: Kind) -> list[Question]:
     """Return the questions about a kind in their order; files are looked for in `folder` first."""
-    n, platform, limits = kind.cables, kind.platform, kind.robot.limits
+    drives = _drives(folder, name, kind)
+    return [*drives, *_geometry(kind), *_limits(kind), *(_turning(kind) if kind.turns else [])]
+
+
+def _drives(folder: Path, name: str, kind: Kind) -> list[Question]:
+    """Return the questions on winches, buses and drives."""
     usual = kind.robot.axes[0].winch.profile
-
-    def template(told: Answers, value: str, otherwise: Callable[[Answers], str]) -> str:
-        """Return the figure of the shipped robot, where its winch is taken and it is not first."""
-        same = told["winch"][0] == usual and kind.name != next(iter(KINDS))
-        return value if same else otherwise(told)
-
-    torque, highest = (
-        value[0] if value else 0.0 for value in (limits.torque_Nm, limits.tension_max_N)
-    )
-    least = limits.tension_min_N[0] if limits.tension_min_N else 1.0
-    asked = [
+    buses = [
+        Question("bus", "URL of the CAN bus", _name, lambda _: "socketcan:can0"),
+        Question("bus_2", "URL of the second CAN bus", _name, lambda _: "socketcan:can1"),
+    ]
+    return [
         Question("name", "Name of the robot", _name, lambda _: name),
         Question(
-            "winch",
-            "Winches: name (`cdpr profiles list`) or path of a profile",
-            lambda text, _: _winch(text, folder),
-            lambda _: usual,
+            "winch", "Winches: name (`cdpr profiles list`) or path of a profile",
+            lambda text, _: _winch(text, folder), lambda _: usual,
         ),
-        Question("bus", "URL of the CAN bus", _name, lambda _: "socketcan:can0"),
-    ]
-    if kind.buses > 1:
-        asked.append(
-            Question("bus_2", "URL of the second CAN bus", _name, lambda _: "socketcan:can1")
-        )
-    asked += [
+        *buses[: kind.buses],
         Question(
-            "nodes", f"Node ids of the {_COUNTS[n]} drives", _nodes(n),
-            lambda _: ", ".join(str(i + 1) for i in range(n)),
+            "nodes", f"Node ids of the {_COUNTS[kind.cables]} drives", _nodes(kind.cables),
+            lambda _: ", ".join(str(i + 1) for i in range(kind.cables)),
         ),
+    ]  # fmt: skip
+
+
+def _geometry(kind: Kind) -> list[Question]:
+    """Return the questions on where the cables leave the frame and end on the platform."""
+    return [
         Question("frame_m", f"Frame: {kind.sides} (m)", _size(kind), lambda _: _text(kind.frame_m)),
-        *(_exit(i, kind) for i in range(n)),
+        *(_exit(i, kind) for i in range(kind.cables)),
         *([] if kind.is_point else [_side(kind)]),
-        *(_anchor(i, kind) for i in range(n)),
+        *(_anchor(i, kind) for i in range(kind.cables)),
+    ]
+
+
+def _limits(kind: Kind) -> list[Question]:
+    """Return the questions on torques, tensions, mass and motion."""
+    platform, limits = kind.platform, kind.robot.limits
+    torque, highest, least = (
+        values[0] if values else otherwise
+        for values, otherwise in (
+            (limits.torque_Nm, 0.0), (limits.tension_max_N, 0.0), (limits.tension_min_N, 1.0),
+        )
+    )  # fmt: skip
+
+    def usual(value: float, otherwise: Callable[[Answers], str]) -> Callable[[Answers], str]:
+        """Have the figure of the shipped robot, where its winch is taken and it is not first."""
+
+        def default(answers: Answers) -> str:
+            same = answers["winch"][0] == kind.robot.axes[0].winch.profile
+            return f"{value:g}" if same and kind.name != next(iter(KINDS)) else otherwise(answers)
+
+        return default
+
+    return [
         Question(
-            "mass_kg", "Mass of the platform (kg)", _number(0.01, 1e4),
-            lambda _: f"{platform.mass_kg:g}",
-        ),
-        Question(
-            "torque_Nm", "Torque limit at the motors (Nm)", _torque,
-            lambda told: template(told, f"{torque:g}", _rated_torque),
+            "torque_Nm", "Torque limit at the motors (Nm)", _torque, usual(torque, _rated_torque)
         ),
         Question(
             "tension_min_N", "Least tension (N)", _number(0.1, 1e5),
-            lambda told: template(
-                told, f"{least:g}", lambda told: f"{told['winch'][1].cable.min_tension_N:g}"
-            ),
+            usual(least, lambda answers: f"{answers['winch'][1].cable.min_tension_N:g}"),
         ),
         Question(
-            "tension_max_N", "Greatest tension (N)", _tension_max,
-            lambda told: template(told, f"{highest:g}", _bearable_tension),
+            "tension_max_N", "Greatest tension (N)", _tension_max, usual(highest, _bearable_tension)
+        ),
+        Question(
+            "mass_kg", "Mass of the platform (kg)", _number(0.01, 1e4),
+            lambda answers: _figure(platform.mass_kg * answers["tension_max_N"] / highest),
         ),
         Question(
             "speed_m_s", "Speed along each direction (m/s)", _number(1e-3, 20.0),
-            lambda _: f"{platform.speed_m_s:g}",
+            lambda answers: _figure(_speed_share(answers) * platform.speed_m_s),
         ),
         Question(
             "acceleration_m_s2", "Acceleration along each direction (m/s2)", _number(1e-3, 100.0),
             lambda _: f"{platform.acceleration_m_s2:g}",
         ),
     ]  # fmt: skip
-    return asked + (_turning(kind) if kind.turns else [])
 
 
 def _turning(kind: Kind) -> list[Question]:
     """Return the questions on targets that are turned; angles are asked in degrees."""
     platform = kind.platform
+
+    def share(answers: Answers) -> float:
+        """Return how much slower than the shipped one a larger platform is to turn."""
+        side_m: float = answers["side_m"]
+        return _speed_share(answers) * min(kind.side_m / side_m, 1.0)
+
+    speed_deg_s = math.degrees(platform.angular_speed_rad_s)
+    acceleration_deg_s2 = math.degrees(platform.angular_acceleration_rad_s2)
     return [
-        Question(key, text, _degrees(low, high), _told_in_degrees(usual))
-        for key, text, low, high, usual in (
-            ("angle_deg", "How far targets may be turned from home's orientation (deg; 0: not)",
-             0.0, 179.0, platform.workspace_angle_rad),
-            ("angular_speed_deg_s", "Angular speed about each axis (deg/s)",
-             0.1, 5000.0, platform.angular_speed_rad_s),
-            ("angular_acceleration_deg_s2", "Angular acceleration about each axis (deg/s2)",
-             0.1, 5e5, platform.angular_acceleration_rad_s2),
-        )
+        Question(
+            "angle_deg", "How far targets may be turned from home's orientation (deg; 0: not)",
+            _degrees(0.0, 179.0), lambda _: _figure(math.degrees(platform.workspace_angle_rad)),
+        ),
+        Question(
+            "angular_speed_deg_s", "Angular speed about each axis (deg/s)", _degrees(0.1, 5000.0),
+            lambda answers: _figure(share(answers) * speed_deg_s),
+        ),
+        Question(
+            "angular_acceleration_deg_s2", "Angular acceleration about each axis (deg/s2)",
+            _degrees(0.1, 5e5), lambda answers: _figure(share(answers) * acceleration_deg_s2),
+        ),
     ]  # fmt: skip
+
+
+def _speed_share(answers: Answers) -> float:
+    """Return how much slower the winches are than those of the shipped robot; 1.0 if faster."""
+    winches: tuple[Winch, Winch] = (answers["winch"][1], answers["kind"].robot.axes[0].winch)
+    taken, usual = (
+        abs(winch.cable_m_per_motor_rad) * winch.motor.rated_speed_rad_s for winch in winches
+    )
+    return min(taken / usual, 1.0)
 
 
 def places(
@@ -157,15 +196,15 @@ def places(
             "home_m",
             f"Where the platform stands at rest: {names} (m)",
             _home(kind.size),
-            lambda told: _text(stand(told), digits=2),
+            lambda answers: _text(stand(answers), digits=2),
         ),
     ]
 
 
 def _exit(i: int, kind: Kind) -> Question:
-    def default(told: Answers) -> str:
+    def default(answers: Answers) -> str:
         """Return the shipped robot's exit point, its frame stretched to the size that is wanted."""
-        return _text(kind.exit_m(i, told["frame_m"]))
+        return _text(kind.exits_m(answers["frame_m"])[i])
 
     names = ", ".join("xyz"[: kind.size])
     return Question(
@@ -179,14 +218,19 @@ def _side(kind: Kind) -> Question:
     else:
         text = "Greatest distance of two anchor points on the platform (m)"
     least = 0.0 if kind.name == "planar-3" else 0.01
-    return Question("side_m", text, _number(least, 10.0), lambda _: f"{kind.side_m:.3g}")
+
+    def default(answers: Answers) -> str:
+        """Return the shipped robot's, as much larger or smaller as the frame is."""
+        return _figure(min(kind.scale(answers["frame_m"]) * kind.side_m, 10.0))
+
+    return Question("side_m", text, _number(least, 10.0), default)
 
 
 def _anchor(i: int, kind: Kind) -> Question:
-    def facing(told: Answers) -> str:
+    def facing(answers: Answers) -> str:
         """Return the corner that faces the exit point, the cables in their order around."""
         n = kind.cables
-        exits = np.array([told[f"exit_{j + 1}_m"] for j in range(n)])
+        exits = np.array([answers[f"exit_{j + 1}_m"] for j in range(n)])
         away = exits - exits.mean(axis=0)
         order = np.argsort(np.arctan2(away[:, 1], away[:, 0]))
         # the triangle stands as its first corner has it: below the middle, or above it
@@ -194,11 +238,11 @@ def _anchor(i: int, kind: Kind) -> Question:
         first = math.copysign(math.pi / 2, away[lone, 1])
         turn = int(np.where(order == i)[0][0]) - int(np.where(order == lone)[0][0])
         angle = first + turn * math.tau / n
-        radius = told["side_m"] / math.sqrt(3.0)
+        radius = answers["side_m"] / math.sqrt(3.0)
         return _text((radius * math.cos(angle), radius * math.sin(angle)), digits=4)
 
-    def scaled(told: Answers) -> str:
-        share = 0.0 if kind.is_point else told["side_m"] / kind.side_m
+    def scaled(answers: Answers) -> str:
+        share = 0.0 if kind.is_point else answers["side_m"] / kind.side_m
         return _text(tuple(share * x for x in kind.platform.anchor_points_m[i]), digits=4)
 
     names = ", ".join("xyz"[: kind.size])
@@ -210,15 +254,15 @@ def _anchor(i: int, kind: Kind) -> Question:
     )
 
 
-def axis_names(told: Answers) -> list[str]:
+def axis_names(answers: Answers) -> list[str]:
     """Return what to call the axes, after where their cables leave."""
-    kind = told["kind"]
-    exits = [told[f"exit_{i + 1}_m"] for i in range(kind.cables)]
+    kind = answers["kind"]
+    exits = [answers[f"exit_{i + 1}_m"] for i in range(kind.cables)]
     if kind.name == "planar-3":
         (x0, y0), (x1, y1), (_, y2) = exits
         if x0 < x1 and y2 < min(y0, y1):
             return [axis.name for axis in kind.robot.axes]
-    elif exits == [kind.exit_m(i, told["frame_m"]) for i in range(kind.cables)]:
+    elif exits == kind.exits_m(answers["frame_m"]):
         names = [axis.name for axis in kind.robot.axes]
         if not names[0].startswith("axis"):
             return names
@@ -264,13 +308,13 @@ def _number(low: float, high: float) -> Callable[[str, Answers], float]:
     return read
 
 
-def _told_in_degrees(angle_rad: float) -> Callable[[Answers], str]:
-    return lambda _: f"{math.degrees(angle_rad):.3g}"
+def _figure(value: float) -> str:
+    return f"{value:.3g}"
 
 
 def _degrees(low: float, high: float) -> Callable[[str, Answers], float]:
     read = _number(low, high)
-    return lambda text, told: math.radians(read(text, told))
+    return lambda text, answers: math.radians(read(text, answers))
 
 
 def _point(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
@@ -279,16 +323,18 @@ def _point(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
             point = tuple(float(part) for part in text.replace(",", " ").split())
         except ValueError:
             point = ()
-        if len(point) != size or not all(abs(x) <= 1000.0 for x in point):
+        if len(point) != size:
             raise AnswerError(f"allowed: {_COUNTS[size]} numbers in m, such as `{_POINTS[size]}`")
+        if not all(abs(x) <= _FARTHEST_m for x in point):
+            raise AnswerError(f"allowed: up to {_FARTHEST_m:g} m each (in metres, not millimetres)")
         return point
 
     return read
 
 
 def _size(kind: Kind) -> Callable[[str, Answers], tuple[float, ...]]:
-    def read(text: str, told: Answers) -> tuple[float, ...]:
-        size = _point(kind.size)(text, told)
+    def read(text: str, answers: Answers) -> tuple[float, ...]:
+        size = _point(kind.size)(text, answers)
         if not all(x > 0.0 for x in size):
             raise AnswerError(f"allowed: {_COUNTS[kind.size]} numbers in m above 0")
         return size
@@ -296,34 +342,34 @@ def _size(kind: Kind) -> Callable[[str, Answers], tuple[float, ...]]:
     return read
 
 
-def _torque(text: str, told: Answers) -> float:
-    return _number(0.001, told["winch"][1].motor.peak_torque_Nm)(text, told)
+def _torque(text: str, answers: Answers) -> float:
+    return _number(0.001, answers["winch"][1].motor.peak_torque_Nm)(text, answers)
 
 
-def _rated_torque(told: Answers) -> str:
-    return f"{told['winch'][1].motor.rated_torque_Nm:g}"
+def _rated_torque(answers: Answers) -> str:
+    return f"{answers['winch'][1].motor.rated_torque_Nm:g}"
 
 
-def _tension_max(text: str, told: Answers) -> float:
-    low_N = told["tension_min_N"]
-    high_N = told["winch"][1].cable.breaking_force_N
-    value = _number(low_N, high_N)(text, told)
+def _tension_max(text: str, answers: Answers) -> float:
+    low_N = answers["tension_min_N"]
+    high_N = answers["winch"][1].cable.breaking_force_N
+    value = _number(low_N, high_N)(text, answers)
     if value == low_N:
         raise AnswerError(f"allowed: more than {low_N:g}, the least tension")
     return value
 
 
-def _bearable_tension(told: Answers) -> str:
-    arm_m = abs(told["winch"][1].cable_m_per_motor_rad)
+def _bearable_tension(answers: Answers) -> str:
+    arm_m = abs(answers["winch"][1].cable_m_per_motor_rad)
     bears_N = min(
-        _TORQUE_RESERVE * told["torque_Nm"] / arm_m, told["winch"][1].cable.breaking_force_N
+        _TORQUE_RESERVE * answers["torque_Nm"] / arm_m, answers["winch"][1].cable.breaking_force_N
     )
-    return f"{max(math.floor(bears_N), 1.1 * told['tension_min_N']):g}"
+    return f"{max(math.floor(bears_N), 1.1 * answers['tension_min_N']):g}"
 
 
 def _upper_corner(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
-    def read(text: str, told: Answers) -> tuple[float, ...]:
-        point, low = _point(size)(text, told), told["low_m"]
+    def read(text: str, answers: Answers) -> tuple[float, ...]:
+        point, low = _point(size)(text, answers), answers["low_m"]
         if not all(high > x for high, x in zip(point, low, strict=True)):
             raise AnswerError(f"allowed: above {_text(low)}, each of them")
         return point
@@ -332,8 +378,8 @@ def _upper_corner(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
 
 
 def _home(size: int) -> Callable[[str, Answers], tuple[float, ...]]:
-    def read(text: str, told: Answers) -> tuple[float, ...]:
-        point, low, high = _point(size)(text, told), told["low_m"], told["high_m"]
+    def read(text: str, answers: Answers) -> tuple[float, ...]:
+        point, low, high = _point(size)(text, answers), answers["low_m"], answers["high_m"]
         beside = any(not low[i] <= point[i] <= high[i] for i in range(size - 1))
         if beside or point[-1] > high[-1]:
             ways = [f"{'xyz'[i]} from {low[i]:g} to {high[i]:g}" for i in range(size - 1)]

@@ -13,7 +13,8 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.cable_loss import worst_swings
-from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, loop_model_of
+from cdpr_rt.robots.free_rotation import SWINGS_m, free_rotation
+from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, designed_loop
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
 from cdpr_rt.robots.robot_arrays import limits_of
@@ -25,7 +26,7 @@ _STIFFNESS_OFF = max(STIFFNESS_SHARES) - 1.0
 
 def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
     """Return what can be said of the robot in numbers, SI, as JSON has it."""
-    told: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "robot": robot.profile,
         "mass_kg": platform.mass_kg,
         "home_m": platform.home_m,
@@ -40,7 +41,7 @@ def figures(robot: Robot, platform: Platform) -> dict[str, Any]:
             )
         ],
     }
-    return told | _of_tensions(robot, platform, told["axes"])
+    return figures | _of_tensions(robot, platform, figures["axes"])
 
 
 def _of_tensions(
@@ -53,21 +54,21 @@ def _of_tensions(
     moving = np.array([statics.reserve_N(points, wanted, turn) for turn in turns])
     lengths = np.array([statics.lengths(points, turn) for turn in turns])
     at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
-    for told, swing in zip(axes, worst_swings(platform), strict=True):
-        told["broken"] = {
+    for figures, swing in zip(axes, worst_swings(platform), strict=True):
+        figures["broken"] = {
             "at_m": swing.position_m,
             "to_m": swing.to_m,
             "swing_m": swing.swing_m,
             "turn_rad": swing.turn_rad,
         }
-    for i, told in enumerate(axes):
-        told["cable_at_home_m"] = float(at_home_m[i])
-        told["least_tension_at_home_N"] = _finite(least_N[i])
-        told["cable_m"] = [float(lengths[..., i].min()), float(lengths[..., i].max())]
-        told["tension_N"] = [float(statics.low_N[i]), float(statics.high_N[i])]
+    for i, figures in enumerate(axes):
+        figures["cable_at_home_m"] = float(at_home_m[i])
+        figures["least_tension_at_home_N"] = _finite(least_N[i])
+        figures["cable_m"] = [float(lengths[..., i].min()), float(lengths[..., i].max())]
+        figures["tension_N"] = [float(statics.low_N[i]), float(statics.high_N[i])]
         gain = abs(robot.axes[i].winch.cable_m_per_motor_rad)
-        told["torque_at_most_Nm"] = float(statics.high_N[i]) * gain
-        told["torque_limit_Nm"] = float(np.broadcast_to(limits.torque_Nm, (len(axes),))[i])
+        figures["torque_at_most_Nm"] = float(statics.high_N[i]) * gain
+        figures["torque_limit_Nm"] = float(np.broadcast_to(limits.torque_Nm, (len(axes),))[i])
     of_all: dict[str, Any] = {
         "held_share": float(np.mean(still >= 0.0)),
         "target_share": float(np.mean(moving >= statics.model.reserve_N)),
@@ -80,7 +81,22 @@ def _of_tensions(
     of_all["loop"] = _of_loop(robot, statics.model)
     if statics.turns:
         of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
+        of_all["free_rotation"] = _of_free_rotation(statics.model)
     return of_all
+
+
+def _of_free_rotation(model: PlatformModel) -> dict[str, float] | None:
+    """Return how a platform swings that no cable keeps from turning; None where none can."""
+    swings = free_rotation(model)
+    if swings is None:
+        return None
+    return {
+        "slowest_Hz": swings.slowest_Hz,
+        "fastest_Hz": swings.fastest_Hz,
+        "swing_rad": swings.swing_rad,
+        "swing_m": swings.swing_m,
+        "lasts_s": swings.lasts_s(SWINGS_m),
+    }
 
 
 def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:
@@ -89,14 +105,13 @@ def _of_loop(robot: Robot, model: PlatformModel) -> dict[str, float] | None:
     None where the cables do not hold the platform.
     """
     try:
-        loop = loop_model_of(model, robot.axes, robot.sync_period_s)
+        loop = designed_loop(model, robot.axes, robot.sync_period_s)
     except GeometryError:
         return None
-    everywhere = loop.margins(loop.design())
-    worst = min(everywhere, key=lambda there: there.modulus)
+    worst = min(loop.margins, key=lambda there: there.modulus)
     return {
-        "slowest_Hz": min(there.slowest_rad_s for there in everywhere) / math.tau,
-        "fastest_Hz": max(there.fastest_rad_s for there in everywhere) / math.tau,
+        "slowest_Hz": loop.slowest_rad_s / math.tau,
+        "fastest_Hz": max(there.fastest_rad_s for there in loop.margins) / math.tau,
         "modulus_margin": worst.modulus,
         "gain_margin": worst.gain,
         "phase_margin_rad": worst.phase_rad,
@@ -108,7 +123,7 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def lines(robot: Robot, platform: Platform, told: dict[str, Any]) -> list[str]:
+def lines(robot: Robot, platform: Platform, figures: dict[str, Any]) -> list[str]:
     """Return the same as lines for people; lengths in m, angles in degrees."""
     text = [
         f"{robot.name} ({robot.profile})",
@@ -117,11 +132,11 @@ def lines(robot: Robot, platform: Platform, told: dict[str, Any]) -> list[str]:
         f"at rest    {_point(platform.home_m)} m, within {platform.home_tolerance_m:g} m",
         f"targets    {_point(platform.workspace_min_m)} to {_point(platform.workspace_max_m)} m",
         *_orientation_lines(platform),
-        *_tension_lines(told),
+        *_tension_lines(figures),
         "",
-        *_table(told["axes"]),
+        *_table(figures["axes"]),
         "",
-        *_broken_lines(told["axes"]),
+        *_broken_lines(figures["axes"]),
     ]
     if platform.is_planar:
         text += ["", *_sketch(robot, platform)]
@@ -158,24 +173,26 @@ def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _tension_lines(told: dict[str, Any]) -> list[str]:
-    held, taken = 100.0 * told["held_share"], 100.0 * told["target_share"]
-    reserve = told["reserve_in_motion_N"]
-    spare = "" if reserve is None or reserve < 0.0 else f", with {reserve:.0f} N to spare in motion"
+def _tension_lines(figures: dict[str, Any]) -> list[str]:
+    held, taken = 100.0 * figures["held_share"], 100.0 * figures["target_share"]
+    reserve, kept = figures["reserve_in_motion_N"], figures["kept_for_control_N"]
+    least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
-        f"tensions   hold it in {held:.0f} % of the box; targets are taken in {taken:.0f} %{spare}",
-        f"           of which the control keeps {told['kept_for_control_N']:.0f} N",
+        f"tensions   hold it in {held:.0f} % of the box; targets are taken where they stay "
+        f"{kept:.0f} N from their",
+        f"           limits in motion, which the control needs: in {taken:.0f} % of it{least}",
     ]
-    lowest = told["lowest_resonance_Hz"]
+    lowest = figures["lowest_resonance_Hz"]
     lines.append(
         f"resonance  rotors against the platform over the cables at {lowest:.1f} Hz or more"
     )
-    if told["loop"] is not None:
-        lines += _loop_lines(told["loop"])
-    if "turns_at_most_rad" in told:
-        turns = told["turns_at_most_rad"]
+    if figures["loop"] is not None:
+        lines += _loop_lines(figures["loop"])
+    if "turns_at_most_rad" in figures:
+        turns = figures["turns_at_most_rad"]
         turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
         lines.append(f"           it {turning} there, which no cable can prevent")
+        lines += _free_rotation_lines(figures["free_rotation"])
     return lines
 
 
@@ -187,6 +204,22 @@ def _loop_lines(loop: dict[str, float]) -> list[str]:
         f"           its gain may still be {loop['gain_margin']:.1f} times off, or its phase "
         f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
     ]
+
+
+def _free_rotation_lines(swings: dict[str, float] | None) -> list[str]:
+    if swings is None:
+        return []
+    lines = [
+        f"           and swings so at {swings['slowest_Hz']:.1f} to {swings['fastest_Hz']:.1f} Hz: "
+        f"a way at full speed leaves {math.degrees(swings['swing_rad']):.2f} deg,",
+        f"           its anchor points by {1e3 * swings['swing_m']:.1f} mm; friction and being "
+        "lifted set it swinging besides",
+    ]
+    if swings["lasts_s"] > 0.0:
+        lines.append(
+            f"           it may take {swings['lasts_s']:.0f} s to die down to {1e3 * SWINGS_m:g} mm"
+        )
+    return lines
 
 
 def _table(axes: Sequence[dict[str, Any]]) -> list[str]:

@@ -92,8 +92,8 @@ class Gamepad:
     def _attach(self, device: EvdevDevice) -> None:
         ranges, values = {}, {}
         for axis in self._map.axes:
-            told = device.absinfo(axis)
-            ranges[axis], values[axis] = AxisRange(told.min, told.max), told.value
+            info = device.absinfo(axis)
+            ranges[axis], values[axis] = AxisRange(info.min, info.max), info.value
         self._stick.begin(ranges, values)
         self._device = device
 
@@ -151,8 +151,8 @@ def stick_map(
     turns = _axes("--turn-axes", turn_axes or TURN_AXES[len(about)], len(about))
     named = [axis for axis, _ in (*moves, *turns)]
     if len(set(named)) < len(named):
-        told = ",".join(filter(None, (axes or AXES[k], turn_axes or TURN_AXES[len(about)])))
-        raise BadInputError(f"--axes, --turn-axes {told}: allowed: different ones")
+        given = ",".join(filter(None, (axes or AXES[k], turn_axes or TURN_AXES[len(about)])))
+        raise BadInputError(f"--axes, --turn-axes {given}: allowed: different ones")
     held, pressed = _code("--dead-man", dead_man, "BTN_"), _code("--confirm", confirm, "BTN_")
     if held == pressed:
         raise BadInputError(f"--confirm {confirm}: allowed: another button than --dead-man")

@@ -167,13 +167,13 @@ def stream_address(status: dict[str, Any], settings: TeleopSettings) -> tuple[st
     if settings.via is not None:
         address = Address.parse("--via", settings.via)
         return address.host, address.port
-    told = status["parts"].get("stream", {}).get("address")
-    if told is None:
+    bound = status["parts"].get("stream", {}).get("address")
+    if bound is None:
         raise BadInputError(
             f"{status['robot']}: its daemon takes no set-point stream; allowed: one that was "
             "started with --stream HOST:PORT"
         )
-    host, _, port = told.rpartition(":")
+    host, _, port = bound.rpartition(":")
     if host in _EVERYWHERE:
         host = "127.0.0.1" if settings.url is None else str(urlsplit(settings.url).hostname)
     return host, int(port)
@@ -200,7 +200,7 @@ def _tell_figures(session: TeleopSession, out: Output) -> None:
     """Say what was confirmed, and what became of what was sent."""
     figures = session.figures()
     trip = figures["round_trip_ms"]
-    told = f"; round trip {trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
+    delay = f"; round trip {trip['p50']:.1f} ms, {trip['p99']:.1f} ms at most in 99 of 100"
     with suppress(OSError):  # nobody reads it any more
         for one in session.confirmations:
             place = " ".join(f"{1e3 * value:+.2f}" for value in one.pose_m)
@@ -208,7 +208,7 @@ def _tell_figures(session: TeleopSession, out: Output) -> None:
             out.say(f"confirmed {one.number} at {one.time_s:.2f} s{where}")
         out.say(
             f"{figures['sent']} set-points sent, {figures['answered']} answered"
-            f"{told if figures['answered'] else ''}"
+            f"{delay if figures['answered'] else ''}"
         )
 
 

@@ -93,8 +93,8 @@ class View:
         return Text("\n", no_wrap=True).join(rows)
 
     def _target(self) -> tuple[float, ...]:
-        told = self._status.get("program_progress", {}).get("target_m")
-        return self._session.setpoint_m if told is None else tuple(map(float, told))
+        target_m = self._status.get("program_progress", {}).get("target_m")
+        return self._session.setpoint_m if target_m is None else tuple(map(float, target_m))
 
     def _lines(self) -> list[Text]:
         session, hand = self._session, self._session.hand
@@ -111,8 +111,8 @@ class View:
         tensions = [axis.get("tension_N") for axis in self._status.get("axes", [])]
         if any(value is not None for value in tensions):
             named = zip(self._axes, tensions, strict=False)
-            told = [f"{name} {'-' if t is None else f'{t:.0f}'}" for name, t in named]
-            lines.append(Text(f"tensions in N: {', '.join(told)}"))
+            texts = [f"{name} {'-' if t is None else f'{t:.0f}'}" for name, t in named]
+            lines.append(Text(f"tensions in N: {', '.join(texts)}"))
         refused = self._status.get("program_progress", {}).get("held_back")
         for text in (hand.trouble, refused, self._status.get("reason")):
             if text and text != self._reason:

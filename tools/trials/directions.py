@@ -77,19 +77,19 @@ class Directions:
 
     def arguments(self, place: FloatArray, speed_m_s: float | None = None) -> dict[str, Any]:
         """Return what the program `pose` is told to go to a place."""
-        told: dict[str, Any] = {"position_m": place[: self.k].tolist()}
+        arguments: dict[str, Any] = {"position_m": place[: self.k].tolist()}
         if self.angle_rad > 0.0:
-            told["rotation_rad"] = place[self.k :].tolist()
+            arguments["rotation_rad"] = place[self.k :].tolist()
         if speed_m_s is not None:
-            told["speed_m_s"] = speed_m_s
-        return told
+            arguments["speed_m_s"] = speed_m_s
+        return arguments
 
     def marked(self, place: FloatArray, prefix: str) -> dict[str, list[float]]:
         """Return a place as a recording's mark holds it."""
-        told = {f"{prefix}_m": place[: self.k].tolist()}
+        place_marked = {f"{prefix}_m": place[: self.k].tolist()}
         if self.turns:
-            told[f"{prefix}_rotation_rad"] = place[self.k :].tolist()
-        return told
+            place_marked[f"{prefix}_rotation_rad"] = place[self.k :].tolist()
+        return place_marked
 
     def place(self, mark: Mapping[str, Any], prefix: str) -> FloatArray:
         """Return a place out of a mark, (d,)."""

@@ -10,8 +10,8 @@ import numpy as np
 from cdpr_profiles import Robot
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_tools.trials.figures import Figure
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation.figures import Figure
+from cdpr_tools.trials.evaluation.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 OVERSHOOT_mm: Final = 2.0

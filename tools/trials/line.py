@@ -9,8 +9,8 @@ import numpy as np
 
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.figures import Figure
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation.figures import Figure
+from cdpr_tools.trials.evaluation.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 SPEED_m_s: Final = 0.01
@@ -128,14 +128,14 @@ def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:
         for i, (what, text) in enumerate((("path", "line"), ("setpoint", "set-point"))):
             wanted = what == "setpoint" and not less_mean
             for part, values in rms.items():
-                told = f"RMS distance from the {text}{less}, {NAMES[part]}"
+                title = f"RMS distance from the {text}{less}, {NAMES[part]}"
                 limit = SETPOINT_mm if wanted and not slow and part == best(parts) else None
-                figures.append(Figure(f"{what}_{part}{key}_mm", told, values[i], "mm", limit))
+                figures.append(Figure(f"{what}_{part}{key}_mm", title, values[i], "mm", limit))
             if len(rms) == len(NAMES):
                 ratio = rms[WITHOUT][i] / rms[WITH][i]
-                told = f"distance from the {text}{less}, without over with"
+                title = f"distance from the {text}{less}, without over with"
                 limit = RATIO if wanted and slow else None
-                ratios.append(Figure(f"{what}{key}_ratio", told, ratio, "", limit, True))
+                ratios.append(Figure(f"{what}{key}_ratio", title, ratio, "", limit, True))
     return [*figures, *_orientation(parts), *ratios]
 
 
@@ -151,9 +151,9 @@ def _orientation(parts: dict[str, Recorded]) -> list[Figure]:
         found, name = line_errors(recorded), NAMES[part]
         if recorded.directions.turns:
             value = _rms([one.off_deg for one in found])
-            told = f"RMS angle from the set-point, {name}"
-            figures.append(Figure(f"orientation_{part}_deg", told, value, "deg"))
+            title = f"RMS angle from the set-point, {name}"
+            figures.append(Figure(f"orientation_{part}_deg", title, value, "deg"))
         if turns := [one.off_mm for one in found if one.is_turn]:
-            told = f"RMS distance from the set-point in turns, {name}"
-            figures.append(Figure(f"turn_{part}_mm", told, _rms(turns), "mm"))
+            title = f"RMS distance from the set-point in turns, {name}"
+            figures.append(Figure(f"turn_{part}_mm", title, _rms(turns), "mm"))
     return figures

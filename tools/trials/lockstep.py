@@ -32,10 +32,10 @@ from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.realtime import one_core
 from cdpr_rt.service.recordings.recording import Recorder
-from cdpr_tools.composition.simulator import OwnSimulator
-from cdpr_tools.daemon.loop_process import description, loop_parts
+from cdpr_tools.composition.simulator import OwnLoadCells, OwnSimulator
+from cdpr_tools.daemon.processes.loop_process import description, loop_parts
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.trials.pose_log import PoseLogTail
+from cdpr_tools.trials.evaluation.pose_log import PoseLogTail
 from cdpr_tools.trials.right import RightInBusTime
 from cdpr_tools.trials.streams.stream import StreamInBusTime
 
@@ -55,9 +55,11 @@ class LockstepRobot:
     the simulator logs the true pose, a file of its own where left out; `record` a folder for the
     recording (MCAP), none where left out. `programs` are run besides the robot's own.
     `commissioned` is the folder of what commissioning has learnt of the motors, where the robot's
-    file does not name it; nothing is made of it where the robot is not to be `compensated`. The
+    file does not name it; nothing is made of it where the robot is not to be `compensated`, and of
+    the others nothing is learnt in motion where it `learns` nothing. The
     calibration of its geometry in force is left aside where it is not to be run `as_calibrated`.
-    `scanner` is where a simulated device outside logs the poses that it measures. The
+    `scanner` is where a simulated device outside logs the poses that it measures, `camera` the
+    socket to make of a simulated camera on the platform. The
     right to move is held from the beginning, see `right`. Raises CommandError, DriverError and
     ProfileError as `cdpr run` does, WorkFailedError where the robot does not get ready.
     """
@@ -72,8 +74,10 @@ class LockstepRobot:
         programs: Mapping[str, Program] | None = None,
         commissioned: Path | None = None,
         compensated: bool = True,
+        learns: bool = True,
         as_calibrated: bool = True,
         scanner: Path | None = None,
+        camera: Path | None = None,
     ) -> None:
         loaded = load_robot(robot)
         self.robot = with_commissioned(
@@ -84,7 +88,7 @@ class LockstepRobot:
         self.period_s = self.robot.sync_period_s
         self._reference = str(robot)
         self._plant, self._truth_path, self._record = plant, truth_log, record
-        self._scanner = scanner
+        self._scanner, self._camera, self._learns = scanner, camera, learns
         self._more_programs = dict(programs or {})
         self._stack = ExitStack()
         self._turns = self._status_seen = 0
@@ -95,6 +99,8 @@ class LockstepRobot:
         """The right to move, and who holds it."""
         self.stream: StreamInBusTime
         """Takes the packets of set-point streams."""
+        self.cells: OwnLoadCells
+        """The simulated load cells of a robot whose file names `tension_sensors`."""
         self.recorder: Recorder | None = None
         self._truth: PoseLogTail | None = None
 
@@ -111,23 +117,34 @@ class LockstepRobot:
     def _start(self, stack: ExitStack) -> None:
         robot, n = self.robot, len(self.robot.axes)
         bus = f"simbus:trial-{os.getpid()}-{next(_names)}"
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-")))
         if self._truth_path is None and robot.platform is not None:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-trial-"))
-            self._truth_path = Path(folder) / "truth.log"
+            self._truth_path = folder / "truth.log"
+        board = None if robot.tension_sensors is None else folder / "board"
         simulator = OwnSimulator(
-            self._reference, bus, self._plant, self._truth_path, scanner=self._scanner
+            self._reference,
+            bus,
+            self._plant,
+            self._truth_path,
+            board=board,
+            scanner=self._scanner,
+            camera=self._camera,
         )
         stack.callback(simulator.stop)
-        self.simulator = simulator
+        self.simulator, port = simulator, None
+        if board is not None:
+            self.cells = OwnLoadCells(str(robot.tension_sensors), board)
+            stack.callback(self.cells.stop)
+            port = self.cells.port
         self.block = block = SharedBlock.create(n, RING_S, 1.0 / self.period_s)
         stack.callback(os.close, block.fd)
         block.counters["start_monotonic_ns"] = time.monotonic_ns()
         block.counters["start_realtime_ns"] = time.time_ns()
-        self.machine = RobotMachine(robot, [bus])
+        self.machine = RobotMachine(robot, [bus], tension_port=port)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
         limits = limits_of(robot)
-        parts = loop_parts(robot, limits, block)
+        parts = loop_parts(robot, limits, block, learns=self._learns)
         programs = {**parts.programs, **self._more_programs}
         # whether the user's own robot may be believed is nothing to a trial of a simulated one
         parts = replace(parts, programs=programs, before_power=lambda: None)

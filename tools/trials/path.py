@@ -14,11 +14,11 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
 from cdpr_rt.motion.path.pieces import pieces_of
 from cdpr_rt.procedures.path.planning import PathPlan, PathPlanner
-from cdpr_rt.programs.platform.path_store import write_plan
+from cdpr_rt.programs.platform.paths.path_store import write_plan
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.figures import Figure
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation.figures import Figure
+from cdpr_tools.trials.evaluation.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 FILE: Final = "path.nc"
@@ -39,6 +39,10 @@ def gcode(directions: Directions, speed_m_s: float) -> str:
     """Return the file: three laps of lines, an arc and a diagonal, turned on the way."""
     half = 1e3 * _SHARE * (directions.high_m - directions.low_m)
     x, y = half[0], half[1]
+    # the arc stays in the box, however wide that is
+    left = 1e3 * (0.5 - _SHARE) * (directions.high_m - directions.low_m)[1]
+    height = min((2.0 - np.sqrt(3.0)) * x, 0.9 * left)
+    radius = (x**2 + height**2) / (2.0 * height)
     up, down = (f" Z{z:.3f}" for z in ((half[2], -half[2]) if directions.k > 2 else (0.0, 0.0)))
     if directions.k == 2:
         up = down = ""
@@ -47,7 +51,7 @@ def gcode(directions: Directions, speed_m_s: float) -> str:
         letter = _LETTERS[directions.names[directions.k]]
         turn, unturn = f" {letter}{0.4 * np.degrees(directions.angle_rad):.3f}", f" {letter}0"
     lap = [
-        f"X{x:.3f}{turn}", f"Y{y:.3f}{up}", f"G3 X{-x:.3f} R{2.0 * x:.3f}",
+        f"X{x:.3f}{turn}", f"Y{y:.3f}{up}", f"G3 X{-x:.3f} R{radius:.3f}",
         f"G1 Y{-y:.3f}{down}{unturn}", f"X0 Y{0.5 * y:.3f}", f"X{-x:.3f} Y{-y:.3f}",
     ]  # fmt: skip
     head = ["G21 G90 G17", f"G0 X{-x:.3f} Y{-y:.3f}{down}", f"G64 P{BLEND_mm:g}"]
@@ -55,9 +59,8 @@ def gcode(directions: Directions, speed_m_s: float) -> str:
     return "\n".join([*head, *(_LAPS * lap), "M2", ""])
 
 
-def plan_of(robot: Robot, directions: Directions, speed_m_s: float) -> PathPlan:
+def plan_of(planner: PathPlanner, directions: Directions, speed_m_s: float) -> PathPlan:
     """Return the plan of the trial's path; raises WorkFailedError where there is none."""
-    planner = PathPlanner(robot)
     origin = 0.5 * (directions.low_m + directions.high_m)
     settings = GcodeSettings(origin, 0.0)
     path = read_gcode(gcode(directions, speed_m_s), FILE, planner.coordinates, settings)
@@ -73,10 +76,10 @@ def drive(run: TrialRun, speed_m_s: float) -> None:
     rig = run.rig
     folder = rig.truth_log.parent
     (folder / FILE).write_text(gcode(run.directions, speed_m_s), encoding="utf-8")
-    plan = plan_of(rig.robot, run.directions, speed_m_s)
+    planner = PathPlanner(rig.robot)
+    plan = plan_of(planner, run.directions, speed_m_s)
     paths = rig.loop.engine.parts.paths
     assert plan.timed is not None and paths is not None  # of a robot with a platform
-    planner = PathPlanner(rig.robot)
     paths.open(folder / "plans")
     lines = plan.nodes.line[plan.timed.node]
     name = write_plan(folder / "plans", plan.timed, lines, FILE, planner.model)
@@ -113,7 +116,7 @@ def errors_of(recorded: Recorded, robot: Robot, speed_m_s: float) -> PathErrors:
     (mark,), (end,) = recorded.marked("path"), recorded.marked("path end")
     rows = slice(recorded.row(mark["cycle"]), recorded.row(end["cycle"]) + 1)
     k = recorded.directions.k
-    plan = plan_of(robot, recorded.directions, speed_m_s)
+    plan = plan_of(PathPlanner(robot), recorded.directions, speed_m_s)
     planned = _dense(plan)[:, :k]
     described = _described(plan)[:, :k]
     setpoint, true = recorded.setpoint_m[rows], recorded.true_m[rows]

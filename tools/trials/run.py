@@ -13,8 +13,8 @@ from cdpr_profiles import load_robot
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.trials.directions import Directions, platform_of
+from cdpr_tools.trials.evaluation.recorded import TRUTH
 from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
-from cdpr_tools.trials.recorded import TRUTH
 
 _TIGHTEN_S, _MOVE_S = 180.0, 60.0
 _SETTLE_S = 2.0
@@ -155,8 +155,8 @@ def trial_run(
         run.mark("end", refused=run.refused)
         rig.turn()  # the last cycle is in the recording as well
     recorder = rig.recorder
-    if recorder is not None and (told := recorder.status())["error"]:
-        raise WorkFailedError(str(told["error"]))
+    if recorder is not None and (status := recorder.status())["error"]:
+        raise WorkFailedError(str(status["error"]))
 
 
 def _require_empty(folder: Path) -> None:

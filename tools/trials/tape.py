@@ -16,9 +16,9 @@ from cdpr_profiles import Robot
 from cdpr_profiles.reading.bounded_input import read_toml
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.trials.directions import platform_of
-from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.evaluation.figures import Figure
+from cdpr_tools.trials.evaluation.recorded import Recorded
 from cdpr_tools.trials.limits import held_figures
-from cdpr_tools.trials.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 OFF_M: Final = (0.02, 0.05)
@@ -27,6 +27,8 @@ POSES: Final = 100
 SPEED_SHARE: Final = 0.25
 """Of the speed of the robot's file: a robot that nobody has calibrated yet is not hurried."""
 STAY_S: Final = 1.0
+_TIME_OVER: Final = "time over"
+"""The mark of a trial whose minutes ended before its poses did."""
 
 
 def plant_text(robot: Robot, plant: Path | None, seed: int) -> str:
@@ -50,6 +52,7 @@ def drive(run: TrialRun, seconds: float) -> None:
     speed_m_s = SPEED_SHARE * float(run.directions.speed[0])
     for _ in range(POSES):
         if run.elapsed_s >= seconds:
+            run.mark(_TIME_OVER)
             break
         target = run.directions.marked(run.start_random_move(speed_m_s), "target")
         run.arrive()
@@ -60,14 +63,19 @@ def drive(run: TrialRun, seconds: float) -> None:
 
 
 def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
-    """Return the extremes of tension and torque, and how far off the poses were."""
+    """Return the extremes of tension and torque, and how far off the poses were.
+
+    How many poses there are is not the robot's doing where the time was over before.
+    """
     directions, marks = recorded.directions, recorded.marked("pose")
     rows = [recorded.row(mark["cycle"]) for mark in marks]
     wanted = np.array([directions.place(mark, "target") for mark in marks])
     wanted = wanted.reshape(-1, directions.d)
     off = np.linalg.norm(recorded.true_m[rows] - wanted[:, : directions.k], axis=1)
+    cut_short = bool(recorded.marked(_TIME_OVER))
+    text = f"poses, out and back{f', of {POSES}: its time was over' if cut_short else ''}"
     figures = [
-        Figure("poses", "poses, out and back", len(marks), "", POSES, True),
+        Figure("poses", text, len(marks), "", 1 if cut_short else POSES, True),
         Figure("minutes", "bus time", float(recorded.time_s[-1]) / 60.0, "min"),
         *held_figures(recorded, robot),
         Figure("off_rms_mm", "RMS distance from a pose", 1e3 * _rms(off), "mm"),
@@ -82,4 +90,4 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
 
 
 def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return float(np.sqrt((values**2).sum() / max(len(values), 1)))

@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_tools.trials.figures import Figure
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation.figures import Figure
+from cdpr_tools.trials.evaluation.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 
 SETTLE_S: Final = 1.5

@@ -15,10 +15,11 @@ from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.stored_settings import load_settings
-from cdpr_tools.trials import limits, line, path, pictures, tape, targets
+from cdpr_tools.trials import limits, line, path, tape, targets
 from cdpr_tools.trials.directions import platform_of
-from cdpr_tools.trials.figures import Figure, all_reached
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation import pictures
+from cdpr_tools.trials.evaluation.figures import Figure, all_reached
+from cdpr_tools.trials.evaluation.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun, trial_run
 from cdpr_tools.trials.streams import streaming
 
@@ -144,6 +145,7 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
                 advance=advance,
                 commissioned=_path(settings.commissioned),
                 compensated=compensated,
+                learns=compensated or len(settings.parts) == 1,
             ) as run,
         ):
             kind.drive(run, settings)
@@ -160,7 +162,7 @@ def judge(folder: Path) -> dict[str, Any]:
     kind.draw(parts, robot, settings).savefig(folder / PICTURE)
     result = {
         **asdict(settings),
-        "figures": {figure.key: figure.told() for figure in figures},
+        "figures": {figure.key: figure.as_table() for figure in figures},
         "reached": all_reached(figures),
         "refused": {part: one.marked("end")[0]["refused"] for part, one in parts.items()},
         "recordings": [str(path) for path in sorted(folder.glob("*/*.mcap"))],
@@ -168,8 +170,8 @@ def judge(folder: Path) -> dict[str, Any]:
         "picture": str(folder / PICTURE),
         "lines": [figure.line() for figure in figures],
     }
-    told = {key: value for key, value in result.items() if key != "lines"}
-    (folder / FIGURES).write_text(to_json(told, indent=1), encoding="utf-8")
+    kept = {key: value for key, value in result.items() if key != "lines"}
+    (folder / FIGURES).write_text(to_json(kept, indent=1), encoding="utf-8")
     return result
 
 

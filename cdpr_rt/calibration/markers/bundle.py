@@ -13,15 +13,16 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import diags_array
 
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray, cross_matrices
-from cdpr_rt.calibration.markers.observations import Observations
+from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
 from cdpr_rt.calibration.markers.reprojection import (
     LENS_PARAMETERS,
     Estimate,
     residuals,
     residuals_and_jacobian,
 )
+from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
 from cdpr_rt.calibration.markers.sheet_errors import SheetErrors, sheet_errors
+from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.errors import ControlError
 
 _STEPS = 60
@@ -105,13 +106,16 @@ class Bundle:
 
 
 def adjust(
-    start: Estimate, seen: Observations, fixed: tuple[int, ...], *, free_lens: bool = False
+    start: Estimate, seen: SeenMarkers, fixed: tuple[int, ...], *, free_lens: bool = False
 ) -> Bundle:
     """Return the best fit from `start` with the markers `fixed`, ids, held: they are the gauge.
 
     Raises BundleError where nothing is fixed, or what was seen does not determine the rest.
     """
     usable = start.map.placed[seen.marker] & start.map.located[seen.image]
+    # a marker that the first map has behind the camera cannot find its way to the front
+    before_camera = np.isfinite(residuals(start, seen.keep(usable))).all(axis=(1, 2))
+    usable[usable] = before_camera
     used = seen.keep(usable)
     free = _free_parameters(start, used, fixed, free_lens)
     cameras = len(np.unique(used.image))
@@ -143,7 +147,7 @@ def adjust(
 
 
 def _free_parameters(
-    start: Estimate, used: Observations, fixed: tuple[int, ...], free_lens: bool
+    start: Estimate, used: SeenMarkers, fixed: tuple[int, ...], free_lens: bool
 ) -> IntArray:
     k = len(start.map.names)
     held = [start.map.ids.index(marker) for marker in fixed]
@@ -174,7 +178,7 @@ def _cost(off: FloatArray, sigma: float) -> float:
 
 
 def _normal_equations(
-    now: Estimate, used: Observations, free: IntArray, sigma: float
+    now: Estimate, used: SeenMarkers, free: IntArray, sigma: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     off, jacobian = residuals_and_jacobian(now, used)
     weight = np.repeat(_weights(off.reshape(-1, 4, 2), sigma).ravel(), 2)
@@ -206,8 +210,8 @@ def _solve(normal: FloatArray, right: FloatArray, cameras: int) -> FloatArray:
 
 def _finish(
     now: Estimate,
-    seen: Observations,
-    used: Observations,
+    seen: SeenMarkers,
+    used: SeenMarkers,
     usable: np.ndarray[tuple[int], np.dtype[np.bool_]],
     free: IntArray,
     steps: int,

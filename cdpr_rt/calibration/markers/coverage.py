@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from cdpr_rt.calibration.markers.images.detection import Sighting
+from cdpr_rt.calibration.markers.sighting import Sighting
 
 _FEW_IMAGES = 3
 _LISTED = 12

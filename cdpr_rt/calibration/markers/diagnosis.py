@@ -13,9 +13,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from cdpr_rt.calibration.markers.bundle import Bundle, adjust
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray
-from cdpr_rt.calibration.markers.observations import Observations
 from cdpr_rt.calibration.markers.reprojection import Estimate, residuals_and_jacobian
+from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
+from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.errors import ControlError
 
 _BAD_SHARE = 0.25
@@ -55,7 +55,7 @@ class LensSuspicion:
     lens: FloatArray
 
 
-def suspects(bundle: Bundle, seen: Observations) -> list[Suspect]:
+def suspects(bundle: Bundle, seen: SeenMarkers) -> list[Suspect]:
     """Return the markers of which many images do not agree with the map."""
     limit = max(_BAD_SIGMAS * bundle.sigma_px, _LEAST_BAD_px)
     off = _off(bundle.off_px)
@@ -73,7 +73,7 @@ def _off(corners_px: FloatArray) -> FloatArray:
 
 
 def _judged(
-    marker: int, rows: IntArray, bundle: Bundle, seen: Observations, limit: float
+    marker: int, rows: IntArray, bundle: Bundle, seen: SeenMarkers, limit: float
 ) -> Suspect:
     names = seen.names
     images = seen.image[rows]
@@ -114,7 +114,7 @@ def _judged(
     )
 
 
-def _each_place(rows: IntArray, bundle: Bundle, seen: Observations) -> tuple[FloatArray, float]:
+def _each_place(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[FloatArray, float]:
     """Return where each image of a marker has its middle, (r, 3), and how well it can, m.
 
     Along the marker's own plane, in which an image tells places well.
@@ -162,7 +162,7 @@ def _best_cut(split: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, i
     return cuts[best], wrong[best]
 
 
-def _size(rows: IntArray, bundle: Bundle, seen: Observations) -> tuple[float, float]:
+def _size(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[float, float]:
     """Return a marker's size over what was told and its standard deviation, cameras as they are."""
     own = seen.keep(np.isin(np.arange(len(seen)), rows))
     map_ = bundle.estimate.map
@@ -181,13 +181,13 @@ def _size(rows: IntArray, bundle: Bundle, seen: Observations) -> tuple[float, fl
 
 
 def _fits_with(
-    size: float, rows: IntArray, bundle: Bundle, seen: Observations, limit: float
+    size: float, rows: IntArray, bundle: Bundle, seen: SeenMarkers, limit: float
 ) -> bool:
     """Return whether a marker fits once it is so large, cameras as they are."""
     own = seen.keep(np.isin(np.arange(len(seen)), rows))
     sizes = own.size_m.copy()
     sizes[seen.marker[rows[0]]] *= size
-    own = Observations(own.names, own.ids, own.image, own.marker, own.corners_px, sizes)
+    own = SeenMarkers(own.names, own.ids, own.image, own.marker, own.corners_px, sizes)
     estimate = bundle.estimate
     start = 6 * (len(estimate.map.names) + int(seen.marker[rows[0]]))
     for _ in range(5):
@@ -201,7 +201,7 @@ def _fits_with(
     return bool((distance > limit).mean() < _BAD_SHARE)
 
 
-def lens_suspicion(bundle: Bundle, seen: Observations, fixed: tuple[int, ...]) -> LensSuspicion:
+def lens_suspicion(bundle: Bundle, seen: SeenMarkers, fixed: tuple[int, ...]) -> LensSuspicion:
     """Return whether the images fit significantly better with another lens.
 
     The change of fx, fy, cx, cy, k1, k2, p1, p2, k3 is weighed with its covariance. The fit must

@@ -13,10 +13,11 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, IntArray, angles
+from cdpr_rt.calibration.markers.geometry.rotations import angles
 from cdpr_rt.calibration.markers.geometry.square_pose import SquarePoses
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
-from cdpr_rt.calibration.markers.observations import Observations
+from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
+from cdpr_rt.core.exchange import FloatArray, IntArray
 
 _MOST_IMAGES = 24
 """Of a pair of markers, so many are compared."""
@@ -45,7 +46,7 @@ class Pair:
         return _EDGE_COST + (self.of / self.images) ** 2 / self.images
 
 
-def marker_pairs(seen: Observations, poses: SquarePoses) -> list[Pair]:
+def marker_pairs(seen: SeenMarkers, poses: SquarePoses) -> list[Pair]:
     """Return all pairs of markers that some image shows together."""
     by_image = [np.flatnonzero(seen.image == i) for i in range(len(seen.names))]
     together: dict[tuple[int, int], list[tuple[int, int]]] = {}
@@ -118,7 +119,7 @@ def placed_along_tree(pairs: list[Pair], count: int, start: int) -> tuple[FloatA
 
 
 def located_cameras(
-    seen: Observations, poses: SquarePoses, position: FloatArray, rotation: FloatArray
+    seen: SeenMarkers, poses: SquarePoses, position: FloatArray, rotation: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return positions (k, 3) and rotations (k, 3, 3) of the camera in the images.
 
@@ -150,7 +151,7 @@ def located_cameras(
     return places, turns
 
 
-def most_agreed(pairs: list[Pair], seen: Observations) -> int:
+def most_agreed(pairs: list[Pair], seen: SeenMarkers) -> int:
     """Return the id of the marker that most images place alike against the others."""
     votes = np.zeros(len(seen.ids))
     for pair in pairs:
@@ -158,7 +159,7 @@ def most_agreed(pairs: list[Pair], seen: Observations) -> int:
     return seen.ids[int(votes.argmax())]
 
 
-def first_map(seen: Observations, poses: SquarePoses, reference: int | None = None) -> MarkerMap:
+def first_map(seen: SeenMarkers, poses: SquarePoses, reference: int | None = None) -> MarkerMap:
     """Return a map of all that hangs together with the marker `reference`, an id.
 
     Where left out it is the one that the images agree on most.

@@ -12,13 +12,14 @@ from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets, rotatio
 from cdpr_rt.calibration.markers.bundle import Bundle, adjust
 from cdpr_rt.calibration.markers.coverage import Coverage, coverage, listed
 from cdpr_rt.calibration.markers.diagnosis import LensSuspicion, Suspect, lens_suspicion, suspects
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, exponentials
+from cdpr_rt.calibration.markers.geometry.rotations import exponentials
 from cdpr_rt.calibration.markers.geometry.square_pose import square_poses
 from cdpr_rt.calibration.markers.graph import first_map
-from cdpr_rt.calibration.markers.images.detection import Sighting
 from cdpr_rt.calibration.markers.marker_map import MarkerMap, best_fit
-from cdpr_rt.calibration.markers.observations import Observations
 from cdpr_rt.calibration.markers.reprojection import Estimate
+from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
+from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 _MOST_ROUNDS = 4
@@ -26,6 +27,7 @@ _GOOD_px, _POOR_px = 0.35, 1.5
 _SCALE_OFF = 0.004
 _FRAME_RATIO = 2.0
 _MIRRORED_IMAGES = 2
+"""Of a marker that is read rightly as well: one image may show by chance what reads as another."""
 _MISFIT_WEIGHT, _MISFIT_SHARE = 0.05, 0.05
 """A corner has so little weight from 13 standard deviations on."""
 
@@ -46,7 +48,7 @@ class MapFit:
     """A map, how good it is, and what was wrong on the way."""
 
     bundle: Bundle
-    seen: Observations
+    seen: SeenMarkers
     """What the map was made from."""
     fixed: tuple[int, ...]
     coverage: Coverage
@@ -90,21 +92,20 @@ def fit_map(
     suspicion = lens_suspicion(bundle, seen, (start,))
     known = _compare(bundle.estimate.map, sheets)
     fixed: tuple[int, ...] = (start,)
-    if numbers := _known_places(bundle.estimate.map, sheets)[0]:
+    if numbers := known_places(bundle.estimate.map, sheets)[0]:
         fixed = tuple(seen.ids[k] for k in numbers)
         bundle = _held(bundle, seen, sheets)
-    faults = _faults(cover, suspicion, known) + _misfits(bundle)
-    warnings = _warnings(sightings, dropped)
+    faults = _faults(cover, suspicion, known) + misfits(bundle)
     notes = _notes(bundle, cover, known, sheets, fixed)
     return MapFit(
         *(bundle, seen, fixed, cover, tuple(dropped), suspicion, known),
-        *(tuple(faults), tuple(warnings), tuple(notes)),
+        *(tuple(faults), tuple(warnings(sightings, dropped)), tuple(notes)),
     )
 
 
 def _observations(
     sightings: Sequence[Sighting], sheets: MarkerSheets, island: set[int]
-) -> Observations:
+) -> SeenMarkers:
     rows = [
         (image, marker, corners)
         for image, one in enumerate(sightings)
@@ -113,12 +114,12 @@ def _observations(
         if marker in island
     ]
     sizes = {marker: sheets.size_of(marker) for marker in island}
-    return Observations.of([one.name for one in sightings], rows, sizes)
+    return SeenMarkers.of([one.name for one in sightings], rows, sizes)
 
 
 def _without_suspects(
-    seen: Observations, lens: FloatArray, reference: int | None
-) -> tuple[Bundle, Observations, list[Suspect]]:
+    seen: SeenMarkers, lens: FloatArray, reference: int | None
+) -> tuple[Bundle, SeenMarkers, list[Suspect]]:
     """Return the fit without the markers that do not fit."""
     if reference is not None and reference not in seen.ids:
         raise InvalidRequestError(
@@ -138,9 +139,7 @@ def _without_suspects(
     return bundle, seen, dropped
 
 
-def _known_places(
-    map_: MarkerMap, sheets: MarkerSheets
-) -> tuple[list[int], FloatArray, FloatArray]:
+def known_places(map_: MarkerMap, sheets: MarkerSheets) -> tuple[list[int], FloatArray, FloatArray]:
     """Return numbers in the map, positions and rotations of known markers that have a place."""
     known = [
         one for one in sheets.known if one.id in map_.ids and map_.placed[map_.ids.index(one.id)]
@@ -151,14 +150,14 @@ def _known_places(
     return numbers, places, exponentials(turns)
 
 
-def _aligned(
+def aligned(
     map_: MarkerMap, sheets: MarkerSheets
 ) -> tuple[MarkerMap, list[int], FloatArray, FloatArray]:
-    """Return the map moved to where the known markers are, and what `_known_places` returns.
+    """Return the map moved to where the known markers are, and what `known_places` returns.
 
     Their corners are made to meet as well as they can; the map keeps its size.
     """
-    numbers, places, turns = _known_places(map_, sheets)
+    numbers, places, turns = known_places(map_, sheets)
     corners = map_.corners_m()[numbers]
     flat = (corners - map_.position_m[numbers][:, None]) @ map_.rotation[numbers]
     own = flat @ turns.transpose(0, 2, 1) + places[:, None]
@@ -168,9 +167,9 @@ def _aligned(
 
 def _compare(map_: MarkerMap, sheets: MarkerSheets) -> KnownFit | None:
     """Return how the map agrees with known places, None with fewer than two of them."""
-    if len(_known_places(map_, sheets)[0]) < 2:
+    if len(known_places(map_, sheets)[0]) < 2:
         return None
-    moved, numbers, places, _ = _aligned(map_, sheets)
+    moved, numbers, places, _ = aligned(map_, sheets)
     middles = moved.position_m[numbers]
     middles, places = middles - middles.mean(axis=0), places - places.mean(axis=0)
     scale = float(np.linalg.norm(places) / np.linalg.norm(middles))
@@ -178,34 +177,42 @@ def _compare(map_: MarkerMap, sheets: MarkerSheets) -> KnownFit | None:
     return KnownFit(scale, float(np.sqrt((left**2).sum(axis=1).mean())), len(numbers))
 
 
-def _held(bundle: Bundle, seen: Observations, sheets: MarkerSheets) -> Bundle:
+def _held(bundle: Bundle, seen: SeenMarkers, sheets: MarkerSheets) -> Bundle:
     """Return the fit with the known markers held at their places."""
-    moved, numbers, places, turns = _aligned(bundle.estimate.map, sheets)
+    moved, numbers, places, turns = aligned(bundle.estimate.map, sheets)
     moved.position_m[numbers] = places
     moved.rotation[numbers] = turns
     fixed = tuple(moved.ids[k] for k in numbers)
     return adjust(Estimate(moved, bundle.estimate.lens), seen, fixed)
 
 
-def _warnings(sightings: Sequence[Sighting], dropped: Sequence[Suspect]) -> list[str]:
-    warnings = []
+def warnings(sightings: Sequence[Sighting], dropped: Sequence[Suspect]) -> list[str]:
+    """Return what was wrong with single markers, in words."""
+    said = []
     twice = Counter(marker for one in sightings for marker in one.repeated)
     for marker, images in sorted(twice.items()):
-        warnings.append(f"marker {marker} is twice in {images} images: its id was printed twice")
+        said.append(f"marker {marker} is twice in {images} images: its id was printed twice")
     mirrored = Counter(marker for one in sightings for marker in one.mirrored)
     for marker, images in sorted(mirrored.items()):
-        if images >= _MIRRORED_IMAGES:
-            warnings.append(f"marker {marker} is printed as its mirror image ({images} images)")
-    return warnings + [one.text for one in dropped]
+        read = any(marker in one.corners_px for one in sightings)
+        if images >= _MIRRORED_IMAGES or not read:
+            where = "an image" if images == 1 else f"{images} images"
+            said.append(f"marker {marker} is printed as its mirror image, by {where}; left out")
+    return said + [one.text for one in dropped]
+
+
+def island_faults(cover: Coverage) -> list[str]:
+    """Return what is to be said where images show markers that hang together with no others."""
+    if cover.connected:
+        return []
+    return [
+        f"{len(cover.islands)} islands: the map holds the largest, {len(cover.islands[0])} of "
+        f"{len(cover.ids)} markers"
+    ]
 
 
 def _faults(cover: Coverage, lens: LensSuspicion, known: KnownFit | None) -> list[str]:
-    faults = []
-    if not cover.connected:
-        faults.append(
-            f"{len(cover.islands)} islands: the map holds the largest, {len(cover.islands[0])} of "
-            f"{len(cover.ids)} markers"
-        )
+    faults = island_faults(cover)
     if lens.wrong:
         faults.append(
             f"the intrinsics are not this camera's as it is now: the images ask for a focal "
@@ -220,7 +227,7 @@ def _faults(cover: Coverage, lens: LensSuspicion, known: KnownFit | None) -> lis
     return faults
 
 
-def _misfits(bundle: Bundle) -> list[str]:
+def misfits(bundle: Bundle) -> list[str]:
     """Return what is to be said of corners that do not fit, whosever they are."""
     seen = np.isfinite(bundle.off_px)
     share = 1.0 - float((bundle.weight[seen] > _MISFIT_WEIGHT).mean())

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, logarithms
-from cdpr_rt.calibration.markers.observations import CORNERS
+from cdpr_rt.calibration.markers.geometry.rotations import logarithms
+from cdpr_rt.calibration.markers.seen_markers import CORNERS
+from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 

@@ -12,9 +12,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from cdpr_rt.calibration.markers.geometry.lens import project, project_with_derivatives
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, cross_matrices, exponentials
+from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices, exponentials
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
-from cdpr_rt.calibration.markers.observations import Observations
+from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
+from cdpr_rt.core.exchange import FloatArray
 
 LENS_PARAMETERS = 9
 _NEAR_m = 1e-3
@@ -47,45 +48,96 @@ class Estimate:
         return Estimate(moved, self.lens + step[6 * (k + m) :])
 
 
-def _points(estimate: Estimate, seen: Observations) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return corners from their markers' middles, from the camera, and in its frame, (n, 4, 3)."""
+@dataclass(frozen=True)
+class Corners:
+    """n markers as they are expected in images, and the derivatives of that.
+
+    Cameras and markers are changed by (position + x_p, exp(x_φ) rotation) along the map's axes.
+    """
+
+    off_px: FloatArray
+    """By how much corners are expected right of and below where they were seen, (n, 4, 2)."""
+    by_camera: FloatArray
+    """(n, 8, 6)"""
+    by_marker: FloatArray
+    """(n, 8, 6)"""
+    by_lens: FloatArray
+    """(n, 8, 9)"""
+    by_size: FloatArray
+    """By the relative size of the sheets, (n, 8, 1)."""
+
+
+@dataclass(frozen=True)
+class Views:
+    """n markers of a map and the cameras that see them; a row is one marker in one image."""
+
+    corners_m: FloatArray
+    """In the marker's frame, (n, 4, 3)."""
+    corners_px: FloatArray
+    """(n, 4, 2)."""
+    marker_position_m: FloatArray
+    marker_rotation: FloatArray
+    camera_position_m: FloatArray
+    camera_rotation: FloatArray
+
+    def _points(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return corners from markers' middles, from cameras, and in their frames, (n, 4, 3)."""
+        turned = self.corners_m @ self.marker_rotation.transpose(0, 2, 1)
+        away = turned + (self.marker_position_m - self.camera_position_m)[:, None]
+        return turned, away, away @ self.camera_rotation
+
+    def off_px(self, lens: FloatArray) -> FloatArray:
+        """Return `Corners.off_px`, inf where a corner would be behind the camera."""
+        flat = self._points()[2].reshape(-1, 3)
+        behind = flat[:, 2] < _NEAR_m
+        safe = np.where(behind[:, None], (0.0, 0.0, 1.0), flat)
+        expected = np.where(behind[:, None], np.inf, project(safe, lens))
+        return expected.reshape(-1, 4, 2) - self.corners_px
+
+    def corners(self, lens: FloatArray) -> Corners:
+        """Return how far corners are off, with the derivatives of that."""
+        n = len(self.corners_px)
+        turned, away, points = self._points()
+        expected, by_point, by_lens = project_with_derivatives(points.reshape(-1, 3), lens)
+        to_camera = self.camera_rotation.transpose(0, 2, 1)
+        by_room = by_point.reshape(n, 4, 2, 3) @ to_camera[:, None]
+        by_camera = np.concatenate([-by_room, by_room @ cross_matrices(away)], axis=3)
+        by_marker = np.concatenate([by_room, -by_room @ cross_matrices(turned)], axis=3)
+        return Corners(
+            expected.reshape(n, 4, 2) - self.corners_px,
+            by_camera.reshape(n, 8, 6),
+            by_marker.reshape(n, 8, 6),
+            by_lens.reshape(n, 8, LENS_PARAMETERS),
+            (by_room @ turned[..., None]).reshape(n, 8, 1),
+        )
+
+
+def _views(estimate: Estimate, seen: SeenMarkers) -> Views:
     map_ = estimate.map
-    turned = seen.corners_m @ map_.rotation[seen.marker].transpose(0, 2, 1)
-    away = turned + (map_.position_m[seen.marker] - map_.camera_position_m[seen.image])[:, None]
-    return turned, away, away @ map_.camera_rotation[seen.image]
+    return Views(
+        seen.corners_m,
+        seen.corners_px,
+        map_.position_m[seen.marker],
+        map_.rotation[seen.marker],
+        map_.camera_position_m[seen.image],
+        map_.camera_rotation[seen.image],
+    )
 
 
-def residuals(estimate: Estimate, seen: Observations) -> FloatArray:
+def residuals(estimate: Estimate, seen: SeenMarkers) -> FloatArray:
     """Return by how much corners are expected right of and below where they were seen, (n, 4, 2).
 
     In pixels; inf where one would be behind the camera.
     """
-    _, _, points = _points(estimate, seen)
-    flat = points.reshape(-1, 3)
-    behind = flat[:, 2] < _NEAR_m
-    safe = np.where(behind[:, None], (0.0, 0.0, 1.0), flat)
-    expected = np.where(behind[:, None], np.inf, project(safe, estimate.lens))
-    return expected.reshape(-1, 4, 2) - seen.corners_px
+    return _views(estimate, seen).off_px(estimate.lens)
 
 
-def residuals_and_jacobian(estimate: Estimate, seen: Observations) -> tuple[FloatArray, csr_array]:
+def residuals_and_jacobian(estimate: Estimate, seen: SeenMarkers) -> tuple[FloatArray, csr_array]:
     """Return `residuals`, flat (8 n,), and their derivatives (8 n, parameters), sparse."""
     k, m = len(estimate.map.names), len(estimate.map.ids)
     n = len(seen)
-    turned, away, points = _points(estimate, seen)
-    expected, by_point, by_lens = project_with_derivatives(points.reshape(-1, 3), estimate.lens)
-    to_camera = estimate.map.camera_rotation[seen.image].transpose(0, 2, 1)
-    by_room = by_point.reshape(n, 4, 2, 3) @ to_camera[:, None]
-    data = np.concatenate(
-        [
-            -by_room,
-            by_room @ cross_matrices(away),
-            by_room,
-            -by_room @ cross_matrices(turned),
-            by_lens.reshape(n, 4, 2, LENS_PARAMETERS),
-        ],
-        axis=3,
-    )
+    corners = _views(estimate, seen).corners(estimate.lens)
+    data = np.concatenate([corners.by_camera, corners.by_marker, corners.by_lens], axis=2)
     columns = np.empty((n, 12 + LENS_PARAMETERS), np.int64)
     columns[:, :6] = 6 * seen.image[:, None] + np.arange(6)
     columns[:, 6:12] = 6 * (k + seen.marker[:, None]) + np.arange(6)
@@ -94,4 +146,4 @@ def residuals_and_jacobian(estimate: Estimate, seen: Observations) -> tuple[Floa
     starts = np.arange(8 * n + 1) * (12 + LENS_PARAMETERS)
     shape = (8 * n, estimate.parameters)
     jacobian = csr_array((data.ravel(), columns.ravel(), starts), shape=shape)
-    return expected.reshape(-1) - seen.corners_px.reshape(-1), jacobian
+    return corners.off_px.reshape(-1), jacobian

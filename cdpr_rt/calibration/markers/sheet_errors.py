@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray
-from cdpr_rt.calibration.markers.observations import Observations
 from cdpr_rt.calibration.markers.reprojection import Estimate, residuals_and_jacobian
+from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
+from cdpr_rt.core.exchange import FloatArray
 
 _SEEN_SHARE, _NOISE_SHARE = 8.0 / 2.0, 5.0 / 2.0
 """A sheet's errors have 8 coordinates at 4 corners. Seen from about one direction its pose takes 6
@@ -32,7 +32,7 @@ class SheetErrors:
     that are seen in n images, with the correlation r of a corner's residuals (design effect)."""
 
 
-def sheet_errors(estimate: Estimate, seen: Observations, weight: FloatArray) -> SheetErrors:
+def sheet_errors(estimate: Estimate, seen: SeenMarkers, weight: FloatArray) -> SheetErrors:
     """Return the sheets' errors by an analysis of variance; `weight` (n, 4) is the fit's.
 
     With n images of a marker, the mean squares between corners and within them are at most

@@ -98,13 +98,8 @@ def matrix(windows: Windows, layout: Layout, first: int, last: int) -> FloatArra
     rows = slice(first, last)
     out = np.zeros((last - first, layout.columns))
     _harmonics(
-        windows.angle_rad,
-        windows.bump,
-        windows.stride,
-        first,
-        np.array(layout.orders, float),
-        out,
-    )
+        windows.angle_rad, windows.bump, windows.stride, first, np.array(layout.orders, float), out,
+    )  # fmt: skip
     if windows.quasi_static:
         out[:, CREEP] = np.maximum(windows.direction[rows], 0.0)
         out[:, CREEP + 1] = np.minimum(windows.direction[rows], 0.0)
@@ -159,10 +154,11 @@ def accumulate(windows: Sequence[Windows], layout: Layout) -> Equations:
                 if part is None:
                     p = layout.columns
                     part = equations.parts[key] = Normal(np.zeros((p, p)), np.zeros(p))
-                part.xx += x[mask].T @ x[mask]
-                part.xy += x[mask].T @ y[mask]
-                part.yy += float(y[mask] @ y[mask])
-                part.rows += int(mask.sum())
+                x_part, y_part = x[mask], y[mask]
+                part.xx += x_part.T @ x_part
+                part.xy += x_part.T @ y_part
+                part.yy += float(y_part @ y_part)
+                part.rows += y_part.size
     equations.folds = 1 + max((key[0] for key in equations.parts), default=-1)
     equations.kinds = 1 + max((key[1] for key in equations.parts), default=-1)
     return equations

@@ -8,8 +8,7 @@ stick-slip as well as sliding.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,9 +21,11 @@ from cdpr_rt.jit import jit
 
 _LOWEST = (0.003, 0.02, 2e-4)
 _HIGHEST = (1.5, 2.0, 2e-2)
-_STEPS = 50
+_INSIDE = 1e-3
+_STEPS = 15
 _FIRST_STEP = 0.3
-_CLOSE = 0.01
+_DIFFERENCE = 3e-3
+_CLOSE = 1e-4
 _SPREAD_OF_MEDIAN = 1.4826
 _LEAST_SPREAD_Nm = 2e-4
 _TAIL = 2.5
@@ -118,43 +119,42 @@ def fit_shape(
     own noise level and Huber weights, so that a run with hunting does not dominate. The search
     begins at each of `starts`.
     """
-    low, high = np.log(_LOWEST), np.log(_HIGHEST)
+    # logarithms from one below the lowest on, so that the differences' steps are never of zero
+    origin = np.log(_LOWEST) - 1.0
+    low, high = np.ones(3), np.log(_HIGHEST) - origin
     equal = [np.ones(m.rows.size) for m in motions]
     weights = [
         _weights(_residuals([m], [w], starts[0])[0]) for m, w in zip(motions, equal, strict=True)
     ]
 
-    def objective(point: FloatArray) -> float:
-        inside = np.clip(point, low, high)
-        residuals = _residuals(motions, weights, FrictionShape(*np.exp(inside)))
-        total = sum(float(w @ r**2) for w, r in zip(weights, residuals, strict=True))
-        return math.log(total + 1e-30) + float(np.sum((point - inside) ** 2))
+    def weighted(point: FloatArray) -> FloatArray:
+        residuals = _residuals(motions, weights, _shape(point + origin))
+        return np.concatenate([np.sqrt(w) * r for w, r in zip(weights, residuals, strict=True)])
 
-    points = [np.log((s.rise, s.speed_rad_s, s.way_rad)) for s in starts]
+    points = [np.log((s.rise, s.speed_rad_s, s.way_rad)) - origin for s in starts]
     for _ in range(2):
-        found = [_minimum(objective, p) for p in points]
-        points = [min(found, key=lambda f: f[1])[0]]
-        shape = FrictionShape(*(float(v) for v in np.exp(np.clip(points[0], low, high))))
+        found = [
+            scipy.optimize.least_squares(
+                weighted,
+                np.clip(point, low + _INSIDE, high - _INSIDE),
+                bounds=(low, high),
+                x_scale=_FIRST_STEP,
+                diff_step=[_DIFFERENCE] * 3,
+                ftol=_CLOSE,
+                xtol=_CLOSE,
+                gtol=None,
+                max_nfev=_STEPS,
+            )
+            for point in points
+        ]
+        points = [min(found, key=lambda f: float(f.cost)).x]
+        shape = _shape(points[0] + origin)
         weights = [_weights(r) for r in _residuals(motions, weights, shape)]
     return shape
 
 
-def _minimum(
-    objective: Callable[[FloatArray], float], start: FloatArray
-) -> tuple[FloatArray, float]:
-    """Return the point near `start` (n,) where the simplex search ends, and the value there."""
-    found = scipy.optimize.minimize(
-        objective,
-        start,
-        method="Nelder-Mead",
-        options={
-            "initial_simplex": np.vstack([start, start + _FIRST_STEP * np.eye(start.size)]),
-            "maxfev": _STEPS,
-            "xatol": _CLOSE * _FIRST_STEP,
-            "fatol": math.inf,
-        },
-    )
-    return found.x, float(found.fun)
+def _shape(logarithms: FloatArray) -> FrictionShape:
+    return FrictionShape(*(float(v) for v in np.exp(logarithms)))
 
 
 def _weights(residual: FloatArray) -> FloatArray:

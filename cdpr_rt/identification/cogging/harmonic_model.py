@@ -140,7 +140,7 @@ def _choose(equations: Equations) -> tuple[OrderSelection, FloatArray, float]:
         everything = total(equations, weight)
         for step in range(2):
             columns = fixed + [c for n in choice.orders for c in equations.layout.order(n - 1)]
-            beta, _ = solve(everything, columns)
+            beta = solve(everything, columns)
             if step == 0:
                 choice = replace(choice, orders=_significant(choice.orders, beta, len(fixed)))
         weight = noise_weights(equations, columns, beta)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.identification.cogging.design import Equations, Layout, Normal
@@ -62,17 +63,24 @@ def _sum(parts: Sequence[Normal], layout: Layout) -> Normal:
     return out
 
 
-def solve(normal: Normal, columns: list[int]) -> tuple[FloatArray, FloatArray]:
-    """Return the coefficients of the chosen columns and the inverse of their normal matrix.
+def solve(normal: Normal, columns: list[int]) -> FloatArray:
+    """Return the coefficients of the chosen columns; 0 for one that is zero in all rows."""
+    lower, scale = _factor(normal, columns)
+    beta = scipy.linalg.cho_solve((lower, True), normal.xy[columns] / scale)
+    return np.asarray(beta / scale)
 
-    A column that is zero in all rows gets the coefficient zero.
+
+def _factor(normal: Normal, columns: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Return the Cholesky factor of the chosen columns' scaled normal matrix, and the scale.
+
+    The factor of the first k columns is the first k rows and columns of it.
     """
     xx = normal.xx[np.ix_(columns, columns)]
     size = np.diag(xx)
     scale = np.sqrt(np.where(size > _EMPTY * size.max(), size, np.inf))
-    scaled = xx / np.outer(scale, scale) + _RIDGE * np.eye(len(columns))
-    inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
-    return inverse @ normal.xy[columns], inverse
+    xx /= np.outer(scale, scale)
+    xx[np.diag_indices_from(xx)] += _RIDGE
+    return np.asarray(np.linalg.cholesky(xx)), np.asarray(scale)
 
 
 def squared_error(part: Normal, columns: list[int], beta: FloatArray) -> float:
@@ -136,11 +144,14 @@ def choose(equations: Equations, fixed: list[int], weight: FloatArray) -> OrderS
 def _rank(train: Normal, fixed: list[int], layout: Layout) -> IntArray:
     """Return the places of the orders by falling significance."""
     columns = fixed + [c for i in range(len(layout.orders)) for c in layout.order(i)]
-    beta, inverse = solve(train, columns)
-    statistic = np.zeros(len(layout.orders))
-    for i in range(len(layout.orders)):
-        pair = slice(len(fixed) + 2 * i, len(fixed) + 2 * i + 2)
-        statistic[i] = beta[pair] @ np.linalg.solve(inverse[pair, pair], beta[pair])
+    lower, scale = _factor(train, columns)
+    inverse = scipy.linalg.lapack.dtrtri(lower, lower=1)[0]
+    first = len(fixed)
+    beta = (inverse.T @ (inverse @ (train.xy[columns] / scale)))[first:].reshape(-1, 2, 1)
+    # 2 x 2 blocks on the diagonal of the normal matrix' inverse
+    pairs = inverse[:, first:].reshape(len(columns), -1, 2)
+    covariance = np.einsum("rni,rnj->nij", pairs, pairs)
+    statistic = (beta * np.linalg.solve(covariance, beta)).sum(axis=(1, 2))
     return np.argsort(-statistic)
 
 
@@ -149,11 +160,12 @@ def _path(
 ) -> FloatArray:
     """Return the mean squared (weighted) error on held-back rows with 0, 1, ... orders."""
     most = min(_MOST, ranking.size)
+    columns = fixed + [c for i in ranking[:most] for c in layout.order(int(i))]
+    lower, scale = _factor(train, columns)
+    solved = scipy.linalg.solve_triangular(lower, train.xy[columns] / scale, lower=True)
     errors = np.zeros(most + 1)
-    columns = list(fixed)
     for size in range(most + 1):
-        if size:
-            columns += layout.order(int(ranking[size - 1]))
-        beta, _ = solve(train, columns)
-        errors[size] = squared_error(test, columns, beta) / test.rows
+        k = len(fixed) + 2 * size
+        beta = scipy.linalg.solve_triangular(lower[:k, :k], solved[:k], lower=True, trans=1)
+        errors[size] = squared_error(test, columns[:k], beta / scale[:k]) / test.rows
     return errors

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -140,12 +141,8 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
         return None
     ndimage = scipy.ndimage  # loaded on use: its import takes long
     noise = encoder_noise_rad(run)
-    smoothing = _SMOOTHING * noise / (speed if quick else _SMOOTHING_SPEED_rad_s)
-    smoothing = min(max(smoothing, period if quick else _SMOOTHING_s), 4.0 * spacing) / period
-    deviation = run.angle_rad - run.setpoint_rad
-    angle = run.setpoint_rad + ndimage.gaussian_filter1d(deviation, 0.5 * smoothing, mode="nearest")
-    drift = ndimage.gaussian_filter1d(deviation, smoothing, order=1, mode="nearest") / period
-    velocity = run.setpoint_velocity_rad_s + drift
+    smoothing = _smoothing_s(noise, speed, period, 4.0 * spacing) / period
+    angle, velocity = _smoothed(run, smoothing, period)
     cycle = np.arange(run.time_s.size)
     torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
     centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
@@ -156,14 +153,9 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     for _ in range(4):
         smooth_torque = ndimage.uniform_filter1d(smooth_torque, step)
     mean = ndimage.uniform_filter1d(velocity, 2 * step + 1)[centre]
-    direction = np.sign(mean)
     quasi_static = speed < _QUASI_STATIC_rad_s
-    set_speed = run.setpoint_velocity_rad_s[centre]
-    moving = (mean * set_speed > 0.0) & (np.abs(mean) > _STANDING * np.abs(set_speed))
-    if quasi_static:
-        moving &= np.abs(mean) < _RUNAWAY * np.abs(set_speed)
-    else:  # the state of the friction before the slide is not known
-        moving &= np.abs(mean) > _SLOWEST_rad_s
+    moving = _slides(mean, run.setpoint_velocity_rad_s[centre], quasi_static)
+    if not quasi_static:  # the state of the friction before the slide is not known
         moving &= np.abs(angle[centre] - angle[0]) > _RELAXED_rad
     return Windows(
         angle_rad=angle[(thin - 1) // 2 :: thin],
@@ -177,14 +169,37 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
         centre_rad=angle[centre],
         centre_s=run.time_s[centre],
         speed_rad_s=mean,
-        direction=direction,
-        moving=np.asarray(moving, np.bool_),
+        direction=np.sign(mean),
+        moving=moving,
         quasi_static=quasi_static,
         fast=fast,
         quick=quick,
         play_rad=_PLAY * noise / math.sqrt(max(1.0, 0.5 * smoothing * _GAUSSIAN_WIDTH)),
         cruise_rad_s=speed,
     )
+
+
+def _smoothing_s(noise_rad: float, speed_rad_s: float, least_s: float, most_s: float) -> float:
+    """Return the standard deviation of the filter of a run's deviation from its set-point."""
+    quick = speed_rad_s > _QUICK_rad_s
+    wanted_s = _SMOOTHING * noise_rad / (speed_rad_s if quick else _SMOOTHING_SPEED_rad_s)
+    return min(max(wanted_s, least_s if quick else _SMOOTHING_s), most_s)
+
+
+def _smoothed(run: SweepData, width: float, period: float) -> tuple[FloatArray, FloatArray]:
+    """Return angle and velocity, the deviation from the set-point smoothed over cycles."""
+    smooth = partial(scipy.ndimage.gaussian_filter1d, run.angle_rad - run.setpoint_rad)
+    angle = run.setpoint_rad + smooth(0.5 * width, mode="nearest")
+    drift = smooth(width, order=1, mode="nearest") / period
+    return angle, run.setpoint_velocity_rad_s + drift
+
+
+def _slides(speed: FloatArray, wanted: FloatArray, quasi_static: bool) -> BoolArray:
+    """Return where a rotor slides along with its set-point, both speeds in rad/s."""
+    along = (speed * wanted > 0.0) & (np.abs(speed) > _STANDING * np.abs(wanted))
+    if quasi_static:
+        return np.asarray(along & (np.abs(speed) < _RUNAWAY * np.abs(wanted)), np.bool_)
+    return np.asarray(along & (np.abs(speed) > _SLOWEST_rad_s), np.bool_)
 
 
 def _bump(stride: int, thin: int) -> FloatArray:

@@ -19,6 +19,8 @@ from cdpr_rt.motion.path.pieces import BoolArray, Pieces, pieces_of
 _SPACING_m: Final = 0.01
 _TURN_rad: Final = 0.08
 """Between nodes at most, along a piece and around an arc."""
+_LEAST_m: Final = 5e-4
+"""What is cut off a corner counts as so much at least, lest nodes are too many."""
 _IN_CORNER: Final = 8
 """Intervals of a corner that is cut."""
 _FULLNESS: Final = 2.0
@@ -97,6 +99,11 @@ def _along_pieces(pieces: Pieces) -> tuple[FloatArray, ...]:
     straight = pieces.angle_rad == 0.0
     apart_m = np.where(straight, 2.0 / np.pi, 1.0) * _SPACING_m
     count = np.ceil(np.maximum(left / apart_m, np.abs(pieces.angle_rad) / _TURN_rad))
+    # the first interval beside a corner is a quarter of what is cut off there
+    cuts = np.stack([cut_before, pieces.cut])
+    narrow = np.maximum(np.where(cuts > 0.0, cuts, np.inf).min(axis=0), _LEAST_m)
+    beside = np.ceil(np.pi * np.sqrt(np.maximum(left, 0.0) / narrow))
+    count = np.maximum(count, np.where(straight, beside, 0.0))
     ends = begins | pieces.stops | (pieces.angle_rad != 0.0)
     count = np.maximum(count, np.where(ends, 4, 1)).astype(np.int64)
     count = np.where(left > 1e-9 * pieces.length, count, 0)

@@ -12,6 +12,20 @@ from cdpr_rt.motion.path.way_points import read_csv_points, read_toml_points
 
 MOST_BYTES: Final = 1 << 24
 GCODE: Final = (".nc", ".ngc", ".gcode", ".tap", ".cnc")
+_POINTS: Final = (".toml", ".csv")
+
+
+def require_kind(path: Path) -> str:
+    """Return the file's suffix in small letters; raises PathError where it is none of a path's."""
+    suffix = path.suffix.lower()
+    if suffix not in (*_POINTS, *GCODE):
+        raise PathError(
+            path,
+            0,
+            f"no kind of path's file; allowed: way points {' '.join(_POINTS)}, "
+            f"G-code {' '.join(GCODE)}",
+        )
+    return suffix
 
 
 def read_path(path: Path, coordinates: Coordinates, settings: GcodeSettings) -> PathDescription:
@@ -20,11 +34,9 @@ def read_path(path: Path, coordinates: Coordinates, settings: GcodeSettings) -> 
     .toml and .csv hold way points, .nc, .ngc, .gcode, .tap and .cnc G-code, which alone makes use
     of `settings`.
     """
-    suffix = path.suffix.lower()
+    suffix = require_kind(path)
     if suffix == ".toml":
         return read_toml_points(path, coordinates)
-    if suffix not in (".csv", *GCODE):
-        raise PathError(path, 0, f"allowed: a file .toml, .csv or {' '.join(GCODE)}")
     text = read_text(path, MOST_BYTES)
     if suffix == ".csv":
         return read_csv_points(text, str(path), coordinates)

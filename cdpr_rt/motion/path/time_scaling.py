@@ -155,7 +155,8 @@ def speed_bounds(nodes: PathNodes, limits: PathLimits) -> FloatArray:
     """Return the greatest (ds/dt)² of each node, (N,), by velocity, feed and bends."""
     k = nodes.coordinates.positions
     first, second = np.abs(nodes.first), np.abs(nodes.second)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # what hardly moves at all may be infinitely fast
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         bounds = [(limits.velocity / first) ** 2, _SHARE * limits.acceleration / second]
         straight, turned = (np.linalg.norm(part, axis=1) for part in (first[:, :k], first[:, k:]))
         along = np.where(straight > _NOTHING, straight, turned)

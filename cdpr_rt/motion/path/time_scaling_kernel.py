@@ -17,6 +17,8 @@ _NOTHING: Final = 1e-12
 _MOST_CUTS: Final = 60
 _FAR: Final = 1e12
 _REACH: Final = 0.55
+_SHORT_m: Final = 1e-5
+"""Between nodes that are nearer to each other the third derivative is not known, for rounding."""
 
 
 @jit
@@ -251,11 +253,12 @@ def strain_run(
         node[c] = i
         place_between(motion[c, 0], i, s, q, first, second, at)
         v, a, j = motion[c, 1], motion[c, 2], motion[c, 3]
+        bends = 1.0 if s[i + 1] - s[i] > _SHORT_m else 0.0
         worst, straight, turned = 0.0, 0.0, 0.0
         for k in range(q.shape[1]):
             rate = at[1, k] * v
             slope = at[1, k] * a + at[2, k] * v * v
-            jerk = at[1, k] * j + 3.0 * at[2, k] * v * a + at[3, k] * v * v * v
+            jerk = at[1, k] * j + 3.0 * at[2, k] * v * a + bends * at[3, k] * v * v * v
             worst = max(worst, abs(rate) / limits[0, k])
             worst = max(worst, math.sqrt(abs(slope) / limits[1, k]))
             worst = max(worst, (abs(jerk) / limits[2, k]) ** (1.0 / 3.0))
@@ -267,9 +270,8 @@ def strain_run(
         wanted = speed[i] if motion[c, 0] - s[i] < 0.5 * (s[i + 1] - s[i]) else speed[i + 1]
         worst = max(worst, along / wanted)
         if rows[i] >= 0:
-            worst = max(
-                worst, _wrench_strain(rows[i], normals, lower, upper, by_u[i], by_x[i], v * v, a)
-            )
+            by_wrench = _wrench_strain(rows[i], normals, lower, upper, by_u[i], by_x[i], v * v, a)
+            worst = max(worst, by_wrench)
         strain[c] = worst
 
 

@@ -151,7 +151,7 @@ def _cells(
     """Return what a row says, in SI."""
     if len(row) != len(columns):
         raise PathError(source, line, f"{len(row)} cells; allowed: {len(columns)}, as in line 1")
-    told = {}
+    values = {}
     for cell, (key, factor) in zip(row, columns, strict=True):
         if not cell.strip():
             continue
@@ -162,5 +162,5 @@ def _cells(
         low, high = _BOUNDS.get(key, (-1e6, 1e6))
         if not low <= value <= high:
             raise PathError(source, line, f"{key}: value {cell}; allowed: {low:g} to {high:g}")
-        told[key] = value
-    return told
+        values[key] = value
+    return values

@@ -1,14 +1,16 @@
-"""Take a platform from pose to pose, and read lengths and tensions where it stands still."""
+"""Take a platform from pose to pose, and read lengths, tensions and markers where it stands."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
-from cdpr_rt.calibration.data import PoseReading
+from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.calibration.readings.camera_data import ImageReading
+from cdpr_rt.calibration.readings.data import PoseReading
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import TripError
 
@@ -25,6 +27,15 @@ class PoseRefusedError(Exception):
 
 
 @dataclass(frozen=True)
+class Held:
+    """A platform that has not come to its target in time, and is held where it is."""
+
+    place: FloatArray
+    """(d,), as its controller has it."""
+    why: str
+
+
+@dataclass(frozen=True)
 class Look:
     """What was read over a while."""
 
@@ -38,17 +49,27 @@ class Look:
     rotation_std_rad: float | None = None
 
 
-class PlatformOperator(Protocol):
-    """Moves a platform and reads its cables; whatever robot and bus they are on."""
-
-    def go(self, place: FloatArray) -> None:
-        """Take it to a place (d,); raises PoseRefusedError, TripError where motion is ended."""
+class PoseReader(Protocol):
+    """Reads a platform's cables and its camera; whatever robot and bus they are on."""
 
     def stay(self, seconds: float) -> None:
         """Let time pass; raises TripError where the motion is ended meanwhile."""
 
     def look(self, seconds: float) -> Look:
         """Let time pass and return what was read; raises TripError."""
+
+    def image(self) -> Sighting | None:
+        """Return what the camera sees, None without one; raises TripError."""
+
+
+class PlatformOperator(PoseReader, Protocol):
+    """Moves a platform as well."""
+
+    def go(self, place: FloatArray) -> Held | None:
+        """Take it to a place (d,); None where it has come there.
+
+        Raises PoseRefusedError, TripError where motion is ended.
+        """
 
 
 class PoseNotifier(Protocol):
@@ -58,7 +79,7 @@ class PoseNotifier(Protocol):
         """Take a line."""
 
 
-def read_pose(operator: PlatformOperator, target: FloatArray) -> PoseReading:
+def read_pose(operator: PoseReader, target: FloatArray) -> PoseReading:
     """Wait until the platform stands still and return what is read there.
 
     Raises PoseRefusedError where it does not come to rest within some ten looks.
@@ -69,7 +90,7 @@ def read_pose(operator: PlatformOperator, target: FloatArray) -> PoseReading:
         half = len(look.length_m) // 2
         moved = np.abs(look.length_m[:half].mean(axis=0) - look.length_m[half:].mean(axis=0)).max()
         if moved < _STILL_m:
-            return _reading(look, target)
+            return _reading(look, target, operator.image())
     raise PoseRefusedError(
         f"the platform did not come to rest: a cable still moves by {1e3 * moved:.2f} mm"
     )
@@ -77,46 +98,86 @@ def read_pose(operator: PlatformOperator, target: FloatArray) -> PoseReading:
 
 @dataclass
 class Measured:
-    """What a procedure has read so far; it is kept whatever ends it."""
+    """What a procedure has read so far; `keep` is called whenever that has grown."""
 
+    keep: Callable[[], None]
     readings: list[PoseReading] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     """Places that were not read, and why."""
+    tried: list[tuple[float, ...]] = field(default_factory=list)
+    """Places (d,) that were not read, or not reached: not to be gone to again."""
+    failures: int = 0
+    """Places in turn that were not reached, or at which the platform did not come to rest."""
+
+    def add(self, reading: PoseReading) -> None:
+        """Take a reading."""
+        self.readings.append(reading)
+        self.keep()
+
+    def leave_out(self, place: FloatArray, why: str) -> None:
+        """Give up a place (d,) that cannot be read."""
+        self.refused.append(f"{_listed(place)}: {why}")
+        self.tried.append(tuple(place.tolist()))
 
 
 def measure_poses(
     operator: PlatformOperator,
     places: Iterable[FloatArray],
-    count: int,
+    between: FloatArray,
     measured: Measured,
     notifier: PoseNotifier,
 ) -> None:
-    """Go to places (d,) until there are `count` readings in `measured`, or no more places.
+    """Go to places (d,) and read each; by way of `between` where it does not go straight.
 
-    Raises TripError where the motion is ended, or where five places in turn do not come to rest.
+    One that is not reached is read where the platform stands. Raises TripError where the motion is
+    ended, or where five places in turn are not reached or do not come to rest.
     """
-    readings, refused = measured.readings, measured.refused
-    failures = 0
     for place in places:
-        if len(readings) >= count:
-            break
+        what = f"pose {len(measured.readings) + 1}, at {_listed(place)}"
         try:
-            operator.go(place)
+            held = _go(operator, place, between)
         except PoseRefusedError as error:
-            refused.append(f"{_listed(place)}: {error}")
+            measured.leave_out(place, str(error))
+            notifier.note(f"{what}, is left out: {error}")
             continue
-        try:
-            readings.append(read_pose(operator, place))
-            failures = 0
-        except PoseRefusedError as error:
-            failures += 1
-            refused.append(f"{_listed(place)}: {error}")
-            notifier.note(f"pose left out: {error}")
-            if failures >= _MOST_FAILURES:
-                raise TripError(f"{failures} poses in turn: {error}") from None
+        except TripError as error:  # nobody knows whether it would not happen there again
+            measured.leave_out(place, str(error))
+            raise
+        failure = _read(operator, place, held, measured)
+        measured.failures = measured.failures + 1 if failure else 0
+        if failure:
+            notifier.note(f"{what}, {failure}")
+        if measured.failures >= _MOST_FAILURES:
+            raise TripError(f"{measured.failures} poses in turn, the last {what}, {failure}")
 
 
-def _reading(look: Look, target: FloatArray) -> PoseReading:
+def _go(operator: PlatformOperator, place: FloatArray, between: FloatArray) -> Held | None:
+    try:
+        return operator.go(place)
+    except PoseRefusedError:
+        operator.go(between)
+        return operator.go(place)
+
+
+def _read(
+    operator: PlatformOperator, place: FloatArray, held: Held | None, measured: Measured
+) -> str:
+    """Read a pose where the platform has come to; return what was wrong, empty for nothing."""
+    try:
+        reading = read_pose(operator, place if held is None else held.place)
+    except (PoseRefusedError, TripError) as error:
+        why = str(error) if held is None else f"{held.why}; {error}"
+        measured.leave_out(place, why)
+        if isinstance(error, TripError):
+            raise
+        return f"is left out: {why}"
+    if held is not None:
+        measured.tried.append(tuple(place.tolist()))
+    measured.add(reading)
+    return "" if held is None else f"is read where the platform stands: {held.why}"
+
+
+def _reading(look: Look, target: FloatArray, seen: Sighting | None) -> PoseReading:
     rotation = None
     if look.rotation is not None:
         rotation = tuple(tuple(row) for row in look.rotation.tolist())
@@ -128,6 +189,7 @@ def _reading(look: Look, target: FloatArray) -> PoseReading:
         position_std_m=look.position_std_m,
         rotation=rotation,
         rotation_std_rad=look.rotation_std_rad,
+        image=None if seen is None else ImageReading.of(seen),
     )
 
 

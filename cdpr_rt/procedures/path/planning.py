@@ -25,7 +25,6 @@ from cdpr_rt.motion.path.time_scaling import (
 from cdpr_rt.procedures.path.unit_slips import size_fault
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
-from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.wrenches.path_wrenches import InertialWrenches, available_wrenches
 
 _POSES_m: Final = 0.02
@@ -74,8 +73,6 @@ class PathPlanner:
         self.model: PlatformModel = platform_model_of(robot)
         self.platform = platform
         self.limits = PathLimits(self.model.speed, self.model.acceleration, self.model.jerk)
-        self.high_N = _left_by_torque(robot, self.model)
-        """Upper bounds of the tensions, (n,): what the file has, or what the torque leaves."""
         low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
         reference = np.zeros(self.model.size)
         reference[: self.model.positions] = np.clip(platform.home_m, low, high)
@@ -150,7 +147,7 @@ class PathPlanner:
         model = self.model
         chosen = self.looked_at(nodes)
         positions = nodes.q[chosen]
-        available = available_wrenches(model, positions, self.high_N)
+        available = available_wrenches(model, positions)
         if not available.holds.all():
             i = int((~available.holds).argmax())
             why = self.missing(positions[i])
@@ -190,7 +187,7 @@ class PathPlanner:
         found = self.model.interference.first_contact(np.ascontiguousarray(nodes.q[chosen]))
         if found is None:
             return None
-        line = int(nodes.line[chosen[found.leg]])
+        line = int(nodes.line[chosen[found.part]])
         return Obstacle(line, found.position, in_words(found.things, found.distance_m))
 
     def _first(
@@ -253,18 +250,3 @@ class PathPlanner:
             np.linalg.norm(self.limits.velocity[k:]) if k < self.model.size else np.inf,
         )
         return int(np.unique(nodes.line[finite & (nodes.speed > most)]).size)
-
-
-def _left_by_torque(robot: Robot, model: PlatformModel) -> FloatArray:
-    """Return upper bounds (n,) of tensions: what the motors can hold beside turning themselves."""
-    torque_Nm = np.asarray(limits_of(robot).torque_Nm)
-    platform = model.platform
-    per_rad = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
-    rotor = np.array([axis.winch.motor.rotor_inertia_kg_m2 for axis in robot.axes])
-    k = model.positions
-    fastest = np.sqrt(k) * platform.acceleration_m_s2
-    if model.size > k:
-        arm = float(model.wrench_scale[-1])
-        fastest += arm * np.sqrt(model.size - k) * platform.angular_acceleration_rad_s2
-    left = (torque_Nm - rotor * fastest / per_rad) / per_rad
-    return np.asarray(np.minimum(model.high_N, left))

@@ -33,12 +33,12 @@ class PathTensions:
     """Where there are tensions within these bounds, (m,)."""
 
 
-def path_tensions(model: PlatformModel, timed: TimedPath, high_N: FloatArray) -> PathTensions:
-    """Return the tensions along a plan; `high_N` (n,) are upper bounds, as for the planner."""
+def path_tensions(model: PlatformModel, timed: TimedPath) -> PathTensions:
+    """Return the tensions along a plan, within what the motors' torque leaves."""
     step = -(-len(timed.samples) // _MOST)
     chosen = np.arange(0, len(timed.samples), step)
     q, v, a = (np.ascontiguousarray(timed.samples[chosen, i]) for i in range(3))
-    low, high = model.low_N + model.reserve_N, high_N - model.reserve_N
+    low, high = model.low_N + model.reserve_N, model.left_by_torque_N - model.reserve_N
     method = model.platform.tension_distribution
     wanted = low if method == "minimum-deviation" else None
     distribution = tension_distribution(method, low, high, model.wrench_scale, wanted)

@@ -116,15 +116,15 @@ class _Recording:
 
     def cycle(self) -> bool:
         """Take in a cycle; return whether the lowest tension has been paid out to."""
-        feedback, told = self._device.feedback, self._exchange.feedback
+        feedback, tension = self._device.feedback, self._exchange.feedback
         self._sums += (1.0, self._device.command.torque_Nm[0], feedback.position_rad[0])
         self._exchange.update()
-        if not told.valid[0]:
+        if not tension.valid[0]:
             raise TripError(self._exchange.reason())
-        if told.time_s[0] == self._read_s:
+        if tension.time_s[0] == self._read_s:
             return False
-        self._read_s = float(told.time_s[0])
-        return self._take(float(told.tension_N[0]), feedback.time_s)
+        self._read_s = float(tension.time_s[0])
+        return self._take(float(tension.tension_N[0]), feedback.time_s)
 
     def _take(self, tension_N: float, time_s: float) -> bool:
         plan, pull = self._plan, self._pull

@@ -13,7 +13,7 @@ from cdpr_rt.core.exchange import FloatArray, Setpoint
 from cdpr_rt.core.rawlog import RawLog
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.identification.tension_gain import CalibrationRefusedError, TorquePoint
-from cdpr_rt.motion.trajectory import Hold, Leg, Motion
+from cdpr_rt.motion.trajectory import Hold, Motion, TrapezoidalMove
 
 _DWELL_S = 1.0
 _RAMP_S = 0.5
@@ -58,8 +58,12 @@ class Hoist:
     def __init__(self, plan: HoistPlan, start_rad: FloatArray, wind_in: int) -> None:
         speed = np.full(np.shape(start_rad), wind_in * plan.speed_rad_s)
         cruise = plan.travel_rad / plan.speed_rad_s - _RAMP_S
-        up = Leg(start_rad, speed, cruise, _RAMP_S)
-        self._parts = (up, Hold(up.end_rad(), _DWELL_S), Leg(up.end_rad(), -speed, cruise, _RAMP_S))
+        up = TrapezoidalMove(start_rad, speed, cruise, _RAMP_S)
+        self._parts = (
+            up,
+            Hold(up.end_rad(), _DWELL_S),
+            TrapezoidalMove(up.end_rad(), -speed, cruise, _RAMP_S),
+        )
         self._start_rad = np.array(start_rad, float)
         self._speed_rad_s = plan.speed_rad_s
         self.duration_s = sum(part.duration_s for part in self._parts)
@@ -87,7 +91,7 @@ class _Lowering:
     def __init__(self, here_rad: FloatArray, start_rad: FloatArray, speed_rad_s: float) -> None:
         travel = start_rad - here_rad
         cruise = max(0.0, float(np.abs(travel).max()) / speed_rad_s - _RAMP_S)
-        self._leg = Leg(here_rad, travel / (cruise + _RAMP_S), cruise, _RAMP_S)
+        self._leg = TrapezoidalMove(here_rad, travel / (cruise + _RAMP_S), cruise, _RAMP_S)
         self.duration_s = 2.0 * self._leg.duration_s
 
     def fill(self, time_s: float, setpoint: Setpoint) -> None:

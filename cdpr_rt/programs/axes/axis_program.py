@@ -62,11 +62,10 @@ class AxisProgram(CommandedProgram):
         return self._brake(setpoint)
 
     def _brake(self, setpoint: Setpoint) -> bool:
-        return ramp_velocity(
-            self._zero_velocity,
-            self._model.acceleration_rad_s2,
-            self._model.period_s,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            setpoint.acceleration_rad_s2,
-        )
+        return self._ramp(self._zero_velocity, setpoint)
+
+    def _ramp(self, velocity_rad_s: FloatArray, setpoint: Setpoint) -> bool:
+        """Ramp the set-point's velocity to this one, (n,); return whether all stand still."""
+        model = self._model
+        bounds = model.acceleration_rad_s2, model.period_s
+        return ramp_velocity(velocity_rad_s, *bounds, *setpoint.arrays)

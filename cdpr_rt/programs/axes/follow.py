@@ -92,22 +92,9 @@ class FollowProgram(AxisProgram):
             self._epoch = stream.epoch
             self._last[:] = stream.pose[:3]
         _lead(
-            stream.scale,
-            stream.pose,
-            self._last,
-            model.cable_m_per_rad,
-            model.speed_rad_s,
-            model.acceleration_rad_s2,
-            setpoint.position_rad,
-            self._target,
-        )
-        approach(
-            self._target,
-            model.speed_rad_s,
-            model.acceleration_rad_s2,
-            model.period_s,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            setpoint.acceleration_rad_s2,
-        )
+            stream.scale, stream.pose, self._last, model.cable_m_per_rad, model.speed_rad_s,
+            model.acceleration_rad_s2, setpoint.position_rad, self._target,
+        )  # fmt: skip
+        bounds = model.speed_rad_s, model.acceleration_rad_s2, model.period_s
+        approach(self._target, *bounds, *setpoint.arrays)
         return False

@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
-from cdpr_rt.motion.approach import ramp_velocity
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
 from cdpr_rt.programs.model import RobotModel
@@ -86,12 +85,5 @@ class JogProgram(AxisProgram):
             return self._brake(setpoint)
         self._cycles_left -= 1
         self._cycles += 1
-        ramp_velocity(
-            self._speed,
-            self._model.acceleration_rad_s2,
-            self._model.period_s,
-            setpoint.position_rad,
-            setpoint.velocity_rad_s,
-            setpoint.acceleration_rad_s2,
-        )
+        self._ramp(self._speed, setpoint)
         return False

@@ -45,17 +45,8 @@ class PointToPoint:
 
     def move(self, setpoint: Setpoint) -> bool:
         """Write the next set-point; return whether it has arrived."""
-        return bool(
-            approach(
-                self.target_rad,
-                self._speed,
-                self._acceleration,
-                self._model.period_s,
-                setpoint.position_rad,
-                setpoint.velocity_rad_s,
-                setpoint.acceleration_rad_s2,
-            )
-        )
+        bounds = self._speed, self._acceleration, self._model.period_s
+        return bool(approach(self.target_rad, *bounds, *setpoint.arrays))
 
     def part_done(self, setpoint: Setpoint) -> float:
         """Return the share of the distance that has been covered, 0 to 1."""

@@ -42,7 +42,7 @@ class TrackProgram(ProgramDefaults):
         self._cycle, self._last = 0, round(self._motion.duration_s / self._period_s)
         self.at_rest = self._stopping = False
 
-    def check(self, _arguments: Mapping[str, Any]) -> None:
+    def check(self, _arguments: Mapping[str, Any]) -> Any:
         """Raise ProgramError: it takes no arguments."""
         raise ProgramError(f"{self.name}: allowed: from a procedure, which gives it a motion")
 

@@ -35,6 +35,7 @@ _LATE = 1.5
 _FASTEST = 1.5
 _LIGHT = 1.2
 _STILL_m = 0.001
+_RUNNING_IN_m_s = 0.02
 _STILL_S = 1.0
 _FADE_S = 0.2
 _MOST_S = 30.0
@@ -187,7 +188,7 @@ class LowerProgram(PlatformProgram):
         fastest = _FASTEST * np.linalg.norm(parts.scale_m * parts.speed) / np.abs(self._cable)
         plausible = np.abs(self._velocity) < fastest
         winches.begin(feedback, np.where(plausible, self._velocity, 0.0), torque_Nm)
-        self._control.compensation_Nm[:] = 0.0
+        self._control.clear_compensation()
 
     def _watch_rest(self, feedback: AxisFeedback) -> None:
         winches, period_s = self._winches, self._parts.period_s
@@ -197,7 +198,10 @@ class LowerProgram(PlatformProgram):
             winches.high_N[:] = winches.low_N
             self._at_rest = not winches.low_N.any()
             return
-        light = bool((winches.tension_N <= _LIGHT * _DRUM_TENSION_SHARE * self._least).all())
+        # a cable that runs in carries nothing, however its winch trembles: it may be a broken one
+        running_in = self._cable * winches.speed_rad_s < -_RUNNING_IN_m_s
+        unloaded = winches.tension_N <= _LIGHT * _DRUM_TENSION_SHARE * self._least
+        light = bool((unloaded | running_in).all())
         paid_out_m = float((self._cable * (feedback.position_rad - self._here)).max())
         if not light or paid_out_m > _STILL_m:
             self._here[:] = feedback.position_rad

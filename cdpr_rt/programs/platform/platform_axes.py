@@ -13,13 +13,10 @@ from cdpr_rt.programs.axes.jog import JogProgram
 from cdpr_rt.programs.base import Program, ProgramError
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import RobotModel
-from cdpr_rt.programs.platform.path import PathProgram
+from cdpr_rt.programs.platform.paths.path import PathProgram
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
+from cdpr_rt.programs.platform.tightening.standing import hangs
 from cdpr_rt.programs.program_base import ProgramDefaults
-from cdpr_rt.robots.workspace import G_m_s2
-
-_CARRIED_SHARE = 0.8
-"""Sum of the tensions over the weight, below which the cables do not carry the platform."""
 
 
 class PlatformHold(ProgramDefaults):
@@ -75,9 +72,9 @@ class PlatformHold(ProgramDefaults):
 
     def progress(self) -> dict[str, Any]:
         """Return whether the platform or the axes are held, and where."""
-        told = {"tight": self._parts.tight, **self._active.progress()}
+        progress = {"tight": self._parts.tight, **self._active.progress()}
         left = self._path.left()
-        return told if left is None else {**told, "path": left}
+        return progress if left is None else {**progress, "path": left}
 
 
 class PlatformIdle(IdleProgram):
@@ -92,13 +89,13 @@ class PlatformIdle(IdleProgram):
         self._parts.slacken()
         super().start(feedback, setpoint, torque_Nm)
 
-    def check(self, arguments: Mapping[str, Any]) -> None:
-        """Raise ProgramError where `command` would, or where the platform would fall."""
+    def check(self, arguments: Mapping[str, Any]) -> Any:
+        """Raise ProgramError for any argument, or where the platform would fall."""
         super().check(arguments)
         if self._parts.tight:
             raise ProgramError("idle: the platform hangs on its cables; lower it first")
-        carried_N = float(np.nansum(self._parts.estimator.estimate.tension_N))
-        if carried_N > _CARRIED_SHARE * self._parts.platform.mass_kg * G_m_s2:
+        if hangs(self._parts):
+            carried_N = float(np.nansum(self._parts.estimator.estimate.tension_N))
             raise ProgramError(
                 f"idle: its cables pull with {carried_N:.0f} N, the platform may hang on them; "
                 "lower it first"
@@ -112,11 +109,11 @@ class PlatformJog(JogProgram):
         super().__init__(model, loop)
         self._parts = parts
 
-    def check(self, arguments: Mapping[str, Any]) -> None:
-        """Raise ProgramError where `command` would, or where the platform hangs on its cables."""
-        super().check(arguments)
+    def check(self, arguments: Mapping[str, Any]) -> Any:
+        """Return what `apply` takes; raises ProgramError, also for a platform on its cables."""
         if self._parts.tight:
             raise ProgramError("jog: the platform hangs on its cables; lower it first")
+        return super().check(arguments)
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque; brakes until speeds are commanded."""

@@ -16,8 +16,9 @@ from cdpr_rt.motion.approach import approach, stopping_position
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
-from cdpr_rt.programs.platform.path_store import PathStore
+from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.programs.program_base import CommandedProgram
+from cdpr_rt.robots.free_rotation import SWINGS_m
 from cdpr_rt.robots.interface import PlatformControl
 from cdpr_rt.robots.kinematics.pose_setpoint import place, write_quaternion
 from cdpr_rt.robots.last_lengths import LastLengths
@@ -27,6 +28,7 @@ from cdpr_rt.robots.robot_arrays import frame_m
 _SLOWED_m, _WAITING_m = 0.02, 0.05
 _LEAST_PACE = 1e-3
 _LEAST_SHARE = 1e-6
+_TOLD_DIGITS = 3
 
 
 @jit
@@ -83,10 +85,13 @@ class PlatformParts:
         self.compensation = compensation
         self.last = LastLengths()
         """The lengths at which it was stopped."""
-        self.paths = PathStore()
+        self.paths = PathStore(model)
         """The planned paths."""
         self.control = control
         self.estimator = estimator
+        self._origins_lost = estimator.origins_lost
+        known = estimator.estimate
+        control.measure_tensions(known.tension_N, known.tension_measured)
         self.period_s = period_s
         self.speed, self.acceleration = model.speed, model.acceleration
         """The most along each direction, (d,)."""
@@ -123,6 +128,10 @@ class PlatformParts:
         known = self.compensation
         return known is not None and bool((known.available & ~feedback.index_known).any())
 
+    def notices(self) -> list[str]:
+        """Return what an operator should know of the robot."""
+        return [text for text in (self.control.cell_trouble,) if text]
+
     def lengths_disagree_m(self) -> float:
         """Return the residual of the forward kinematics, 0 while cables are slack."""
         return self.control.residual_m if self.tight else 0.0
@@ -142,9 +151,16 @@ class PlatformParts:
 
     def forget(self) -> None:
         """Forget where the platform is, as if it stood at home."""
-        self.tight = self.last.displaced = False
+        self.tight = self.last.displaced = self.last.fallen = False
         self.estimator.forget_lengths()
         self.control.reset()
+        self.follow_origins()
+
+    def follow_origins(self) -> None:
+        """Forget what was learnt of the motors where their angles count from elsewhere since."""
+        if self._origins_lost != self.estimator.origins_lost:
+            self._origins_lost = self.estimator.origins_lost
+            self.control.forget_motors()
 
 
 class PlatformProgram(CommandedProgram):
@@ -234,7 +250,11 @@ class PlatformProgram(CommandedProgram):
             "rotation_rad": control.estimated[k:].tolist(),
             "target_rotation_rad": self._target[k:].tolist(),
         }
+        learnt = control.learnt_Nm
+        friction, cogging = ([], []) if learnt is None else learnt.round(_TOLD_DIGITS).tolist()
         return {
+            "learnt_friction_Nm": friction,
+            "learnt_cogging_Nm": cogging,
             "position_m": control.estimated[:k].tolist(),
             "target_m": self._target[:k].tolist(),
             **(turned if self._about.size else {}),
@@ -242,8 +262,18 @@ class PlatformProgram(CommandedProgram):
             "missing": control.missing(),
             "held_back": self._held_back(),
             "done": float(self._at_rest and self._arrival.over),
-            "trouble": self._arrival.text(),
+            "trouble": self._arrival.text() or self._swing_text(),
         }
+
+    def _swing_text(self) -> str:
+        """Return how far a platform that has arrived may still swing, an empty text for little."""
+        swing_rad, swing_m = self._control.swing_rad, self._control.swing_m
+        if not self._arrival.over or swing_m < SWINGS_m:
+            return ""
+        return (
+            f"the platform may still turn to and fro by {math.degrees(swing_rad):.1f} deg or more, "
+            f"its anchor points by {1e3 * swing_m:.0f} mm: no cable keeps it from turning"
+        )
 
     def _held_back(self) -> str:
         """Return why the set-point is slowed down, an empty text where it is not."""
@@ -278,14 +308,9 @@ class PlatformProgram(CommandedProgram):
     def _go_towards(self, goal: FloatArray) -> bool:
         control = self._control
         return approach(
-            goal,
-            self._pace(),
-            self._acceleration,
-            self._parts.period_s,
-            control.position,
-            control.velocity,
-            control.acceleration,
-        )
+            goal, self._pace(), self._acceleration, self._parts.period_s, control.position,
+            control.velocity, control.acceleration,
+        )  # fmt: skip
 
     def _brake(self) -> None:
         """Have the set-point come to rest on the straight line on which it moves."""

@@ -18,6 +18,7 @@ from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform.platform_program import (
     PlatformParts,
     PlatformProgram,
+    along_velocity,
     distance_m,
     synchronise,
 )
@@ -60,8 +61,9 @@ class PoseProgram(PlatformProgram):
         self._last_sample, self._hand = np.zeros(7), np.zeros((4, 4))
         self._last_sample[3] = 1.0
         self._goal, self._seen_goal, self._kept = np.zeros((3, d))
+        self._slowing = np.array(parts.acceleration)
         self._deadband_weight = 0.0
-        self._hindrance = hand_target.FREE
+        self._hindrance, self._near = hand_target.FREE, -1
         self._clutched = False
         self._aim: FloatArray | None = None
         self._has_aim = False
@@ -82,7 +84,7 @@ class PoseProgram(PlatformProgram):
         super().start(feedback, setpoint, torque_Nm)
         self._following = self._has_aim = self._inside = False
         self._braking = self._blocked = False
-        self._hindrance = hand_target.FREE
+        self._hindrance, self._near = hand_target.FREE, -1
 
     @property
     def stream_age_s(self) -> float:
@@ -111,6 +113,8 @@ class PoseProgram(PlatformProgram):
         lags = super()._held_back()
         if lags or not self._following:
             return lags
+        if self._near >= 0:
+            return self._control.contact(self._near)
         return self._missing_at(self._seen_goal) or _HELD_BACK[self._hindrance]
 
     def _missing_at(self, position: FloatArray) -> str:
@@ -140,31 +144,36 @@ class PoseProgram(PlatformProgram):
             return "go", self._position(keys), speed
         if arguments[what] is not True:
             raise ProgramError(f"pose: {what}: value {arguments[what]!r}; allowed: true")
-        if what == "resume" and self._aim is None:
-            raise ProgramError("pose: resume: no target has been left; allowed: position_m")
-        return what, self._aim, speed
+        aim = self._aim
+        if what == "resume":
+            if aim is None:
+                raise ProgramError("pose: resume: no target has been left; allowed: position_m")
+            missing = self._control.feasible_path(aim)
+            if missing:
+                raise ProgramError(f"pose: resume: on the way, {missing}")
+        return what, aim, speed
 
     def _position(self, keys: CommandArguments) -> FloatArray:
         """Return the position (d,) that is wanted; what is left out stays as it is."""
         k, control, wanted = self._k, self._control, np.zeros(self._target.size)
         acceleration = self._parts.acceleration
         stopping_position(control.position, control.velocity, acceleration, wanted)
-        told = []
+        asked = []
         if "position_m" in keys:
             wanted[:k] = self._checked_position(keys)
-            told.append(f"position_m: value {wanted[:k].tolist()}")
+            asked.append(f"position_m: value {wanted[:k].tolist()}")
         if "rotation_rad" in keys:
             wanted[k:] = self._checked_rotation(keys)
-            told.append(f"rotation_rad: value {wanted[k:].tolist()}")
+            asked.append(f"rotation_rad: value {wanted[k:].tolist()}")
         else:
             turned, most = float(np.linalg.norm(wanted[k:])), self._parts.model.angle_rad
             wanted[k:] *= 1.0 if turned <= most else most / turned
         missing = control.feasible(wanted)
         if missing:
-            raise ProgramError(f"pose: {', '.join(told)}: {missing}")
+            raise ProgramError(f"pose: {', '.join(asked)}: {missing}")
         missing = control.feasible_path(wanted)
         if missing:
-            raise ProgramError(f"pose: {', '.join(told)}: on the way, {missing}")
+            raise ProgramError(f"pose: {', '.join(asked)}: on the way, {missing}")
         return wanted
 
     def _checked_position(self, keys: CommandArguments) -> FloatArray:
@@ -279,13 +288,16 @@ class PoseProgram(PlatformProgram):
             control.position, target, self._hand, goal,
         )  # fmt: skip
         self._seen_goal[:] = goal
-        if control.stands(goal) or not control.stands(target):
+        near = control.touches(goal)
+        if near >= 0 or distance_m(goal, target, self._parts.scale_m) > 0.0:
+            self._near = near
+        if near < 0 and (control.stands(goal) or not control.stands(target)):
             target[:] = goal
             return
         # along the edge in one direction, where not in all; turning is one of them
         for part in self._steps:
             self._kept[part], target[part] = target[part], goal[part]
-            if control.stands(target):
+            if control.stands(target) and control.touches(target) < 0:
                 return
             target[part] = self._kept[part]
 
@@ -295,18 +307,36 @@ class PoseProgram(PlatformProgram):
         before[0], before[1] = control.position, control.velocity
         before[2] = control.acceleration
         arrived = self._go_towards(goal)
-        stops = control.stands(self._stopping_position())
-        if self._inside and not stops:
+        self._stopping_position()
+        if self._following:
+            self._stop_straight()
+        stops = control.stands(self._rest)
+        # all of the way to a pose has been looked at before
+        near = control.nears(self._rest) if self._following else -1
+        if near >= 0:
+            self._near = near
+        if near >= 0 or (self._inside and not stops):
             control.position[:], control.velocity[:] = before[0], before[1]
             control.acceleration[:] = before[2]
-            if not self._following:
-                self._braking = True
-                self._seen_goal[:] = self._rest
-                self._target[:] = self._stopping_position()
-            self._go_towards(self._stopping_position())
+            if self._following:
+                self._stop_straight()
+                self._acceleration, self._slowing = self._slowing, self._acceleration
+                self._go_towards(self._rest)
+                self._acceleration, self._slowing = self._slowing, self._acceleration
+                return False
+            self._braking = True
+            self._seen_goal[:] = self._rest
+            self._target[:] = self._stopping_position()
+            self._go_towards(self._target)
             return False
         self._inside = stops
         return arrived
+
+    def _stop_straight(self) -> None:
+        """Write at which position it comes to rest if it brakes straight on, and how it does."""
+        control = self._control
+        along_velocity(control.velocity, self._parts.acceleration, self._slowing)
+        stopping_position(control.position, control.velocity, self._slowing, self._rest)
 
 
 def _listed(values: FloatArray) -> str:

@@ -95,19 +95,8 @@ class WinchSpeedLoop:
     def update(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Write the torques of this cycle."""
         _control_speed(
-            self._period_s,
-            self._weight,
-            self.low_N,
-            self.high_N,
-            self.paying_out_m_s,
-            self.fastest_in_m_s,
-            self._cable,
-            self._gain,
-            self.integral_rate_1_s,
-            feedback.position_rad,
-            self._last,
-            self.speed_rad_s,
-            self._integral,
-            self.tension_N,
+            self._period_s, self._weight, self.low_N, self.high_N, self.paying_out_m_s,
+            self.fastest_in_m_s, self._cable, self._gain, self.integral_rate_1_s,
+            feedback.position_rad, self._last, self.speed_rad_s, self._integral, self.tension_N,
             torque_Nm,
-        )
+        )  # fmt: skip

@@ -21,7 +21,9 @@ import numpy as np
 from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.interference.segment_kernel import (
+    box_depth,
     box_to_box,
+    segment_depth,
     segment_to_box,
     segment_to_segment,
 )
@@ -100,6 +102,29 @@ def distance(
         _into_platform(pose, points[1])
         return segment_to_box(points[0], points[1], boxes[0], near)
     return segment_to_box(points[0], points[1], boxes[second], near)
+
+
+@jit
+def depth(
+    pair: IntArray,
+    pose: FloatArray,
+    ends: FloatArray,
+    boxes: FloatArray,
+    trim: float,
+    points: FloatArray,
+) -> float:
+    """Return how deep two things of a pair that are not apart are in each other; cables are not."""
+    kind, first, second = pair[KIND], pair[FIRST], pair[SECOND]
+    if kind == CABLES:
+        return 0.0
+    if kind == BODY_BOX:
+        return box_depth(pose, boxes[0], boxes[second])
+    _take(ends, first, pair[TRIMMED], trim, points[:2])
+    if kind == CABLE_BODY:
+        _into_platform(pose, points[0])
+        _into_platform(pose, points[1])
+        return segment_depth(points[0], points[1], boxes[0])
+    return segment_depth(points[0], points[1], boxes[second])
 
 
 @jit

@@ -34,6 +34,7 @@ from cdpr_rt.robots.interference.clearance_kernel import (
     KIND,
     SECOND,
     TRIMMED,
+    depth,
     distance,
     write_ends,
 )
@@ -56,10 +57,14 @@ _LEAVING: Final = 0.9
 """Share of its distance that a pair which is in contact at the start has to keep."""
 _LEAVES: Final = 4.0
 """Clearances by which the platform moves at most until what touches altogether has come apart."""
+_WATCHES: Final = 32
+"""How often that is looked at meanwhile."""
+_DEEPER: Final = 0.05
+"""Clearances by which it may get deeper, for rounding and play."""
 _SPEED, _ACCELERATION, _EXIT, _FAR, _FREE, _HOLDS, _RATES = range(7)
 _TOGETHER = 0.02
 """Share of the way by which pairs are looked at early, since others are looked at anyway."""
-_MOST_LOOKS = 20_000
+MOST_LOOKS: Final = 20_000
 _SMALL = 1e-4
 
 
@@ -71,26 +76,49 @@ def first_contact(
     clearance: float,
     trim: float,
     way: FloatArray,
-) -> tuple[float, int, float]:
+    most_looks: int,
+) -> tuple[float, int, float, bool]:
     """Return the share of the way at which a pair comes into contact, which pair, and its distance.
 
     Returns 2.0 and -1 where none does. What is in contact at the start has to stay about as far
-    apart, and to be clear at the end; what touches altogether there has to be clear before the
-    platform has moved by _LEAVES clearances, and to stay so. A pair that _MOST_LOOKS do
-    not prove clear counts as in contact.
+    apart, and to be clear at the end; what touches altogether there must not get deeper, has to be
+    clear before the platform has moved by _LEAVES clearances, and to stay so. A pair that
+    `most_looks` do not prove clear counts as in contact; last is whether it is known to be.
     """
+    allowed = np.full(pairs.shape[0], clearance)
+    share, pair, apart, known = _advance(
+        geometry, boxes, pairs, clearance, trim, way, most_looks, allowed
+    )
+    if pair < 0:
+        pair, apart = _still_near(geometry, boxes, pairs, clearance, trim, way, allowed)
+        share = 2.0 if pair < 0 else 1.0
+    return share, pair, apart, known
+
+
+@jit
+def _advance(
+    geometry: FloatArray,
+    boxes: FloatArray,
+    pairs: IntArray,
+    clearance: float,
+    trim: float,
+    way: FloatArray,
+    most_looks: int,
+    allowed: FloatArray,
+) -> tuple[float, int, float, bool]:
+    """Return the first contact on the way; write how far apart each pair has to stay, `allowed`."""
     n, count = geometry.shape[1], pairs.shape[0]
     cables, ends, rates = np.empty((CABLE_ROWS, n)), np.empty((2, n, 3)), np.empty((_RATES, n))
     points, near, corners = np.empty((4, 3)), np.empty((2, 3)), np.empty((8, 3))
-    pose, twist, moves, room = (
+    pose, twist, moves, scratch = (
         np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3)), np.empty((4, 3)),
     )  # fmt: skip
-    until, allowed = np.zeros(count), np.full(count, clearance)
+    until, least = np.zeros(count), np.full(count, -math.inf)
     body_speed = _write_speeds(geometry, boxes, way, rates)
     share, looks = 0.0, 0
     leaves = _LEAVES * clearance / (max(body_speed, np.max(rates[_SPEED])) + TINY)
     while share < 1.0:
-        place_on(way, share, room, pose, twist)
+        place_on(way, share, scratch, pose, twist)
         write_ends(geometry, pose, cables, ends)
         _write_exit_speeds(geometry, pose, way, cables, ends, rates)
         for k in range(count):
@@ -99,30 +127,54 @@ def first_contact(
             apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
             if looks == 0:
                 allowed[k] = _to_keep(apart, clearance)
-                if allowed[k] < 0.0:
-                    until[k] = leaves
-                    continue
+            if allowed[k] < 0.0 and share < leaves:
+                if not apart > 0.0:
+                    apart = -depth(pairs[k], pose, ends, boxes, trim, points)
+                if apart < least[k]:
+                    return share, k, max(apart, 0.0), True
+                least[k] = max(least[k], apart - _DEEPER * clearance)
+                until[k] = min(share + leaves / _WATCHES, leaves)
+                continue
             if allowed[k] < 0.0:
                 allowed[k] = clearance  # has to have come apart
-            if apart - allowed[k] >= TOUCH_m and looks < _MOST_LOOKS:
+            if apart - allowed[k] >= TOUCH_m and looks < most_looks:
                 until[k] = share + _clear_for(
                     pairs[k], apart, allowed[k], trim, pose, twist, way, points, near, rates,
                     body_speed, moves,
                 )  # fmt: skip
             elif until[k] <= share:
-                return share, k, apart
+                return share, k, apart, apart - allowed[k] < TOUCH_m
         share = 1.0
         for k in range(count):
             share = min(share, until[k])
         looks += 1
-    place_on(way, 1.0, room, pose, twist)
-    write_ends(geometry, pose, cables, ends)
-    for k in range(count):
+    return 2.0, -1, math.inf, True
+
+
+@jit
+def _still_near(
+    geometry: FloatArray,
+    boxes: FloatArray,
+    pairs: IntArray,
+    clearance: float,
+    trim: float,
+    way: FloatArray,
+    allowed: FloatArray,
+) -> tuple[int, float]:
+    """Return the first pair in contact at the start that is not clear at the end, -1 for none."""
+    n = geometry.shape[1]
+    pose, twist, scratch, points = (
+        np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3)), np.empty((4, 3)),
+    )  # fmt: skip
+    near, corners, ends = np.empty((2, 3)), np.empty((8, 3)), np.empty((2, n, 3))
+    place_on(way, 1.0, scratch, pose, twist)
+    write_ends(geometry, pose, np.empty((CABLE_ROWS, n)), ends)
+    for k in range(pairs.shape[0]):
         if allowed[k] < clearance:
             apart = distance(pairs[k], pose, ends, boxes, trim, points, near, corners)
             if not apart >= clearance:
-                return 1.0, k, apart
-    return 2.0, -1, math.inf
+                return k, apart
+    return -1, math.inf
 
 
 @jit
@@ -133,16 +185,16 @@ def _to_keep(apart: float, clearance: float) -> float:
 
 @jit
 def place_on(
-    way: FloatArray, share: float, room: FloatArray, pose: FloatArray, twist: FloatArray
+    way: FloatArray, share: float, scratch: FloatArray, pose: FloatArray, twist: FloatArray
 ) -> None:
     """Write the pose at a share of the way, and its derivative there: twist (2, 3).
 
-    `room` (4, 3) is overwritten.
+    `scratch` (4, 3) is overwritten.
 
     For a rotation vector φ with derivative φ' the angular velocity is φ' + (1 - cos θ)/θ² φ × φ' +
     (θ - sin θ)/θ³ φ × (φ × φ').
     """
-    phi, turn = room[0], room[1:4]
+    phi, turn = scratch[0], scratch[1:4]
     for k in range(3):
         phi[k] = way[TURNED, k] + share * way[TURN, k]
         twist[0, k] = way[STEP, k]
@@ -168,7 +220,8 @@ def place_on(
 
 
 @jit
-def _size(vector: FloatArray) -> float:
+def size_of(vector: FloatArray) -> float:
+    """Return the length of a vector (3,)."""
     return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
 
 
@@ -177,9 +230,9 @@ def _write_speeds(
     geometry: FloatArray, boxes: FloatArray, way: FloatArray, rates: FloatArray
 ) -> float:
     """Write bounds of anchor points' speeds and accelerations; return that of the body's speed."""
-    step, turn = _size(way[STEP]), _size(way[TURN])
+    step, turn = size_of(way[STEP]), size_of(way[TURN])
     for i in range(geometry.shape[1]):
-        arm = _size(geometry[ANCHORS : ANCHORS + 3, i])
+        arm = size_of(geometry[ANCHORS : ANCHORS + 3, i])
         rates[_SPEED, i], rates[_ACCELERATION, i] = step + turn * arm, turn * turn * arm
     furthest = 0.0
     for k in range(3):
@@ -203,7 +256,7 @@ def _write_exit_speeds(
     e and l are half of what they are. In the platform's frame that place moves as the platform
     turns as well.
     """
-    step, turn = _size(way[STEP]), _size(way[TURN])
+    step, turn = size_of(way[STEP]), size_of(way[TURN])
     for i in range(geometry.shape[1]):
         v, r, free = rates[_SPEED, i], geometry[RADIUS, i], cables[FREE, i]
         speed, least = 0.0, free
@@ -257,9 +310,9 @@ def _clear_for(
         _write_moves(pair, 1, apart, trim, pose, twist, way, points, near, rates, moves)
     for a in range(2):
         for b in range(2, 2 + others):
-            room = apart - allowed + moves[a, 0] + moves[b, 0]
+            left = apart - allowed + moves[a, 0] + moves[b, 0]
             g, h = moves[a, 1] + moves[b, 1], moves[a, 2] + moves[b, 2]
-            least = min(least, 2.0 * room / (g + math.sqrt(g * g + 2.0 * h * room) + TINY))
+            least = min(least, 2.0 * left / (g + math.sqrt(g * g + 2.0 * h * left) + TINY))
     return least
 
 
@@ -291,7 +344,7 @@ def _write_moves(
             if end == 0:
                 speed = rates[_FAR, i]
             elif trimmed:
-                speed = trim * (_size(way[TURN]) + 2.0 * both / rates[_FREE, i])
+                speed = trim * (size_of(way[TURN]) + 2.0 * both / rates[_FREE, i])
                 if 4.0 * trim > rates[_FREE, i]:
                     speed = rates[_FAR, i]
         elif trimmed:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
@@ -12,10 +12,19 @@ import numpy as np
 from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.jit import bound
 from cdpr_rt.robots.interference import clearance_kernel as kernel
-from cdpr_rt.robots.interference.contact_kernel import START, TURNED, WAY_ROWS, first_contact
-from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
+from cdpr_rt.robots.interference.contact_kernel import (
+    MOST_LOOKS,
+    START,
+    TURNED,
+    WAY_ROWS,
+    first_contact,
+)
+from cdpr_rt.robots.interference.nearing_kernel import nears
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, CABLE_ROWS, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 
+_PARTS: Final = 16
+"""In which a short way is looked at."""
 _EVERYWHERE_m: Final = 1e4
 """How deep boxes of a plane are."""
 
@@ -27,12 +36,14 @@ class Contact:
     position: FloatArray
     """Of the platform, (d,): coordinates, then rotation vector."""
     coordinates: int
-    leg: int
+    part: int
     """Which straight part of the way, from 0."""
     share: float
     """Of that part."""
     things: tuple[str, str]
     distance_m: float
+    known: bool
+    """Whether they do come so near, or only could not be proved to stay clear."""
 
     def __str__(self) -> str:
         place, turned = (
@@ -40,7 +51,10 @@ class Contact:
             for part in (self.position[: self.coordinates], self.position[self.coordinates :])
         )
         about = f" turned by {turned} rad" if self.position[self.coordinates :].any() else ""
-        return f"at {place} m{about}: {in_words(self.things, self.distance_m)}"
+        text = in_words(self.things, self.distance_m)
+        if not self.known:
+            text += ", and cannot be proved in time to stay clear; go another way or in parts"
+        return f"at {place} m{about}: {text}"
 
 
 class Interference:
@@ -68,8 +82,8 @@ class Interference:
         self._geometry, self._directions = kinematics.geometry, np.array(kinematics.directions)
         self._coordinates = sum(direction < 3 for direction in kinematics.directions)
         self._home = np.array(home, float)
-        boxes = [np.zeros((2, 3)) if body is None else _in_space(body)]
-        boxes += [_in_space(box) for box in obstacles]
+        boxes = [np.zeros((2, 3)) if body is None else _in_space(body, 0.0)]
+        boxes += [_in_space(box, _EVERYWHERE_m) for box in obstacles]
         self._boxes = np.array(boxes)
         self.pairs: IntArray = np.array(
             list(self._found_pairs(body is not None, planar)), np.int64
@@ -77,9 +91,15 @@ class Interference:
         """What is compared: rows of `clearance_kernel`."""
         self._way = np.zeros((WAY_ROWS, 3))
         self._way[0], self._way[4:] = self._home[0], self._home[1:]
+        self._nears: Callable[[int], int] | None = None
         if len(self.pairs):
-            self._first_contact = bound(
-                first_contact, *self.arrays, self._way,
+            self._first_contact = bound(first_contact, *self.arrays, self._way, then=(MOST_LOOKS,))
+            n, corners = kinematics.n, np.abs(self._boxes[0]).max(axis=0)
+            arms = np.linalg.norm([*self._geometry[ANCHOR:RADIUS].T, corners], axis=1)
+            self._nears = bound(
+                nears, *self.arrays, self._way, float(arms.max()), np.empty((CABLE_ROWS, n)),
+                np.empty((2, 2, n, 3)), np.empty((3, 4, 3)), np.empty((5, 8, 3)),
+                np.empty(len(self.pairs)), then=(_PARTS,),
             )  # fmt: skip
 
     @property
@@ -106,21 +126,44 @@ class Interference:
             return ""
         return in_words(self.things(int(pair[0])), float(clearance[0]))
 
-    def first_contact(self, positions: FloatArray) -> Contact | None:
+    def nears(self, start: FloatArray, end: FloatArray) -> int:
+        """Return a pair that comes into contact on a short way straight between positions (d,).
+
+        -1 for none. For use in every cycle: allocates no arrays, and may see contact where things
+        only pass each other quickly and closely. What is in contact at the start may leave.
+        """
+        return self._on_way(start, end, _PARTS)
+
+    def touches(self, start: FloatArray, end: FloatArray) -> int:
+        """Return a pair that is in contact at the end of a way, as for `nears`."""
+        return self._on_way(start, end, 0)
+
+    def _on_way(self, start: FloatArray, end: FloatArray, parts: int) -> int:
+        if self._nears is None:
+            return -1
+        self._lead(start, end)
+        return self._nears(parts)
+
+    def within_clearance(self, pair: int) -> str:
+        """Return in words that a pair is in contact."""
+        return in_words(self.things(pair), self.clearance_m)
+
+    def first_contact(self, positions: FloatArray, looks: int = MOST_LOOKS) -> Contact | None:
         """Return the first contact on the way straight from position to position, (m, d).
 
         Straight in the coordinates of `PlatformModel`, coordinates and rotation vector from home's
         orientation, and proved for all places between, not only looked at in some. What is in
         contact where a straight part begins may not come much nearer, and has to be clear at its
-        end.
+        end. What so many `looks` at a part do not prove clear counts as in contact.
         """
-        for leg in range(len(positions) - 1 if len(self.pairs) else 0):
-            start, end = positions[leg], positions[leg + 1]
+        for part in range(len(positions) - 1 if len(self.pairs) else 0):
+            start, end = positions[part], positions[part + 1]
             self._lead(start, end)
-            share, pair, distance = self._first_contact()
+            share, pair, distance, known = self._first_contact(looks)
             if pair >= 0:
                 there = start + share * (end - start)
-                return Contact(there, self._coordinates, leg, share, self.things(pair), distance)
+                things = self.things(pair)
+                return Contact(there, self._coordinates, part, share, things, distance, known)
         return None
 
     def _lead(self, start: FloatArray, end: FloatArray) -> None:
@@ -132,10 +175,10 @@ class Interference:
     def things(self, pair: int) -> tuple[str, str]:
         """Return what a pair consists of, in words."""
         kind, first, second, _ = (int(x) for x in self.pairs[pair])
-        one = "platform" if kind == kernel.BODY_BOX else f"cable {first}"
+        one = "platform" if kind == kernel.BODY_BOX else f"cable {first + 1}"
         if kind == kernel.CABLES:
-            return one, f"cable {second}"
-        return one, "platform" if kind == kernel.CABLE_BODY else f"obstacle {second - 1}"
+            return one, f"cable {second + 1}"
+        return one, "platform" if kind == kernel.CABLE_BODY else f"obstacle {second}"
 
     def _found_pairs(self, has_body: bool, planar: bool) -> Iterator[tuple[int, int, int, int]]:
         exits, anchors = self._geometry[:3].T, self._geometry[ANCHOR:RADIUS].T
@@ -169,10 +212,13 @@ def in_words(things: tuple[str, str], distance_m: float) -> str:
     return f"{who} come within {1e3 * distance_m:.0f} mm of each other"
 
 
-def _in_space(box: FloatArray) -> FloatArray:
-    """Return a box with three coordinates; one in a plane has any depth."""
+def _in_space(box: FloatArray, deep_m: float) -> FloatArray:
+    """Return a box with three coordinates; one in a plane is so deep on either side of it.
+
+    A platform's body that was deep would sweep far when it is turned.
+    """
     given = np.asarray(box, float)
-    in_space = np.array([[-_EVERYWHERE_m] * 3, [_EVERYWHERE_m] * 3])
+    in_space = np.array([[-deep_m] * 3, [deep_m] * 3])
     in_space[:, : given.shape[1]] = given
     return in_space
 

@@ -11,6 +11,7 @@ import math
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.jit import jit
 
+_CUTS = 60
 _PARALLEL = 1e-12
 """Squared sine of an angle below which two segments are taken to be parallel."""
 
@@ -111,6 +112,57 @@ def box_to_box(
             if not i >> k & 1:
                 least = min(least, segment_to_box(corners[i], corners[i | 1 << k], box, near))
     return least
+
+
+@jit
+def segment_depth(p: FloatArray, q: FloatArray, box: FloatArray) -> float:
+    """Return how far the segment p q is inside a box: of its points, the most to the next side.
+
+    How far a point is beyond the sides is convex along the segment. Below 0 for one outside.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(_CUTS):
+        third = (high - low) / 3.0
+        if _beyond(p, q, box, low + third) < _beyond(p, q, box, high - third):
+            high -= third
+        else:
+            low += third
+    return -_beyond(p, q, box, 0.5 * (low + high))
+
+
+@jit
+def box_depth(pose: FloatArray, box: FloatArray, other: FloatArray) -> float:
+    """Return how far a box at a `pose` (4, 3) overlaps one that is not turned.
+
+    Along the direction, of those square to the sides of either, in which they overlap the least.
+    """
+    least = math.inf
+    for axis in range(6):
+        apart, reach = 0.0, 0.0
+        for j in range(3):
+            # the unit vector, of the room's or the box's axes, times both middles and half sizes
+            n = pose[1 + j, axis - 3] if axis > 2 else (1.0 if j == axis else 0.0)
+            apart += n * (pose[0, j] - 0.5 * (other[0, j] + other[1, j]))
+            reach += abs(n) * 0.5 * (other[1, j] - other[0, j])
+        for k in range(3):
+            along = 0.0
+            for j in range(3):
+                n = pose[1 + j, axis - 3] if axis > 2 else (1.0 if j == axis else 0.0)
+                along += n * pose[1 + j, k]
+            apart += along * 0.5 * (box[0, k] + box[1, k])
+            reach += abs(along) * 0.5 * (box[1, k] - box[0, k])
+        least = min(least, reach - abs(apart))
+    return least
+
+
+@jit
+def _beyond(p: FloatArray, q: FloatArray, box: FloatArray, share: float) -> float:
+    """Return how far a point of p q is beyond a side of a box, below 0 within all of them."""
+    most = -math.inf
+    for k in range(3):
+        x = p[k] + share * (q[k] - p[k])
+        most = max(most, box[0, k] - x, x - box[1, k])
+    return most
 
 
 @jit

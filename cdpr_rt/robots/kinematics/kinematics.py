@@ -82,6 +82,12 @@ class CableKinematics:
         self._target, self._slack_free = np.zeros(self.n), np.zeros(self.n)
         self._no_tension = np.zeros(self.n)
 
+    @property
+    def turns_freely(self) -> bool:
+        """Whether a platform in a plane has an orientation that no cable controls."""
+        anchors = self.geometry[cable_kernel.ANCHOR : cable_kernel.RADIUS]
+        return self.directions == PLANAR_POINT and bool(np.ptp(anchors, axis=1).any())
+
     def lengths(
         self, pose: Pose, tension_N: FloatArray | None = None, out: FloatArray | None = None
     ) -> FloatArray:
@@ -170,13 +176,8 @@ class CableKinematics:
     def _search(self, lengths_m: FloatArray, restarts: int) -> None:
         found = self._solution
         status, found.steps, cost = pose_search.find_pose(
-            self.geometry,
-            lengths_m,
-            found.pose.array,
-            self._cables,
-            self.solver,
-            restarts,
-        )
+            self.geometry, lengths_m, found.pose.array, self._cables, self.solver, restarts,
+        )  # fmt: skip
         found.converged = status == pose_search.CONVERGED
         found.residual_m = math.sqrt(cost / self.n)
 
@@ -189,15 +190,9 @@ class CableKinematics:
     def _unstretch(self, tension_N: FloatArray, rho: FloatArray) -> None:
         cables = self._cables
         write_unstretched_lengths(
-            cables[:3],
-            cables[cable_kernel.FREE],
-            cables[cable_kernel.ARC],
-            self._up,
-            tension_N,
-            1.0 / self.model.stiffness_N,
-            self.model.weight_N_m,
-            rho,
-        )
+            cables[:3], cables[cable_kernel.FREE], cables[cable_kernel.ARC], self._up, tension_N,
+            1.0 / self.model.stiffness_N, self.model.weight_N_m, rho,
+        )  # fmt: skip
 
 
 def _points(given: FloatArray, what: str) -> FloatArray:

@@ -2,7 +2,7 @@
 
 Arrays besides those of `cable_kernel`, of float64:
 
-    solver    (24, 6)     room: NORMAL, FACTOR, GRADIENT, STEP; DIRECTIONS: 1 for those of the
+    solver    (24, 6)     scratch: NORMAL, FACTOR, GRADIENT, STEP; DIRECTIONS: 1 for those of the
                           twist that are solved for, 0 for those that stay as they are; ACCEPTED,
                           the sum of squares up to which lengths agree; and from KEPT on four
                           poses (4, 4, 3), of which the last one's rotation is that at home

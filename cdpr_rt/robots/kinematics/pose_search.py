@@ -21,7 +21,7 @@ from cdpr_rt.robots.kinematics.normal_equations import (
 HOME = 3
 _BEFORE, _START, _BEST = 0, 1, 2
 
-CONVERGED, UNFINISHED, SINGULAR, STUCK = 0, 1, 2, 3
+CONVERGED, UNFINISHED, SINGULAR, STALLED = 0, 1, 2, 3
 """How a search ended: found; steps used up; a direction is free; in a minimum that is none."""
 
 TOLERANCE = 1e-9
@@ -52,7 +52,7 @@ def descend(
 
     Where that gets slowly on, as lengths that disagree make it do, by Newton's method; a step
     that makes things worse is taken back and damped (Levenberg-Marquardt). It ends where the last
-    two steps show that less than TOLERANCE is left to go; and, STUCK, where the next step is to
+    two steps show that less than TOLERANCE is left to go; and, STALLED, where the next step is to
     win little of a cost above `accepted`: on the way to where lengths agree it wins all. Returns
     how it ended, steps, and the cost; lengths that are no numbers end as SINGULAR.
     """
@@ -65,25 +65,16 @@ def descend(
             assemble(cables, solver)
             if slow:
                 add_curvature(geometry, pose, cables, solver)
-        singular = not factorise(solver, damping)
-        if singular:
-            # curved downwards, if it is not a direction that is free
-            assemble(cables, solver)
-            singular = not factorise(solver, damping)
-            damping = max(damping, _REGULAR_DAMPING)
-            if not factorise(solver, damping):
-                return SINGULAR, k, cost
+        singular, damping = _factorise_damped(cables, solver, damping)
+        if damping < 0.0:
+            return SINGULAR, k, cost
         size, gain = find_step(solver)
         if k > 1 and cost > accepted and gain < _LEAST_SHARE * cost:
-            return STUCK, k, cost
+            return STALLED, k, cost
         copy_pose(pose, kept[_BEFORE])
         move(pose, solver[STEP])
-        if damping == 0.0 and size < _SMALL_STEP:
-            # what is left shrinks as the last two steps did; faster where lengths agree
-            agree = cost - gain < _AGREE * size * size
-            left = size * size * (size / before if agree and before > 0.0 else 1.0)
-            if left < TOLERANCE * (before - size):
-                return CONVERGED, k, max(cost - gain, 0.0)
+        if damping == 0.0 and _is_there(size, before, cost - gain):
+            return CONVERGED, k, max(cost - gain, 0.0)
         new = compare(geometry, lengths, pose, cables)
         fresh = new <= cost or size < TOLERANCE
         if not fresh:
@@ -99,6 +90,31 @@ def descend(
         cost = new
         damping = 0.1 * damping if damping > 1e-5 else 0.0
     return UNFINISHED, k, cost
+
+
+@jit
+def _factorise_damped(cables: FloatArray, solver: FloatArray, damping: float) -> tuple[bool, float]:
+    """Factorise the equations; return whether a direction is free, and the damping it has taken.
+
+    That is negative where none helps.
+    """
+    if factorise(solver, damping):
+        return False, damping
+    # curved downwards, if it is not a direction that is free
+    assemble(cables, solver)
+    singular = not factorise(solver, damping)
+    damping = max(damping, _REGULAR_DAMPING)
+    return singular, damping if factorise(solver, damping) else -1.0
+
+
+@jit
+def _is_there(size: float, before: float, cost: float) -> bool:
+    """Return whether what is left to go behind a step of this size, and cost, is of no account.
+
+    It shrinks as the last two steps did, faster where lengths agree.
+    """
+    shrunk = size / before if cost < _AGREE * size * size and before > 0.0 else 1.0
+    return size < _SMALL_STEP and size * size * shrunk < TOLERANCE * (before - size)
 
 
 @jit

@@ -20,10 +20,10 @@ _SMALL = 1e-4
 
 @jit
 def place(
-    q: FloatArray, directions: IntArray, home: FloatArray, room: FloatArray, pose: FloatArray
+    q: FloatArray, directions: IntArray, home: FloatArray, scratch: FloatArray, pose: FloatArray
 ) -> None:
     """Write the pose of a set-point `q` (d,); what is not controlled is as at `home` (4, 3)."""
-    phi, turn = room[0], room[1:4]
+    phi, turn = scratch[0], scratch[1:4]
     for k in range(3):
         phi[k], pose[0, k] = 0.0, home[0, k]
     for k in range(q.size):
@@ -42,40 +42,40 @@ def place(
 
 @jit
 def place_all(
-    q: FloatArray, directions: IntArray, home: FloatArray, room: FloatArray, poses: FloatArray
+    q: FloatArray, directions: IntArray, home: FloatArray, scratch: FloatArray, poses: FloatArray
 ) -> None:
     """Write the poses (m, 4, 3) of set-points (m, d)."""
     for j in range(q.shape[0]):
-        place(q[j], directions, home, room, poses[j])
+        place(q[j], directions, home, scratch, poses[j])
 
 
 @jit
 def locate(
-    pose: FloatArray, directions: IntArray, home: FloatArray, room: FloatArray, q: FloatArray
+    pose: FloatArray, directions: IntArray, home: FloatArray, scratch: FloatArray, q: FloatArray
 ) -> None:
     """Write the set-point `q` (d,) of a pose: the inverse of `place`."""
-    _turn_between(pose, home, room)
+    _turn_between(pose, home, scratch)
     for k in range(q.size):
-        q[k] = pose[0, directions[k]] if directions[k] < 3 else room[0, directions[k] - 3]
+        q[k] = pose[0, directions[k]] if directions[k] < 3 else scratch[0, directions[k] - 3]
 
 
 @jit
-def subtract(pose: FloatArray, other: FloatArray, room: FloatArray, x: FloatArray) -> None:
+def subtract(pose: FloatArray, other: FloatArray, scratch: FloatArray, x: FloatArray) -> None:
     """Write x = pose ⊟ other (6,), as of `pose`: the logarithm map."""
-    _turn_between(pose, other, room)
+    _turn_between(pose, other, scratch)
     for k in range(3):
-        x[k], x[3 + k] = pose[0, k] - other[0, k], room[0, k]
+        x[k], x[3 + k] = pose[0, k] - other[0, k], scratch[0, k]
 
 
 @jit
-def _turn_between(pose: FloatArray, other: FloatArray, room: FloatArray) -> None:
+def _turn_between(pose: FloatArray, other: FloatArray, scratch: FloatArray) -> None:
     for i in range(3):
         for j in range(3):
             entry = 0.0
             for k in range(3):
                 entry += pose[1 + i, k] * other[1 + j, k]
-            room[1 + i, j] = entry
-    logarithm(room[1:4], room[0])
+            scratch[1 + i, j] = entry
+    logarithm(scratch[1:4], scratch[0])
 
 
 @jit
@@ -103,12 +103,12 @@ def move_with(
     shaped: FloatArray,
     directions: IntArray,
     period: float,
-    room: FloatArray,
+    scratch: FloatArray,
     twist: FloatArray,
     acceleration: FloatArray,
 ) -> None:
     """Write twist and its derivative (6,) of a set-point `shaped` (3, d) with its derivatives."""
-    phi, rate, slope, after = room[0], room[1], room[2], room[3]
+    phi, rate, slope, after = scratch[0], scratch[1], scratch[2], scratch[3]
     turns = False
     for k in range(6):
         twist[k] = acceleration[k] = 0.0
@@ -140,7 +140,7 @@ def refer(
     geometry: FloatArray,
     motors: FloatArray,
     pose: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
     wanted: FloatArray,
     cables: FloatArray,
     twist: FloatArray,
@@ -156,13 +156,13 @@ def refer(
     ⊟ pose. The motors' are (n,) each, eqs. (2.2), (2.4), (3.2), (3.11), with the stretch of each
     cable taken off. Where no angle is controlled the platform is taken to stay as it is turned.
     """
-    place(shaped[0], directions, home, room, wanted)
+    place(shaped[0], directions, home, scratch, wanted)
     if directions[directions.size - 1] < 3:
         for i in range(1, 4):
             for j in range(3):
                 wanted[i, j] = pose[i, j]
-    subtract(wanted, pose, room, error)
-    move_with(shaped, directions, period, room, twist, acceleration)
+    subtract(wanted, pose, scratch, error)
+    move_with(shaped, directions, period, scratch, twist, acceleration)
     run_cables(geometry, wanted, cables)
     for i in range(motors.shape[1]):
         rate, slope = 0.0, 0.0
@@ -178,9 +178,9 @@ def refer(
 @jit
 def write_quaternion(pose: FloatArray, out: FloatArray) -> None:
     """Write position x y z and quaternion w x y z, w at least 0, of a pose into `out` (7,)."""
-    room = out[4:7]
-    logarithm(pose[1:4], room)
-    angle = math.sqrt(room[0] ** 2 + room[1] ** 2 + room[2] ** 2)
+    scratch = out[4:7]
+    logarithm(pose[1:4], scratch)
+    angle = math.sqrt(scratch[0] ** 2 + scratch[1] ** 2 + scratch[2] ** 2)
     share = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.0
     for k in range(3):
         out[k] = pose[0, k]

@@ -2,30 +2,39 @@
 
 Arrays besides those of `cable_kernel` and `normal_equations`, of float64:
 
-    motors    (13, n)  THETA, OMEGA observed angle and velocity; LAGGING, CALM: velocity low-passed
-                       once and twice; LENGTH of the cable to its anchor, RATE of it; TENSION by
-                       which it is taken to be stretched; STRETCH, its length over that without
-                       tension; AT_ZERO, length without tension at the motor's zero; and what does
-                       not change: M_PER_RAD paid out, COMPLIANCE 1/EA, WEIGHT in N/m, INERTIA of
-                       the motor in kg m2
-    filters   (4,)     PERIOD, s; OBSERVER and SMOOTHER, rad/s; SMOOTH, share of the smooth velocity
+    motors    (13, n)  THETA, OMEGA observed angle and velocity; LOWPASSED_ONCE, LOWPASSED
+                       velocity, by one pole and by both; LENGTH of the cable to its anchor,
+                       RATE of it; TENSION by which it is taken to be stretched; STRETCH, its
+                       length over that without tension; AT_ZERO, length without tension at the
+                       motor's zero; and what does not change: M_PER_RAD paid out, COMPLIANCE
+                       1/EA, WEIGHT in N/m, INERTIA of the motor in kg m2
+    filters   (4,)     PERIOD, s; OBSERVER, SMOOTHER, rad/s; SMOOTH, share of smooth velocity
+    rotation  (9,)     of a platform that turns freely, as of `free_rotation_kernel`
+    swing     (4,)     likewise: SWUNG, rad from where its tensions have no moment; SPINNING, rad/s;
+                       AMPLITUDE, rad, and AMPLITUDE_m of an anchor point
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ARC, ERROR, FREE
+from cdpr_rt.robots.kinematics import free_rotation_kernel as free
+from cdpr_rt.robots.kinematics.cable_kernel import ARC, ERROR, FREE
 from cdpr_rt.robots.kinematics.cable_model import unstretched_length
 from cdpr_rt.robots.kinematics.normal_equations import GRADIENT, assemble, factorise, substitute
 from cdpr_rt.robots.kinematics.pose_search import find_pose
 
-THETA, OMEGA, LAGGING, CALM, LENGTH, RATE, TENSION, STRETCH, AT_ZERO = range(9)
+THETA, OMEGA, LOWPASSED_ONCE, LOWPASSED, LENGTH, RATE, TENSION, STRETCH, AT_ZERO = range(9)
 M_PER_RAD, COMPLIANCE, WEIGHT, INERTIA, MOTOR_ROWS = 9, 10, 11, 12, 13
 PERIOD, OBSERVER, SMOOTHER, SMOOTH, FILTERS = range(5)
+SWUNG, SPINNING, AMPLITUDE, AMPLITUDE_m, SWING = range(5)
 _MOST_TURN_rad = 0.02
+# of the type that comes from Python: for a literal numba compiles the search anew
+_NO_RESTARTS: int = np.int64(0)  # type: ignore[assignment]
 
 
 @jit
@@ -43,9 +52,9 @@ def observe(motors: FloatArray, position: FloatArray, filters: FloatArray) -> No
         error = position[i] - predicted
         motors[THETA, i] = predicted + (1.0 - decay * decay) * error
         motors[OMEGA, i] += (1.0 - decay) ** 2 / period * error
-        motors[LAGGING, i] += weight * (motors[OMEGA, i] - motors[LAGGING, i])
-        motors[CALM, i] += weight * (motors[LAGGING, i] - motors[CALM, i])
-        fast, calm = motors[OMEGA, i], motors[CALM, i]
+        motors[LOWPASSED_ONCE, i] += weight * (motors[OMEGA, i] - motors[LOWPASSED_ONCE, i])
+        motors[LOWPASSED, i] += weight * (motors[LOWPASSED_ONCE, i] - motors[LOWPASSED, i])
+        fast, calm = motors[OMEGA, i], motors[LOWPASSED, i]
         motors[RATE, i] = motors[M_PER_RAD, i] * (fast + filters[SMOOTH] * (calm - fast))
         free = motors[AT_ZERO, i] + motors[M_PER_RAD, i] * motors[THETA, i]
         motors[LENGTH, i] = free * motors[STRETCH, i]
@@ -61,6 +70,8 @@ def track_pose(
     cables: FloatArray,
     solver: FloatArray,
     twist: FloatArray,
+    rotation: FloatArray,
+    swing: FloatArray,
     turns: bool,
     position: FloatArray,
 ) -> tuple[float, float]:
@@ -73,8 +84,8 @@ def track_pose(
     """
     observe(motors, position, filters)
     if turns:
-        _turn_to_equilibrium(motors, geometry, pose)
-    _, _, cost = find_pose(geometry, motors[LENGTH], pose, cables, solver, 0)
+        _turn_to_equilibrium(motors, filters, geometry, pose, rotation, swing)
+    _, _, cost = find_pose(geometry, motors[LENGTH], pose, cables, solver, _NO_RESTARTS)
     stretch(motors, cables, up)
     n = motors.shape[1]
     for i in range(n):
@@ -109,22 +120,40 @@ def stretch(motors: FloatArray, cables: FloatArray, up: FloatArray) -> None:
 
 
 @jit
-def _turn_to_equilibrium(motors: FloatArray, geometry: FloatArray, pose: FloatArray) -> None:
-    """Turn the platform about z by one Newton step to where tensions have no moment about it."""
-    moment, slope = 0.0, 0.0
-    for i in range(motors.shape[1]):
-        x = pose[1, 0] * geometry[ANCHOR, i] + pose[1, 1] * geometry[ANCHOR + 1, i]
-        y = pose[2, 0] * geometry[ANCHOR, i] + pose[2, 1] * geometry[ANCHOR + 1, i]
-        wx, wy = geometry[0, i] - pose[0, 0] - x, geometry[1, i] - pose[0, 1] - y
-        rho = math.sqrt(wx * wx + wy * wy)
-        wx, wy = wx / rho, wy / rho
-        across, along = x * wy - y * wx, -y * wx + x * wy
-        tension = motors[TENSION, i]
-        moment += tension * across
-        slope -= tension * (x * wx + y * wy + (x * x + y * y - along * across) / rho)
-    if slope < 0.0:
-        angle = min(max(-moment / slope, -_MOST_TURN_rad), _MOST_TURN_rad)
-        cosine, sine = math.cos(angle), math.sin(angle)
-        for k in range(3):
-            a, b = pose[1, k], pose[2, k]
-            pose[1, k], pose[2, k] = cosine * a - sine * b, sine * a + cosine * b
+def _turn_to_equilibrium(
+    motors: FloatArray,
+    filters: FloatArray,
+    geometry: FloatArray,
+    pose: FloatArray,
+    rotation: FloatArray,
+    swing: FloatArray,
+) -> None:
+    """Turn the platform about z by one Newton step to where tensions have no moment about it.
+
+    The true one swings about there, since it does not follow at once: its `swing` is reckoned from
+    its inertia, and is told; where it is at an instant is not known well enough to be used.
+    """
+    free.turn_about_z(geometry, motors[TENSION], pose, rotation)
+    if rotation[free.STEEPNESS] > 0.0:
+        angle = rotation[free.MOMENT] / rotation[free.STEEPNESS]
+        angle = min(max(angle, -_MOST_TURN_rad), _MOST_TURN_rad)
+        _swing(filters, rotation, angle, swing)
+        free.turn(pose, angle)
+
+
+@jit
+def _swing(filters: FloatArray, rotation: FloatArray, moved: float, swing: FloatArray) -> None:
+    """Advance a swing by a cycle in which its middle ψ has moved by an angle.
+
+    With lengths that follow ψ, the platform is turned from there by δ: I_s δ̈ = -κ δ - I ψ̈, less a
+    damping.
+    """
+    if rotation[free.STIFFNESS] <= 0.0:
+        return
+    omega = math.sqrt(rotation[free.STIFFNESS] / rotation[free.SWINGING])
+    drag = 2.0 * free.DAMPING_RATIO * omega * swing[SPINNING]
+    swing[SPINNING] -= filters[PERIOD] * (omega * omega * swing[SWUNG] + drag)
+    share = rotation[free.INERTIA] / rotation[free.SWINGING]
+    swing[SWUNG] += filters[PERIOD] * swing[SPINNING] - share * moved
+    swing[AMPLITUDE] = math.hypot(swing[SWUNG], swing[SPINNING] / omega)
+    swing[AMPLITUDE_m] = rotation[free.REACH] * swing[AMPLITUDE]

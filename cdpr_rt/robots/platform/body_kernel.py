@@ -26,13 +26,15 @@ def body_of(platform: Platform) -> FloatArray:
 
 
 @jit
-def write_mass_matrix(body: FloatArray, pose: FloatArray, room: FloatArray, M: FloatArray) -> None:
-    """Write M (6, 6) of twists at a pose (4, 3), and into `room` (4, 3) what it takes for it.
+def write_mass_matrix(
+    body: FloatArray, pose: FloatArray, scratch: FloatArray, M: FloatArray
+) -> None:
+    """Write M (6, 6) of twists at a pose (4, 3), and into `scratch` (4, 3) what it takes for it.
 
     M = [m 1, -m [r]×; m [r]×, I - m [r]×²] with r = Q c the centre of mass from the origin, and
-    I = Q I_c Q^T, which are `room[0]` and `room[1:]`.
+    I = Q I_c Q^T, which are `scratch[0]` and `scratch[1:]`.
     """
-    Q, r, about = pose[1:4], room[0], room[1:4]
+    Q, r, about = pose[1:4], scratch[0], scratch[1:4]
     m = body[MASS]
     for i in range(3):
         r[i] = 0.0
@@ -61,17 +63,17 @@ def write_mass_matrix(body: FloatArray, pose: FloatArray, room: FloatArray, M: F
 def write_wrench(
     body: FloatArray,
     M: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
     twist: FloatArray,
     acceleration: FloatArray,
     wrench: FloatArray,
 ) -> None:
     """Write the wrench (6,) of weight and inertia on a platform that moves so (Newton, Euler).
 
-    -(M a) - (m ω × (ω × r), r × that + ω × I ω) + (m g, r × m g), with M and `room` as
+    -(M a) - (m ω × (ω × r), r × that + ω × I ω) + (m g, r × m g), with M and `scratch` as
     `write_mass_matrix` leaves them.
     """
-    m, r, about = body[MASS], room[0], room[1:4]
+    m, r, about = body[MASS], scratch[0], scratch[1:4]
     wx, wy, wz = twist[3], twist[4], twist[5]
     along = wx * r[0] + wy * r[1] + wz * r[2]
     square = wx * wx + wy * wy + wz * wz

@@ -13,42 +13,38 @@ import numpy as np
 
 from cdpr_profiles import RobotAxis
 from cdpr_rt.control.compensation import Compensation
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.jit import bound
+from cdpr_rt.robots.free_rotation import SHAPING_s, rotation_of
 from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
-from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, CABLE_ROWS, RADIUS, run_cables
-from cdpr_rt.robots.kinematics.kinematics import PLANAR_POINT
+from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
-from cdpr_rt.robots.platform.loop_design import (
-    DAMPING_RATIO,
-    LoopGains,
-    OBSERVER_rad_s,
-    loop_model_of,
-)
+from cdpr_rt.robots.platform.cell_check import CellCheck, balance_doubt_N
+from cdpr_rt.robots.platform.cell_feedback import CellFeedback
+from cdpr_rt.robots.platform.control_rows import loop_settings, motor_rows, tracking_filters
+from cdpr_rt.robots.platform.loop_design import designed_loop
+from cdpr_rt.robots.platform.motor_learning import MotorLearning
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
-from cdpr_rt.robots.tension.tension_split import split
-from cdpr_rt.robots.workspace import SHARES
+from cdpr_rt.robots.tension.tension_split import OK, split
+from cdpr_rt.robots.workspace import SHARES, missing
 
-_REGULATOR_SHARE = 0.25
-_INTEGRAL_SHARE = 0.3
-_DEAD_m = 6e-5
-_BREAKING = 20.0
-_STUCK_m_s = 0.002
 _SETTLING_STEPS = 60
 _LIFT_S = 0.05
-_SHAPING_S = 0.06
+_MOST_LOOKS = 200
+"""At the contacts of a way, between two cycles."""
 
 
 class CableControl:
     """A controller whose set-point is a platform's: position, velocity, acceleration, (d,) each.
 
     See `PlatformControl`. The tensions that carry the platform are those of the method that its
-    file names; the loop's wrench goes on top. The gains are designed from the robot.
+    file names; the loop's wrench goes on top. The gains are designed from the robot. Of motors
+    that `compensation` does not know it learns friction and cogging, where it `learns`.
     """
 
     def __init__(
@@ -58,12 +54,14 @@ class CableControl:
         torque_Nm: FloatArray,
         period_s: float,
         compensation: Compensation | None = None,
+        *,
+        learns: bool = True,
     ) -> None:
         """Take what the motors may be asked for, `torque_Nm` (n,).
 
         Raises GeometryError for as many axes as the platform has not cables.
         """
-        n, d = model.kinematics.n, model.size
+        n = model.kinematics.n
         if len(axes) != n:
             raise GeometryError(f"{len(axes)} axes; allowed: {n}, one for each cable")
         self.model, self._period_s = model, period_s
@@ -74,68 +72,68 @@ class CableControl:
         """Between which the tensions are planned, (n,)."""
         self.least_N = model.low_N
         self.torque_Nm = np.array(torque_Nm, float)
-        self._setpoint, self._shaped = np.zeros((3, d)), np.zeros((3, d))
-        self.position, self.velocity, self.acceleration = self._setpoint
-        self.position[:] = model.home
-        self.shaped: FloatArray = self._shaped[0]
-        """The set-point's position as the control follows it: shaped, some cycles later, (d,)."""
-        self._past = np.zeros((max(1, round(_SHAPING_S / period_s)), 3, d))
-        self._place = 0
-        self._shape_anew()
+        self._begin_set_point()
         self.tension_N = np.array(self.low_N)
         self.outcome, self.share = 0, 1.0
-        self.effort_Nm, self.compensation_Nm = np.zeros(n), np.zeros(n)
+        self.effort_Nm, self.compensation_Nm, self.motor_loss_Nm = np.zeros((3, n))
+        self._limited = False
+        self.cogging_Nm = np.zeros(n) if compensation is None else compensation.cogging_Nm
         self.residual_m, self._apart_m_s = np.inf, 0.0
         self.estimated = np.array(model.home)
         """Where the platform is, (d,)."""
         self._compensation = compensation
-        self._motors = self._motor_rows(axes)
-        self.gains = loop_model_of(model, axes, period_s).design()
+        self._motors = motor_rows(model, axes)
+        self._motors[tracking.TENSION] = self.low_N
+        self.gains = designed_loop(model, axes, period_s).gains
         span_N = float((model.high_N - model.low_N).min())
-        self._settings = _settings(self.gains, span_N, period_s)
-        self._distribution = self._chosen_distribution()
-        self._bind(n, d)
+        self._settings = loop_settings(self.gains, span_N, period_s)
+        known = np.zeros(n, np.bool_) if compensation is None else compensation.available
+        self.learning: MotorLearning | None = None
+        """What is learnt of the motors that nothing is known of."""
+        if learns and not known.all():
+            scale, reserve_N = model.wrench_scale, model.reserve_N
+            self.learning = MotorLearning(axes, known, scale, reserve_N, period_s)
+        self._cells: CellFeedback | None = None
+        self._check = self._cell_check(axes)
+        moves = np.zeros((4, 6))
+        self._bind_pose(moves)
+        self._bind_force(moves)
+        self._bind_tensions()
 
-    def _chosen_distribution(self) -> TensionDistribution | None:
-        """Return the tension distribution of the robot's file; None for the split's own."""
-        method = self.model.platform.tension_distribution
-        if method == "minimum-deviation":
-            return None
-        scale = self.model.wrench_scale
-        return tension_distribution(method, self.low_N, self.high_N, scale)
+    def _begin_set_point(self) -> None:
+        self._setpoint, self._shaped = np.zeros((2, 3, self.model.size))
+        self.position, self.velocity, self.acceleration = self._setpoint
+        self.position[:] = self.model.home
+        self.shaped: FloatArray = self._shaped[0]
+        """The set-point's position as the control follows it: shaped, some cycles later, (d,)."""
+        cycles = max(1, round(SHAPING_s / self._period_s))
+        self._past, self._place = np.zeros((cycles, 3, self.model.size)), 0
+        self._shape_anew()
 
-    def _motor_rows(self, axes: Sequence[RobotAxis]) -> FloatArray:
-        platform = self.model.platform
-        rows = np.zeros((tracking.MOTOR_ROWS, len(axes)))
-        rows[tracking.M_PER_RAD] = [axis.winch.cable_m_per_motor_rad for axis in axes]
-        rows[tracking.INERTIA] = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
-        if platform.cable_model != "rigid":
-            rows[tracking.COMPLIANCE] = [1.0 / axis.winch.cable.stiffness_N for axis in axes]
-        if platform.cable_model == "catenary":
-            rows[tracking.WEIGHT] = [axis.winch.cable.weight_per_length_N_m for axis in axes]
-        rows[tracking.STRETCH] = 1.0
-        rows[tracking.TENSION] = self.low_N
-        return rows
+    def _cell_check(self, axes: Sequence[RobotAxis]) -> CellCheck:
+        model = self.model
+        cable_m = np.abs(self._motors[tracking.M_PER_RAD])
+        rated_N = np.array([axis.winch.motor.rated_torque_Nm for axis in axes]) / cable_m
+        names, scale = [axis.name for axis in axes], model.wrench_scale
+        weight_N = float(np.abs(model.weight()[: model.positions]).max())
+        doubt_N = balance_doubt_N(weight_N, model.positions - 1, scale)
+        return CellCheck(names, rated_N, doubt_N, scale, self._period_s)
 
-    def _bind(self, n: int, d: int) -> None:
-        """Fix the arrays of the kernels, which are compiled here."""
+    def _bind_pose(self, moves: FloatArray) -> None:
+        """Fix the arrays of the kernels that find the pose and follow it, which write `moves`."""
         model, kinematics, motors = self.model, self.model.kinematics, self._motors
-        self._up = np.eye(3)[model.positions - 1]
+        n, self._up = kinematics.n, np.eye(3)[model.positions - 1]
         self._directions = np.array(kinematics.directions)
         self._home, self._pose = model.home_pose, Pose(np.zeros(3))
         self._pose.array[:] = self._home.array
         self._wanted, self._to = Pose(np.zeros(3)), Pose(np.zeros(3))
         self._room3, self._cables = np.zeros((4, 3)), np.zeros((CABLE_ROWS, n))
-        filters = np.zeros(tracking.FILTERS)
-        filters[tracking.PERIOD], filters[tracking.OBSERVER] = self._period_s, OBSERVER_rad_s
-        filters[tracking.SMOOTHER] = self.gains.smoother_rad_s
-        filters[tracking.SMOOTH] = self.gains.smooth
-        moves, position = np.zeros((4, 6)), np.zeros(n)
-        anchors = kinematics.geometry[ANCHOR:RADIUS]
-        turns = kinematics.directions == PLANAR_POINT and bool(np.ptp(anchors, axis=1).any())
+        filters = tracking_filters(self.gains, self._period_s)
+        self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
         self._track = bound(
             tracking.track_pose, motors, filters, kinematics.geometry, self._up, self._pose.array,
-            self._cables, kinematics.solver, moves[3], turns, then=(position,),
+            self._cables, kinematics.solver, moves[3], rotation_of(model.platform), self._swing,
+            kinematics.turns_freely, then=(position,),
         )  # fmt: skip
         self._locate = bound(
             pose_setpoint.locate,
@@ -148,17 +146,35 @@ class CableControl:
             np.zeros((CABLE_ROWS, n)), moves[1], moves[2], moves[0],
             then=(position, position, position),
         )  # fmt: skip
+
+    def _bind_force(self, moves: FloatArray) -> None:
+        """Fix the arrays of the kernels that find the platform's force by its `moves` (4, 6)."""
+        model, motors = self.model, self._motors
+        n, d = model.kinematics.n, model.size
         self._state = np.zeros(2 * d + 1)
         self._W, self._wrench, self._force = np.zeros((d, n)), np.zeros(d), np.zeros(d)
-        self._carried, space = np.array(self.low_N), np.zeros((n + 1, n))
-        scale = model.wrench_scale
+        scratch, J = np.zeros((7, 7, 7)), np.zeros((n, d))
         self._correct = bound(
-            loop.correct, self._settings, self._state, scale, body_of(model.platform),
-            self._directions, self._cables, self._pose.array, moves, np.zeros((7, 7, 7)),
-            np.zeros((n, d)), self._W, self._wrench, self._force, then=(1.0, 1.0),
+            loop.correct, self._settings, self._state, model.wrench_scale, body_of(model.platform),
+            self._directions, self._cables, self._pose.array, moves, scratch,
+            J, self._W, self._wrench, self._force, then=(1.0, 1.0),
         )  # fmt: skip
+        if self.learning is not None:
+            self.learning.bind(
+                motors[tracking.THETA], motors[tracking.OMEGA], J, scratch[loop.MASS],
+                scratch[loop.TWIST_ERROR][:d], self._force, self.compensation_Nm,
+            )  # fmt: skip
+
+    def _bind_tensions(self) -> None:
+        """Fix the arrays of the kernels that have the cables exert the force, and the motors."""
+        model, motors, scale = self.model, self._motors, self.model.wrench_scale
+        n, d, method = model.kinematics.n, model.size, model.platform.tension_distribution
+        self._distribution: TensionDistribution | None = None  # the split's own
+        if method != "minimum-deviation":
+            self._distribution = tension_distribution(method, self.low_N, self.high_N, scale)
         plan, size = np.array([self.low_N, self.high_N]), max(n, 8)
-        self._slow = np.array(self.low_N)
+        self._slow, self._carried = plan[0].copy(), plan[0].copy()
+        space, position = np.zeros((n + 1, n)), np.zeros(n)
         self._split = bound(
             split, self._W, self._wrench, self._force, scale, plan, model.reserve_N,
             self._period_s / (self._period_s + _LIFT_S), self._distribution is not None,
@@ -171,7 +187,6 @@ class CableControl:
             space[1:], self.compensation_Nm, self.torque_Nm, self.effort_Nm,
             then=(0, position, position),
         )  # fmt: skip
-        self._seven = np.zeros(7)
 
     # -- Controller
 
@@ -183,6 +198,39 @@ class CableControl:
         self.share = 1.0
         if self._compensation is not None:
             self._compensation.reset()
+        if self.learning is not None:
+            self.learning.restart()
+        if self._cells is not None:
+            self._cells.restart(self.tension_N)
+
+    @property
+    def learnt_Nm(self) -> FloatArray | None:
+        """Friction and amplitude of the cogging that each motor was learnt to have, (2, n)."""
+        return None if self.learning is None else self.learning.learnt_Nm
+
+    def forget_motors(self) -> None:
+        """Forget what was learnt of the motors, as where their encoders have begun anew."""
+        if self.learning is not None:
+            self.learning.forget()
+
+    def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None:
+        """Hold the cables' tensions by readings (n,) that others keep up to date, where they hold.
+
+        Without a reading a motor is believed its torque constant, and what is known of it.
+        """
+        self._cells = CellFeedback(
+            tension_N, measured, self._motors[tracking.M_PER_RAD], self.model.reserve_N,
+            self._period_s, self._check, self._W, self._wrench,
+        )  # fmt: skip
+
+    @property
+    def cell_trouble(self) -> str:
+        """Which load cell is off and by how much; stays until `trust_cells`."""
+        return self._check.trouble
+
+    def trust_cells(self) -> None:
+        """Forget which load cell was off."""
+        self._check.clear()
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write torques and the axes' set-points for the platform's present set-point."""
@@ -190,13 +238,36 @@ class CableControl:
         self._place = self._shape(self._place, self._setpoint, self._shaped)
         slope = setpoint.acceleration_rad_s2
         self._refer(setpoint.position_rad, setpoint.velocity_rad_s, slope)
-        if self._compensation is not None:
-            self._compensation.torque(feedback, setpoint, self.compensation_Nm)
+        if self.learning is not None:
+            self.learning.learn(self._was_exerted())
         self._correct(self.share, self._apart_m_s)
+        self._make_up(feedback, setpoint)
         if self._distribution is not None:
             self._distribution.solve(self._W, self._wrench, self._carried)
         self.outcome, self.share, null_directions = self._split()
-        self._drive(null_directions, slope, torque_Nm)
+        self._limited = self._drive(null_directions, slope, torque_Nm)
+
+    def _was_exerted(self) -> bool:
+        """Return whether the last cycle's force was had from the cables, all of it."""
+        plausible = self._apart_m_s <= loop.PLAUSIBLE_m_s
+        return plausible and self.share >= 1.0 and self.outcome == OK and not self._limited
+
+    def _make_up(self, feedback: AxisFeedback, setpoint: Setpoint) -> None:
+        """Write the torques against what is known, or learnt, or measured of the motors."""
+        learning, cells, torque = self.learning, self._cells, self.compensation_Nm
+        if self._compensation is not None:
+            self._compensation.torque(feedback, setpoint, self.motor_loss_Nm)
+        torque[:] = self.motor_loss_Nm
+        if learning is not None:
+            learning.write(setpoint.velocity_rad_s)
+            torque += learning.torque_Nm
+        if cells is not None:
+            cells.update(self.tension_N)
+            torque += cells.torque_Nm
+
+    def clear_compensation(self) -> None:
+        """Have it said that nothing is added, while a program drives the winches itself."""
+        self.compensation_Nm[:] = self.motor_loss_Nm[:] = self.cogging_Nm[:] = 0.0
 
     # -- where the platform is
 
@@ -204,11 +275,12 @@ class CableControl:
         """Take the motors to stand where they are, and the platform where its cables have it."""
         motors = self._motors
         motors[tracking.THETA] = feedback.position_rad
-        motors[[tracking.OMEGA, tracking.LAGGING, tracking.CALM]] = 0.0
+        motors[[tracking.OMEGA, tracking.LOWPASSED_ONCE, tracking.LOWPASSED]] = 0.0
         motors[tracking.TENSION] = np.maximum(motors[tracking.TENSION], self.low_N)
         self._pose.array[:] = self._home.array
         for _ in range(_SETTLING_STEPS):
             self.observe(feedback)
+        self._swing[:] = 0.0
 
     def stand_still(self) -> None:
         """Have the set-point stand where the platform is."""
@@ -251,9 +323,8 @@ class CableControl:
     @property
     def free_lengths_m(self) -> FloatArray:
         """Lengths of the cables without tension, as the motors' angles have them, (n,)."""
-        motors = self._motors
-        turned = motors[tracking.M_PER_RAD] * motors[tracking.THETA]
-        return np.asarray(motors[tracking.AT_ZERO] + turned)
+        turned = self._motors[tracking.M_PER_RAD] * self._motors[tracking.THETA]
+        return np.asarray(self._motors[tracking.AT_ZERO] + turned)
 
     @property
     def pose(self) -> FloatArray:
@@ -261,16 +332,47 @@ class CableControl:
         pose_setpoint.write_quaternion(self._pose.array, self._seven)
         return self._seven
 
+    @property
+    def swing_rad(self) -> float:
+        """By how much a platform that no cable keeps from turning may swing to and fro; else 0."""
+        return float(self._swing[tracking.AMPLITUDE])
+
+    @property
+    def swing_m(self) -> float:
+        """By how much an anchor point of such a platform may swing to and fro; else 0."""
+        return float(self._swing[tracking.AMPLITUDE_m])
+
     # -- where it can be
 
     def missing(self) -> str:
         """Return why the last cycle's tensions are not feasible, an empty text where they are."""
-        return self._held.feasible(self._wanted) if self.outcome else ""
+        if not self.outcome:
+            return ""
+        return self._held.feasible(self._wanted) or self._missing_in_motion()
+
+    def _missing_in_motion(self) -> str:
+        """Return which cable limits the wanted motion where the platform could stand."""
+        W, low_N, high_N = self._W, self.low_N, self.high_N
+        needed_N = self._carried - np.linalg.pinv(W) @ (W @ self._carried + self._wrench)
+        margin_N = float(np.minimum(needed_N - low_N, high_N - needed_N).min())
+        return f"for this motion, {missing(margin_N, needed_N, low_N, high_N)}"
 
     def stands(self, position: FloatArray) -> bool:
         """Return whether the platform can be held, and accelerated, at a position (d,)."""
         self._turn_to(position)
         return self.workspace.stands(self._to)
+
+    def nears(self, position: FloatArray) -> int:
+        """Return a pair of things in contact on a short way from the set-point, -1 for none."""
+        return self._interference.nears(self.position, position)
+
+    def touches(self, position: FloatArray) -> int:
+        """Return a pair of things in contact at a position (d,), -1 for none."""
+        return self._interference.touches(self.position, position)
+
+    def contact(self, pair: int) -> str:
+        """Return in words that a pair is in contact."""
+        return self._interference.within_clearance(pair)
 
     def feasible(self, position: FloatArray) -> str:
         """Return why the platform cannot stand at a position (d,), an empty text where it can.
@@ -289,24 +391,12 @@ class CableControl:
         poses = self.model.poses((1.0 - share) * begin + share * np.asarray(position))
         obstacle = self.workspace.first_obstacle(poses)
         if obstacle is None:
-            contact = self._interference.first_contact(np.array([begin, position]))
+            contact = self._interference.first_contact(np.array([begin, position]), _MOST_LOOKS)
             return "" if contact is None else str(contact)
         there, why = obstacle
         place = ", ".join(f"{x:.3f}" for x in there.p[: self.model.positions])
         return f"at {place} m {why}"
 
     def _turn_to(self, position: FloatArray) -> None:
-        pose_setpoint.place(
-            position, self._directions, self._home.array, self._room3, self._to.array
-        )
-
-
-def _settings(gains: LoopGains, span_N: float, period_s: float) -> FloatArray:
-    row = np.zeros(loop.SETTINGS)
-    row[loop.PERIOD], row[loop.BANDWIDTH] = period_s, gains.bandwidth_rad_s
-    row[loop.DAMPING], row[loop.RATIO] = gains.damping_N_s_m, DAMPING_RATIO
-    row[loop.INTEGRAL], row[loop.LOOSE] = gains.integral_1_s, gains.loose_N_s_m
-    row[loop.ROTOR] = gains.rotor_kg
-    row[loop.REGULATOR_N], row[loop.MOST_N] = _REGULATOR_SHARE * span_N, _INTEGRAL_SHARE * span_N
-    row[loop.BREAKING], row[loop.STUCK], row[loop.DEAD] = _BREAKING, _STUCK_m_s, _DEAD_m
-    return row
+        home, room3 = self._home.array, self._room3
+        pose_setpoint.place(position, self._directions, home, room3, self._to.array)

@@ -21,12 +21,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles import RobotAxis
+from cdpr_profiles.platform import Platform
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
@@ -66,7 +68,7 @@ class LoopGains:
     """Share of the low-passed velocity in the velocity that is damped."""
     smoother_rad_s: float
     """Double pole of the low-pass."""
-    loose_N_s_m: float
+    null_damping_N_s_m: float
     """Damping of cables that pull against each other."""
     integral_share: float
     """Rate of the integral part over 2 ζ ω of the slowest mode, at most."""
@@ -159,8 +161,8 @@ class LoopModel:
     ) -> None:
         """Fill in λ (d,), and G (stiffness, frequencies, d, d) along the modes, at pose `i`."""
         pose, kinematics = model.pose(q), model.kinematics
-        M, room = np.zeros((6, 6)), np.zeros((4, 3))
-        write_mass_matrix(body_of(model.platform), pose.array, room, M)
+        M, scratch = np.zeros((6, 6)), np.zeros((4, 3))
+        write_mass_matrix(body_of(model.platform), pose.array, scratch, M)
         M_p = M[np.ix_(kinematics.directions, kinematics.directions)]
         J = kinematics.jacobian(pose)
         if np.linalg.matrix_rank(J) < J.shape[1]:
@@ -217,9 +219,9 @@ class LoopModel:
 
     def _keeps(self, gains: LoopGains) -> bool:
         damping, stiffness, _ = self._along_modes(gains)
-        room = np.zeros((2, *self._plants.shape[-2:]), complex)
+        scratch = np.zeros((2, *self._plants.shape[-2:]), complex)
         factors = self._factors(gains)
-        return keeps_margin(self._plants, *factors, damping, stiffness, LEAST_MARGIN, room)
+        return keeps_margin(self._plants, *factors, damping, stiffness, LEAST_MARGIN, scratch)
 
     def design(self) -> LoopGains:
         """Return the loop that overcomes friction the soonest of those that keep LEAST_MARGIN.
@@ -280,11 +282,44 @@ class LoopModel:
         return gains.integral_1_s * float(stiffness)
 
 
-def loop_model_of(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> LoopModel:
-    """Return the linear model of a robot with these axes, one for each of the n cables."""
+@dataclass(frozen=True)
+class DesignedLoop:
+    """The loop of a robot, and what it keeps at each of `design_poses`."""
+
+    gains: LoopGains
+    margins: tuple[LoopMargins, ...]
+
+    @property
+    def slowest_rad_s(self) -> float:
+        """Of the platform's modes in closed loop, at all poses."""
+        return min(there.slowest_rad_s for there in self.margins)
+
+
+@dataclass(frozen=True)
+class _Robot:
+    """What a loop is designed from; that of one robot is designed once."""
+
+    platform: Platform
+    rotors_kg: tuple[float, ...]
+    stiffness_N: tuple[float, ...]
+    period_s: float
+    model: PlatformModel = field(compare=False)
+
+
+def designed_loop(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> DesignedLoop:
+    """Return the loop of a robot with these axes, one for each of the n cables.
+
+    Raises GeometryError where the cables do not hold the platform.
+    """
     winches = [axis.winch for axis in axes]
-    rotors_kg = np.array(
-        [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
-    )
-    stiffness_N = np.array([w.cable.stiffness_N for w in winches])
-    return LoopModel(model, rotors_kg, stiffness_N, period_s)
+    rotors_kg = [w.motor.rotor_inertia_kg_m2 / w.cable_m_per_motor_rad**2 for w in winches]
+    stiffness_N = [w.cable.stiffness_N for w in winches]
+    return _designed(_Robot(model.platform, tuple(rotors_kg), tuple(stiffness_N), period_s, model))
+
+
+@lru_cache(maxsize=4)
+def _designed(robot: _Robot) -> DesignedLoop:
+    rotors_kg, stiffness_N = np.array(robot.rotors_kg), np.array(robot.stiffness_N)
+    loop = LoopModel(robot.model, rotors_kg, stiffness_N, robot.period_s)
+    gains = loop.design()
+    return DesignedLoop(gains, tuple(loop.margins(gains)))

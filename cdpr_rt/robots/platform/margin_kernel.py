@@ -19,16 +19,16 @@ def keeps_margin(
     damping: FloatArray,
     stiffness: FloatArray,
     least: float,
-    room: ComplexArray,
+    scratch: ComplexArray,
 ) -> bool:
     """Return whether no singular value of any return difference S = 1 + C G is below `least`.
 
     `plants` (m, k, f, d, d) are G at m poses with k stiffnesses, and C is diagonal: `of_speed`
     (f,) times `damping` (m, d) and `of_place` (f,) times `stiffness` (m, d). They are not while
-    S^H S - least² 1 has a Cholesky factor. `room` (2, d, d) is overwritten.
+    S^H S - least² 1 has a Cholesky factor. `scratch` (2, d, d) is overwritten.
     """
     m, k, f, d, _ = plants.shape
-    S, H = room[0], room[1]
+    S, H = scratch[0], scratch[1]
     for j in range(m):
         for i in range(k):
             for w in range(f):

@@ -22,7 +22,7 @@ import numpy as np
 
 from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.interference.contact_kernel import STEP, TURN, place_on
+from cdpr_rt.robots.interference.contact_kernel import STEP, TURN, place_on, size_of
 from cdpr_rt.robots.kinematics.cable_kernel import (
     ANCHOR,
     AXIS,
@@ -66,7 +66,7 @@ def held_until(
     d, n = scale.size, geometry.shape[1]
     cables, W, D = np.empty((CABLE_ROWS, n)), np.empty((d, n)), np.empty((6, n))
     space, scaled, side = np.zeros((n + 1, n)), np.empty((d, n + 1)), max(n, 8)
-    room, inverse, unit = np.zeros((4, side, side)), np.zeros((6, n)), np.zeros(d)
+    scratch, inverse, unit = np.zeros((4, side, side)), np.zeros((6, n)), np.zeros(d)
     carrying, left = np.zeros((wrenches.shape[0], n)), np.zeros((2, 2, 2))
     pose, twist, turns = np.empty((4, 3)), np.empty((2, 3)), np.empty((4, 3))
     share, looks = 0.0, 0
@@ -78,12 +78,12 @@ def held_until(
         for k in range(d):
             for i in range(n):
                 W[k, i] = -cables[chosen[k], i]
-        if null_space(W, wrenches[0], scale, bounds, scaled, space, room) < d:
+        if null_space(W, wrenches[0], scale, bounds, scaled, space, scratch) < d:
             break
         for k in range(d):
             unit[:] = 0.0
             unit[k] = -1.0
-            other_wrench(unit, scale, scaled, room, inverse[chosen[k]])
+            other_wrench(unit, scale, scaled, scratch, inverse[chosen[k]])
         for j in range(wrenches.shape[0]):
             for i in range(n):
                 carrying[j, i] = 0.0
@@ -130,18 +130,12 @@ def _write_changes(
     h over a length l the direction u changes by v/l, and its change by h/l + 3 v²/l². Over a pulley
     beside whose axis the anchor is by e only a first bound is taken, v/l + v/e.
     """
-    step, turn = 0.0, 0.0
-    for k in range(3):
-        step += way[STEP, k] ** 2
-        turn += way[TURN, k] ** 2
-    step, turn = math.sqrt(step), math.sqrt(turn)
+    step, turn = size_of(way[STEP]), size_of(way[TURN])
     left[:] = 0.0
     reach = math.inf
-    vx, vy, vz = twist[0, 0], twist[0, 1], twist[0, 2]
-    wx, wy, wz = twist[1, 0], twist[1, 1], twist[1, 2]
     for i in range(geometry.shape[1]):
         bx, by, bz = geometry[ANCHOR, i], geometry[ANCHOR + 1, i], geometry[ANCHOR + 2, i]
-        arm = math.sqrt(bx * bx + by * by + bz * bz)
+        arm = size_of(geometry[ANCHOR : ANCHOR + 3, i])
         whole = math.sqrt((bx + centre[0]) ** 2 + (by + centre[1]) ** 2 + (bz + centre[2]) ** 2)
         speed, bend, free = step + turn * whole, turn * turn * whole, cables[FREE, i]
         radius, first, second = geometry[RADIUS, i], 0.0, 0.0
@@ -154,23 +148,7 @@ def _write_changes(
             first_moment, second_moment = arm * (turn + first), 0.0
         else:
             reach = min(reach, _SHARE_OF_LENGTH * free / (speed + TINY))
-            rx = pose[1, 0] * bx + pose[1, 1] * by + pose[1, 2] * bz
-            ry = pose[2, 0] * bx + pose[2, 1] * by + pose[2, 2] * bz
-            rz = pose[3, 0] * bx + pose[3, 1] * by + pose[3, 2] * bz
-            mx, my, mz = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
-            ux, uy, uz = cables[0, i], cables[1, i], cables[2, i]
-            cx, cy, cz = vx + mx, vy + my, vz + mz
-            speed = min(speed, math.sqrt(cx * cx + cy * cy + cz * cz) + bend)
-            along = ux * cx + uy * cy + uz * cz
-            cx, cy, cz = (
-                (cx - along * ux) / free,
-                (cy - along * uy) / free,
-                (cz - along * uz) / free,
-            )
-            D[0, i], D[1, i], D[2, i] = -cx, -cy, -cz
-            D[3, i] = -(my * uz - mz * uy + ry * cz - rz * cy)
-            D[4, i] = -(mz * ux - mx * uz + rz * cx - rx * cz)
-            D[5, i] = -(mx * uy - my * ux + rx * cy - ry * cx)
+            speed = min(speed, _write_derivative(geometry, pose, twist, cables, i, D) + bend)
             rate = _CLOSER * speed / free
             second = _CLOSER * bend / free + 3.0 * rate * rate
             first_moment, second_moment = 0.0, arm * (turn * turn + 2.0 * turn * rate + second)
@@ -181,6 +159,34 @@ def _write_changes(
             left[_MOMENT, 0, k] += first_moment * tension
             left[_MOMENT, 1, k] += second_moment * tension
     return reach
+
+
+@jit
+def _write_derivative(
+    geometry: FloatArray,
+    pose: FloatArray,
+    twist: FloatArray,
+    cables: FloatArray,
+    i: int,
+    D: FloatArray,
+) -> float:
+    """Write the column of `D` of a cable without a pulley; return its anchor's speed."""
+    bx, by, bz = geometry[ANCHOR, i], geometry[ANCHOR + 1, i], geometry[ANCHOR + 2, i]
+    wx, wy, wz = twist[1, 0], twist[1, 1], twist[1, 2]
+    rx = pose[1, 0] * bx + pose[1, 1] * by + pose[1, 2] * bz
+    ry = pose[2, 0] * bx + pose[2, 1] * by + pose[2, 2] * bz
+    rz = pose[3, 0] * bx + pose[3, 1] * by + pose[3, 2] * bz
+    mx, my, mz = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
+    ux, uy, uz, free = cables[0, i], cables[1, i], cables[2, i], cables[FREE, i]
+    cx, cy, cz = twist[0, 0] + mx, twist[0, 1] + my, twist[0, 2] + mz
+    speed = math.sqrt(cx * cx + cy * cy + cz * cz)
+    along = ux * cx + uy * cy + uz * cz
+    cx, cy, cz = (cx - along * ux) / free, (cy - along * uy) / free, (cz - along * uz) / free
+    D[0, i], D[1, i], D[2, i] = -cx, -cy, -cz
+    D[3, i] = -(my * uz - mz * uy + ry * cz - rz * cy)
+    D[4, i] = -(mz * ux - mx * uz + rz * cx - rx * cz)
+    D[5, i] = -(mx * uy - my * ux + rx * cy - ry * cx)
+    return speed
 
 
 @jit

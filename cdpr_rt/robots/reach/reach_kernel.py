@@ -8,6 +8,7 @@ from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.interference.contact_kernel import (
     BASE,
+    MOST_LOOKS,
     START,
     STEP,
     TURNED,
@@ -53,7 +54,9 @@ def reach_all(
             if chosen[k] > 2:
                 row, column = TURNED, chosen[k] - 3
             way[row, column], way[row + STEP, column] = start[k], ends[j, k] - start[k]
-        touches, pair, _ = first_contact(geometry, boxes, pairs, clearance, trim, way)
+        touches, pair, _, _ = first_contact(
+            geometry, boxes, pairs, clearance, trim, way, MOST_LOOKS
+        )
         until = min(touches, 1.0)
         why[j] = WHOLE if pair < 0 else CONTACT
         shares[j], _ = held_until(

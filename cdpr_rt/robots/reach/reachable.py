@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.reach.reach_kernel import CONTACT, NOT_HELD, WHOLE, reach_all
@@ -31,7 +31,7 @@ class Reached:
     cut_by_contact: int
     cut_by_tensions: int
     outside: int
-    """Of those cut, how many ended outside the box of targets, and are left out."""
+    """How many ended outside the box of targets, or down on the stand, and are left out."""
 
 
 class Reach:
@@ -117,8 +117,21 @@ class Reach:
             positions[:, k:] = turns * rng.uniform(0.0, 1.0, (m, 1)) ** (1.0 / (d - k))
         return positions
 
-    def _is_target(self, positions: FloatArray) -> FloatArray:
+    def _is_target(self, positions: FloatArray) -> BoolArray:
         platform, k = self.model.platform, self.model.positions
         low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
         inside = (positions[:, :k] >= low) & (positions[:, :k] <= high)
-        return np.asarray(inside.all(axis=1))
+        return np.asarray(inside.all(axis=1)) & self._clears_stand(positions)
+
+    def _clears_stand(self, positions: FloatArray) -> BoolArray:
+        """Return whether a platform that stands at home, under its targets, stays above that.
+
+        Its underside is that of the box around its anchor points, which turning brings lower.
+        """
+        model, up = self.model, self.model.positions - 1
+        platform = model.platform
+        if platform.workspace_min_m[up] < platform.home_m[up]:
+            return np.ones(len(positions), bool)
+        poses = np.concatenate([model.home_pose.array[None], model.poses(positions)])
+        under_m = (poses[:, 0, up, None] + poses[:, 1 + up] @ model.corners.T).min(axis=1)
+        return np.asarray(under_m[1:] >= under_m[0] + platform.clearance_m)

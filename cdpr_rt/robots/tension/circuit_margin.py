@@ -40,25 +40,25 @@ def write_circuit_margins(
     carrying: FloatArray,
     space: FloatArray,
     scaled: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Write the margins (m,) of m poses: of the worst wrench, N, -inf without a rank of d.
 
     `matrices` (m, d, n) are the W, n at most d + 2. `wrenches` (k, d) has w_0 of one or several
     sets of wrenches first and the g_k that all of them share, `generators` many, last. A margin
     that is found to be below `least` may be less still: nothing more is looked for then.
-    `carrying` (k, n), `space` (n + 1, n), `scaled` (d, n + 1) and `room` as of `null_space` are
+    `carrying` (k, n), `space` (n + 1, n), `scaled` (d, n + 1) and `scratch` as of `null_space` are
     overwritten.
     """
     d, n = scale.size, bounds.shape[1]
     for j in range(margins.size):
-        rank = null_space(matrices[j], wrenches[0], scale, bounds, scaled, space, room)
+        rank = null_space(matrices[j], wrenches[0], scale, bounds, scaled, space, scratch)
         if rank < d:
             margins[j] = -math.inf
             continue
         carrying[0] = space[0]
         for k in range(1, wrenches.shape[0]):
-            other_wrench(wrenches[k], scale, scaled, room, carrying[k])
+            other_wrench(wrenches[k], scale, scaled, scratch, carrying[k])
         margins[j] = circuit_margin(space, n - d, bounds, carrying, generators, least)
 
 

@@ -8,7 +8,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.jit import jit
 
 CARRIED = 1 << 30
-"""What `settle` returns where nothing of the wrench is missing: no cable's number."""
+"""What `nearest_wrench` returns where nothing of the wrench is missing: no cable's number."""
 _ROUNDING = 1e-9
 """Share of the terms of a wrench that may be missing of it."""
 _INDEPENDENT = 1e-9
@@ -16,29 +16,29 @@ _INDEPENDENT = 1e-9
 
 
 @jit
-def settle(
+def nearest_wrench(
     scaled: FloatArray,
     bounds: FloatArray,
     scale: FloatArray,
     found: bool,
     t: FloatArray,
     missing: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> int:
     """Check the tensions `t` (n,), or replace them by the ones of which A t is nearest to b.
 
     `scaled` = [A b] (d, n + 1), A = W/scale and b = -w_e/scale, is that of `null_space`, as are the
     `bounds` (3, n). Where `found` `t` is taken but for what rounding has put outside its bounds,
     else it is where to begin: cables between their bounds are those that may prove free. Writes
-    `missing` = -(W t + w_e) (d,). `room` (4, m, m), m >= n and 8, is overwritten. Returns CARRIED
-    or, where the wrench is not, the bound that limits most: moved by 1 N it would bring A t nearest
-    to b. i + 1 is cable i's upper one, -i - 1 its lower one, 0 none.
+    `missing` = -(W t + w_e) (d,). `scratch` (4, m, m), m >= n and 8, is overwritten. Returns
+    CARRIED or, where the wrench is not, the bound that limits most: moved by 1 N it would
+    bring A t nearest to b. i + 1 is cable i's upper one, -i - 1 its lower one, 0 none.
     """
     d, n = missing.size, t.size
     for i in range(n):
         t[i] = min(max(t[i], bounds[0, i]), bounds[1, i])
     if not found:
-        _nearest(scaled, bounds, t, missing, room)
+        _bounded_least_squares(scaled, bounds, t, missing, scratch)
     distance = _missing(scaled, t, missing)
     size = 0.0
     for k in range(d):
@@ -49,7 +49,7 @@ def settle(
     if distance > most:
         limit = 0
         for i in range(n):
-            pull = _pull(scaled, missing, i)
+            pull = _gradient(scaled, missing, i)
             at_high, at_low = t[i] >= bounds[1, i], t[i] <= bounds[0, i]
             if (pull > most and at_high) or (-pull > most and at_low):
                 limit, most = (i + 1 if pull > 0.0 else -i - 1), abs(pull)
@@ -71,7 +71,7 @@ def _missing(scaled: FloatArray, t: FloatArray, missing: FloatArray) -> float:
 
 
 @jit
-def _pull(scaled: FloatArray, missing: FloatArray, i: int) -> float:
+def _gradient(scaled: FloatArray, missing: FloatArray, i: int) -> float:
     """Return a'(b - A t), a the column of cable `i`."""
     pull = 0.0
     for k in range(missing.size):
@@ -80,43 +80,43 @@ def _pull(scaled: FloatArray, missing: FloatArray, i: int) -> float:
 
 
 @jit
-def _nearest(
-    scaled: FloatArray, bounds: FloatArray, t: FloatArray, missing: FloatArray, room: FloatArray
+def _bounded_least_squares(
+    scaled: FloatArray, bounds: FloatArray, t: FloatArray, missing: FloatArray, scratch: FloatArray
 ) -> None:
     """Move `t`, within its bounds, to the t within them of the least |A t - b|.
 
     The active set of Lawson and Hanson (1974) with two bounds (Stark and Parker, 1995): the cable
     whose tension wants off its bound most is let free; the free ones take the least-squares
     solution, or as much of the way to it as their bounds allow, which stops one of them again.
-    |A t - b| falls strictly, so no set of free cables comes twice. In `room`: rows of [0] an
+    |A t - b| falls strictly, so no set of free cables comes twice. In `scratch`: rows of [0] an
     orthonormal basis Q of the free columns, [1] the U by which they are Q U, [2] vectors: which
     cables are free, which are barred from it, how long their columns are, steps.
     """
     d, n = missing.size, t.size
-    free, barred, length = room[2, 0], room[2, 1], room[2, 2]
+    free, barred, length = scratch[2, 0], scratch[2, 1], scratch[2, 2]
     for i in range(n):
         square = 0.0
         for k in range(d):
             square += scaled[k, i] * scaled[k, i]
         length[i] = math.sqrt(square)
         barred[i] = 1.0 if bounds[0, i] == bounds[1, i] else 0.0
-    count = _guess(scaled, bounds, t, missing, room)
+    count = _free_at_start(scaled, bounds, t, missing, scratch)
     for _ in range(10 * n):
         least = _ROUNDING * _missing(scaled, t, missing)
         cable, most = -1, 0.0
         for i in range(n):
             at_low, at_high = t[i] <= bounds[0, i], t[i] >= bounds[1, i]
             if barred[i] == 0.0 and (at_low or at_high):
-                pull = _pull(scaled, missing, i)
+                pull = _gradient(scaled, missing, i)
                 wants = pull if at_low else -pull
                 if wants > least * length[i] and wants > most * length[i]:
                     cable, most = i, wants / length[i]
         if cable < 0 or count == d:
             return
         was = t[cable]
-        if _append(scaled, cable, count, d, room):
+        if _append(scaled, cable, count, d, scratch):
             free[count] = cable
-            count = _go(scaled, bounds, t, missing, count + 1, room)
+            count = _step_towards(scaled, bounds, t, missing, count + 1, scratch)
         if t[cable] == was:  # rounding: it is no way off after all
             barred[cable] = 1.0
         else:
@@ -125,25 +125,25 @@ def _nearest(
 
 
 @jit
-def _guess(
-    scaled: FloatArray, bounds: FloatArray, t: FloatArray, missing: FloatArray, room: FloatArray
+def _free_at_start(
+    scaled: FloatArray, bounds: FloatArray, t: FloatArray, missing: FloatArray, scratch: FloatArray
 ) -> int:
     """Let the cables between their bounds free and stop all at once that do not stay there.
 
     Repeated with those that are left until all of them do. Returns how many are free.
     """
-    d, free, step = missing.size, room[2, 0], room[2, 3]
+    d, free, step = missing.size, scratch[2, 0], scratch[2, 3]
     while True:
         count, stopped = 0, False
         for i in range(t.size):
             if bounds[0, i] < t[i] < bounds[1, i]:
-                if count < d and _append(scaled, i, count, d, room):
+                if count < d and _append(scaled, i, count, d, scratch):
                     free[count] = i
                     count += 1
                 else:
                     t[i] = bounds[0, i]
         _missing(scaled, t, missing)
-        _least_squares(missing, count, room)
+        _least_squares(missing, count, scratch)
         for j in range(count):
             i = int(free[j])
             t[i] = min(max(t[i] + step[j], bounds[0, i]), bounds[1, i])
@@ -153,10 +153,10 @@ def _guess(
 
 
 @jit
-def _append(scaled: FloatArray, cable: int, count: int, d: int, room: FloatArray) -> bool:
+def _append(scaled: FloatArray, cable: int, count: int, d: int, scratch: FloatArray) -> bool:
     """Add a cable's column to the factors Q U of `count` others; False where it depends on them."""
-    Q, U = room[0], room[1]
-    before = room[2, 2, cable]
+    Q, U = scratch[0], scratch[1]
+    before = scratch[2, 2, cable]
     for k in range(d):
         Q[count, k] = scaled[k, cable]
     for m in range(count):
@@ -186,18 +186,18 @@ def _append(scaled: FloatArray, cable: int, count: int, d: int, room: FloatArray
 
 
 @jit
-def _go(
+def _step_towards(
     scaled: FloatArray,
     bounds: FloatArray,
     t: FloatArray,
     missing: FloatArray,
     count: int,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> int:
     """Move the free tensions to their least-squares solution within bounds; return how many are."""
-    free, step, d = room[2, 0], room[2, 3], missing.size
+    free, step, d = scratch[2, 0], scratch[2, 3], missing.size
     while count > 0:
-        _least_squares(missing, count, room)
+        _least_squares(missing, count, scratch)
         share, stopped = 1.0, -1
         for j in range(count):
             i = int(free[j])
@@ -213,15 +213,15 @@ def _go(
         count -= 1
         for j in range(stopped, count):
             free[j] = free[j + 1]
-            _append(scaled, int(free[j]), j, d, room)
+            _append(scaled, int(free[j]), j, d, scratch)
         _missing(scaled, t, missing)
     return count
 
 
 @jit
-def _least_squares(missing: FloatArray, count: int, room: FloatArray) -> None:
+def _least_squares(missing: FloatArray, count: int, scratch: FloatArray) -> None:
     """Write the steps of the free tensions to their least-squares solution: U step = Q'missing."""
-    Q, U, step = room[0], room[1], room[2, 3]
+    Q, U, step = scratch[0], scratch[1], scratch[2, 3]
     for j in range(count - 1, -1, -1):
         step[j] = 0.0
         for k in range(missing.size):

@@ -27,27 +27,27 @@ def null_space(
     bounds: FloatArray,
     scaled: FloatArray,
     space: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> int:
     """Write the tensions that carry a wrench: `space` (n + 1, n), t0 first, then the rows of N.
 
     t0 has the least norm; n - rank rows of N are valid. Rows of W t = -w_e are divided by `scale`
     (d,): A = W/scale and b = -w_e/scale are written as `scaled` = [A b] (d, n + 1). Where W has not
     full rank, t0 carries of the wrench what can be carried, by least squares in the scaled norm.
-    `room` (4, m, m), m >= n and 8, is overwritten. Returns the rank, or -1 where W, w_e or `bounds`
-    (3, n), the lower and upper ones and the wanted tensions, is not finite or of another size, or
-    where a lower bound is above its upper one.
+    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns the rank, or -1 where W, w_e or
+    `bounds` (3, n), the lower and upper ones and the wanted tensions, is not finite or of
+    another size, or where a lower bound is above its upper one.
     """
     n = space.shape[1]
     d = scale.size
     if W.shape != (d, n) or w_e.size != d or not _scale(W, w_e, scale, bounds, scaled):
         return -1
-    M, R, order, z = room[0], room[1], room[2, 0], room[2, 1]
-    rank = _factor(scaled, d, n, M, R, order, room[2, 2])
+    M, R, order, z = scratch[0], scratch[1], scratch[2, 0], scratch[2, 1]
+    rank = _factor(scaled, d, n, M, R, order, scratch[2, 2])
     if rank == d:
         _solve(R, order, scaled[:, n], z)
     else:
-        _least_squares(R, order, scaled[:, n], rank, z, room[3])
+        _least_squares(R, order, scaled[:, n], rank, z, scratch[3])
     for j in range(n - rank + 1):  # Q (z, 0) and Q's last columns
         for i in range(n):
             space[j, i] = 0.0 if j > 0 or i >= rank else z[i]
@@ -68,43 +68,43 @@ def null_spaces(
     particular: FloatArray,
     null_directions: IntArray,
     scaled: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Write the tensions that carry each of k wrenches (k, d) at each of m poses.
 
     `matrices` (m, d, n) are the W of the poses; `spaces` (m, n + 1, n) as of `null_space` for the
     first wrench, `particular` (m, k, n) the t0 of every one, `null_directions` (m,) how many there
-    are, -1 where W is not finite or has not full rank. `scaled` (d, n + 1) and `room` are
+    are, -1 where W is not finite or has not full rank. `scaled` (d, n + 1) and `scratch` are
     overwritten.
     """
     m, d, n = matrices.shape
     for j in range(m):
-        rank = null_space(matrices[j], wrenches[0], scale, bounds, scaled, spaces[j], room)
+        rank = null_space(matrices[j], wrenches[0], scale, bounds, scaled, spaces[j], scratch)
         null_directions[j] = n - rank if rank == d else -1
         if rank < d:
             continue
         particular[j, 0] = spaces[j, 0]
         for k in range(1, wrenches.shape[0]):
-            other_wrench(wrenches[k], scale, scaled, room, particular[j, k])
+            other_wrench(wrenches[k], scale, scaled, scratch, particular[j, k])
 
 
 @jit
 def other_wrench(
-    w_e: FloatArray, scale: FloatArray, scaled: FloatArray, room: FloatArray, t0: FloatArray
+    w_e: FloatArray, scale: FloatArray, scaled: FloatArray, scratch: FloatArray, t0: FloatArray
 ) -> None:
     """Write the `t0` (n,) of another wrench (d,) right after `null_space`, where W has full rank.
 
-    `scaled` and `room` are those of that call; the wrench's column of `scaled` is overwritten.
+    `scaled` and `scratch` are those of that call; the wrench's column of `scaled` is overwritten.
     """
     d, n = scale.size, t0.size
     for i in range(d):
         scaled[i, n] = -w_e[i] / scale[i]
-    z = room[2, 1]
-    _solve(room[1], room[2, 0], scaled[:, n], z)
+    z = scratch[2, 1]
+    _solve(scratch[1], scratch[2, 0], scaled[:, n], z)
     for i in range(n):
         t0[i] = z[i] if i < d else 0.0
     for i in range(d - 1, -1, -1):
-        _reflect(room[0], i, n, t0)
+        _reflect(scratch[0], i, n, t0)
 
 
 @jit

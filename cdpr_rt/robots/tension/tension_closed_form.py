@@ -13,17 +13,17 @@ def closed_form(
     r: int,
     bounds: FloatArray,
     t: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> bool:
     """Write the tensions t_m - W^+(w_e + W t_m) (n,) nearest to wanted ones t_m.
 
     While one is outside its bounds, the one furthest outside is put on the bound and the others are
     computed anew, until none of the `r` null directions of `space` (n + 1, n) is left, which is
-    that of `null_space`, as are `bounds` (3, n). `room` (4, m, m), m >= n and 8, is overwritten.
+    that of `null_space`, as are `bounds` (3, n). `scratch` (4, m, m), m >= n and 8, is overwritten.
     Returns False where that leads to no tensions within bounds, which does not prove that there are
     none.
     """
-    Q, x, column, c, free = room[0], room[1, 0], room[1, 1], room[1, 2], room[1, 3]
+    Q, x, column, c, free = scratch[0], scratch[1, 0], scratch[1, 1], scratch[1, 2], scratch[1, 3]
     tolerance = start(space, r, bounds, x)
     for fixed in range(r + 1):
         cable, violation = furthest_outside(space, r, bounds, x, t, tolerance)

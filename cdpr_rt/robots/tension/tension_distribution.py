@@ -14,7 +14,7 @@ import numpy as np
 from cdpr_profiles.platform import TENSION_METHODS
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import ControlError
-from cdpr_rt.robots.tension.nearest_wrench import CARRIED, settle
+from cdpr_rt.robots.tension.nearest_wrench import CARRIED, nearest_wrench
 from cdpr_rt.robots.tension.null_space import null_space
 from cdpr_rt.robots.tension.tension_closed_form import closed_form
 from cdpr_rt.robots.tension.tension_polygon import CENTROID, ONE_NORM, TWO_NORM, choose
@@ -77,8 +77,8 @@ class TensionDistribution(ABC):
         if not (self.low <= self.high).all():
             i = int(np.argmax(self.low > self.high))
             raise TensionError(
-                f"cable {i}: tension bounds {self.low[i]:g} to {self.high[i]:g} N; allowed: the "
-                "lower one not above the upper one"
+                f"cable {i + 1}: tension bounds {self.low[i]:g} to {self.high[i]:g} N; allowed: "
+                "the lower one not above the upper one"
             )
         if not (self.wrench_scale > 0.0).all():
             raise TensionError(f"wrench_scale {self.wrench_scale}; allowed: above 0")
@@ -103,7 +103,7 @@ class TensionDistribution(ABC):
         if rank < 0:
             return _REFUSED
         outcome = self._choose(self._cables - rank, t_out)
-        self._limit = settle(
+        self._limit = nearest_wrench(
             self._scaled, self._bounds, self.wrench_scale,
             outcome is not _NEAREST, t_out, self.missing, self._room,
         )  # fmt: skip

@@ -28,20 +28,20 @@ def choose(
     bounds: FloatArray,
     point: int,
     t: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> bool:
     """Replace `t` (n,), any tensions within bounds, by those at a point of the polygon.
 
     `space` (n + 1, n) is that of `null_space` with `r` null directions, as are `bounds` (3, n).
-    `room` (4, m, m), m >= n and 8, is overwritten. Returns False, and leaves `t`, where r is above
-    2.
+    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns False, and leaves `t`, where r is
+    above 2.
     """
     n = space.shape[1]
     if r > 2:
         return False
     if r == 0:
         return True
-    x, chosen = room[0, 0], room[0, 1]
+    x, chosen = scratch[0, 0], scratch[0, 1]
     x[0] = x[1] = chosen[1] = 0.0
     for k in range(r):
         for i in range(n):
@@ -49,8 +49,8 @@ def choose(
     if r == 1:
         chosen[0] = _of_segment(space, bounds, point)
     else:
-        size = room.shape[1] ** 2
-        X, Y, entered = room[1].reshape(size), room[2].reshape(size), room[3].reshape(size)
+        size = scratch.shape[1] ** 2
+        X, Y, entered = scratch[1].reshape(size), scratch[2].reshape(size), scratch[3].reshape(size)
         first, last = _walk(space, bounds, x, X, Y, entered)
         chosen[:2] = x[:2]
         if last > first:

@@ -26,18 +26,19 @@ def project(
     r: int,
     bounds: FloatArray,
     t: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> bool:
     """Write the tensions t = t0 + N' lambda (n,) within bounds nearest to the wanted ones.
 
     `space` (n + 1, n) is that of `null_space` with `r` null directions, as are `bounds` (3, n).
-    `room` (4, m, m), m >= n and 8, is overwritten. Returns False where there are none: those cables
-    are at their bounds then whose bounds contradict each other, and all others between theirs.
+    `scratch` (4, m, m), m >= n and 8, is overwritten. Returns False where there are none: those
+    cables are at their bounds then whose bounds contradict each other, and all others between
+    theirs.
     """
-    cable, active = _search(space, r, bounds, t, room)
+    cable, active = _search(space, r, bounds, t, scratch)
     if cable < 0:
         return True
-    _contradict(t, bounds, cable, active, room[3, 4], room[3, 7])
+    _contradict(t, bounds, cable, active, scratch[3, 4], scratch[3, 7])
     return False
 
 
@@ -51,7 +52,7 @@ def write_margins(
     margins: FloatArray,
     tensions: FloatArray,
     shrunk: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> None:
     """Write how far tensions can stay from all their bounds, at m poses under k wrenches each.
 
@@ -59,7 +60,7 @@ def write_margins(
     `null_spaces`, `bounds` (3, n) as of `project`. `margins` (m,) are those of the worst wrench, at
     the most `most`, N: below zero by how much some tension must be outside, -inf where the cables
     cannot hold one direction. `tensions` (m, n) are that wrench's, with that margin. `shrunk`
-    (3, n) and `room` (4, l, l), l >= n and 8, are overwritten.
+    (3, n) and `scratch` (4, l, l), l >= n and 8, are overwritten.
     """
     n = spaces.shape[2]
     for j in range(margins.size):
@@ -73,7 +74,7 @@ def write_margins(
             for i in range(n):
                 spaces[j, 0, i] = particular[j, k, i]
             margin = _margin(
-                spaces[j], null_directions[j], bounds, margins[j], tensions[j], shrunk, room,
+                spaces[j], null_directions[j], bounds, margins[j], tensions[j], shrunk, scratch,
                 k == 0,
             )  # fmt: skip
             margins[j] = min(margins[j], margin)
@@ -87,15 +88,13 @@ def _margin(
     most: float,
     t: FloatArray,
     shrunk: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
     written: bool,
 ) -> float:
     """Return the greatest margin up to `most` to all bounds, and write tensions (n,) that have it.
 
-    Tensions are written where the margin is less than `most`, or `written`. Bounds that contradict
-    each other when they are moved inward by a margin give, by the weights y with which they do, a
-    least upper bound of margins: sum of y_i (e_i + margin) = 0, e_i being how far inside t0 bound i
-    lies. From above, each of them is a vertex of the dual, of which there are finitely many.
+    Tensions are written where the margin is less than `most`, or `written`. Margins are tried from
+    above, each a vertex of the dual, of which there are finitely many.
     """
     n = space.shape[1]
     found, margin = shrunk[3], most
@@ -105,28 +104,11 @@ def _margin(
     while True:
         for i in range(n):
             shrunk[0, i], shrunk[1, i] = bounds[0, i] + margin, bounds[1, i] - margin
-        cable, active = _search(space, r, shrunk, found, room)
+        cable, active = _search(space, r, shrunk, found, scratch)
         if cable < 0:
             break
-        below = found[cable] < shrunk[0, cable]
-        side = 1.0 if below else -1.0
-        length = 0.0
-        for k in range(r):
-            length += space[1 + k, cable] ** 2
-        weight = 1.0 / math.sqrt(length) if active > 0 else 1.0
-        total = weight
-        error = weight * side * (bounds[0 if below else 1, cable] - space[0, cable])
-        for j in range(active):
-            i = int(room[3, 7, j])
-            along, length = 0.0, 0.0
-            for k in range(r):
-                along += room[0, k, j] * space[1 + k, i]
-                length += space[1 + k, i] ** 2
-            weight = max(-room[3, 4, j], 0.0) / math.sqrt(length)
-            side = 1.0 if along > 0.0 else -1.0
-            total += weight
-            error += weight * side * (bounds[0 if side > 0.0 else 1, i] - space[0, i])
-        before, margin = margin, -error / total
+        side = 1.0 if found[cable] < shrunk[0, cable] else -1.0
+        before, margin = margin, _most_margin(space, r, bounds, cable, side, active, scratch)
         if not margin < before:  # by less than rounding
             margin = before
             break
@@ -137,16 +119,52 @@ def _margin(
 
 
 @jit
+def _most_margin(
+    space: FloatArray,
+    r: int,
+    bounds: FloatArray,
+    cable: int,
+    side: float,
+    active: int,
+    scratch: FloatArray,
+) -> float:
+    """Return the greatest margin that bounds leave which contradict each other, moved inward by it.
+
+    They are those of `_search`, the `cable`'s that is below (`side` 1.0) or above (-1.0) among
+    them. By the weights y with which they do, sum of y_i (e_i + margin) = 0, e_i being how far
+    inside t0 bound i lies.
+    """
+    length = 0.0
+    for k in range(r):
+        length += space[1 + k, cable] ** 2
+    weight = 1.0 / math.sqrt(length) if active > 0 else 1.0
+    total = weight
+    error = weight * side * (bounds[0 if side > 0.0 else 1, cable] - space[0, cable])
+    for j in range(active):
+        i = int(scratch[3, 7, j])
+        along, length = 0.0, 0.0
+        for k in range(r):
+            along += scratch[0, k, j] * space[1 + k, i]
+            length += space[1 + k, i] ** 2
+        weight = max(-scratch[3, 4, j], 0.0) / math.sqrt(length)
+        side = 1.0 if along > 0.0 else -1.0
+        total += weight
+        error += weight * side * (bounds[0 if side > 0.0 else 1, i] - space[0, i])
+    margin: float = -error / total
+    return margin
+
+
+@jit
 def _search(
-    space: FloatArray, r: int, bounds: FloatArray, t: FloatArray, room: FloatArray
+    space: FloatArray, r: int, bounds: FloatArray, t: FloatArray, scratch: FloatArray
 ) -> tuple[int, int]:
     """Write t = t0 + N'x nearest to what is wanted while bounds are still missed, one by one.
 
     Returns the cable of the bound that contradicts others, -1 where none does, and how many those
-    are: in `room`, [3, 7] has their cables, [3, 4] the parts of its normal along theirs, which are
-    columns of [0]. 0 where it is no null direction that moves the cable.
+    are: in `scratch`, [3, 7] has their cables, [3, 4] the parts of its normal along theirs, which
+    are columns of [0]. 0 where it is no null direction that moves the cable.
     """
-    x, unit = room[3, 0], room[3, 1]
+    x, unit = scratch[3, 0], scratch[3, 1]
     tolerance = start(space, r, bounds, x)
     active, cable = 0, -1
     for _ in range(20 * space.shape[1]):
@@ -162,8 +180,8 @@ def _search(
             return cable, 0
         for k in range(r):
             unit[k] = side * space[1 + k, cable] / length
-        room[3, 7, active] = cable
-        active, added = _add(x, unit, r, abs(violation) / length, active, room)
+        scratch[3, 7, active] = cable
+        active, added = _add(x, unit, r, abs(violation) / length, active, scratch)
         if not added:
             break
     return cable, active
@@ -253,17 +271,17 @@ def _contradict(
 
 @jit
 def _add(
-    x: FloatArray, unit: FloatArray, r: int, distance: float, active: int, room: FloatArray
+    x: FloatArray, unit: FloatArray, r: int, distance: float, active: int, scratch: FloatArray
 ) -> tuple[int, bool]:
     """Move `x` (r,) until the constraint with normal `unit`, `distance` away, holds and is active.
 
     Constraints that would have to push the other way are dropped before. Returns how many are
-    active then, and False where those that are leave no room for it. In `room`: [0] the active
+    active then, and False where those that are leave no room for it. In `scratch`: [0] the active
     normals as columns, [1] an orthonormal basis Q of them, [2] the U by which they are Q U, [3]
     vectors, the last of which has the cables of the active ones and of this one.
     """
-    normals, Q, U = room[0], room[1], room[2]
-    multipliers, c, step, z = room[3, 2], room[3, 3], room[3, 4], room[3, 5]
+    normals, Q, U = scratch[0], scratch[1], scratch[2]
+    multipliers, c, step, z = scratch[3, 2], scratch[3, 3], scratch[3, 4], scratch[3, 5]
     own = 0.0
     while True:
         left = gram_schmidt(unit, r, Q, active, c, z)
@@ -281,7 +299,7 @@ def _add(
             distance -= reach * left * left
         if whole <= first:
             break
-        active = _drop(normals, Q, U, room[3], r, drop, active)
+        active = _drop(normals, Q, U, scratch[3], r, drop, active)
     for k in range(r):
         normals[k, active] = unit[k]
         Q[k, active] = z[k] / left

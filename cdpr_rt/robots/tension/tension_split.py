@@ -13,7 +13,7 @@ import math
 
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.tension.nearest_wrench import settle
+from cdpr_rt.robots.tension.nearest_wrench import nearest_wrench
 from cdpr_rt.robots.tension.null_space import null_space, other_wrench
 from cdpr_rt.robots.tension.tension_projection import project
 
@@ -42,54 +42,53 @@ def split(
     particular: FloatArray,
     scaled: FloatArray,
     space: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> tuple[int, float, int]:
     """Write tensions `t` (n,) that exert `force` (d,) besides carrying the wrench `known` (d,).
 
     `plan` (2, n) are the planned bounds. `slow` (n,), kept from cycle to cycle, follows with `pace`
     what the force needs; `carried` (n,) is written, or taken where it is `given`. `missing` (d,) is
     what of the wrench they leave out; where they do, `t` comes nearest to it. The arrays behind are
-    overwritten, as of `null_space`. Returns OK, or INFEASIBLE where no tensions within the
-    plan carry what is known, or SINGULAR; the share of the force that is exerted; and how many
-    null directions `space` has, from its row 1 on.
+    overwritten, as of `null_space`. Returns OK, INFEASIBLE where no tensions within the plan carry
+    what is known, or SINGULAR; the share of the force exerted; the null directions in `space`.
     """
     d, n = W.shape
-    size = 0.0
     for k in range(d):
-        size += (force[k] / scale[k]) ** 2
         missing[k] = known[k] - force[k]
     _widen(plan, 0.0, bounds)
-    for i in range(n):
-        bounds[2, i] = plan[0, i]
-    rank = null_space(W, known, scale, bounds, scaled, space, room)
-    if rank < d:
-        for i in range(n):
-            t[i] = carried[i] = plan[0, i]
+    _copy(plan[0], bounds[2])
+    if null_space(W, known, scale, bounds, scaled, space, scratch) < d:
+        _copy(plan[0], t)
+        _copy(plan[0], carried)
         return SINGULAR, 0.0, 0
-    r = n - rank
-    for i in range(n):
-        particular[0, i] = space[0, i]
-    other_wrench(missing, scale, scaled, room, particular[1])
+    r = n - d
+    _copy(space[0], particular[0])
+    other_wrench(missing, scale, scaled, scratch, particular[1])
     outcome = OK
     if not given:
         outcome = _carry(
             known, scale, plan, reserve, pace, r, slow, carried, t, missing, bounds, particular,
-            scaled, space, room,
+            scaled, space, scratch,
         )  # fmt: skip
     _widen(plan, reserve if outcome == INFEASIBLE else FAST * reserve, bounds)
-    for i in range(n):
-        bounds[2, i] = carried[i]
-    _start_from(particular[1], space)
-    found = project(space, r, bounds, t, room)
+    _copy(carried, bounds[2])
+    _copy(particular[1], space[0])
+    found = project(space, r, bounds, t, scratch)
     for k in range(d):
         scaled[k, n] = (force[k] - known[k]) / scale[k]
-    settle(scaled, bounds, scale, found, t, missing, room)
+    nearest_wrench(scaled, bounds, scale, found, t, missing, scratch)
     if found:
         return outcome, 1.0, r
-    left = 0.0
-    for k in range(d):
-        left += (missing[k] / scale[k]) ** 2
-    return outcome, max(0.0, 1.0 - math.sqrt(left / max(size, 1e-300))), r
+    left = _square(missing, scale) / max(_square(force, scale), 1e-300)
+    return outcome, max(0.0, 1.0 - math.sqrt(left)), r
+
+
+@jit
+def _square(wrench: FloatArray, scale: FloatArray) -> float:
+    total = 0.0
+    for k in range(scale.size):
+        total += (wrench[k] / scale[k]) ** 2
+    return total
 
 
 @jit
@@ -108,24 +107,23 @@ def _carry(
     particular: FloatArray,
     scaled: FloatArray,
     space: FloatArray,
-    room: FloatArray,
+    scratch: FloatArray,
 ) -> int:
     """Write the tensions that carry what is known; `t` is overwritten. Returns the outcome."""
     n = t.size
     _widen(plan, _SLOW * reserve, bounds)
-    _start_from(particular[1], space)
-    if project(space, r, bounds, t, room):
+    _copy(particular[1], space[0])
+    if project(space, r, bounds, t, scratch):
         for i in range(n):
             slow[i] += pace * (t[i] - slow[i])
     _widen(plan, 0.0, bounds)
-    for i in range(n):
-        bounds[2, i] = slow[i]
-    _start_from(particular[0], space)
-    if project(space, r, bounds, carried, room):
+    _copy(slow, bounds[2])
+    _copy(particular[0], space[0])
+    if project(space, r, bounds, carried, scratch):
         return OK
     for k in range(scale.size):
         scaled[k, n] = -known[k] / scale[k]
-    settle(scaled, bounds, scale, False, carried, missing, room)
+    nearest_wrench(scaled, bounds, scale, False, carried, missing, scratch)
     return INFEASIBLE
 
 
@@ -136,6 +134,6 @@ def _widen(plan: FloatArray, by: float, bounds: FloatArray) -> None:
 
 
 @jit
-def _start_from(particular: FloatArray, space: FloatArray) -> None:
-    for i in range(particular.size):
-        space[0, i] = particular[i]
+def _copy(values: FloatArray, into: FloatArray) -> None:
+    for i in range(values.size):
+        into[i] = values[i]

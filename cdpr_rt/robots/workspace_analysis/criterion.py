@@ -10,9 +10,8 @@ import numpy as np
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.robots.platform_model import platform_model
+from cdpr_rt.robots.platform_model import platform_model, platform_model_of
 from cdpr_rt.robots.rigid_body import orientations
-from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import PlatformStatics
 
 
@@ -89,11 +88,8 @@ def criterion_of(
 ) -> Criterion:
     """Return the criterion of a robot that has a platform, within its limits."""
     assert robot.platform is not None
-    limits, n = limits_of(robot), len(robot.axes)
-    low, high = (
-        tuple(np.broadcast_to(bound, (n,)).astype(float).tolist())
-        for bound in (limits.tension_min_N, limits.tension_max_N)
-    )
+    model = platform_model_of(robot)
+    low, high = tuple(model.low_N.tolist()), tuple(model.left_by_torque_N.tolist())
     turns = tuple(tuple(turn) for turn in np.asarray(turns_rad).tolist())
     return Criterion(robot.platform, low, high, acceleration_m_s2, turns, least_N, contact_free)
 

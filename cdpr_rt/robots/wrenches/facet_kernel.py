@@ -13,18 +13,18 @@ _FLAT: Final = 1e-9
 
 
 @jit
-def _largest(room: FloatArray, r: int) -> tuple[int, int]:
+def _largest(scratch: FloatArray, r: int) -> tuple[int, int]:
     """Return row and column of the entry that is farthest from 0, from r on, of (d - 1, d)."""
     row, column = r, r
-    for i in range(r, room.shape[0] - 1):
-        for k in range(r, room.shape[1]):
-            if abs(room[i, k]) > abs(room[row, column]):
+    for i in range(r, scratch.shape[0] - 1):
+        for k in range(r, scratch.shape[1]):
+            if abs(scratch[i, k]) > abs(scratch[row, column]):
                 row, column = i, k
     return row, column
 
 
 @jit
-def _normal(W: FloatArray, columns: IntArray, room: FloatArray, normal: FloatArray) -> bool:
+def _normal(W: FloatArray, columns: IntArray, scratch: FloatArray, normal: FloatArray) -> bool:
     """Write the direction (d,) at right angles to d - 1 columns of W; False where there are more.
 
     Gauss' elimination with full pivoting.
@@ -33,24 +33,24 @@ def _normal(W: FloatArray, columns: IntArray, room: FloatArray, normal: FloatArr
     order = np.arange(d)
     for r in range(d - 1):
         for k in range(d):
-            room[r, k] = W[k, columns[r]]
+            scratch[r, k] = W[k, columns[r]]
     for r in range(d - 1):
-        row, column = _largest(room, r)
-        if abs(room[row, column]) < _FLAT:
+        row, column = _largest(scratch, r)
+        if abs(scratch[row, column]) < _FLAT:
             return False
         for k in range(d):
-            room[r, k], room[row, k] = room[row, k], room[r, k]
+            scratch[r, k], scratch[row, k] = scratch[row, k], scratch[r, k]
         for i in range(d - 1):
-            room[i, r], room[i, column] = room[i, column], room[i, r]
+            scratch[i, r], scratch[i, column] = scratch[i, column], scratch[i, r]
         order[r], order[column] = order[column], order[r]
         for i in range(d - 1):
             if i != r:
-                factor = room[i, r] / room[r, r]
+                factor = scratch[i, r] / scratch[r, r]
                 for k in range(r, d):
-                    room[i, k] -= factor * room[r, k]
+                    scratch[i, k] -= factor * scratch[r, k]
     size = 1.0
     for r in range(d - 1):
-        normal[order[r]] = -room[r, d - 1] / room[r, r]
+        normal[order[r]] = -scratch[r, d - 1] / scratch[r, r]
         size += normal[order[r]] ** 2
     normal[order[d - 1]] = 1.0
     normal /= np.sqrt(size)
@@ -76,7 +76,7 @@ def write_facets(
     each direction counts as much as 1 N.
     """
     m, d, n = matrices.shape
-    W, room = np.zeros((d, n)), np.zeros((d, d))
+    W, scratch = np.zeros((d, n)), np.zeros((d, d))
     for j in range(m):
         for k in range(d):
             for i in range(n):
@@ -84,7 +84,7 @@ def write_facets(
         for f in range(combinations.shape[0]):
             normal = normals[j, f]
             lower[j, f] = upper[j, f] = 0.0
-            if not _normal(W, combinations[f], room, normal):
+            if not _normal(W, combinations[f], scratch, normal):
                 normal[:] = 0.0
                 continue
             for i in range(n):

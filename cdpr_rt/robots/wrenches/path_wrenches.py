@@ -43,19 +43,14 @@ class AvailableWrenches:
         return np.asarray(((needed <= self.upper) & (-needed >= self.lower)).all(axis=1))
 
 
-def available_wrenches(
-    model: PlatformModel, positions: FloatArray, high_N: FloatArray
-) -> AvailableWrenches:
-    """Return the wrenches at positions (m, d), for tensions with the model's reserve to bounds.
-
-    `high_N` (n,) are upper bounds, such as what the motors' torque leaves.
-    """
+def available_wrenches(model: PlatformModel, positions: FloatArray) -> AvailableWrenches:
+    """Return the wrenches at positions (m, d), for tensions with the model's reserve to bounds."""
     matrices = model.workspace(0.0, 0.0).wrench_matrices(model.poses(positions))
     m, d, n = matrices.shape
     chosen = np.array(list(itertools.combinations(range(n), d - 1)), np.int64)
     normals = np.zeros((m, len(chosen), d))
     lower, upper = np.zeros((2, m, len(chosen)))
-    low, high = model.low_N + model.reserve_N, high_N - model.reserve_N
+    low, high = model.low_N + model.reserve_N, model.left_by_torque_N - model.reserve_N
     write_facets(matrices, model.wrench_scale, chosen, low, high, normals, lower, upper)
     weight = np.zeros(6)
     weight[model.positions - 1] = -model.platform.mass_kg * G_m_s2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -11,8 +12,10 @@ import numpy as np
 
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.shared_block import SharedBlockError
-from cdpr_rt.core.states import LoopState, Transition
+from cdpr_rt.core.states import LoopState, Reaction, Transition
+from cdpr_rt.core.task import Task
 from cdpr_rt.errors import ControlError
+from cdpr_rt.programs.base import Program
 from cdpr_rt.runtime.control_loop.engine import HOLD, Engine
 from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
 from cdpr_rt.runtime.control_loop.transition_runner import Steps, TransitionRunner
@@ -21,11 +24,28 @@ from cdpr_rt.runtime.control_loop.transitions import Transitions
 Command = Mapping[str, Any]
 _MOST_TEXT, _SHORT_TEXT = 1500, 200
 _LONGEST_CABLE_m = 1000.0
+_ANOTHER = "another command came after it"
 _MOVING = frozenset({"enable", "program", "set"})
 
 
+@dataclass(frozen=True)
+class _PutOff:
+    """A command whose preparation goes on beside the cycles."""
+
+    command: Command
+    task: Task[None]
+    program: Program
+    state: LoopState
+    """In which it came, and the program that ran then."""
+
+
 class CommandDispatcher:
-    """Takes commands, refuses those that the state forbids, and replies once to each."""
+    """Takes commands, refuses those that the state forbids, and replies once to each.
+
+    One that needs something to be prepared, such as a file to be read, is put off until that has
+    been done, and dispatched anew then. Any other command that is carried out meanwhile ends it,
+    and so does whatever else changes state or program, such as a hold by the supervisor.
+    """
 
     def __init__(
         self,
@@ -38,6 +58,7 @@ class CommandDispatcher:
         self._runner = runner
         self._transitions = transitions
         self._request_stop = request_stop
+        self._put_off: _PutOff | None = None
         self._counters = engine.block.counters
         # read in every cycle: a memoryview is faster
         queues = ("urgent", "urgent_taken", "commands", "commands_taken")
@@ -58,11 +79,15 @@ class CommandDispatcher:
         }
 
     def poll(self) -> None:
-        """Take one stop request, then one command, if there are any."""
+        """Take one stop request, then one command, if there are any, or one that was put off."""
+        if self._put_off is not None and self._is_overtaken(self._put_off):
+            self._give_up(self._put_off, self._life.reason or "something else came first")
         if self._urgent[0] != self._urgent_taken[0]:
             self._take(self._urgent_taken, self._engine.block.take_urgent)
         if self._commands[0] != self._commands_taken[0]:
             self._take(self._commands_taken, self._engine.block.take_command)
+        elif self._put_off is not None and self._put_off.task.done:
+            self._take_up(self._put_off)
 
     def _take(self, taken: memoryview, take: Callable[[], Command | None]) -> None:
         try:
@@ -74,8 +99,7 @@ class CommandDispatcher:
             self._dispatch(command)
 
     def _dispatch(self, command: Command) -> None:
-        number = command.get("number")
-        number = number if isinstance(number, int) else 0
+        number = _number(command)
         do = command.get("do")
         handler = self._handlers.get(do) if isinstance(do, str) else None
         answer = partial(self._reply, number)
@@ -94,10 +118,49 @@ class CommandDispatcher:
         except Exception as error:  # whatever a command holds: the loop goes on
             answer(f"{do}: {type(error).__name__}: {error}")
             return
+        put_off = self._put_off
+        if put_off is not None and put_off.command is command:
+            return  # replied to when it is taken up
+        if put_off is not None and do != "lengths":
+            self._give_up(put_off, _ANOTHER)
         if steps is None:
             answer("")
         else:
             self._runner.begin(steps, answer)
+
+    def _prepare(self, command: Command, program: Program) -> bool:
+        """Return whether a command for a program has been put off, as something is to be done."""
+        work = program.preparation(self._arguments(command))
+        if work is None:
+            return False
+        engine, clock = self._engine, self._engine.machine.clock
+        if self._put_off is not None:
+            self._give_up(self._put_off, _ANOTHER)
+        task = clock.start(lambda: clock.run_blocking(work))
+        self._put_off = _PutOff(command, task, engine.program, self._life.state)
+        return True
+
+    def _is_overtaken(self, put_off: _PutOff) -> bool:
+        """Return whether the robot does something else by now than when the command came."""
+        engine, state = self._engine, self._life.state
+        changed = engine.program is not put_off.program or state is not put_off.state
+        return changed or engine.reacting is not Reaction.NONE
+
+    def _take_up(self, put_off: _PutOff) -> None:
+        """Dispatch a command whose preparation has ended, or reply why that has failed."""
+        self._put_off = None
+        try:
+            put_off.task.result()
+        except Exception as error:  # of a file, whatever it holds: the loop goes on
+            mistake = "" if isinstance(error, ControlError) else f"{type(error).__name__}: "
+            self._reply(_number(put_off.command), f"{mistake}{error}")
+            return
+        self._dispatch(put_off.command)
+
+    def _give_up(self, put_off: _PutOff, why: str) -> None:
+        self._put_off = None
+        self._engine.machine.clock.cancel(put_off.task)
+        self._reply(_number(put_off.command), f"given up: {why}")
 
     def _reply(self, number: int, error: str) -> None:
         state = self._life.state.label
@@ -123,11 +186,13 @@ class CommandDispatcher:
         self._require(Transition.ACKNOWLEDGE)
         return self._transitions.acknowledge()
 
-    def _enable(self, command: Command) -> Steps:
+    def _enable(self, command: Command) -> Steps | None:
         self._refuse_read_only("enable")
         self._require(Transition.ENABLE)
         name = self._known(command.get("program") or HOLD)
         right = self._right("enable", command)
+        if self._prepare(command, self._engine.parts.programs[name]):
+            return None
         return self._transitions.enable(name, self._arguments(command), right)
 
     def _disable(self, _command: Command) -> Steps | None:
@@ -148,11 +213,15 @@ class CommandDispatcher:
             return
         self._require_running(HOLD)
         if engine.program.name != HOLD:  # a repeated hold keeps its position
-            self._run(HOLD, {}, 0)
+            engine.switch(HOLD, {}, 0)
 
     def _program(self, command: Command) -> None:
         name = self._known(command.get("program"))
-        self._run(name, self._arguments(command), self._right("program", command))
+        right = self._right("program", command)
+        self._require_running(name)
+        if self._prepare(command, self._engine.parts.programs[name]):
+            return
+        self._engine.switch(name, self._arguments(command), right)
         if name != HOLD:
             self._life.clear_reason()  # of the last hold
 
@@ -161,6 +230,8 @@ class CommandDispatcher:
         right, program = self._right("set", command), self._engine.program
         if program.needs_lease and right != self._engine.right.mover:
             raise RefusedError(f"set: {program.name} was not started by who holds the right now")
+        if self._prepare(command, program):
+            return
         program.command(self._arguments(command))
         self._life.changed = True
 
@@ -190,10 +261,6 @@ class CommandDispatcher:
                     f"cable_length_m[{i}]: {length!r}; allowed: above 0, up to {_LONGEST_CABLE_m:g}"
                 )
         return np.array([math.nan if length is None else length for length in lengths])
-
-    def _run(self, name: str, arguments: Mapping[str, Any], right: int) -> None:
-        self._require_running(name)
-        self._engine.switch(name, arguments, right)
 
     # -- preconditions
 
@@ -240,3 +307,8 @@ class CommandDispatcher:
         if not isinstance(arguments, dict):
             raise RefusedError(f"wanted: {arguments!r}; allowed: a table")
         return arguments
+
+
+def _number(command: Command) -> int:
+    number = command.get("number")
+    return number if isinstance(number, int) else 0

@@ -123,7 +123,8 @@ class Engine:
             feedback,
             machine.read_tension(),
             cycle.elapsed_s,
-            self.program.controller.compensation_Nm,
+            self.program.controller.motor_loss_Nm,
+            self.program.controller.cogging_Nm,
         )
         if self.program.needs_lease:
             self._watch_right()
@@ -165,7 +166,7 @@ class Engine:
 
     def hold(self, reason: str, details: Mapping[str, Any] | None = None) -> None:
         """End the motion and hold the axes, for `reason`."""
-        self.life.set_fault_reason(reason, details)
+        self.life.set_reason(reason, details)
         self.switch(HOLD)
 
     def switch(self, name: str, arguments: Mapping[str, Any] | None = None, right: int = 0) -> None:
@@ -174,8 +175,7 @@ class Engine:
         `right` is the number of the grant of the right to move that it runs under, 0 for none.
         """
         program = self.parts.programs[name]
-        if arguments is not None:
-            program.check(arguments)
+        checked = None if arguments is None else program.check(arguments)
         cycle = self.cycle
         assert cycle is not None  # cycles run
         device = cycle.device
@@ -183,7 +183,7 @@ class Engine:
             device.command.torque_Nm[:] = 0.0
         program.start(device.feedback, self.setpoint, device.command.torque_Nm)
         if arguments is not None:
-            program.command(arguments)
+            program.apply(checked)
         self.program, self.right.mover = program, right
         self.program_number = self.programs.index(program)
         self._rows.follow(self)

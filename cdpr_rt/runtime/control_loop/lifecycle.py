@@ -44,7 +44,7 @@ class Lifecycle:
             self.since_ns = time.monotonic_ns()
             self.changed = True
 
-    def set_fault_reason(self, reason: str, details: Mapping[str, Any] | None = None) -> None:
+    def set_reason(self, reason: str, details: Mapping[str, Any] | None = None) -> None:
         """Set why the motion ended or was held."""
         self.reason = reason[:_MOST_CHARACTERS]
         self.details = details
@@ -52,4 +52,4 @@ class Lifecycle:
 
     def clear_reason(self) -> None:
         """Clear the reason."""
-        self.set_fault_reason("")
+        self.set_reason("")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.programs.base import Program
-from cdpr_rt.programs.platform.path_store import PathStore
+from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.robots.last_lengths import LastLengths
 
 
@@ -38,6 +38,8 @@ class LoopParts:
     """Stores the cables' lengths of the last stop, where a start can use them."""
     paths: PathStore | None = None
     """The planned paths of a robot with a platform."""
+    notices: Callable[[], Sequence[str]] = tuple
+    """Returns what an operator should know of the robot besides its state."""
     before_power: Callable[[], object] = lambda: None
     """Called before the drives get power; may wait for files."""
     enable_realtime: Callable[[], Sequence[str]] = tuple

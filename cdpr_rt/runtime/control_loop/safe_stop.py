@@ -89,7 +89,7 @@ class SafeStop:
             if engine.program.name != HOLD and engine.driving:
                 engine.hold(reason, supervisor.details())
             return
-        self._life.set_fault_reason(reason, supervisor.details())
+        self._life.set_reason(reason, supervisor.details())
         if state is LoopState.ACTIVE:
             self.stop(reaction, LoopState.FAULT, torque_Nm)
         else:
@@ -104,7 +104,7 @@ class SafeStop:
     def remove_power(self, error: Exception) -> None:
         """Remove the power at once after an exception, of a program for instance."""
         traceback.print_exception(error)
-        self._life.set_fault_reason(f"{type(error).__name__}: {error}")
+        self._life.set_reason(f"{type(error).__name__}: {error}")
         if self._life.state is LoopState.ACTIVE:
             self.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
 
@@ -117,6 +117,7 @@ class SafeStop:
             way = StopMethod.QUICK_STOP
         engine.reacting = Reaction.QUICK_STOP if way is StopMethod.QUICK_STOP else reaction
         if way in (StopMethod.QUICK_STOP, StopMethod.TORQUE_OFF):
+            self._note_fall()
             if way is StopMethod.QUICK_STOP:
                 self._machine.quick_stop()
             else:
@@ -126,6 +127,14 @@ class SafeStop:
                 torque_Nm[:] = 0.0
             engine.switch(IDLE)
         self._runner.begin(self.come_to_rest(then))
+
+    def _note_fall(self) -> None:
+        """Note that a platform falls, where no brakes hold it and it may hang on its cables."""
+        last, lowering, engine = self._engine.parts.last, self._lowering, self._engine
+        if last is None or lowering is None or not self.lowers:
+            return
+        hangs = self.without_pose or not self._estimator.estimate.may_be_slack
+        last.fallen = last.fallen or hangs or engine.program.name == lowering.program
 
     def _method(self, reaction: Reaction, then: LoopState) -> StopMethod:
         """Return how to end the motion, by what is known of pose and drives."""
@@ -155,6 +164,7 @@ class SafeStop:
         assert lowering is not None  # there is a platform to be lowered
         if not self.without_pose:
             self.without_pose = True
+            self._note_fall()  # drives that are lost let it fall, and nobody sees how it comes down
             self._engine.switch(lowering.program, {"blind": True})
 
     def enter_fault(self) -> None:
@@ -189,7 +199,7 @@ class SafeStop:
             yield from self._keep_lengths()
         if any(unconfirmed):
             reason = "; ".join(filter(None, (life.reason, *unconfirmed)))
-            life.set_fault_reason(reason, life.details)
+            life.set_reason(reason, life.details)
             then = LoopState.FAULT
         life.enter(then)
         engine.reacting = Reaction.NONE
@@ -239,7 +249,7 @@ class SafeStop:
         found: list[str] = []
         yield from self._runner.run_task(lambda: found.append(machine.explain(life.reason)))
         if found:
-            life.set_fault_reason(found[0], life.details)
+            life.set_reason(found[0], life.details)
         if self._engine.lost_bus:
             yield from self.leave_cycles()
 

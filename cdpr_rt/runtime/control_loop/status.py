@@ -91,7 +91,7 @@ class StatusPage:
             "busy": self._runner.busy,
             "read_only": engine.machine.read_only,
             "lockstep": engine.cycle is not None and engine.cycle.device.lockstep,
-            "notices": [*engine.notices, *engine.machine.notices],
+            "notices": [*engine.notices, *engine.parts.notices(), *engine.machine.notices],
             "safety": engine.machine.safety,
             "buses": engine.machine.bus_state(),
             "check": self._transitions.check_result,

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.core.states import CUT_SHORT, LoopState, Reaction
 from cdpr_rt.runtime.control_loop.engine import Engine
 from cdpr_rt.runtime.control_loop.safe_stop import SafeStop
 from cdpr_rt.runtime.control_loop.transition_runner import TransitionRunner
 from cdpr_rt.runtime.control_loop.transitions import Transitions
 
 EMERGENCY_STOP: Final = "emergency stop by cdpr estop"
-CUT_SHORT: Final = "the power was taken at once while the loop was ending"
 _NOT_LOWERED: Final = "; the platform was not let down"
 
 
@@ -53,10 +52,10 @@ class StopRequests:
             return
         if state is LoopState.ACTIVE:
             cut_short = CUT_SHORT + (_NOT_LOWERED if self._safe_stop.lowers else "")
-            life.set_fault_reason(cut_short if self._stopping else EMERGENCY_STOP)
+            life.set_reason(cut_short if self._stopping else EMERGENCY_STOP)
             self._safe_stop.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
         elif state is LoopState.READY and not self._stopping:
-            life.set_fault_reason(EMERGENCY_STOP)
+            life.set_reason(EMERGENCY_STOP)
             self._safe_stop.enter_fault()
 
     def _end(self) -> None:

@@ -47,7 +47,7 @@ class Transitions:
             yield from self.configure()
             yield from self.check()
         except ControlError as error:
-            self._life.set_fault_reason(str(error))
+            self._life.set_reason(str(error))
 
     def configure(self) -> Steps:
         """Boot the drives; inactive then, unconfigured where it fails."""
@@ -60,7 +60,7 @@ class Transitions:
         try:
             yield from run_task(machine.open)
         except ControlError as error:
-            life.set_fault_reason(str(error))
+            life.set_reason(str(error))
             raise
         life.enter(LoopState.INACTIVE)
 
@@ -85,7 +85,7 @@ class Transitions:
                 yield from self._reset_faults()
             yield from self._check_cycles()
         except ControlError as error:
-            life.set_fault_reason(str(error))
+            life.set_reason(str(error))
             yield from self._safe_stop.explain()
             yield from self._safe_stop.leave_cycles()
             raise RefusedError(life.reason) from error
@@ -191,7 +191,7 @@ class Transitions:
                 machine.powered, _POWER_ON_S, "the power of all drives"
             )
         except ControlError as error:
-            life.set_fault_reason(f"{error}: {', '.join(machine.states())}")
+            life.set_reason(f"{error}: {', '.join(machine.states())}")
             self._safe_stop.stop(Reaction.TORQUE_OFF, LoopState.FAULT)
             raise ControlError(life.reason) from error
         last, device = engine.parts.last, machine.device
@@ -207,7 +207,7 @@ class Transitions:
             return
         missing = engine.right.refusal(right)
         if missing:
-            life.set_fault_reason(f"{program}: {missing}; held")
+            life.set_reason(f"{program}: {missing}; held")
             raise RefusedError(life.reason)
         engine.switch(program, arguments, right)
 
@@ -239,7 +239,7 @@ class Transitions:
         except ControlError as error:
             life.enter(LoopState.FAULT)
             text = str(error)
-            life.set_fault_reason(text if before in text else f"{text}{_BEFORE}{before})")
+            life.set_reason(text if before in text else f"{text}{_BEFORE}{before})")
             raise
 
     def shut_down(self) -> Steps:
@@ -258,6 +258,6 @@ class Transitions:
             unconfirmed.append(str(error))
         if any(unconfirmed):
             self.power_off_unconfirmed = unconfirmed[0]
-            life.set_fault_reason(self.power_off_unconfirmed)
+            life.set_reason(self.power_off_unconfirmed)
         life.enter(LoopState.UNCONFIGURED)
         self.ended = True

@@ -83,10 +83,12 @@ def create_app(service: Service) -> FastAPI:
         redoc_url=None,
         responses=_ERRORS,
     )
-    _add_errors(app)
+    _add_errors(app, service)
     _add_reading(app, service)
     _add_control(app, service)
-    _add_commands(app, service)
+    _add_open_commands(app, service)
+    _add_motion(app, service)
+    _add_path(app, service)
     WebSocketRoutes(service).add(app)
     _add_key(app)
     return app
@@ -107,9 +109,10 @@ def _add_key(app: FastAPI) -> None:
             operation["security"] = [] if path == "/status" else [{"key": []}]
 
 
-def _add_errors(app: FastAPI) -> None:
+def _add_errors(app: FastAPI, service: Service) -> None:
     async def known(_: Request, error: Exception) -> Response:
-        return _error(_STATUS[type(error)], str(error))
+        state = service.link.state() if isinstance(error, LoopGoneError) else None
+        return _error(_STATUS[type(error)], str(error), state=state)
 
     async def refused(_: Request, error: Exception) -> Response:
         assert isinstance(error, _LoopRefusedError)
@@ -219,10 +222,29 @@ def _add_control(app: FastAPI, service: Service) -> None:
         return models.StreamSession.model_validate(service.issue_stream_session(token))
 
 
-def _add_commands(app: FastAPI, service: Service) -> None:
-    async def tell(do: str, body: models.Who | None) -> models.Done:
-        return _done(await service.command(do, body.client if body else "somebody"))
+_OPEN_COMMANDS: Final = {
+    "configure": "Boot the drives; no power.",
+    "check": "Run the cycle without power and see whether all drives answer: inactive to ready.",
+    "acknowledge": "Acknowledge a fault whose cause is gone; nothing gets power by it.",
+    "hold": "Stop the motion and stay there, with power; for everybody who is let in.",
+    "disable": "Stop the motion, then take the power off; for everybody who is let in.",
+    "shutdown": "Stop the motion, take the power off, end the daemon; for everybody who is let in.",
+}
+"""Commands that need no right to move."""
 
+
+def _add_open_commands(app: FastAPI, service: Service) -> None:
+    def add(do: str, about: str) -> None:
+        async def command(body: models.Who | None = None) -> models.Done:
+            return _done(await service.command(do, body.client if body else "somebody"))
+
+        app.post(f"/{do}", responses=_REFUSALS, name=do, description=about)(command)
+
+    for do, about in _OPEN_COMMANDS.items():
+        add(do, about)
+
+
+def _add_motion(app: FastAPI, service: Service) -> None:
     async def ask(
         do: str, body: models.Who, token: str | None, request: Request, **fields: Any
     ) -> models.Done:
@@ -230,36 +252,6 @@ def _add_commands(app: FastAPI, service: Service) -> None:
             do, body.client, token, request.is_disconnected, **fields
         )
         return _done(reply)
-
-    @app.post("/configure", responses=_REFUSALS)
-    async def configure(body: models.Who | None = None) -> models.Done:
-        """Boot the drives; no power."""
-        return await tell("configure", body)
-
-    @app.post("/check", responses=_REFUSALS)
-    async def check(body: models.Who | None = None) -> models.Done:
-        """Run the cycle without power and see whether all drives answer: inactive to ready."""
-        return await tell("check", body)
-
-    @app.post("/acknowledge", responses=_REFUSALS)
-    async def acknowledge(body: models.Who | None = None) -> models.Done:
-        """Acknowledge a fault whose cause is gone; nothing gets power by it."""
-        return await tell("acknowledge", body)
-
-    @app.post("/hold", responses=_REFUSALS)
-    async def hold(body: models.Who | None = None) -> models.Done:
-        """Stop the motion and stay there, with power; for everybody who is let in."""
-        return await tell("hold", body)
-
-    @app.post("/disable", responses=_REFUSALS)
-    async def disable(body: models.Who | None = None) -> models.Done:
-        """Stop the motion, then take the power off; for everybody who is let in."""
-        return await tell("disable", body)
-
-    @app.post("/shutdown", responses=_REFUSALS)
-    async def shutdown(body: models.Who | None = None) -> models.Done:
-        """Stop the motion, take the power off, end the daemon; for everybody who is let in."""
-        return await tell("shutdown", body)
 
     @app.post("/enable", responses=_REFUSALS)
     async def enable(
@@ -281,6 +273,13 @@ def _add_commands(app: FastAPI, service: Service) -> None:
         """Tell the running program what it is to do."""
         return await ask("set", body, token, request, wanted=body.wanted)
 
+    @app.post("/lengths", responses=_REFUSALS)
+    async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
+        """Tell how long the cables are now: `cable_length_m`, one for each axis or null."""
+        return await ask("lengths", body, token, request, wanted=body.wanted)
+
+
+def _add_path(app: FastAPI, service: Service) -> None:
     @app.post("/path", responses=_REFUSALS)
     async def plan_path(body: models.PathFile) -> models.Planned:
         """Begin to plan a path for the robot; `GET /path` tells when it is planned."""
@@ -293,11 +292,6 @@ def _add_commands(app: FastAPI, service: Service) -> None:
         The program `path` follows it by the name in `plan`.
         """
         return models.Planned.model_validate(service.planner.job)
-
-    @app.post("/lengths", responses=_REFUSALS)
-    async def lengths(body: models.Set, request: Request, token: Token = None) -> models.Done:
-        """Tell how long the cables are now: `cable_length_m`, one for each axis or null."""
-        return await ask("lengths", body, token, request, wanted=body.wanted)
 
 
 def _done(reply: Reply) -> models.Done:

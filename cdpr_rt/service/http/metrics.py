@@ -31,7 +31,8 @@ _BOUNDS_S: Final = np.array(
     [2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 7e-4, 1e-3, 2e-3, 5e-3, 1e-2, 0.1]
 )
 _SCALARS: Final = tuple(field for field in SCALAR_FIELDS if field.metric)
-_TIMES: Final = tuple(field for field in _SCALARS if field.kind == "<f8")
+_TIMES: Final = tuple(field for field in _SCALARS if field.is_wall_time)
+_NUMBERS: Final = tuple(field for field in _SCALARS if field.kind == "<f8" and not field.wall)
 _COUNTS: Final = tuple(field for field in _SCALARS if field.kind != "<f8")
 _AXES: Final = tuple(field for field in AXIS_FIELDS if field.metric)
 
@@ -111,6 +112,9 @@ class Metrics(Collector):
     def _of_row(self, row: Row) -> Iterator[Metric]:
         for field in _COUNTS:
             yield CounterMetricFamily(f"cdpr_{field.metric}", _about(field), int(row[field.name]))
+        for field in _NUMBERS:
+            if math.isfinite(value := float(row[field.name])):
+                yield GaugeMetricFamily(f"cdpr_{field.metric}", _about(field), value)
         axes = self._service.link.description().get("axes") or []
         names = [str(axis.get("name", number)) for number, axis in enumerate(axes)]
         for field in _AXES:

@@ -148,7 +148,7 @@ class Error(_Answer):
 
     error: str
     state: str | None = None
-    """The loop's state, where it was the loop that refused."""
+    """The loop's state, where it was the loop that refused or where no loop takes commands."""
 
 
 class Done(_Answer):

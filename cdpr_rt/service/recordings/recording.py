@@ -43,8 +43,8 @@ class Recorder:
     A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, the next file begins where one
     has `most_bytes`. Before each, what `retention` does not keep is removed.
     A disk that takes no more, or has less than `reserve_bytes` left (without:
-    64 MB, or a twentieth of a small disk), ends the recording for good: `told` says why, `ended` is
-    called with it, and nobody else is concerned.
+    64 MB, or a twentieth of a small disk), ends the recording for good: `status` says why, `ended`
+    is called with it, and nobody else is concerned.
     A recorder that follows on another one of the same block goes on at the first row that was not
     safe yet.
     It has a thread of its own between `start` and `stop`; or, where what is recorded is to depend
@@ -96,7 +96,7 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     def start(self) -> None:
-        """Open the first file and record from now on, until `stop`; see `told` for how it goes."""
+        """Open the first file and record from now on, until `stop`; see `status`."""
         self.begin()
         if not self._error:
             self._thread.start()
@@ -108,7 +108,7 @@ class Recorder:
             self._thread.join()
 
     def begin(self) -> None:
-        """Open the first file; see `told` for how it goes."""
+        """Open the first file; see `status`."""
         with self._failing():
             self._open()
 

@@ -110,8 +110,8 @@ class RecordingFile:
 
     def room(self) -> tuple[int, int]:
         """Return the bytes that are free on its disk, and how many the disk has."""
-        told = os.fstatvfs(self._fd)
-        return told.f_bavail * told.f_frsize, told.f_blocks * told.f_frsize
+        usage = os.fstatvfs(self._fd)
+        return usage.f_bavail * usage.f_frsize, usage.f_blocks * usage.f_frsize
 
     def sync(self) -> None:
         """Make everything logged so far safe."""

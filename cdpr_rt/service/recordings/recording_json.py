@@ -71,15 +71,9 @@ class RowTexts:
             values = self._floats if is_float else self._integers
             values[:m, columns] = rows[name].reshape(m, -1)
         size = _write(
-            self._literals,
-            self._literal_ends,
-            self._kinds,
-            self._columns,
-            self._floats[:m],
-            self._integers[:m],
-            self._text,
-            self._ends,
-        )
+            self._literals, self._literal_ends, self._kinds, self._columns, self._floats[:m],
+            self._integers[:m], self._text, self._ends,
+        )  # fmt: skip
         text = self._text[:size].tobytes()
         ends = self._ends[:m].tolist()
         return [text[a:b] for a, b in zip([0, *ends[:-1]], ends, strict=True)]

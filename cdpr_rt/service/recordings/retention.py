@@ -62,8 +62,8 @@ def _recordings(folder: Path, robot: str) -> Iterator[tuple[Path, float, int]]:
         if not name.fullmatch(path.name) or path.is_symlink():
             continue
         with suppress(OSError):
-            told = path.stat()
-            yield path, told.st_mtime, told.st_size
+            entry = path.stat()
+            yield path, entry.st_mtime, entry.st_size
 
 
 def size_text(count: float) -> str:

@@ -81,14 +81,14 @@ class Window:
 
 @dataclass
 class _Session:
-    """One sender's use of the stream, under one taking of the right to move."""
+    """One sender's use of the stream, under one grant of the right to move."""
 
     name: int
     key: bytes
     token: str
     """That of the right, which it renews."""
     right: int
-    """The number of the taking that the token belongs to."""
+    """The number of the grant that the token belongs to."""
     given: bool
     """Whether the control interface has given it to the holder; such a one bears silence."""
     own: bool = False
@@ -111,7 +111,7 @@ class StreamSessionManager:
 
     One session holds the stream. The control interface gives it to the holder of the right to move
     by `issue`, or it begins with a shared `key`: nobody is answered who has neither. It is bound to
-    one taking of the right and to the first address that uses it; after its end nothing of it
+    one grant of the right and to the first address that uses it; after its end nothing of it
     counts. Any thread may use it. Raises ControlError for a key that is too short.
     """
 
@@ -293,12 +293,12 @@ class StreamSessionManager:
     def _state(self, packet: StreamSetpoint, standing: Standing, now_ns: int) -> StreamAnswer:
         block = self._block
         written = int(block.counters["rows"][0])
-        told = packet.session, standing, packet.sequence, packet.sent_ns, now_ns
+        echoed = packet.session, standing, packet.sequence, packet.sent_ns, now_ns
         if not written:
-            return StreamAnswer(*told, round_trip_s=self.round_trip_s)
+            return StreamAnswer(*echoed, round_trip_s=self.round_trip_s)
         row = block.rows[(written - 1) % block.capacity]
         return StreamAnswer(
-            *told,
+            *echoed,
             int(row["state"]),
             int(row["program"]),
             int(row["reaction"]),

@@ -61,7 +61,7 @@ class Topic:
 class FoxgloveServer:
     """Lets viewers in, tells them the topics, and sends each what it has subscribed to.
 
-    All methods belong to the asyncio loop that serves, but `told`. `name` is that of the server;
+    All methods belong to the asyncio loop that serves, but `status`. `name` is that of the server;
     `origins` are the web pages that may look on, as a browser writes them; programs send no
     `Origin`. Nobody waits for a viewer that does not read: it misses messages, and is cut off.
     """

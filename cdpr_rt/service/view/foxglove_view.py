@@ -41,9 +41,10 @@ _AXES: Final = {
 """What the live view calls each field that it shows of an axis."""
 _SCALARS: Final = tuple(field for field in SCALAR_FIELDS if field.live)
 _TIMES: Final = {
-    field.name: field.name.replace("_s", "_ms") for field in _SCALARS if field.kind == "<f8"
+    field.name: field.name.replace("_s", "_ms") for field in _SCALARS if field.is_wall_time
 }
-_COUNTS: Final = tuple(field.name for field in _SCALARS if field.name not in _TIMES)
+_NUMBERS: Final = tuple(field.name for field in _SCALARS if field.kind == "<f8" and not field.wall)
+_COUNTS: Final = tuple(field.name for field in _SCALARS if field.kind != "<f8")
 
 
 class LiveView:
@@ -93,8 +94,8 @@ class LiveView:
 
         Also how many look on, how many were refused, and why the last of them.
         """
-        told = {"url": self._url, "moments": self._messages, "error": self._error}
-        return {**told, **self._server.status()}
+        figures = {"url": self._url, "moments": self._messages, "error": self._error}
+        return {**figures, **self._server.status()}
 
     def _run(self) -> None:
         try:
@@ -165,7 +166,7 @@ class _Topics:
         self._axes = self._json("/axes", axes)
         tensions = _object("Tensions", dict.fromkeys(self._names, "number"))
         self._tensions = self._json("/tensions", tensions)
-        timing = dict.fromkeys(_TIMES.values(), "number")
+        timing = dict.fromkeys((*_TIMES.values(), *_NUMBERS), "number")
         counts = dict.fromkeys(_COUNTS, "integer")
         self._timing = self._json("/cycle_time", _object("CycleTime", {**timing, **counts}))
         words = dict.fromkeys(LABELS, "string")
@@ -181,8 +182,8 @@ class _Topics:
 
     def _json(self, name: str, schema: dict[str, Any]) -> Topic:
         data = json.dumps(schema).encode()
-        told = Schema(name=schema["title"], encoding="jsonschema", data=data)
-        return self._server.advertise(name, "json", told)
+        published = Schema(name=schema["title"], encoding="jsonschema", data=data)
+        return self._server.advertise(name, "json", published)
 
     def show_event(self, text: str, time_ns: int) -> None:
         """Put a line into the log."""
@@ -275,5 +276,6 @@ def _state_of(row: Row) -> dict[str, Any]:
 
 def _timing_of(rows: Row) -> dict[str, Any]:
     longest = {shown: 1e3 * float(rows[name].max()) for name, shown in _TIMES.items()}
-    counts = {name: int(rows[name][-1]) for name in _COUNTS}
-    return {**longest, **counts}
+    numbers = {name: float(rows[name][-1]) for name in _NUMBERS}
+    known = {name: value for name, value in numbers.items() if math.isfinite(value)}
+    return {**longest, **known, **{name: int(rows[name][-1]) for name in _COUNTS}}

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdpr_profiles import load_robot
-from cdpr_rt.calibration.observations import Observations
-from cdpr_rt.calibration.parameters import USUAL, CableGeometry
+from cdpr_rt.calibration.estimation.parameters import USUAL, CableGeometry
+from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.kinematics.cable_model import CableModel
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
@@ -74,10 +74,10 @@ def made_up(
         lengths[j] = truly.lengths(pose, tension[j])
     # what the encoders say: offset and drum taken away again
     reference = lengths[0] - cable[:, 3]
-    told = (lengths - cable[:, 3] + cable[:, 4] * reference) / (1.0 + cable[:, 4])
-    told += rng.normal(0.0, 1.0, told.shape) * noise_m
+    reading = (lengths - cable[:, 3] + cable[:, 4] * reference) / (1.0 + cable[:, 4])
+    reading += rng.normal(0.0, 1.0, reading.shape) * noise_m
     start = model.poses(places)
-    seen = Observations.of_lengths(told, tension, start)
+    seen = Observations.of_lengths(reading, tension, start)
     return MadeUp(file, true, held, replace(seen, reference_m=reference))
 
 

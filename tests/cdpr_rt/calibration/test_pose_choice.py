@@ -6,35 +6,38 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
+from cdpr_rt.calibration.estimation.fit import moved
+from cdpr_rt.calibration.estimation.residuals import lengths_told
 from cdpr_rt.calibration.pose_choice import (
-    EXIT_m,
+    HAND_EYE_m,
+    HAND_EYE_rad,
     LENGTH_m,
-    OFFSET_m,
     POSITION_m,
     ROTATION_rad,
+    cable_geometry,
     information_rows,
     informative,
+    pose_rows,
     predicted_deviation_m,
     spread,
 )
-from cdpr_rt.robots.platform_model import platform_model_of
+from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.reach.reachable import Reach
 
-PRIOR = np.diag([EXIT_m**-2] * 3 + [OFFSET_m**-2])
 
-
-def candidates(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def candidates(count: int) -> tuple[np.ndarray, np.ndarray, PlatformModel, np.ndarray]:
     model = platform_model_of(load_robot("spatial-8"))
     positions = Reach(model).draw(count, 9).positions
     points = np.array(model.platform.exit_points_m), np.array(model.platform.anchor_points_m)
-    return *points, positions, model.poses(positions)
+    return *points, model, model.poses(positions)
 
 
 def log_det(rows: np.ndarray, taken: list[int]) -> float:
-    inform = PRIOR + np.einsum("mia,mib->iab", rows[taken], rows[taken])
-    return float(np.linalg.slogdet(inform)[1].sum())
+    inform = np.eye(rows.shape[2]) + np.einsum("mia,mib->ab", rows[taken], rows[taken])
+    return float(np.linalg.slogdet(inform)[1])
 
 
 def test_no_spread_is_twice_as_wide_as_the_one_that_is_chosen() -> None:
@@ -52,18 +55,58 @@ def test_no_spread_is_twice_as_wide_as_the_one_that_is_chosen() -> None:
 
 
 def test_each_pose_that_is_taken_tells_most_beside_those_before() -> None:
-    exits, anchors, _, poses = candidates(40)
-    rows = information_rows(exits, anchors, poses)
-    taken = informative(exits, anchors, poses, 6).tolist()
+    _, _, model, poses = candidates(100)
+    rows = pose_rows(cable_geometry(model), poses)
+    taken = informative(cable_geometry(model), poses, 5).tolist()
     for k, one in enumerate(taken):
         before = taken[:k]
         others = [j for j in range(len(poses)) if j not in before]
         assert one == max(others, key=lambda j: log_det(rows, [*before, j]))
 
 
+def test_what_a_pose_tells_is_the_information_without_the_pose() -> None:
+    # poses and parameters as unknowns of one problem, from which the poses are taken out
+    _, _, model, poses = candidates(3)
+    geometry = cable_geometry(model)
+    rows = pose_rows(geometry, poses)
+    size, n = geometry.size, geometry.n
+    tension = np.full((1, n), 50.0)
+    for j, pose in enumerate(poses):
+        J = np.zeros((n + 6, size + 12))
+
+        def told(
+            x: np.ndarray, pose: np.ndarray = pose, tension: np.ndarray = tension
+        ) -> np.ndarray:
+            there = moved(pose[None], x[None, size + 6 :], (0, 1, 2, 3, 4, 5))
+            lengths = lengths_told(geometry.with_values(x[:size]), there, tension)[0]
+            Q = there[0, 1:]
+            camera = np.concatenate([
+                (there[0, 0] + Q @ x[size : size + 3]) / POSITION_m,
+                Rotation.from_matrix(
+                    Q @ Rotation.from_rotvec(x[size + 3 : size + 6]).as_matrix() @ pose[1:].T
+                ).as_rotvec() / ROTATION_rad,
+            ])  # fmt: skip
+            return np.concatenate([lengths / geometry.knowledge.length_m, camera])
+
+        known = np.concatenate([geometry.known_std(), [HAND_EYE_m] * 3, [HAND_EYE_rad] * 3])
+        for k in range(size + 12):
+            step = np.zeros(size + 12)
+            step[k] = 1e-6
+            J[:, k] = (told(step) - told(-step)) / 2e-6
+        H = J.T @ J
+        p, x = slice(0, size + 6), slice(size + 6, None)
+        left = H[p, p] - H[p, x] @ np.linalg.solve(H[x, x], H[x, p])
+        drums = np.isin(np.arange(size + 6), [5 * i + 4 for i in range(n)])
+        same = ~drums  # the length paid out at a pose is known to the rows alone
+        expected = (left * np.outer(known, known))[np.ix_(same, same)]
+        got = (rows[j].T @ rows[j])[np.ix_(same, same)]
+        assert got == pytest.approx(expected, rel=1e-3, abs=1e-4 * np.abs(expected).max())
+
+
 def test_chosen_poses_tell_more_than_as_many_at_random() -> None:
-    exits, anchors, _, poses = candidates(400)
-    chosen = predicted_deviation_m(exits, anchors, poses[informative(exits, anchors, poses, 30)])
+    exits, anchors, model, poses = candidates(400)
+    taken = informative(cable_geometry(model), poses, 30)
+    chosen = predicted_deviation_m(exits, anchors, poses[taken])
     at_random = predicted_deviation_m(exits, anchors, poses[:30])
     assert chosen < at_random
 

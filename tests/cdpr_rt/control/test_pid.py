@@ -49,6 +49,8 @@ def test_saturates_and_leaves_the_limit_at_once() -> None:
 
 def test_known_torque_counts_towards_the_limit_and_is_kept_apart() -> None:
     class Constant:
+        cogging_Nm = np.zeros(1)
+
         def reset(self) -> None:
             pass
 

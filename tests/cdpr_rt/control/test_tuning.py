@@ -58,7 +58,7 @@ def test_bandwidth_is_found_in_time(bandwidth):
     assert simulated_response(design, 1.5 * bandwidth, 2) < 0.6
 
 
-@settings(derandomize=True, deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(inertia=inertias, latency=st.floats(0.5e-3, 4e-3), bandwidth=st.floats(3.0, 25.0))
 def test_margins_hold(inertia, latency, bandwidth):
     design = design_pid(inertia, latency, bandwidth)
@@ -68,7 +68,7 @@ def test_margins_hold(inertia, latency, bandwidth):
     assert design.sensitivity_peak <= MAX_SENSITIVITY
 
 
-@settings(derandomize=True, deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(inertia=inertias)
 def test_gains_follow_the_inertia(inertia):
     one, other = design_pid(1e-4, 2e-3, 10.0), design_pid(inertia, 2e-3, 10.0)
@@ -97,7 +97,7 @@ def test_sweep_gain_leaves_the_latency_its_phase():
     assert math.sqrt(gain / 1.13e-4) * 2.3e-3 == pytest.approx(0.3)
 
 
-@settings(derandomize=True, deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(inertias, st.sampled_from([5e-4, 1e-3, 2e-3, 4e-3]))
 def test_a_firm_loop_keeps_its_bounds_and_bears_more_inertia(inertia, period):
     latency = 0.8e-3 + 1.5 * period

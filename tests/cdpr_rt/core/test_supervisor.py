@@ -114,7 +114,7 @@ WILD = st.one_of(
 )
 
 
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(*[WILD] * 7, st.integers(0, 31)), min_size=1, max_size=20))
 def test_whatever_is_asked_for_no_drive_gets_more_than_it_may(
     cycles: list[tuple[float, float, float, float, float, float, float, int]],

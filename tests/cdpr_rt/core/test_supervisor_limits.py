@@ -142,14 +142,14 @@ CASES = [
     Case(
         Limit.TORQUE,
         torque(-2.01),
-        "axis 1: torque -2.01 Nm, 2 Nm allowed",
+        "axis 2: torque -2.01 Nm, 2 Nm allowed",
         value=-2.01,
         does_not=(torque(2.0),),
     ),
     Case(
         Limit.TORQUE_RATE,
         torque_by_steps(1.5),
-        "axis 1: torque rate 1.5e+03 Nm/s, 1e+03 Nm/s allowed",
+        "axis 2: torque rate 1.5e+03 Nm/s, 1e+03 Nm/s allowed",
         at=1,
         value=1500.0,
         does_not=(torque_by_steps(0.99),),
@@ -157,35 +157,35 @@ CASES = [
     Case(
         Limit.SPEED,
         speed(-20.1),
-        "axis 1: speed -1152 deg/s, 1146 deg/s allowed",
+        "axis 2: speed -1152 deg/s, 1146 deg/s allowed",
         value=-20.1,
         does_not=(speed(19.9), speed(-19.9)),
     ),
     Case(
         Limit.ENCODER_JUMP,
         jump(0.0701),
-        "axis 1: angle jumped by 4.0 deg, 4.0 deg possible",
+        "axis 2: angle jumped by 4.0 deg, 4.0 deg possible",
         value=0.0701,
         # what a motor may turn while nobody hears of it
         does_not=(jump(0.0699), jump(-0.0699), jump(0.0899, missed=1)),
     ),
-    Case(Limit.SPEED, speed(math.nan), "axis 1: speed nan deg/s, 1146 deg/s allowed", does_not=()),
+    Case(Limit.SPEED, speed(math.nan), "axis 2: speed nan deg/s, 1146 deg/s allowed", does_not=()),
     Case(
         Limit.FOLLOWING_ERROR,
         behind(0.21),
-        "axis 1: following error 12.0 deg, 11.5 deg allowed",
+        "axis 2: following error 12.0 deg, 11.5 deg allowed",
         value=0.21,
         does_not=(behind(0.19), behind(-0.19)),
     ),
     Case(
         Limit.FOLLOWING_ERROR,
         behind(math.nan),
-        "axis 1: following error nan deg, 11.5 deg allowed",
+        "axis 2: following error nan deg, 11.5 deg allowed",
     ),
     Case(
         Limit.CABLE_LENGTH,
         length(4.01, 0.1),
-        "axis 1: cable length 4.010 m, 4.000 m allowed",
+        "axis 2: cable length 4.010 m, 4.000 m allowed",
         value=4.01,
         # on the way back, at rest, and where the length is not known
         does_not=(length(3.99, 0.1), length(4.01, -0.1), length(4.01, 0.0), length(math.nan, 0.1)),
@@ -193,21 +193,21 @@ CASES = [
     Case(
         Limit.CABLE_LENGTH,
         length(0.49, -0.1),
-        "axis 1: cable length 0.490 m, 0.500 m allowed",
+        "axis 2: cable length 0.490 m, 0.500 m allowed",
         value=0.49,
         does_not=(length(0.51, -0.1), length(0.49, 0.1)),
     ),
     Case(
         Limit.TENSION_HIGH,
         tension(101.0),
-        "axis 1: tension 101.0 N, 100.0 N allowed",
+        "axis 2: tension 101.0 N, 100.0 N allowed",
         value=101.0,
         does_not=(tension(99.0), tension(math.nan)),
     ),
     Case(
         Limit.TENSION_LOW,
         tension(15.0),
-        "axis 1: tension 15.0 N, at least 20.0 N required",
+        "axis 2: tension 15.0 N, at least 20.0 N required",
         at=99,
         value=15.0,
         does_not=(tension(21.0),),
@@ -215,27 +215,27 @@ CASES = [
     Case(
         Limit.SLACK,
         tension(2.0, paid_out_rad=0.06),
-        "axis 1: the cable is slack: tension 2.0 N, slack below 5.0 N",
+        "axis 2: the cable is slack: tension 2.0 N, slack below 5.0 N",
         at=99,
         value=2.0,
     ),
     Case(
         Limit.BROKEN_CABLE,
         tension(0.0, after_cycles=20),
-        "axis 1: the cable seems broken: tension fell to 4.8 N at once, from above 20.0 N",
+        "axis 2: the cable seems broken: tension fell to 4.8 N at once, from above 20.0 N",
         at=18,
         value=50.0 / 21.0 * 2,
     ),
     Case(
         Limit.TENSION_SENSOR,
         sensor(False),
-        "axis 1: the tension sensor gives no valid reading",
+        "axis 2: the tension sensor gives no valid reading",
         does_not=(sensor(True),),
     ),
     Case(
         Limit.STALE,
         flag("alive", 1000),
-        "axis 1: feedback silent or irregular for 11 cycles, 10 allowed",
+        "axis 2: feedback silent or irregular for 11 cycles, 10 allowed",
         at=10,
         value=11.0,
         does_not=(flag("alive", 10),),
@@ -243,7 +243,7 @@ CASES = [
     Case(
         Limit.STALE,
         flag("rate_ok", 1000),
-        "axis 1: feedback silent or irregular for 11 cycles, 10 allowed",
+        "axis 2: feedback silent or irregular for 11 cycles, 10 allowed",
         at=10,
         value=11.0,
         does_not=(flag("rate_ok", 10),),
@@ -251,7 +251,7 @@ CASES = [
     Case(
         Limit.MISSED,
         missed(lambda _k: True),
-        "axis 1: no feedback for 4 cycles, 3 allowed",
+        "axis 2: no feedback for 4 cycles, 3 allowed",
         at=3,
         value=4.0,
         does_not=(missed(lambda k: k in (0, 1, 2, 60, 61, 62)),),
@@ -259,7 +259,7 @@ CASES = [
     Case(
         Limit.MISSED_IN_WINDOW,
         missed(lambda k: k % 8 == 0),
-        "axis 1: 6 answers missed in a window, 5 allowed",
+        "axis 2: 6 answers missed in a window, 5 allowed",
         at=40,
         value=6.0,
         does_not=(missed(lambda k: k % 10 == 0),),
@@ -275,7 +275,7 @@ CASES = [
     Case(
         Limit.NOT_FINITE,
         torque(math.nan),
-        "axis 1: the controller's torque is nan, a finite number is required",
+        "axis 2: the controller's torque is nan, a finite number is required",
     ),
 ]
 

@@ -41,7 +41,7 @@ def points(
     return made
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(
     gain=st.floats(0.015, 0.037),
     friction=st.floats(0.0, 0.3),

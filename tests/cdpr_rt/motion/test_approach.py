@@ -40,7 +40,6 @@ class Run:
         assert np.all(np.abs(paces) <= self.speed * (1 + 1e-12))
 
 
-@settings(derandomize=True, deadline=None)
 @given(pairs, bounds, bounds)
 def test_arrives_without_overshoot_as_early_as_the_bounds_allow(
     target: np.ndarray, speed: np.ndarray, acceleration: np.ndarray
@@ -63,7 +62,6 @@ def test_arrives_without_overshoot_as_early_as_the_bounds_allow(
     assert np.all(places * np.sign(target) <= np.abs(target) + 1e-9)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.lists(st.tuples(pairs, st.integers(1, 400)), min_size=1, max_size=8), bounds, bounds)
 def test_bounds_hold_whatever_becomes_of_the_target(
     targets: list[tuple[np.ndarray, int]], speed: np.ndarray, acceleration: np.ndarray
@@ -82,7 +80,6 @@ def test_a_target_that_is_no_number_brakes() -> None:
     np.testing.assert_array_equal(run.velocity, 0.0)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.lists(st.tuples(pairs, st.integers(1, 400)), min_size=1, max_size=8), bounds)
 def test_a_pace_is_reached_within_the_acceleration(
     wanted: list[tuple[np.ndarray, int]], acceleration: np.ndarray
@@ -104,7 +101,7 @@ def test_a_pace_is_reached_within_the_acceleration(
     assert ramp_velocity(np.zeros(2), np.full(2, 1e6), PERIOD_S, *state)
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(pairs, pairs, st.floats(0.0, 1.0))
 def test_a_goal_lies_on_the_way_to_its_target(
     target: np.ndarray, position: np.ndarray, awake: float
@@ -131,7 +128,7 @@ def test_what_sleeps_takes_more_to_wake_than_what_is_awake_to_fall_asleep() -> N
     assert shares[0.0, 2e-4] > 0.99
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(pairs, bounds, bounds)
 def test_what_is_braked_stops_at_the_place_to_rest(
     pace: np.ndarray, speed: np.ndarray, acceleration: np.ndarray

@@ -87,7 +87,7 @@ dropped = st.sets(st.integers(1, 59), max_size=12)
 doubled = st.lists(st.booleans(), min_size=60, max_size=60)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(transits, dropped, doubled, st.sampled_from([30.0, 60.0]), st.integers(0, 1 << 61))
 def test_loss_jitter_duplicates_and_another_order_never_make_it_leap(
     transits: list[float], dropped: set[int], doubled: list[bool], rate: float, offset_ns: int
@@ -114,7 +114,7 @@ def test_loss_jitter_duplicates_and_another_order_never_make_it_leap(
     assert counts["refused"] == counts["overrun"] == 0
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.floats(0.0, 0.15), min_size=30, max_size=30))
 def test_after_some_seconds_jitter_makes_no_sample_late(transits: list[float]) -> None:
     sender = Sender()
@@ -208,7 +208,7 @@ def test_a_leap_of_hand_or_clock_begins_anew(
 rotations = st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3)
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(rotations, st.booleans())
 @example([1e-9, 0.0, 0.0], True)
 def test_the_attitude_turns_evenly_on_the_shortest_way(turn: list[float], flipped: bool) -> None:
@@ -231,7 +231,7 @@ words = st.integers(0, 2**64 - 1)
 numbers = st.floats(allow_nan=True, allow_infinity=True)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(
     st.lists(
         st.tuples(

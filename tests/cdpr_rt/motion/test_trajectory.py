@@ -1,14 +1,14 @@
 """Laws of motion that every leg obeys."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_rt.core.exchange import Setpoint
-from cdpr_rt.motion.trajectory import Hold, Leg
+from cdpr_rt.motion.trajectory import Hold, TrapezoidalMove
 
 legs = st.builds(
-    Leg,
+    TrapezoidalMove,
     st.lists(st.floats(-10, 10), min_size=2, max_size=2).map(np.array),
     st.lists(st.floats(-5, 5), min_size=2, max_size=2).map(np.array),
     st.floats(0, 3),
@@ -16,7 +16,7 @@ legs = st.builds(
 )
 
 
-def sample(leg: Leg, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sample(leg: TrapezoidalMove, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     setpoint = Setpoint(2)
     positions, velocities = [], []
     for t in times:
@@ -26,9 +26,8 @@ def sample(leg: Leg, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(positions), np.array(velocities)
 
 
-@settings(derandomize=True, deadline=None)
 @given(legs)
-def test_velocity_is_the_derivative_and_keeps_its_bounds(leg: Leg) -> None:
+def test_velocity_is_the_derivative_and_keeps_its_bounds(leg: TrapezoidalMove) -> None:
     times = np.linspace(-0.1, leg.duration_s + 0.1, 4001)
     positions, velocities = sample(leg, times)
     step = times[1] - times[0]
@@ -42,9 +41,10 @@ def test_velocity_is_the_derivative_and_keeps_its_bounds(leg: Leg) -> None:
     np.testing.assert_allclose(positions[-1], leg.end_rad(), atol=1e-9)
 
 
-@settings(derandomize=True, deadline=None)
 @given(legs, st.floats(0, 1))
-def test_braking_continues_position_and_velocity_and_ends_at_rest(leg: Leg, where: float) -> None:
+def test_braking_continues_position_and_velocity_and_ends_at_rest(
+    leg: TrapezoidalMove, where: float
+) -> None:
     t = where * leg.duration_s
     before, after = Setpoint(2), Setpoint(2)
     leg.fill(t, before)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
+    Held,
     Look,
     Measured,
     PoseRefusedError,
@@ -18,18 +20,36 @@ from cdpr_rt.procedures.calibration.measure_poses import (
 class Operator:
     """A platform that refuses some places and shakes at others."""
 
-    def __init__(self, shaky: float = -1.0, refused: float = -1.0) -> None:
-        self.shaky, self.refused = shaky, refused
+    def __init__(
+        self,
+        shaky: float = -1.0,
+        refused: float = -1.0,
+        behind: float = -1.0,
+        beyond: float = np.inf,
+    ) -> None:
+        self.shaky, self.refused, self.behind, self.beyond = shaky, refused, behind, beyond
         self.here = np.zeros(2)
         self.looks = 0
+        self.marker: int | None = None
+        self.gone: list[float] = []
 
-    def go(self, place: FloatArray) -> None:
-        if place[0] == self.refused:
+    def go(self, place: FloatArray) -> Held | None:
+        straight = self.here[0] == BETWEEN[0] or place[0] == BETWEEN[0]
+        if place[0] == self.refused or (place[0] == self.behind and not straight):
             raise PoseRefusedError("cable 2 would need 200 N")
-        self.here = place
+        self.gone.append(float(place[0]))
+        self.here = np.minimum(place, self.beyond)
+        if place[0] <= self.beyond:
+            return None
+        return Held(self.here, "900 mm off after 14 s: cable 2 would need 200 N")
 
     def stay(self, seconds: float) -> None:
         assert seconds > 0.0
+
+    def image(self) -> Sighting | None:
+        if self.marker is None:
+            return None
+        return Sighting("now", {self.marker: np.arange(8.0).reshape(4, 2)}, repeated=(9,))
 
     def look(self, seconds: float) -> Look:
         self.looks += 1
@@ -47,30 +67,78 @@ class Notes:
         self.lines.append(text)
 
 
+BETWEEN = np.array([0.5, 2.0])
 PLACES = [np.array([float(k), 2.0]) for k in range(1, 12)]
 
 
-def test_it_reads_as_many_as_are_wanted() -> None:
-    measured = Measured()
-    measure_poses(Operator(), PLACES, 5, measured, Notes())
+def collected() -> tuple[Measured, list[int]]:
+    """Return what takes readings, and how many there were whenever it had them kept."""
+    kept: list[int] = []
+    measured = Measured(lambda: kept.append(len(measured.readings)))
+    return measured, kept
+
+
+def test_each_reading_is_kept_at_once_with_what_the_camera_saw() -> None:
+    operator = Operator()
+    operator.marker = 4
+    measured, kept = collected()
+    measure_poses(operator, PLACES[:5], BETWEEN, measured, Notes())
     assert [reading.target[0] for reading in measured.readings] == [1, 2, 3, 4, 5]
+    assert kept == [1, 2, 3, 4, 5]
     last = measured.readings[-1]
     assert last.length_m == (5.0, 2.0, 1.0) and last.tension_N == (40.0,) * 3
     assert last.position_m == (5.0, 2.0, 0.0) and last.position_std_m == 0.001
+    assert last.image is not None and last.image.repeated == (9,)
+    assert last.image.sighting("x").corners_px[4].tolist() == [[0, 1], [2, 3], [4, 5], [6, 7]]
 
 
 def test_what_is_refused_or_shakes_is_left_out_with_its_reason() -> None:
-    operator, measured, notes = Operator(shaky=3.0, refused=2.0), Measured(), Notes()
-    measure_poses(operator, PLACES, 4, measured, notes)
+    operator, notes = Operator(shaky=3.0, refused=2.0), Notes()
+    measured, _ = collected()
+    measure_poses(operator, PLACES[:6], BETWEEN, measured, notes)
     assert [reading.target[0] for reading in measured.readings] == [1, 4, 5, 6]
     assert "200 N" in measured.refused[0]
-    assert "10.00 mm" in measured.refused[1] and "10.00 mm" in notes.lines[0]
+    assert "10.00 mm" in measured.refused[1]
+    assert notes.lines[0].startswith("pose 2, at 2.000, 2.000, is left out: cable 2")
+    assert "pose 2, at 3.000" in notes.lines[1] and "10.00 mm" in notes.lines[1]
+    assert measured.tried == [(2.0, 2.0), (3.0, 2.0)]
     assert operator.looks == 4 + 10
 
 
+def test_where_the_straight_way_is_refused_it_goes_by_the_place_between() -> None:
+    operator = Operator(behind=3.0)
+    measured, _ = collected()
+    measure_poses(operator, PLACES[:4], BETWEEN, measured, Notes())
+    assert len(measured.readings) == 4 and not measured.refused
+    assert operator.gone == [1.0, 2.0, 0.5, 3.0, 4.0]
+
+
 def test_it_gives_up_where_nothing_comes_to_rest_and_keeps_what_it_has() -> None:
-    measured = Measured()
+    measured, _ = collected()
     places = [PLACES[0], *[np.array([7.0, float(k)]) for k in range(9)]]
     with pytest.raises(TripError, match="5 poses in turn"):
-        measure_poses(Operator(shaky=7.0), places, 20, measured, Notes())
+        measure_poses(Operator(shaky=7.0), places, BETWEEN, measured, Notes())
     assert len(measured.readings) == 1 and len(measured.refused) == 5
+
+
+def test_what_is_not_reached_is_read_where_it_stands_five_times_in_turn_at_the_most() -> None:
+    measured, kept = collected()
+    notes = Notes()
+    measure_poses(Operator(beyond=8.0), PLACES[5:], BETWEEN, measured, notes)
+    assert [reading.target[0] for reading in measured.readings] == [6, 7, 8, 8, 8, 8]
+    assert [place[0] for place in measured.tried] == [9, 10, 11] and kept == [1, 2, 3, 4, 5, 6]
+    assert notes.lines[0] == (
+        "pose 4, at 9.000, 2.000, is read where the platform stands: 900 mm off after 14 s: "
+        "cable 2 would need 200 N"
+    )
+    measured, _ = collected()
+    with pytest.raises(TripError, match=r"5 poses in turn, the last pose 7, at 9\.000"):
+        measure_poses(Operator(beyond=4.0), PLACES[2:], BETWEEN, measured, notes)
+    assert [reading.target[0] for reading in measured.readings] == [3, 4, 4, 4, 4, 4, 4]
+
+
+def test_what_neither_is_reached_nor_stands_is_left_out_with_both_reasons() -> None:
+    measured, notes = collected()[0], Notes()
+    measure_poses(Operator(beyond=8.0, shaky=8.0), PLACES[8:9], BETWEEN, measured, notes)
+    assert not measured.readings and measured.tried == [(9.0, 2.0)]
+    assert "900 mm off" in notes.lines[0] and "10.00 mm" in notes.lines[0]

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
 from cdpr_rt.core.shared_block import SAMPLE, SharedBlock
 from cdpr_rt.motion.pose_stream import PoseStream
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
@@ -73,8 +73,10 @@ class IdealControl:
         self.tension_N, self.least_N, self.low_N = np.array([model.low_N] * 3)
         self.torque_Nm = np.full(n, 10.0)
         self.effort_Nm, self.compensation_Nm = np.zeros((2, n))
+        self.motor_loss_Nm, self.cogging_Nm = np.zeros((2, n))
         self.inertia_kg_m2, self.residual_m = np.full(n, 1e-4), 0.0
         self.free_lengths_m = np.zeros(n)
+        self.swing_rad = self.swing_m = 0.0
         self._there = model.pose(model.home)
         self.ways: list[tuple[FloatArray, FloatArray]] = []
         """Those that were asked for: from where to where."""
@@ -91,6 +93,14 @@ class IdealControl:
     def pose(self) -> FloatArray:
         return seven(self.model, self.estimated)
 
+    cell_trouble = ""
+    learnt_Nm = None
+
+    def trust_cells(self) -> None: ...
+
+    def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None: ...
+    def forget_motors(self) -> None: ...
+    def clear_compensation(self) -> None: ...
     def begin(self, feedback: AxisFeedback) -> None: ...
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None: ...
     def reset(self) -> None: ...
@@ -113,6 +123,15 @@ class IdealControl:
 
     def stands(self, position: FloatArray) -> bool:
         return self.workspace.stands(self._at(position))
+
+    def nears(self, position: FloatArray) -> int:
+        return self.model.interference.nears(self.position, position)
+
+    def touches(self, position: FloatArray) -> int:
+        return self.model.interference.touches(self.position, position)
+
+    def contact(self, pair: int) -> str:
+        return self.model.interference.within_clearance(pair)
 
     def feasible(self, position: FloatArray) -> str:
         return self.workspace.feasible(self._at(position))
@@ -160,9 +179,15 @@ class IdealPlatform:
         self.path, self.paces = [self.control.position.copy()], [np.zeros(self.model.size)]
 
     def switch(self, program: PlatformProgram, wanted: Mapping[str, Any]) -> None:
+        self.prepare(program, wanted)
         program.start(self.feedback, self.setpoint, self.torque)
         program.command(wanted)
         self.program = program
+
+    @staticmethod
+    def prepare(program: PlatformProgram, wanted: Mapping[str, Any]) -> None:
+        if (work := program.preparation(wanted)) is not None:
+            work()
 
     def cycle(self) -> None:
         self.feedback.cycle += 1
@@ -218,8 +243,8 @@ def rotation_of(model: PlatformModel, position: FloatArray) -> Rotation:
 
 def home_rotation(model: PlatformModel) -> Rotation:
     """Return the orientation at home."""
-    told = model.platform.home_rotation_rad
-    return Rotation.from_rotvec(np.pad(told, (3 - len(told), 0)))
+    rotation_rad = model.platform.home_rotation_rad
+    return Rotation.from_rotvec(np.pad(rotation_rad, (3 - len(rotation_rad), 0)))
 
 
 def seven(model: PlatformModel, position: FloatArray) -> NDArray[np.float64]:

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 from cdpr_rt.motion.rotations import multiply, to_quaternion, to_rotation_vector
 from cdpr_rt.motion.stream_buttons import CLUTCH
 from cdpr_rt.programs.base import ProgramError
-from cdpr_rt.programs.platform.index_path import index_path
 from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
 from cdpr_rt.programs.platform.platform_program import PlatformProgram
+from cdpr_rt.programs.platform.tightening.index_path import index_path
 
 PLATFORMS = {3: (PLANE, 20.0, 200.0), 6: (ROOM, 10.0, 2000.0)}
 AWAY = {3: [0.1, 0.05, 0.15], 6: [0.1, -0.05, 0.2, 0.1, -0.05, 0.15]}
@@ -236,7 +236,7 @@ wild = st.tuples(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=6)
+@settings(max_examples=6)
 @given(st.lists(wild, min_size=5, max_size=12))
 def test_nothing_that_a_hand_does_makes_a_step_or_leaves_the_workspace(
     made: IdealPlatform, hand: list[tuple[list[float], list[float], float, int, int]]
@@ -298,7 +298,6 @@ def test_the_way_to_the_indices_is_at_home_s_orientation(robot: IdealPlatform) -
 vectors = st.lists(st.floats(-1.8, 1.8), min_size=3, max_size=3).map(np.array)
 
 
-@settings(derandomize=True, deadline=None)
 @given(vectors, vectors)
 def test_rotations_are_those_of_scipy(first: np.ndarray, second: np.ndarray) -> None:
     q, p, product, phi = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(3)

@@ -47,7 +47,7 @@ def check_set_points(rig: ProgramRig) -> None:
     assert np.all(np.abs(rig.array("torque")) <= rig.model.torque_Nm)
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(orders, CYCLE_S, samples), min_size=1, max_size=10))
 def test_no_step_in_velocity_whatever_is_ordered(
     sequence: list[tuple[tuple[str, dict[str, object] | None], float, tuple[float, ...] | None]],
@@ -67,7 +67,7 @@ def test_no_step_in_velocity_whatever_is_ordered(
     check_set_points(rig)
 
 
-@settings(derandomize=True, deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     st.lists(st.floats(0.0, 0.05), min_size=40, max_size=40),
     st.sets(st.integers(0, 39), max_size=12),

@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import RobotAxis, load_robot
+from cdpr_profiles.catalogue import load_motor
 from cdpr_profiles.platform import Platform
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.motion.approach import approach
@@ -19,8 +20,8 @@ from cdpr_rt.robots.platform_model import PlatformModel, platform_model
 from cdpr_sim_bus.cia402.drive import transmission_of
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import CableRobot
+from cdpr_sim_bus.robot.logs.platform_record import RobotShape
 from cdpr_sim_bus.robot.motor_state import MotorRatings, build_motor
-from cdpr_sim_bus.robot.platform_record import RobotShape
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 
 PERIOD_S = 1e-3
@@ -58,6 +59,24 @@ def planar() -> Machine:
     """The robot planar-3."""
     assert _PLANAR.platform is not None
     return Machine(_PLANAR.platform, tuple(_PLANAR.axes), 20.0, 150.0, 4.5)
+
+
+def bar() -> Machine:
+    """A bar of 0.4 m on three cables, fastened unevenly: it turns a lot, at 2 to 4 Hz."""
+    motor = load_motor("MPP0922D")
+    axes = [replace(axis, winch=replace(axis.winch, motor=motor)) for axis in _PLANAR.axes]
+    platform = Platform(
+        mass_kg=3.0,
+        home_m=(0.0, 1.2),
+        home_tolerance_m=0.05,
+        workspace_min_m=(-0.4, 1.3),
+        workspace_max_m=(0.5, 2.0),
+        speed_m_s=0.5,
+        acceleration_m_s2=2.0,
+        exit_points_m=((-2.0, 3.0), (2.0, 3.0), (0.1, 0.0)),
+        anchor_points_m=((-0.15, 0.02), (0.25, 0.0), (0.03, -0.02)),
+    )
+    return Machine(platform, tuple(axes), 20.0, 120.0, 3.0)
 
 
 def spatial() -> Machine:

@@ -12,7 +12,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform import body_kernel
 
-quick = settings(derandomize=True, deadline=None, max_examples=60)
+quick = settings(max_examples=60)
 
 
 def points(rng: np.random.Generator) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -36,8 +36,8 @@ def test_mass_matrix_and_wrench_are_those_of_points(seed: int) -> None:
     rng = np.random.default_rng(seed)
     m, at, body = points(rng)
     pose = Pose(rng.normal(size=3), Rotation.from_rotvec(rng.normal(size=3)).as_matrix())
-    M, room = np.zeros((6, 6)), np.zeros((4, 3))
-    body_kernel.write_mass_matrix(body, pose.array, room, M)
+    M, scratch = np.zeros((6, 6)), np.zeros((4, 3))
+    body_kernel.write_mass_matrix(body, pose.array, scratch, M)
     r = at @ pose.Q.T
     twist, acceleration = rng.normal(size=(2, 6))
     omega = twist[3:]
@@ -45,7 +45,7 @@ def test_mass_matrix_and_wrench_are_those_of_points(seed: int) -> None:
     assert 0.5 * twist @ M @ twist == pytest.approx(0.5 * m @ (velocity**2).sum(axis=1))
     np.testing.assert_allclose(M, M.T, atol=1e-12)
     wrench = np.zeros(6)
-    body_kernel.write_wrench(body, M, room, twist, acceleration, wrench)
+    body_kernel.write_wrench(body, M, scratch, twist, acceleration, wrench)
     pull = acceleration[:3] + np.cross(acceleration[3:], r) + np.cross(omega, np.cross(omega, r))
     forces = m[:, None] * (body[body_kernel.GRAVITY :] - pull)
     wanted = np.concatenate([forces.sum(axis=0), np.cross(r, forces).sum(axis=0)])

@@ -103,6 +103,18 @@ def test_overshoot_is_small_and_the_set_point_is_followed(
         assert np.abs(off[:, k:]).max(initial=0.0) < np.radians(1.0)
 
 
+def test_friction_and_cogging_are_learnt_in_motion(in_a_plane: Moved) -> None:
+    physics = in_a_plane[0]
+    learning, motors = physics.control.learning, RobotPlant().motor_plants(3)
+    assert learning is not None
+    # the tension's share of friction is learnt along with the motor's own; after so little motion
+    # better of all motors together than of each
+    share = learning.friction_Nm / [motor.friction.coulomb_Nm for motor in motors]
+    assert share.min() > 0.5 and share.max() < 2.0 and 0.9 < share.mean() < 1.6
+    amplitude = np.linalg.norm(learning.cogging_Nm, axis=1)
+    np.testing.assert_allclose(amplitude, [m.cogging[0].amplitude_Nm for m in motors], rtol=0.35)
+
+
 def test_a_robot_with_much_friction_does_not_leap() -> None:
     """Friction above what the proportional part may ask for; the damping is not saturated."""
     physics, legs = moved(Physics(planar(), with_friction(0.5)), PLANE[:2])
@@ -166,7 +178,7 @@ def test_an_obstacle_in_the_way_is_told() -> None:
     model = platform_model_of(replace(robot, platform=blocked))
     control = CableControl(model, robot.axes, np.full(8, 6.0), PERIOD_S)
     told = control.feasible_path(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
-    assert "at -0.050, 0.100, 1.810 m: platform and obstacle 0 come within 10 mm" in told
+    assert "at -0.050, 0.100, 1.810 m: platform and obstacle 1 come within 10 mm" in told
     assert not control.feasible_path(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
 
 
@@ -197,6 +209,20 @@ def test_tensions_that_are_missing_are_told(place: tuple[float, float], told: bo
     model = control.model
     assert control.tension_N.min() >= model.low_N[0] - 1e-9
     assert control.tension_N.max() <= model.high_N[0] + 1e-9
+
+
+def test_an_acceleration_that_tensions_cannot_give_is_told() -> None:
+    control = planar().control()
+    feedback, setpoint, torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
+    place = np.array([0.0, 1.9])
+    control.take_lengths(control.model.kinematics.lengths(control.model.pose(place)), feedback)
+    control.begin(feedback)
+    control.stand_still()
+    control.acceleration[:] = [0.0, -200.0]
+    for _ in range(100):
+        control.update(feedback, setpoint, torque)
+    assert control.stands(place)
+    assert control.missing().startswith("for this motion, cable")
 
 
 def test_lengths_of_this_very_cycle_stay_and_home_is_found() -> None:

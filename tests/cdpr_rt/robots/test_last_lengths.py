@@ -61,6 +61,32 @@ def test_a_robot_that_was_not_stopped_leaves_none(path: Path):
     last = read(path)
     assert last.lengths is None
     assert "in motion" in last.why
+    assert last.fallen
+
+
+def test_a_robot_that_was_stopped_with_slack_cables_has_not_fallen(path: Path):
+    last = read(path)
+    last.begin_to_move(np.zeros(3))
+    assert read(path).fallen
+    last.keep(AxisEstimate(3), AxisFeedback(3))
+    assert not read(path).fallen
+    assert "has not been stopped with known lengths" in read(path).why
+
+
+@pytest.mark.parametrize("flag", ["fallen", "displaced"])
+def test_that_it_fell_is_remembered_until_it_is_tight_again(path: Path, flag: str):
+    last = read(path)
+    last.begin_to_move(np.zeros(3))
+    setattr(last, flag, True)
+    for _ in range(2):
+        last.keep(AxisEstimate(3), AxisFeedback(3))  # enabled and disabled, no cable wound
+        last = read(path)
+        assert getattr(last, flag)
+        last.begin_to_move(np.zeros(3))
+    setattr(last, flag, False)
+    last.fallen = False
+    last.keep(AxisEstimate(3), AxisFeedback(3))
+    assert not getattr(read(path), flag)
 
 
 def test_what_did_not_move_stays_true_though_nobody_knew_it(path: Path):
@@ -105,6 +131,7 @@ def test_a_damaged_file_leaves_none_and_says_which(path: Path, damage: str):
     path.write_text(damage)
     last = read(path)
     assert last.lengths is None
+    assert last.fallen
     assert str(path) in last.why
 
 

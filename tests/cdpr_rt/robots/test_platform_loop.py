@@ -101,7 +101,7 @@ class Loop:
             (loop.PERIOD, PERIOD_S), (loop.BANDWIDTH, gains.bandwidth_rad_s),
             (loop.DAMPING, gains.damping_N_s_m), (loop.RATIO, DAMPING_RATIO),
             (loop.ROTOR, gains.rotor_kg), (loop.REGULATOR_N, 1e12), (loop.MOST_N, 1e12),
-            (loop.STUCK, 1.0), (loop.DEAD, 1.0),
+            (loop.STICTION_SPEED, 1.0), (loop.DEADBAND, 1.0),
         ):  # fmt: skip
             self.settings[key] = value
         self.pose, self.cables = model.pose(q), np.zeros((CABLE_ROWS, n))
@@ -187,7 +187,7 @@ def test_rates_that_contradict_each_other_are_not_followed() -> None:
 def test_nothing_is_integrated_that_cannot_be_had() -> None:
     machine = planar()
     law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
-    law.settings[loop.INTEGRAL], law.settings[loop.DEAD] = 5.0, 1e-9
+    law.settings[loop.INTEGRAL], law.settings[loop.DEADBAND] = 5.0, 1e-9
     law.moves[0, 0] = 0.01
     law.force(share=0.5)
     assert not law.state[:2].any()
@@ -204,7 +204,7 @@ def test_nothing_is_integrated_that_cannot_be_had() -> None:
 def test_the_integral_part_sleeps_within_what_friction_hides_and_wakes_later() -> None:
     machine = planar()
     law = Loop(machine, loop_model(machine).design(), np.array([0.1, 1.9]))
-    law.settings[loop.INTEGRAL], law.settings[loop.DEAD] = 5.0, 1e-4
+    law.settings[loop.INTEGRAL], law.settings[loop.DEADBAND] = 5.0, 1e-4
     awake = []
     for error in (3e-4, 1.5e-4, 0.5e-4, 0.5e-4, 1.5e-4, 3e-4, 3e-4):
         law.moves[0, 0] = error
@@ -237,7 +237,7 @@ def test_the_lightest_rotor_decides_how_much_is_damped() -> None:
 
     def damping(*axes: RobotAxis) -> float:
         gains = loop_model(dataclasses.replace(machine, axes=axes)).design()
-        return gains.loose_N_s_m * (1.0 - gains.smooth)
+        return gains.null_damping_N_s_m * (1.0 - gains.smooth)
 
     assert damping(geared, light, geared) == pytest.approx(damping(light, light, light))
     assert damping(geared, geared, geared) == pytest.approx(4.0 * damping(light, light, light))
@@ -297,7 +297,7 @@ def radius(
         proportional = K @ back @ theta
         integral = integral + gains.integral_1_s * period_s * proportional
         tension = back.T @ (proportional + D @ back @ speed + integral)
-        tension = tension + gains.loose_N_s_m * N @ (N.T @ omega)
+        tension = tension + gains.null_damping_N_s_m * N @ (N.T @ omega)
         plant = (early @ np.concatenate([plant, before]))[:size]
         plant = (rest @ np.concatenate([plant, last]))[:size]
         return np.concatenate([plant, theta, omega, lagging, calm, integral, tension, last])

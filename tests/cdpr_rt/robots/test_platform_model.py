@@ -65,7 +65,7 @@ def test_weight_and_wrench_scale_are_those_of_the_directions() -> None:
     assert suspended.poses(np.array([[1.0, 2.0, 3.0]]))[0] == pytest.approx(pose.array)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(
     st.tuples(st.floats(-1.9, 1.9), st.floats(0.2, 2.9)),
     st.tuples(st.floats(-150.0, 150.0), st.floats(-150.0, 150.0)),

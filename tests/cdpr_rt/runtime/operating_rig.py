@@ -20,7 +20,7 @@ from cdpr_rt.core.rawlog import RawLogWriter, column_names
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import Reaction
 from cdpr_rt.core.supervisor import Supervisor
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.programs.axes.track import TrackProgram
 from cdpr_rt.programs.axes.zero_torque import ZeroTorqueProgram
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
@@ -175,8 +175,8 @@ def controller() -> Proportional:
     return Proportional(np.full(2, 1.0), np.full(2, 0.5))
 
 
-def leg() -> Leg:
-    return Leg(np.zeros(2), np.array([1.0, -1.0]), 0.5, 0.1)
+def leg() -> TrapezoidalMove:
+    return TrapezoidalMove(np.zeros(2), np.array([1.0, -1.0]), 0.5, 0.1)
 
 
 def log(path: Path) -> RawLogWriter:

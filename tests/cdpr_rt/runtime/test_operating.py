@@ -13,7 +13,7 @@ from cdpr_rt.core.exchange import Setpoint
 from cdpr_rt.core.rawlog import read_raw_log
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import InterruptedMotionError, RawLogError, TripError
-from cdpr_rt.motion.trajectory import Hold, Leg
+from cdpr_rt.motion.trajectory import Hold, TrapezoidalMove
 from tests.cdpr_rt.runtime.operating_rig import (
     DAMPING,
     INERTIA,
@@ -65,7 +65,7 @@ def test_a_motion_longer_than_the_ring_loses_no_row(tmp_path: Path) -> None:
     writer, told = log(tmp_path / "a.raw"), []
     with powered() as rig:
         assert rig.block.capacity == 256
-        motion = Leg(np.zeros(2), np.array([0.1, 0.1]), 9.0, 0.1)
+        motion = TrapezoidalMove(np.zeros(2), np.array([0.1, 0.1]), 9.0, 0.1)
         rig.operator.follow(controller(), motion, writer, told.append)
     writer.close()
     np.testing.assert_array_equal(
@@ -78,7 +78,7 @@ def test_motions_follow_each_other_with_no_torque_in_between() -> None:
     with powered() as rig:
         for _ in range(2):
             start = rig.device.angle.copy()
-            rig.follow(Leg(start, np.array([1.0, -1.0]), 0.5, 0.1))
+            rig.follow(TrapezoidalMove(start, np.array([1.0, -1.0]), 0.5, 0.1))
             assert not rig.device.pending.any()
         rig.operator.disable()
         assert not rig.machine.power
@@ -92,7 +92,7 @@ def test_bridges_few_missing_answers_and_trips_on_more() -> None:
         rig.follow()
     with powered() as rig:
         rig.device.silent = {rig.began + k for k in range(50, 60)}
-        with pytest.raises(TripError, match=r"axis 0: no feedback for 4 cycles, 3 allowed"):
+        with pytest.raises(TripError, match=r"axis 1: no feedback for 4 cycles, 3 allowed"):
             rig.follow()
         assert np.all(rig.device.pending == 0.0)
         assert not rig.machine.power
@@ -107,14 +107,15 @@ def test_alarm_speed_and_following_error_end_the_motion_without_torque() -> None
         assert not rig.machine.power
     with (
         powered() as rig,
-        pytest.raises(TripError, match=r"axis 0: following error .* 114\.6 deg allowed"),
+        pytest.raises(TripError, match=r"axis 1: following error .* 114\.6 deg allowed"),
     ):
         rig.follow(
-            Leg(np.zeros(2), np.array([5.0, 0]), 5.0, 0.1), Proportional(np.zeros(2), np.zeros(2))
+            TrapezoidalMove(np.zeros(2), np.array([5.0, 0]), 5.0, 0.1),
+            Proportional(np.zeros(2), np.zeros(2)),
         )
     with powered() as rig:
         rig.device.speed[:] = 200.0
-        with pytest.raises(TripError, match=r"axis 0: speed .* 2865 deg/s allowed"):
+        with pytest.raises(TripError, match=r"axis 1: speed .* 2865 deg/s allowed"):
             rig.follow()
 
 
@@ -132,7 +133,9 @@ def test_a_motion_that_was_ended_may_be_tried_again_once_it_is_acknowledged(
         rig.operator.idle(0.5)
         rig.operator.enable()
         writer = log(tmp_path / "b.raw")
-        rig.follow(Leg(rig.device.angle.copy(), np.array([1.0, -1.0]), 0.5, 0.1), log=writer)
+        rig.follow(
+            TrapezoidalMove(rig.device.angle.copy(), np.array([1.0, -1.0]), 0.5, 0.1), log=writer
+        )
         writer.close()
     assert len(read_raw_log(tmp_path / "b.raw").rows) == 701
 
@@ -213,7 +216,7 @@ def test_a_full_disk_ends_the_motion_without_torque() -> None:
 
     with powered() as rig:
         with pytest.raises(RawLogError):
-            rig.follow(Leg(np.zeros(2), np.array([0.1, 0.1]), 5.0, 0.1), log=Full())
+            rig.follow(TrapezoidalMove(np.zeros(2), np.array([0.1, 0.1]), 5.0, 0.1), log=Full())
         assert rig.cycle < 2100
         rig.loop.turn()
         assert np.all(rig.device.pending == 0.0)
@@ -302,8 +305,8 @@ def test_a_reason_to_stop_brakes_the_motion_first(tmp_path: Path) -> None:
 def test_a_braking_motion_may_take_its_time(tmp_path: Path) -> None:
     """As a mass that is lowered to where it hung."""
 
-    class Slow(Leg):
-        def brake(self, time_s: float) -> Leg:
+    class Slow(TrapezoidalMove):
+        def brake(self, time_s: float) -> TrapezoidalMove:
             self.fill(time_s, now := Setpoint(2))
             return Hold(now.position_rad, 14.0)
 

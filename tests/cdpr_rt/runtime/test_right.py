@@ -1,4 +1,4 @@
-"""Which taking of the right to move holds, as the loop reads it while the service writes."""
+"""Which grant of the right to move holds, as the loop reads it while the service writes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def sides() -> tuple[PublishedRight, RightToMove, Clock]:
 Sides = tuple[PublishedRight, RightToMove, Clock]
 
 
-def test_only_the_newest_taking_holds_and_only_while_its_time_lasts(sides: Sides) -> None:
+def test_only_the_newest_grant_holds_and_only_while_its_time_lasts(sides: Sides) -> None:
     service, loop, _ = sides
     assert loop.current == 0
     first = service.begin(NOW_NS + 1)

@@ -16,7 +16,7 @@ from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import Reaction
 from cdpr_rt.core.supervisor import Limits, Supervisor
 from cdpr_rt.core.tension import TensionFeedback
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.runtime.warm_up import warm_up
 
 CYCLE = (
@@ -58,7 +58,7 @@ def test_the_cycle_compiles_nothing_after_it(n: int) -> None:
     supervisor, estimator = Supervisor(Limits(3.0, 100.0, 6.0), n, 1e-3), Estimator(n, 1e-3)
     for controller in (Proportional(np.full(n, 2.0), limit), pid):
         controller.reset()
-        Leg(rows[0], np.full(n, 0.05), 3.0, 0.5).fill(0.7, setpoint)
+        TrapezoidalMove(rows[0], np.full(n, 0.05), 3.0, 0.5).fill(0.7, setpoint)
         controller.update(feedback, setpoint, torque)
         estimator.update(feedback, read)
         assert supervisor.check(feedback, estimator.estimate, setpoint, torque) == Reaction.NONE

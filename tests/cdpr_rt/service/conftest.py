@@ -1,6 +1,7 @@
 """The service that tests of its policies share, one for each module."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -17,3 +18,9 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 def rig(shared: Rig) -> Rig:
     shared.reset()
     return shared
+
+
+@pytest.fixture
+def own_rig(tmp_path: Path) -> Iterator[Rig]:
+    with running(tmp_path) as rig:
+        yield rig

@@ -29,7 +29,7 @@ def made() -> tuple[Lease, Clock]:
 
 
 def until_ns() -> int:
-    """Until when the loop is told that the newest taking holds."""
+    """Until when the loop is told that the newest grant holds."""
     return int(BLOCK.counters["right_until_ns"][0])
 
 
@@ -98,7 +98,7 @@ OPERATIONS = st.lists(
 )
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(OPERATIONS)
 def test_at_most_one_token_counts_and_only_while_it_is_renewed(
     operations: list[tuple[str, int, float]],

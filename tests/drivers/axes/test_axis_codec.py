@@ -22,7 +22,7 @@ TPDO1 = struct.Struct("<Hih")
 TPDO2 = struct.Struct("<bHi")
 ENABLED = 0x27
 I32 = st.integers(-(1 << 31), (1 << 31) - 1)
-SETTINGS = settings(derandomize=True, deadline=None, max_examples=150)
+SETTINGS = settings(max_examples=150)
 
 
 class Group:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 
 import pytest
+from fork_server import FORKED
 
 SIMULATOR = """
 import math, sys
@@ -38,7 +38,7 @@ class SimulatorProcess:
     def __init__(self, name: str) -> None:
         self.name = name
         self.process = subprocess.Popen(
-            [sys.executable, "-c", SIMULATOR, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [*FORKED, SIMULATOR, name], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         )
         assert self.process.stdout is not None
         assert b"ready" in self.process.stdout.readline()

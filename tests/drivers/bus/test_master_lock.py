@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from fork_server import FORKED
 
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.master_lock import MasterLock, refuse_second_master
@@ -28,7 +28,7 @@ sys.stdin.read()
 
 @contextmanager
 def held_elsewhere(url: str) -> Iterator[subprocess.Popen[bytes]]:
-    command = [sys.executable, "-c", HOLDER, url]
+    command = [*FORKED, HOLDER, url]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         try:
             assert process.stdout is not None

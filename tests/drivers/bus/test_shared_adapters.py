@@ -138,7 +138,7 @@ def test_frames_of_before_do_not_come_in(start: Start) -> None:
 
 
 @given(st.lists(st.binary(max_size=30), max_size=10))
-@settings(derandomize=True, max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_rubbish_on_the_line_yields_frames_or_nothing(chunks: list[bytes]) -> None:
     adapter = SlcanAdapter.__new__(SlcanAdapter)
     adapter._reported_flags = 0

@@ -18,7 +18,7 @@ from cdpr_drivers.camera.camera import CameraError, grey
 from cdpr_drivers.camera.open_camera import open_camera
 from cdpr_drivers.camera.opencv_camera import OpencvCamera
 from cdpr_rt.core.clock import LockstepClock
-from cdpr_sim_bus.camera.camera_plant import CameraPlant, LensPlant
+from cdpr_sim_bus.camera.camera_plant import CameraFaultPlant, CameraPlant, LensPlant
 from cdpr_sim_bus.camera.camera_server import CameraServer
 from cdpr_sim_bus.camera.sim_camera import SimCamera
 from cdpr_sim_bus.physics_board import PhysicsBoard, PlatformState
@@ -26,6 +26,7 @@ from cdpr_sim_bus.physics_board import PhysicsBoard, PlatformState
 TINY = CameraPlant(
     samples=4,
     lens=LensPlant(width_px=80, height_px=64, focal_px=(70.0, 70.0), centre_px=(40.0, 32.0)),
+    faults=(CameraFaultPlant(kind="unplugged", from_image=2),),
 )
 LEVEL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -172,6 +173,11 @@ def test_a_simulated_camera_shows_the_boards_platform_until_it_is_unplugged(tmp_
             assert later is not None
             assert later.device_time_s == 3.0
             assert np.abs(later.pixels.astype(float) - image.pixels).max() > 50
+            with pytest.raises(CameraError, match=r"gives no image any more.*unplugged\?"):
+                camera.grab()
+        with open_camera(f"sim:{path}", clock) as camera:  # plugged in again
+            again = camera.grab()
+            assert again is not None and again.device_time_s == 3.0
             server.terminate()
             server.join()
             with pytest.raises(CameraError, match=r"gives no image any more.*unplugged\?"):

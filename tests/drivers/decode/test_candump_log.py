@@ -6,12 +6,10 @@ import io
 
 import can
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_drivers.decode import Frame, LogError, format_line, parse_line, read_log
-
-seeded = settings(derandomize=True, deadline=None)
 
 TIMES = st.integers(0, 4_000_000_000_000_000).map(lambda us: round(us * 1e-6, 6))
 DATA = st.binary(max_size=8)
@@ -28,13 +26,11 @@ ERRORS = st.tuples(TIMES, st.integers(0, 0x1FFFFFFF), st.binary(min_size=8, max_
 CHANNELS = st.sampled_from(["can0", "vcan17", "slcan-a", "lab.2"])
 
 
-@seeded
 @given(CHANNELS, STANDARD | EXTENDED | REMOTE | ERRORS)
 def test_a_line_gives_back_its_frame(channel: str, frame: Frame) -> None:
     assert parse_line(format_line(channel, frame)) == (channel, frame)
 
 
-@seeded
 @given(STANDARD | EXTENDED | REMOTE | ERRORS)
 def test_packed_frames_keep_all(frame: Frame) -> None:
     assert Frame.unpack(frame.time_s, frame.pack()) == frame
@@ -52,14 +48,12 @@ def _message(frame: Frame) -> can.Message:
     )
 
 
-@seeded
 @given(STANDARD | EXTENDED | REMOTE)
 def test_python_can_reads_what_we_write(frame: Frame) -> None:
     (read,) = can.CanutilsLogReader(io.StringIO(format_line("can0", frame) + "\n"))
     assert read.equals(_message(frame), timestamp_delta=1e-6, check_direction=False)
 
 
-@seeded
 @given(STANDARD | EXTENDED | REMOTE)
 def test_we_read_what_python_can_writes(frame: Frame) -> None:
     file = io.StringIO()

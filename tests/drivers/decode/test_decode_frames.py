@@ -21,7 +21,6 @@ from cdpr_profiles import DriveProfile, Pdo, PdoEntry, load_winch
 
 WINCH = load_winch("winch-mpp0923d")
 KNOWN = KnownNode.of_winch(WINCH)
-seeded = settings(derandomize=True, deadline=None)
 
 
 def decoded(identifier: int, data: bytes | str, known: KnownNode = KNOWN) -> Record:
@@ -49,7 +48,6 @@ def pdo(dictionary: canopen.ObjectDictionary, entries: dict[int, int]) -> bytes:
 DICTIONARY = canopen.import_od(str(WINCH.drive.eds), 1)
 
 
-@seeded
 @given(st.integers(0, 0xFFFF), st.integers(-(2**31), 2**31 - 1), st.integers(-32768, 32767))
 def test_feedback_is_decoded_to_si(status: int, position: int, torque: int) -> None:
     data = pdo(DICTIONARY, {0x6041: status, 0x6064: position, 0x6077: torque})
@@ -62,7 +60,6 @@ def test_feedback_is_decoded_to_si(status: int, position: int, torque: int) -> N
     assert record.fields[2].text == f"{torque * 3.0 / 1000:.4f} Nm"
 
 
-@seeded
 @given(st.integers(0, 0xFFFF), st.integers(-32768, 32767))
 def test_commands_are_decoded(control: int, torque: int) -> None:
     record = decoded(0x201, pdo(DICTIONARY, {0x6040: control, 0x6071: torque}))
@@ -330,7 +327,7 @@ FRAMES = st.tuples(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.lists(FRAMES, max_size=60), st.booleans())
 def test_no_frame_makes_it_fail(frames: list[tuple[int, bytes, int, int]], known: bool) -> None:
     decoder = Decoder({1: KNOWN}) if known else Decoder(others=KnownNode(WINCH.drive))

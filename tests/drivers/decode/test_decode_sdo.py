@@ -71,8 +71,6 @@ def one(found: list[SdoEvent], step: Step) -> SdoEvent:
 
 VALUES = st.binary(min_size=1, max_size=40) | st.binary(min_size=880, max_size=900)
 overheard = settings(
-    derandomize=True,
-    deadline=None,
     max_examples=12,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )

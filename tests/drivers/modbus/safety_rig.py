@@ -77,8 +77,8 @@ def start(*arguments: str | Path) -> subprocess.Popen[bytes]:
 
 def ready(process: subprocess.Popen[bytes]) -> dict[str, Any]:
     assert process.stdout is not None
-    told: dict[str, Any] = json.loads(process.stdout.readline())["ready"]
-    return told
+    line: dict[str, Any] = json.loads(process.stdout.readline())
+    return dict(line["ready"])
 
 
 def wait_until(done: Callable[[], object], timeout_s: float = DEADLINE_S) -> float:

@@ -73,7 +73,7 @@ def test_the_robots_file_names_a_folder_or_a_file(robot: Robot, learnt: Path) ->
     path.write_text(own)
     assert all(load_profiles(load_robot(path)))
     path.write_text(own.replace("learnt/upper-left", "learnt/nowhere"))
-    with pytest.raises(ConfigurationError, match=r"axis axis 0: .*nowhere: cannot be read"):
+    with pytest.raises(ConfigurationError, match=r"axis axis 1: .*nowhere: cannot be read"):
         load_profiles(load_robot(path))
     path.write_text(own.replace('"learnt/upper-left"', "7"))
     with pytest.raises(ProfileError, match="commissioned"):

@@ -14,7 +14,7 @@ from cdpr_sim_bus.bus.bus_load import BusLoad
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
 from cdpr_sim_bus.frame import LONGEST_FRAME_BITS, pack_frame
 
-LAW = settings(derandomize=True, max_examples=200, deadline=None)
+LAW = settings(max_examples=200)
 
 
 def test_paced_time_is_wall_time() -> None:

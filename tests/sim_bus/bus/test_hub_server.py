@@ -6,11 +6,11 @@ import json
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from fork_server import FORKED
 
 SIMULATOR = """
 import math, pathlib, sys
@@ -39,7 +39,7 @@ class Simulator:
     def __init__(self, bus: str, trace: Path, stdin: int = subprocess.PIPE) -> None:
         self.trace = trace
         self.process = subprocess.Popen(
-            [sys.executable, "-c", SIMULATOR, bus, str(trace)],
+            [*FORKED, SIMULATOR, bus, str(trace)],
             stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

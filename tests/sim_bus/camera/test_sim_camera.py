@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -125,6 +127,32 @@ def test_what_is_broken_shows() -> None:
     pushed = SimCamera(plant(markers=(moved,)))
     places = [corners_of(pushed, pushed.grab(above())) for _ in range(2)]
     assert (places[1] - places[0])[:, 0].mean() == pytest.approx(0.05 * 280.0 / 1.2, abs=0.5)
+
+
+def test_faults_of_the_plant_come_at_their_images_and_go(tmp_path: Path) -> None:
+    path = tmp_path / "plant.toml"
+    path.write_text(
+        "seed = 3\n[camera]\nsamples = 4\n"
+        + "".join(
+            f'[[camera.faults]]\nkind = "{kind}"\nfrom_image = {k}\nimages = {count}\n'
+            for kind, k, count in (("dark", 1, 1), ("defocus", 2, 1), ("unplugged", 3, 2))
+        )
+    )
+    faults = CameraPlant.load_file(path).faults
+    camera, whole = SimCamera(plant(faults=faults)), SimCamera(plant())
+    images = []
+    for _ in range(6):
+        reference = whole.grab(above())
+        if camera.skip_unplugged():
+            images.append(None)
+        else:
+            images.append(camera.grab(above()))
+    assert [image is None for image in images] == [False, False, False, True, True, False]
+    good, dark, soft, last = (image.astype(float) for image in images if image is not None)
+    assert dark.max() < 15 < good.max()
+    edges = [np.abs(np.diff(cv2.blur(x, (3, 3)), axis=1)).max() for x in (soft, good)]
+    assert edges[0] < 0.4 * edges[1]
+    np.testing.assert_array_equal(last, reference)
 
 
 def test_sheets_are_printed_with_the_errors_of_the_plant() -> None:

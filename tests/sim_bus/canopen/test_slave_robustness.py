@@ -52,7 +52,7 @@ def protected(od: ObjectDictionary) -> dict[tuple[int, int], object]:
     return {(e.index, e.sub): e.value for e in od if not e.writable and e.index not in served}
 
 
-@settings(derandomize=True, max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(garbage=st.lists(frames, max_size=60), state=st.sampled_from([1, 2, 128]))
 def test_garbage_changes_nothing_protected(garbage: list[tuple[int, bytes]], state: int) -> None:
     bench = Bench().boot()

@@ -40,7 +40,7 @@ def shared(odd_eds_path: Path) -> Bench:
     return Bench(odd_eds_path).boot()
 
 
-@settings(derandomize=True, max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(content=contents, block_down=st.booleans(), block_up=st.booleans(), crc=st.booleans())
 def test_bytes_come_back_through_every_kind_of_transfer(
     shared: Bench, content: bytes, block_down: bool, block_up: bool, crc: bool

@@ -114,7 +114,7 @@ def test_starting_on_the_limit_switch(method: int) -> None:
     assert homed_deg(rig) == pytest.approx(next_index(edge, direction), abs=1.5)
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12)
 @given(start=st.floats(-700, 700), method=st.sampled_from([33, 34]), offset=st.integers(-500, 500))
 def test_index_methods_from_anywhere(start: float, method: int, offset: int) -> None:
     rig = rig_at(start)

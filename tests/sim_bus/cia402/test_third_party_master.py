@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 
 import canopen
 import pytest
 from canopen.profiles.p402 import BaseNode402
+from fork_server import FORKED
 
 from tests.sim_bus.cia402.drive_rig import EDS, NODE
 
@@ -31,7 +31,7 @@ serve([drive], "simbus:" + sys.argv[1], mode=ClockMode(sys.argv[2]), until_stdin
 def node(request: pytest.FixtureRequest) -> Iterator[BaseNode402]:
     name = f"third-party-{request.param}-{os.getpid()}"
     process = subprocess.Popen(
-        [sys.executable, "-c", SIMULATOR, name, request.param],
+        [*FORKED, SIMULATOR, name, request.param],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )

@@ -33,7 +33,7 @@ def spinning(speed_rad_s: float, **sections: object) -> Motor:
     return motor
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(
     speed=st.floats(-300.0, 300.0),
     counts=st.integers(16, 2**22),
@@ -64,7 +64,7 @@ def test_noise_has_the_stated_deviation() -> None:
     assert abs(np.corrcoef(deviation[1:], deviation[:-1])[0, 1]) < 0.03
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(
     speed=st.floats(-400.0, 400.0).filter(lambda v: abs(v) > 0.5),
     counts=st.sampled_from([17, 1000, 5000, 8192, 10007, 65536]),

@@ -103,7 +103,7 @@ def test_energy_is_kept_but_for_what_friction_and_cable_take() -> None:
     assert energy() - start == pytest.approx(put_in - lost, rel=1e-4)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(
     stiffness=st.floats(1e3, 1e9),
     damping=st.floats(0.0, 0.1),

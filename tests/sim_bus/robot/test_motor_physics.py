@@ -116,7 +116,7 @@ def test_motion_agrees_with_a_stiff_solver(
     assert sample.velocity_rad_s == pytest.approx(velocity, abs=tolerance * max(speeds))
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(
     velocity=st.floats(0.05, 60.0),
     forward=st.booleans(),
@@ -147,7 +147,7 @@ def test_steady_friction_follows_the_stribeck_curve(
     assert sample.friction_Nm == pytest.approx(float(expected), rel=0.02)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(
     torque=st.floats(-0.999, 0.999),
     sigma0=st.floats(200.0, 5000.0),
@@ -182,7 +182,7 @@ def test_rotor_sticks_below_breakaway_and_slips_above(
     assert abs(velocity) > 1.0
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 @given(speed=st.floats(1.0, 80.0), order=st.integers(1, 40), sigma0=st.floats(5.0, 2000.0))
 def test_coasting_never_gains_energy(speed: float, order: int, sigma0: float) -> None:
     term = {"order": order, "amplitude_Nm": 0.05, "phase_deg": 0.0}

@@ -12,6 +12,7 @@ from cdpr_profiles import load_winch
 from cdpr_profiles.errors import ProfileError
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from tests.sim_bus.robot.body_lab import body, free_length_m, run
 
 
 def test_each_motor_is_its_own() -> None:
@@ -32,6 +33,10 @@ def test_each_motor_is_its_own() -> None:
             {"geometry": {"exit_errors_m": ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.1))}},
             r"geometry.exit_errors_m\[2\]: 3 coordinates; allowed: 2",
         ),
+        (
+            {"cables": {"slips": ({"cable": 4, "at_s": 1.0, "slip_m": 0.01},)}},
+            r"cables.slips\[0\].cable: 4; allowed: 1 to 3",
+        ),
         ({"start": {"position_m": (0.0, 1.0, 2.0)}}, "start.position_m: 3 coordinates"),
         ({"motor": {"load": {"kind": "hung_mass"}}}, "motor.load: allowed: inertia_kg_m2;"),
     ],
@@ -41,6 +46,24 @@ def test_a_plant_that_does_not_fit_the_robot_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=reason):
         RobotPlant.model_validate(table).require_fit(3, 2)
+
+
+def test_a_cable_slips_once_at_its_time() -> None:
+    slips = (
+        {"cable": 2, "at_s": 0.02, "slip_m": 0.012},
+        {"cable": 1, "at_s": 0.01, "slip_m": -0.003},
+    )
+    robot, other = (
+        body(locked=True, cables={"slips": one}, floor={"present": True}) for one in (slips, ())
+    )
+    seen = []
+    for first_s in (0.0, 0.015, 0.03):
+        run(robot, 0.015, begin_s=first_s)
+        run(other, 0.015, begin_s=first_s)
+        seen.append((free_length_m(robot) - free_length_m(other))[:2])
+    assert seen[0] == pytest.approx([-0.003, 0.0], abs=1e-4)
+    assert seen[1] == pytest.approx([-0.003, 0.012], abs=1e-4)
+    assert seen[2] == pytest.approx([-0.003, 0.012], abs=1e-4)
 
 
 def test_a_single_motors_plant_is_refused(tmp_path: Path) -> None:

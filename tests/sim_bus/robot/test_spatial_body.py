@@ -129,7 +129,7 @@ def moved(robot: CableRobot, position_m: tuple[float, ...], vector: tuple[float,
 _coordinate = st.floats(-0.8, 0.8)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(
     st.tuples(_coordinate, _coordinate, st.floats(0.8, 2.0)),
     st.tuples(_coordinate, _coordinate, _coordinate),
@@ -146,7 +146,7 @@ def test_a_cable_over_a_pulley_is_its_arc_and_what_is_free(
         assert robot.distance_m(i) == pytest.approx(expected, abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(
     st.tuples(_coordinate, _coordinate, st.floats(0.8, 2.0)),
     st.tuples(_coordinate, _coordinate, _coordinate),

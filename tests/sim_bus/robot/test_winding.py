@@ -10,7 +10,7 @@ import pytest
 from cdpr_sim_bus.robot.rotor import paid_out
 from tests.sim_bus.robot.body_lab import body, run
 
-LAGGING = {
+LOWPASSED_ONCE = {
     "run_out_m": 0.01,
     "pitch_m": 0.01,
     "carriage_error": 1.0,
@@ -20,7 +20,7 @@ LAGGING = {
 
 
 def test_cable_is_paid_out_as_drum_and_carriage_say() -> None:
-    m = body(winding=LAGGING).motors[0]
+    m = body(winding=LOWPASSED_ONCE).motors[0]
     start, _ = paid_out(m)
     for turns in (0.5, 1.0, 3.25):  # of the drum, four of the motor each
         m["angle"] = m["angle_start"] + 8.0 * math.pi * turns
@@ -32,7 +32,7 @@ def test_cable_is_paid_out_as_drum_and_carriage_say() -> None:
 
 
 def test_the_lever_is_the_slope_of_what_is_paid_out() -> None:
-    m = body(winding=LAGGING).motors[1]
+    m = body(winding=LOWPASSED_ONCE).motors[1]
     for angle in np.linspace(-30.0, 30.0, 13):
         lengths = []
         for step in (-1e-5, 1e-5):
@@ -43,7 +43,7 @@ def test_the_lever_is_the_slope_of_what_is_paid_out() -> None:
 
 
 def test_winding_makes_no_energy() -> None:
-    robot = body(winding=LAGGING)
+    robot = body(winding=LOWPASSED_ONCE)
     robot.platform["velocity"][0, :2] = 0.3, 0.1
     p, m = robot.platform[0], robot.motors
 

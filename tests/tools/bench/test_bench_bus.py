@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cdpr_tools.commands.bench.bench_bus import _table
+from cdpr_tools.commands.bench.cyclic.bench_bus import _table
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_tools.bench import kinematics as bench
 from cdpr_tools.bench.geometries import COGIRO, held_tensions
-from cdpr_tools.commands.bench import bench_kinematics
+from cdpr_tools.commands.bench.platforms import bench_kinematics
 
 
 def test_bad_starts_are_found(monkeypatch: pytest.MonkeyPatch) -> None:

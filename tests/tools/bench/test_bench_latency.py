@@ -10,6 +10,9 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+pytestmark = pytest.mark.long
 
 PERIOD_S = 0.002
 
@@ -35,7 +38,8 @@ def test_a_loop_that_is_held_up_for_many_cycles_is_that_late() -> None:
     """The loop gives up the deadlines that have passed; their lateness is counted all the same."""
     arguments = [str(PERIOD_S), "1000", "ordinary"]
     probe = subprocess.Popen(
-        [sys.executable, "-m", "cdpr_tools.bench.wakeups", *arguments], stdout=subprocess.PIPE
+        [sys.executable, "-m", "cdpr_tools.bench.cyclic.wakeups", *arguments],
+        stdout=subprocess.PIPE,
     )
     while probe.poll() is None:  # whenever it has loaded its libraries, one falls into its cycles
         time.sleep(0.5)

@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 
 from cdpr_tools.bench.daemon import stop as stop_bench
-from cdpr_tools.commands.bench.bench_stop import _table
+from cdpr_tools.commands.bench.cyclic.bench_stop import _table
 from cdpr_tools.output import Output
+
+pytestmark = pytest.mark.long
 
 STOPS = 6
 

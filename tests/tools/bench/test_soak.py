@@ -20,6 +20,8 @@ from cdpr_tools.bench.soak import Process, Soak, growth
 from cdpr_tools.composition.session import open_robot
 from tests.tools.robot_rig import OUT, ROOT, Simulator, robot_file, unique
 
+pytestmark = pytest.mark.long
+
 SHORT = ("--hours", "0.006", "--rate", "250")
 
 

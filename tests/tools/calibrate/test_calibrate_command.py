@@ -15,8 +15,10 @@ from cdpr_here import cdpr_here
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
-from cdpr_rt.calibration.data import CalibrationData, PoseReading
+from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
 from cdpr_rt.robots.calibration_state import distrust, mark_not_calibrated
+from cdpr_tools.calibrate.made_readings import HAND_EYE_m
+from tests.cdpr_rt.calibration.camera_robot import camera_robot
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
 
 
@@ -84,6 +86,7 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     told = result(done)
     assert told["good"] and told["frame"].startswith("the room")
     proof = told["verification"]
+    assert proof["reference"] == "points"
     assert proof["mean_position_error_mm"] < 0.6 * proof["mean_position_error_before_mm"]
     assert len(told["parameters"]) == 8 * 5 + 1
     assert matplotlib.image.imread(told["picture"]).std() > 0.01
@@ -100,6 +103,18 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     assert again.returncode == 2 and "none to undo" in again.stderr
 
 
+def test_the_folder_of_a_run_can_be_fitted_again(tmp_path: Path) -> None:
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
+    data_of(what, tmp_path / "data.json")
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path, "--dry-run", "--json")
+    told = result(done)
+    assert told["poses"] == 45 and told["data"] == str(tmp_path / "data.json")
+    assert f"fit it again: cdpr calibrate fit spatial-8 --data {tmp_path}" in done.stderr
+    assert "truth" not in told
+    nothing = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path / "nothing")
+    assert nothing.returncode == 2 and "nothing" in nothing.stderr
+
+
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
     what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = data_of(what, tmp_path / "data.json")
@@ -112,6 +127,7 @@ def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> N
     assert "measure the platform at three poses" in done.stderr
     assert "measure one distance" in done.stderr
     residuals = told["verification"]
+    assert residuals["reference"] == "none"
     assert residuals["length_residual_mm"] < residuals["length_residual_before_mm"]
 
 
@@ -156,12 +172,15 @@ def test_bad_data_and_requests_are_refused(tmp_path: Path) -> None:
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", few)
     assert done.returncode == 2 and "15 and more" in done.stderr
     other = cdpr_here("calibrate", "fit", "planar-4", "--data", few)
-    assert other.returncode == 2 and "another state" in other.stderr
+    assert other.returncode == 2 and "not of 'planar-4'" in other.stderr
     few.write_text("{}")
     assert cdpr_here("calibrate", "fit", "spatial-8", "--data", few).returncode == 2
     assert cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path / "no").returncode == 2
     both = cdpr_here("calibrate", "run", "planar-4", "--redundancy", "--scanner")
     assert both.returncode == 2 and "give one of" in both.stderr
+    for robot in ("planar-4", "point-4"):
+        blind = cdpr_here("calibrate", "run", robot, "--camera")
+        assert blind.returncode == 2 and "does not turn its platform" in blind.stderr
     none = cdpr_here("calibrate", "run", "bench-2", "--redundancy")
     assert none.returncode == 2 and "no platform" in none.stderr
     kind = cdpr_here("calibrate", "run", "planar-4", "--redundancy", "--identify", "exit,colour")
@@ -200,3 +219,19 @@ def test_the_first_pose_has_to_be_home(tmp_path: Path) -> None:
     data = data_of(made_up("spatial-8", 20, 12), tmp_path / "data.json")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data)
     assert done.returncode == 2 and "allowed: home" in done.stderr
+
+
+def test_markers_in_the_data_are_fitted_with_the_cables(tmp_path: Path) -> None:
+    what = camera_robot(20)
+    what.made.data.save(tmp_path / "data.json")
+    done = cdpr_here("calibrate", "fit", "spatial-8", "--data", tmp_path / "data.json", "--json")
+    told = result(done)
+    assert told["camera"]["position_m"] == pytest.approx(HAND_EYE_m, abs=0.01)
+    assert len(told["camera"]["markers"]) == 12
+    proof = told["verification"]
+    assert proof["reference"] == "camera"
+    assert proof["by"].startswith("the camera, on a map by the images")
+    assert proof["mean_position_error_mm"] < 2.0 < proof["mean_position_error_before_mm"]
+    assert proof["mean_orientation_error_deg"] < 0.2
+    assert "off the camera, on a map by" in done.stderr
+    assert "or the places of three markers" in done.stderr

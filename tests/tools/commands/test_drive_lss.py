@@ -22,7 +22,7 @@ import typer
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import ProfileError, load_drive
-from cdpr_tools.commands.drive.drive import app
+from cdpr_tools.commands.drive.group import app
 from cdpr_tools.errors import CommandError
 
 WINCH = "winch-mpp0923d"

@@ -18,8 +18,9 @@ from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording import Recorder
 from cdpr_tools.recordings.picture import FIELDS, faults_of, pose_curves
+from cdpr_tools.recordings.reasons import Reasons
 from cdpr_tools.recordings.selection import Selection
-from cdpr_tools.recordings.summary import worth_telling
+from cdpr_tools.recordings.summary import _chosen, worth_telling
 from cdpr_tools.report.style import decimated
 from tests.cdpr_rt.service.recordings.recording_rig import block_with_clock, made_rows, put
 
@@ -189,8 +190,10 @@ def test_a_platform_s_pose_is_drawn_as_far_as_it_moves(tmp_path: Path) -> None:
     moved = _recorded(tmp_path / "moved", rows)
     _done("plot", plain)
     _done("plot", moved)
-    low, high = (imread(path.with_suffix(".png")).shape[0] for path in (plain, moved))
-    assert low < high
+    sizes = [imread(path.with_suffix(".png")).shape[:2] for path in (plain, moved)]
+    (_, narrow), (_, wide) = sizes
+    assert narrow < wide
+    assert max(high for high, _ in sizes) < 1800, "more than a screen shows"
 
 
 def test_curves_with_single_unknown_values_keep_their_extremes() -> None:
@@ -278,8 +281,9 @@ def test_what_ran_and_what_went_wrong_are_told_with_their_times(tmp_path: Path) 
     path = _recorded(tmp_path, rows, axes=axes, programs=["hold", "pose"])
     (figures,) = _done("info", path)["recordings"]
     assert [run["program"] for run in figures["runs"]] == ["hold", "pose", "hold"]
+    assert [run.get("cut_short_by") for run in figures["runs"]] == [None, None, "a fault"]
     _, shown, _ = _log("info", path)
-    assert "pose: ended with platform at 300.6, 2000.0 mm, 0.6 mm off its target" in shown
+    assert "pose: ended, platform at 300.6, 2000.0 mm, 0.6 mm from its target" in shown
 
     selection = Selection([path], FIELDS)
     columns = selection.columns()
@@ -287,6 +291,58 @@ def test_what_ran_and_what_went_wrong_are_told_with_their_times(tmp_path: Path) 
     assert after_s == pytest.approx(0.7, abs=1e-3) and fault_s == pytest.approx(0.9, abs=1e-3)
     assert text == "controlled stop by broken cable of right"
     assert _done("plot", path)["rows"] == 1000
+
+
+def test_an_emergency_stop_is_named_where_it_cut_a_motion_short(tmp_path: Path) -> None:
+    why = "emergency stop by cdpr estop"
+    rows = made_rows(0, 1000)
+    rows["state"][:], rows["program"][:] = LoopState.ACTIVE, 2
+    rows["program"][:200] = 1
+    rows["program"][600:] = 0  # the power goes at once, no supervisor reacts
+    rows["state"][603:] = LoopState.FAULT
+    block = block_with_clock()
+    axes = [{"name": "left"}, {"name": "right"}]
+    block.write_description({"robot": "bench", "axes": axes, "programs": ["idle", "pose", "path"]})
+    recorder, writer = Recorder(block, tmp_path, "bench", reserve_bytes=0), RowWriter(block)
+    recorder.begin()
+    put(writer, rows[:620])
+    block.write_status({"state": "fault", "reason": why, "reason_limit": None})
+    recorder.look()
+    put(writer, rows[620:])
+    recorder.finish()
+    (path,) = tmp_path.iterdir()
+    _, shown, _ = _log("info", path)
+    assert f"path: cut short: {why}; then left" in shown
+    assert "pose: ended, left" in shown
+
+    selection = Selection([path], FIELDS)
+    told = [text for _, text in faults_of(selection.readers, selection.columns())]
+    assert told == [f"state fault: {why}"]
+
+
+def test_a_fault_is_shown_whatever_has_happened_since() -> None:
+    fault = {"text": "state fault", "cycle": 7, "reaction": 0}
+    reason = {"text": "emergency stop", "limit": None}
+    program = {"text": "program path", "cycle": 9, "reaction": 0}
+    moves = [{"text": f"hold by me {k}", "kind": "command"} for k in range(50)]
+    kept = _chosen(worth_telling([fault, reason, program, *moves]), 10)
+    texts = [event["text"] for event in kept]
+    assert texts == ["state fault", "emergency stop", *(f"hold by me {k}" for k in range(42, 50))]
+
+
+def test_each_reaction_has_the_reason_that_came_with_it() -> None:
+    reasons = Reasons(
+        [
+            (10**9, {"text": "slack", "limit": None}),
+            (3 * 10**9, {"text": "too fast", "kind": "reason"}),
+            (2 * 10**9, {"text": "state fault", "cycle": 1, "limit": 3}),
+            (2 * 10**9, {"text": "a command", "kind": "command"}),
+        ]
+    )
+    assert reasons.after(10**9 + 20_000_000) == "slack"
+    assert reasons.after(2 * 10**9) == "too fast"
+    assert reasons.after(2 * 10**9, 25 * 10**8) == ""
+    assert reasons.after(4 * 10**9) == ""
 
 
 def test_who_may_move_and_refusals_over_and_over_do_not_fill_the_list() -> None:

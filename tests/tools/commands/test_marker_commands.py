@@ -96,7 +96,7 @@ def test_intrinsics_of_another_lens_fail_with_the_reason(photos: Path, tmp_path:
         (("map", "{photos}"), "--size-mm is missing"),
         (("map", "{photos}", "--size-mm", "150", "--dictionary", "4x4"), "did you mean"),
         (("map", "{photos}", "--size-mm", "150", "--reference", "77"), "is not in the map"),
-        (("map", "/nowhere", "--size-mm", "150"), "camera.toml"),
+        (("map", "/nowhere", "--size-mm", "150"), "a folder with images"),
         (("print", "0-3", "--size-mm", "190"), "150 mm is the largest"),
         (("print", "3-x", "--size-mm", "100"), "allowed: such as 0-39"),
         (("print", "99-100", "--size-mm", "100"), "allowed: 0 to 99"),

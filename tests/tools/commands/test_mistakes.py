@@ -38,6 +38,7 @@ MISTAKES = (
     ("A key that others may read", "cdpr status --url http://robot:8080 --key-file key"),
     ("A robot's file that exists", "cdpr robot new misspelt.toml"),
     ("No recording", "cdpr log info notes.mcap"),
+    ("A file that holds no path", "cdpr path notes.mcap --run"),
     ("A picture of another format", "cdpr log plot notes.mcap --out run.jpg"),
 )
 HEAD = """\

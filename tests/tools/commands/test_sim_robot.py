@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cdpr_drivers.camera.open_camera import open_camera
+from cdpr_rt.core.clock import LockstepClock
 from cdpr_sim_bus.record_file import HEADER_BYTES
 from cdpr_tools.commands.sim.sim_fault import Fault, fault
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -26,6 +28,9 @@ slack_m = 0.0
 [scanner]
 position_sigma_m = 0.004
 rate_Hz = 50.0
+[camera]
+samples = 4
+lens = { width_px = 80, height_px = 64, focal_px = [70.0, 70.0], centre_px = [40.0, 32.0] }
 """
 
 
@@ -52,12 +57,13 @@ class Robot:
     def __init__(self, folder: Path) -> None:
         self.name = unique()
         self.log, self.scanner = folder / "pose.bin", folder / "scanner.bin"
+        self.camera = folder / "camera"
         plant = folder / "plant.toml"
         plant.write_text(PLANT)
         self.simulator = Simulator(
             *("planar-3", "--bus", f"simbus:{self.name}"),
             *("--plant", str(plant), "--truth-log", str(self.log)),
-            *("--scanner", str(self.scanner)),
+            *("--scanner", str(self.scanner), "--camera", str(self.camera)),
         )
         self.bus = can.Bus(interface="simbus", channel=f"{self.name}-can0")
 
@@ -109,6 +115,14 @@ def test_a_scanner_measures_the_pose_with_errors(robot: Robot) -> None:
     off = seen["position_m"] - true["position_m"]
     assert (off[:, 2] == 0.0).all()
     assert 0.001 < np.std(off[:, :2]) < 0.007
+
+
+def test_a_camera_on_the_platform_sees_from_where_it_truly_is(robot: Robot) -> None:
+    true = robot.sync(0.1)
+    with open_camera(f"sim:{robot.camera}", LockstepClock()) as camera:
+        image = camera.grab()
+    assert image is not None and image.pixels.shape == (64, 80)
+    assert image.device_time_s == pytest.approx(true["time_s"], abs=1e-9)
 
 
 def test_a_cable_is_cut_while_the_robot_runs(

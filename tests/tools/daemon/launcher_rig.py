@@ -16,11 +16,11 @@ import time
 from pathlib import Path
 
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.runtime.control_loop.stop_requests import CUT_SHORT
-from cdpr_tools.daemon import launcher
-from cdpr_tools.daemon.child import end_with_launcher
+from cdpr_rt.core.states import CUT_SHORT
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
-from cdpr_tools.daemon.notify import ServiceManager
+from cdpr_tools.daemon.processes import launcher
+from cdpr_tools.daemon.processes.child import end_with_launcher
+from cdpr_tools.daemon.processes.notify import ServiceManager
 from cdpr_tools.daemon.settings import RunSettings
 
 NAME = "stand-in"

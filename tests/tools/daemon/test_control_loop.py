@@ -326,8 +326,6 @@ def test_a_request_to_end_brakes_within_the_acceleration_limit(lab: tuple[Path, 
 
 def test_nothing_that_is_posted_crashes_the_loop_or_gives_power(ready: LoopRig) -> None:
     @settings(
-        derandomize=True,
-        deadline=None,
         max_examples=4,
         suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
     )

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import socket
+import sys
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cdpr_profiles.errors import ProfileError
+from cdpr_tools.cli import main
 from cdpr_tools.client.client import (
     ConnectionLostError,
     NoDaemonError,
@@ -18,6 +23,7 @@ from cdpr_tools.client.client import (
     key_values,
     open_daemon,
 )
+from cdpr_tools.commands.robot.path import robot_called
 from cdpr_tools.errors import BadInputError
 
 
@@ -58,6 +64,44 @@ def test_what_a_killed_daemon_left_behind_is_none(listening: list[Path], folder:
     assert where(None) == str(listening[1])
     with pytest.raises(NoDaemonError, match="no daemon runs for dead"):
         where("dead")
+
+
+@contextmanager
+def running(path: Path, reference: str) -> Iterator[None]:
+    """A daemon that tells one command which robot it runs."""
+    body = b'{"reference": "%s"}' % reference.encode()
+    head = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body)
+
+    def serve() -> None:
+        listener.accept()[0].close()  # whether it lives
+        with listener.accept()[0] as caller:
+            assert caller.recv(4096).startswith(b"GET /description")
+            caller.sendall(head + body)
+
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield
+        thread.join()
+    path.unlink()
+
+
+def test_a_file_is_that_of_the_robot_that_the_daemon_of_its_name_runs(folder: Path) -> None:
+    own, others = folder / "mine.toml", folder / "elsewhere" / "mine.toml"
+    with running(folder / "mine.sock", str(own)):
+        assert where(str(own)) == str(folder / "mine.sock")
+    refused = pytest.raises(BadInputError, match="the daemon of this name runs")
+    with running(folder / "mine.sock", str(own)), refused:
+        where(str(others))
+
+
+def test_a_robot_is_found_by_the_name_of_the_daemon_that_runs_its_file(folder: Path) -> None:
+    with running(folder / "mine.sock", "planar-3"):
+        assert robot_called("mine").profile == "planar-3"
+    with pytest.raises(ProfileError, match="no profile named 'mine'"):
+        robot_called("mine")
 
 
 @pytest.mark.parametrize(("path", "tries"), [("/hold", 3), ("/disable", 3), ("/check", 1)])
@@ -126,3 +170,39 @@ def test_values_are_json() -> None:
 def test_what_is_no_json_is_refused(text: str) -> None:
     with pytest.raises(BadInputError, match=r"^a|^=1"):
         key_values([text])
+
+
+def test_a_command_waits_for_a_daemon_that_is_still_starting(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    states = ["starting", "starting", "unconfigured", "inactive", "ready"]
+    asked: list[str] = []
+
+    class Answering(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append(self.path)
+            asks_state = self.path == "/status"
+            answer = {"state": states.pop(0), "reason": ""} if asks_state else {"programs": []}
+            text = json.dumps(answer).encode()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(text)))
+            self.end_headers()
+            self.wfile.write(text)
+
+        def log_message(self, *_: Any) -> None:
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Answering) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        url = f"http://127.0.0.1:{server.server_port}"
+        monkeypatch.setattr(sys, "argv", ["cdpr", "tighten", "--url", url])
+        try:
+            with pytest.raises(SystemExit) as ended:
+                main()
+        finally:
+            server.shutdown()
+            thread.join()
+    told = capsys.readouterr().err
+    assert asked == ["/status"] * 5 + ["/description"] and ended.value.code == 2
+    assert told.count("the daemon is still starting: its control loop is loaded, ") == 1

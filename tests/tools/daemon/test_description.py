@@ -12,7 +12,7 @@ from cdpr_profiles.calibration.in_force import load_calibrated, take_over, undo
 from cdpr_profiles.catalogue import list_profiles
 from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_tools.daemon.loop_process import description, look_at_calibration
+from cdpr_tools.daemon.processes.loop_process import description, look_at_calibration
 from tests.profiles.test_geometry_calibration import calibration
 
 

@@ -19,6 +19,8 @@ import pytest
 
 from cdpr_tools.daemon.loop_file import LoopFile
 
+pytestmark = pytest.mark.long
+
 TIMEOUT_S = 60.0
 
 
@@ -145,8 +147,8 @@ def test_it_tells_when_both_are_up_and_ends_the_loop_before_the_service(start: S
 
 
 def test_what_systemd_has_no_room_for_is_told_until_it_is_taken(start: Start) -> None:
-    daemon = start({"stopping_s": 1.0}, watchdog_s=0.4)
-    daemon.stuff()  # before anything is told: the stand-ins take their time to load
+    daemon = start({"stopping_s": 1.0, "loading_s": 0.5}, watchdog_s=0.4)
+    daemon.stuff()  # before anything is told
     daemon.line("ready")
     (daemon.folder / "fault").touch()
     assert daemon.line("told")["told"] == "fault: left: too fast"

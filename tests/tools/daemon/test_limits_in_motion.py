@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.core.supervisor import Limit
+from cdpr_rt.programs.program_base import ProgramDefaults
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 from tests.tools.daemon.loop_rig import LoopRig, opened
 from tests.tools.robot_rig import robot_file, simulated
@@ -35,7 +36,7 @@ following_error = "torque off"
 Deed = Callable[[int, AxisFeedback, Setpoint, FloatArray], None]
 
 
-class Wild:
+class Wild(ProgramDefaults):
     """A program that does whatever a test wants; axis 0 is left at rest."""
 
     name = "wild"
@@ -54,12 +55,6 @@ class Wild:
         self._cycles = 0
         setpoint.position_rad[:] = feedback.position_rad
         setpoint.velocity_rad_s[:] = 0.0
-
-    def check(self, _wanted: Mapping[str, Any]) -> None:
-        """Anything goes."""
-
-    def command(self, _wanted: Mapping[str, Any]) -> None:
-        """Nothing is wanted."""
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         torque_Nm[:] = 0.0
@@ -133,7 +128,7 @@ def test_drives_are_told_the_robots_torque_and_heartbeat(ready: WildRig) -> None
 def test_a_motor_that_runs_away_is_stopped_by_its_drive(ready: WildRig) -> None:
     rows = ready.go_wild(push(1.0))
     told = ready.status
-    assert told["reason"].startswith("axis 1: speed ")
+    assert told["reason"].startswith("axis 2: speed ")
     assert told["reason"].endswith("2292 deg/s allowed")
     assert told["reason_limit"]["limit"] == "speed"
     assert told["reason_limit"]["value"] > told["reason_limit"]["allowed"] == pytest.approx(40.0)
@@ -220,7 +215,7 @@ def test_a_cable_beyond_its_length_is_held_and_may_come_back(ready: WildRig) -> 
         ready.turn_until(lambda: ready.loop.engine.program.name == "hold")
         told = ready.status
         assert (told["state"], told["program"]) == ("active", "hold")
-        assert told["reason"].startswith("axis 1: cable length 1.02")
+        assert told["reason"].startswith("axis 2: cable length 1.02")
         assert told["reason"].endswith("1.020 m allowed")
         ready.turn(200)
         length_m = estimator.estimate.cable_length_m[1]

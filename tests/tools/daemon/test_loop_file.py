@@ -21,6 +21,7 @@ from cdpr_tools.errors import WorkFailedError
 NOBODY = 65534
 OBEYS = "import signal, sys; signal.signal(signal.SIGUSR1, print); print(1, flush=True); input()"
 DOES_NOT = "print(1, flush=True); input()"
+IGNORES = OBEYS.replace("print)", "signal.SIG_IGN)")
 
 
 def cdpr(*arguments: str | Path, **env: str) -> subprocess.CompletedProcess[str]:
@@ -73,6 +74,19 @@ def test_a_process_that_the_signal_would_end_is_let_be(
     outcome = stopped(path)
     assert not outcome.confirmed
     assert f"process {process.pid} is no loop of user {os.geteuid()}" in outcome.text
+    assert process.poll() is None
+
+
+@pytest.mark.parametrize("process", [IGNORES], indirect=True)
+def test_a_loop_that_has_turned_last_is_said_to_have_ended(
+    tmp_path: Path, process: subprocess.Popen[bytes]
+) -> None:
+    path = tmp_path / "r.loop"
+    path.write_text(json.dumps(named(process.pid)))
+    assert not LoopFile.read(path).runs()
+    outcome = stopped(path)
+    assert not outcome.confirmed
+    assert outcome.text.startswith("its loop has ended; drives that had power")
     assert process.poll() is None
 
 

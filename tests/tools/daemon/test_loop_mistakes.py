@@ -79,7 +79,7 @@ def test_a_status_that_cannot_be_written_ends_no_loop(
 ) -> None:
     before = rig.status["state"]
     if what == "reason":
-        rig.loop.life.set_fault_reason("\u00e9" * 20000)
+        rig.loop.life.set_reason("\u00e9" * 20000)
     elif what == "safety":
         monkeypatch.setattr(RobotMachine, "safety", "x" * 20000)
     else:

@@ -133,15 +133,16 @@ def test_in_a_plane_a_relative_motion_turns_about_its_normal() -> None:
     [
         (PLANE, {"to": "700 2000"}, "--to 700 2000: x 700 mm; allowed: -600 to 600 mm, the work"),
         (PLANE, {"to": "0.3 2.0"}, "--to 0.3 2.0: y 2 mm; allowed: 1400 to 2400 mm"),
-        (PLANE, {"to": "0 2000 5"}, "--to 0 2000 5: 3 numbers; allowed: X Y in mm"),
-        (ROOM, {"to": "0 2000"}, "--to 0 2000: 2 numbers; allowed: X Y Z in mm"),
+        (PLANE, {"to": "abc"}, "--to abc: 'abc' is no number; allowed: X Y in mm"),
+        (PLANE, {"to": "0 2000 5"}, "--to 0 2000 5: 3 numbers; allowed: 2, X Y in mm"),
+        (ROOM, {"to": "0 2000"}, "--to 0 2000: 2 numbers; allowed: 3, X Y Z in mm"),
         (PLANE, {"to": "nan 2000"}, "--to nan 2000: allowed: finite numbers, X Y in mm"),
         (PLANE, {"rotate": "5"}, "--rotate 5: no angle of this platform is controlled"),
-        (TURNING, {"rotate": "1 2 3"}, "--rotate 1 2 3: 3 numbers; allowed: ANGLE in deg"),
+        (TURNING, {"rotate": "1 2 3"}, "--rotate 1 2 3: 3 numbers; allowed: 1, ANGLE in deg"),
         (TURNING, {"rotate": "20"}, "--rotate 20: 20 deg from the orientation at home; "
          "allowed: up to 15 deg"),
         (ROOM, {"rotate": "15 15 0"}, "--rotate 15 15 0: 21.21 deg from .*: up to 20 deg"),
-        (ROOM, {"rotate": "1"}, "--rotate 1: 1 numbers; allowed: RX RY RZ in deg"),
+        (ROOM, {"rotate": "1"}, "--rotate 1: 1 number; allowed: 3, RX RY RZ in deg"),
         (PLANE, {"to": "0 2000", "speed": 900.0}, "--speed 900: allowed: up to 500 mm/s"),
         (PLANE, {"to": "5 0", "relative": True}, "--relative: it is not known where"),
         (PLANE, {"to": "5 0", "frame": Frame.PLATFORM}, "--frame platform: allowed: together"),
@@ -239,7 +240,7 @@ def test_options_take_all_numbers_that_follow(
         (["--to"], "requires an argument"),
         (["--to", "1", "2", "left=3"], "not together with axes"),
         (["--frame", "platform", "left=3"], "--frame platform: allowed: together with"),
-        (["--to", "1", "2"], "2 numbers; allowed: X Y Z in mm"),
+        (["--to", "1", "2"], "2 numbers; allowed: 3, X Y Z in mm"),
     ],
 )
 def test_mistakes_end_with_a_message(

@@ -1,4 +1,4 @@
-"""A thousand takings of the right to move: no cycle moves under a right that is another's by then.
+"""A thousand grants of the right to move: no cycle moves under a right that is another's by then.
 
 Two clients move axis 0, one forwards and one backwards, so that each set-point tells whose it is.
 An attacker wants axis 1 to move. All goes through the lease, the session manager of the set-point
@@ -112,7 +112,7 @@ class Scene:
     number: int = 0
     until_ns: int = 0
     ordered: bool = False
-    """Whether the holder has asked for motion under the present taking."""
+    """Whether the holder has asked for motion under the present grant."""
     tokens: list[str] = field(default_factory=list)
     orders: list[dict[str, Any]] = field(default_factory=list)
     packets: list[tuple[bytes, int]] = field(default_factory=list)
@@ -121,7 +121,7 @@ class Scene:
     speed: float = 0.0
     driven: int = 0
     stopped: int = 0
-    """Cycles that moved on the holder's behalf; takings that have stopped somebody's motion."""
+    """Cycles that moved on the holder's behalf; grants that have stopped somebody's motion."""
 
     def __post_init__(self) -> None:
         self.sessions = StreamSessionManager(self.rig.block, self.rig.lease)
@@ -280,6 +280,7 @@ CLIENTS = Client("forwards", 1, 4001), Client("backwards", -1, 4002)
 ATTACKER = Client("attacker", 0, 666)
 
 
+@pytest.mark.long
 def test_no_motion_goes_on_under_somebody_elses_right(rig: LoopRig) -> None:
     print(f"seed {SEED}")
     rig.obeyed("enable")
@@ -305,7 +306,7 @@ def test_no_motion_goes_on_under_somebody_elses_right(rig: LoopRig) -> None:
             if chance.random() < 0.15:
                 attacks(scene)
     counts = rig.loop.engine.parts.programs["follow"].progress()
-    print(f"{scene.number} takings, {scene.stopped} in motion, {scene.driven} cycles moved")
+    print(f"{scene.number} grants, {scene.stopped} in motion, {scene.driven} cycles moved")
     print(f"packets {dict(scene.sessions.counts)}, samples {counts}")
     assert scene.driven > TAKINGS
     assert scene.stopped > TAKINGS // 8

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from cdpr_tools.client.status_text import compensation_text, status_text
+import pytest
+
+from cdpr_tools.client.dead_loop import death_text
+from cdpr_tools.client.motion import finish
+from cdpr_tools.client.status_text import compensation_text, learnt_text, stage_text, status_text
+from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.output import Output
 
 
-def test_a_part_that_does_not_work_is_told_by_its_option() -> None:
-    status: dict[str, Any] = {
+def status_of(**keys: Any) -> dict[str, Any]:
+    return {
         "robot": "bench",
         "state": "ready",
         "program": None,
@@ -20,8 +26,14 @@ def test_a_part_that_does_not_work_is_told_by_its_option() -> None:
         "cycle": None,
         "control": {"held": False},
         "loop": {"silent_s": 0.0},
-        "parts": {"live_view": {"error": "the live view ended: why"}, "stream": {"error": ""}},
+        "parts": {},
+        **keys,
     }
+
+
+def test_a_part_that_does_not_work_is_told_by_its_option() -> None:
+    parts = {"live_view": {"error": "the live view ended: why"}, "stream": {"error": ""}}
+    status = status_of(parts=parts)
     lines = [str(line) for line in status_text(status).renderables]
     assert "--live does not work: the live view ended: why" in lines
     assert not any("--stream" in line for line in lines)
@@ -38,3 +50,62 @@ def test_the_status_tells_which_motors_are_compensated() -> None:
         "compensated: left; not compensated before its index passes: right; not commissioned: lower"
     )
     assert compensation_text([{"name": "left"}]) == ""
+
+
+def test_what_was_learnt_of_the_motors_is_told_once_it_is_something() -> None:
+    progress = {"learnt_friction_Nm": [0.08, 0.11], "learnt_cogging_Nm": [0.0, 0.0]}
+    told = learnt_text({"program_progress": progress})
+    assert told == "reckoned of the motors: friction 0.080 to 0.110 Nm"
+    assert learnt_text({"program_progress": {"learnt_friction_Nm": [0.0, 0.0]}}) == ""
+    assert learnt_text({"program_progress": {}}) == ""
+
+
+@pytest.mark.parametrize(
+    ("told", "power"),
+    [
+        ({"driving": True}, "drives that had power stop by themselves"),
+        ({"busy": True}, "drives that had power stop by themselves"),
+        ({}, "its drives had been told to have no power"),
+        ({"read_only": True, "driving": True}, "it only listened"),
+    ],
+)
+def test_of_a_dead_loop_nothing_is_told_as_if_it_were_known(
+    told: dict[str, Any], power: str
+) -> None:
+    progress = {"position_m": [0.3, 2.0], "target_m": [0.0, 1.0], "tight": True, "stage": "pull"}
+    reason = "the loop has died: killed by signal 9"
+    status = status_of(state="dead", program="pose", reason=reason, program_progress=progress)
+    status["loop"] = {"silent_s": 14.2}
+    lines = [str(line) for line in status_text(status | told).renderables[:-1]]
+    assert lines[0].startswith("bench: dead") and "pose" not in lines[0]
+    assert lines[1] == f"reason: {reason}"
+    assert lines[2].startswith(power)
+    assert lines[3].startswith("next: `cdpr stop`")
+    assert "of 14 s ago" in lines[4] and "where it is now is not known" in lines[4]
+    assert len(lines) == 5
+    assert power in death_text(status | told) and "next: `cdpr stop`" in death_text(status)
+
+
+def test_a_stop_under_way_has_a_reason_also_where_the_loop_gives_none() -> None:
+    class Stopping:
+        def get(self, path: str) -> dict[str, Any]:
+            if path == "/events":
+                texts = [("command", "disable by eve@lab"), ("state", "active")]
+                return {"events": [{"kind": kind, "text": text} for kind, text in texts]}
+            return status_of(state="active", program="lower", reacting="controlled stop")
+
+    with pytest.raises(WorkFailedError, match=r"^disable by eve@lab \(controlled stop under way"):
+        finish(Stopping(), Output(False), stopped=False)  # type: ignore[arg-type]
+
+
+def test_a_platform_of_unknown_pose_is_not_told_to_be_taken_home() -> None:
+    assert stage_text("lower", {"stage": "home", "blind": False}).startswith("taking the platform")
+    assert stage_text("lower", {"stage": "home", "blind": True}) == "letting the platform down"
+
+
+def test_a_path_is_left_until_its_end() -> None:
+    path = {"name": "part.nc", "line": 7, "time_s": 5.0, "duration_s": 10.0}
+    status = status_of(state="active", program="hold", program_progress={"path": path})
+    assert "path part.nc left at 50 %, line 7" in str(status_text(status).renderables[1])
+    path["time_s"] = 10.0
+    assert not any("part.nc" in str(line) for line in status_text(status).renderables)

@@ -86,8 +86,6 @@ STEPS = st.lists(
 
 
 @settings(
-    derandomize=True,
-    deadline=None,
     max_examples=100,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

@@ -52,7 +52,7 @@ def test_one_bus_of_two_is_lost(tmp_path: Path) -> None:
                 rig.turn_until(lambda: rig.state is LoopState.FAULT)
             rows = rig.rows()
             rig.turn_until(lambda: not rig.loop.busy)
-            assert "axis 0: not known to be without power" in rig.status["reason"]
+            assert "axis 1: not known to be without power" in rig.status["reason"]
         expect_no_coasting(log, 1)
         assert rows["valid"][:, 1].all()  # it was listened to
         assert not rows["alive"][-1, 0]

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 import cdpr_profiles
 from cdpr_profiles import ProfileError, load_drive
 from cdpr_profiles.eds.eds_check import read_eds
-from cdpr_tools.commands.drive.drive import app
+from cdpr_tools.commands.drive.group import app
 from cdpr_tools.drive_import.files import eds_text
 from cdpr_tools.drive_import.proposal import propose
 from cdpr_tools.errors import BAD_INPUT, CommandError
@@ -304,8 +304,9 @@ VALUES = st.sampled_from(
 ) | st.text(max_size=6)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:The .warn. method:DeprecationWarning")  # of the library
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_a_mutated_data_sheet_makes_a_profile_or_a_clear_error(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

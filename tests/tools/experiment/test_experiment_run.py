@@ -20,6 +20,8 @@ from cdpr_tools.experiment.session import ExperimentSettings, run_session
 from cdpr_tools.experiment.trial import Condition
 from cdpr_tools.output import Output
 
+pytestmark = pytest.mark.long
+
 OFFSETS_M = ((0.05, 0.02), (0.0, 0.0))
 CONDITION = Condition("A", 4.0, 0.35, 1)
 SETTINGS = ExperimentSettings(

@@ -11,7 +11,8 @@ from PIL import Image
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated, take_over
-from cdpr_rt.programs.platform.path_store import PathStore, paths_folder
+from cdpr_rt.programs.platform.paths.path_progress import paths_folder
+from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.robots.platform_model import platform_model_of
 from tests.profiles.test_geometry_calibration import calibration
 
@@ -43,9 +44,10 @@ def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkey
     assert "planned within" in done.stderr
     with Image.open(picture) as image:
         assert min(image.size) > 500
-    store = PathStore()
+    store = PathStore(platform_model_of(load_calibrated("spatial-8")))
     store.open(paths_folder("spatial-8"))
-    plan = store.plan(told["plan"], platform_model_of(load_calibrated("spatial-8")))
+    store.load(told["plan"])
+    plan = store.plan(told["plan"])
     assert plan.duration_s == pytest.approx(told["duration_s"])
     assert plan.line[0] == 3 and plan.line[-1] == 5
 

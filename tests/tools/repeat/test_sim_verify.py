@@ -20,6 +20,8 @@ from cdpr_tools.repeat.compare import compare
 from cdpr_tools.repeat.disturbance import Stops
 from cdpr_tools.repeat.run import Run, processes_of
 
+pytestmark = pytest.mark.long
+
 SLOW_S = 60.0
 DIFFERENT = """#!/bin/sh
 # the drive's noise has another seed in each run

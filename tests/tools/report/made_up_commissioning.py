@@ -48,12 +48,12 @@ class MadeUp:
         effort: Callable[[np.ndarray], np.ndarray],
     ) -> Path:
         """Write one pass; `error` and `effort` are given over the set-point from the index."""
-        leg = what.leg(np.array([INDEX_rad]))
+        move = what.move(np.array([INDEX_rad]))
         begin, end = what.measured()
         time_s = np.arange(round(what.duration_s() / PERIOD_s)) * PERIOD_s
-        cruise = np.clip(time_s - what.ramp_s, 0.0, leg.cruise_s)
+        cruise = np.clip(time_s - what.ramp_s, 0.0, move.cruise_s)
         up = np.minimum(time_s, what.ramp_s)
-        down = np.clip(time_s - what.ramp_s - leg.cruise_s, 0.0, what.ramp_s)
+        down = np.clip(time_s - what.ramp_s - move.cruise_s, 0.0, what.ramp_s)
         way = 0.5 * up**2 / what.ramp_s + cruise + down - 0.5 * down**2 / what.ramp_s
         setpoint = what.speed_rad_s * way
         velocity = what.speed_rad_s * (up / what.ramp_s - down / what.ramp_s)

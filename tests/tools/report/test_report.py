@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_profiles import Winch, load_winch
@@ -275,7 +275,6 @@ def test_path_that_cannot_be_written(tmp_path: Path) -> None:
         save(tmp_path / "file" / "report.html", "text")
 
 
-@settings(derandomize=True)
 @given(st.floats(allow_nan=False, allow_infinity=False, width=32), st.integers(2, 5))
 def test_numbers_keep_their_digits(value: float, digits: int) -> None:
     text = number(value, digits).replace("−", "-").replace("\u202f", "")

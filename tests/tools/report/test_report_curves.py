@@ -24,7 +24,7 @@ ANGLE = np.arange(GRID) * (math.tau / GRID)
 RAMP = Pass(math.radians(22.0), math.tau, math.tau)
 
 
-@settings(derandomize=True, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(1, 60_000), st.integers(0, 2**32 - 1))
 def test_thinned_curves_keep_their_peaks(size: int, seed: int) -> None:
     y = np.random.default_rng(seed).standard_normal(size)
@@ -37,7 +37,7 @@ def test_thinned_curves_keep_their_peaks(size: int, seed: int) -> None:
     assert few_y.min() == y.min()
 
 
-@settings(derandomize=True, max_examples=30)
+@settings(max_examples=30)
 @given(
     gain=st.floats(0.5, 1.5),
     late_deg=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)),

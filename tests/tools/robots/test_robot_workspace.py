@@ -96,6 +96,7 @@ def test_any_number_of_workers_finds_the_same() -> None:
     assert searched("planar-4", *COARSE, "--within", "5", "--workers", "2") == alone
 
 
+@pytest.mark.long
 def test_a_cluster_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     ray_cluster = pytest.importorskip("ray.cluster_utils")
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
@@ -135,14 +136,14 @@ def test_a_centre_outside_is_refused_with_one_that_is_not() -> None:
         (["planar-4", "--rotate", "-200"], "less than 180 deg"),
         (["planar-4", "--within", "180"], "less than 180 deg"),
         (["planar-4", "--within", "-1"], "less than 180 deg"),
-        (["spatial-8", "--rotate", "1", "2"], "2 numbers; allowed: RX RY RZ in deg"),
+        (["spatial-8", "--rotate", "1", "2"], "2 numbers; allowed: 3, RX RY RZ in deg"),
         (["spatial-8", "--rotate", "1", "2", "3", "--within", "4"], "not together with --within"),
         (["spatial-8", "--centre", "1", "2", "nan"], "allowed: finite numbers"),
-        (["planar-3", "--low", "1", "2", "3"], "3 numbers; allowed: X Y in mm"),
+        (["planar-3", "--low", "1", "2", "3"], "3 numbers; allowed: 2, X Y in mm"),
         (["planar-3", "--low", "0", "0", "--high", "100", "0"], "--low below --high"),
         (["planar-3", "--low", "-1e9", "0"], "within 1000 m"),
         (["planar-3", "--mesh", "a.stl"], "this one's is flat"),
-        (["spatial-8", "--mesh", "a.xyz"], "allowed: .stl, .ply, .obj"),
+        (["spatial-8", "--mesh", "a.xyz"], "allowed: a name that ends in .stl, .ply, .obj"),
         (["spatial-8", "--png", "/nowhere/a.png"], "a file in a folder that can be written to"),
         (["nobody"], "nobody"),
     ],

@@ -8,8 +8,8 @@ import pytest
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.streams.stream_packet import Standing, StreamSession
 from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.trials.evaluation.pose_log import read_pose_log
 from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
-from cdpr_tools.trials.pose_log import read_pose_log
 from cdpr_tools.trials.streams.stream import StreamSender
 
 HEIGHT = 1.5

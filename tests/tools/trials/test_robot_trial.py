@@ -13,10 +13,12 @@ from mcap.reader import make_reader
 
 from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles.errors import ProfileError
-from cdpr_tools.commands import robot_trial
-from cdpr_tools.commands.robot_trial import KindOfTrial
+from cdpr_tools.commands.robot import robot_trial
+from cdpr_tools.commands.robot.robot_trial import KindOfTrial
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation.recorded import Recorded
+
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[3]
 BEHIND = 1024  # the header of a log of true poses

@@ -8,6 +8,8 @@ from mcap.reader import make_reader
 
 from cdpr_tools.trials.lockstep import LockstepRobot
 
+pytestmark = pytest.mark.long
+
 COMPARED = ("/cycle", "/description", "/events", "/status")
 
 

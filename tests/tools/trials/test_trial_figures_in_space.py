@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from cdpr_tools.trials import limits, line, pictures, tape, targets
+from cdpr_tools.trials import limits, line, tape, targets
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.figures import Figure
+from cdpr_tools.trials.evaluation import pictures
+from cdpr_tools.trials.evaluation.figures import Figure
 from cdpr_tools.trials.streams import streaming
 from tests.tools.trials.made_up_trial import PERIOD_S, PLANE, POINT, SPACE, recorded
 
@@ -31,7 +32,7 @@ def turn_about(axis: np.ndarray, angle: float) -> np.ndarray:
 
 
 @given(st.lists(st.floats(-1.7, 1.7), min_size=6, max_size=6))
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 def test_a_place_is_where_the_platform_is_and_how_it_has_turned_from_home(values):
     place = np.array(values)
     angle = float(np.linalg.norm(place[3:]))
@@ -263,3 +264,42 @@ def test_tensions_out_of_their_bounds_under_the_tape_measure_are_found():
     assert found["off_mm"].value == pytest.approx(5.0)
     assert found["orientation_off_deg"].value == pytest.approx(np.degrees(0.01), rel=0.02)
     pictures.of_tape(made, ROBOT)
+
+
+class HurriedRun:
+    """A trial whose robot takes 10 s from pose to pose; what it marks."""
+
+    def __init__(self) -> None:
+        self.directions, self.elapsed_s = SPACE, 0.0
+        self.marks: list[dict[str, object]] = []
+
+    def start_random_move(self, _speed_m_s: float) -> np.ndarray:
+        return HERE
+
+    def arrive(self) -> None:
+        self.elapsed_s += 4.0
+
+    def go(self, _place: np.ndarray, _speed_m_s: float) -> None:
+        self.elapsed_s += 4.0
+
+    def stay(self, seconds: float) -> None:
+        self.elapsed_s += seconds
+
+    def mark(self, what: str, **values: object) -> None:
+        self.marks.append({"mark": what, "row": 50 * len(self.marks), **values})
+
+
+@pytest.mark.parametrize(
+    ("seconds", "poses", "wanted"), [(30.0, 3, 1), (999.0, 100, 100), (2000.0, 100, 100)]
+)
+def test_poses_that_the_time_did_not_last_for_are_not_missed(seconds, poses, wanted):
+    run = HurriedRun()
+    tape.drive(run, seconds)
+    true = np.tile(HERE, (6000, 1))
+    found = figures_of(tape.judge(recorded(true, true, run.marks, SPACE), ROBOT))
+    assert (found["poses"].value, found["poses"].limit) == (poses, wanted)
+    assert found["poses"].reached
+    # a robot that did not do them all, in all the time it wanted, did miss some
+    marks = run.marks[:2] if wanted == 100 else run.marks[-1:]
+    found = figures_of(tape.judge(recorded(true, true, marks, SPACE), ROBOT))
+    assert not found["poses"].reached

@@ -20,10 +20,12 @@ from cdpr_rt.control.tuning import stiffest_pid
 from cdpr_rt.core.clock import PacedClock
 from cdpr_rt.core.limits import Limits
 from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_tools.bench.daemon.loop_daemon import answers_in_time
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.errors import WorkFailedError
 
 PROGRAM = "cdpr_tools.bench.daemon.loop_baseline"
+OF_PLATFORM = "cdpr_tools.bench.daemon.pose_baseline"
 _BANDWIDTHS_HZ = (20.0, 15.0, 12.0, 8.0, 5.0)
 _PATIENCE_S = 120.0
 _CYCLIC_TORQUE = 10
@@ -31,15 +33,16 @@ _LIMITS = ("torque_Nm", "torque_rate_Nm_s", "speed_rad_s", "following_error_rad"
 
 
 def measure(robot: Robot, seconds: float, speed_rad_s: float) -> dict[str, Any]:
-    """Turn the robot's motors for `seconds` under the baseline loop; return its figures.
+    """Turn the robot's motors, or lead its platform, for `seconds` under the baseline loop.
 
-    Raises WorkFailedError when it ends early.
+    Returns its figures; raises WorkFailedError when it ends early, or a limit stopped it.
     """
+    program = PROGRAM if robot.platform is None else OF_PLATFORM
     limits = limits_of(robot)
     with _booted(robot, limits) as channels:
         given = {**_axes(robot, limits, channels), "seconds": seconds, "speed_rad_s": speed_rad_s}
         done = subprocess.run(
-            [sys.executable, "-P", "-m", PROGRAM, json.dumps(given)],
+            [sys.executable, "-P", "-m", program, json.dumps(given)],
             capture_output=True,
             text=True,
             timeout=_PATIENCE_S + seconds,
@@ -48,6 +51,8 @@ def measure(robot: Robot, seconds: float, speed_rad_s: float) -> dict[str, Any]:
     if done.returncode != 0:
         raise WorkFailedError(f"the baseline loop ended: {done.stderr.strip()[-300:]}")
     measured: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    if measured["stopped"]:
+        raise WorkFailedError(f"the baseline loop: a limit for {measured['stopped']} cycles")
     return measured
 
 
@@ -60,6 +65,7 @@ def _booted(robot: Robot, limits: Limits) -> Iterator[dict[str, str]]:
     with ExitStack() as stack:
         simulator = OwnSimulator(robot.reference, f"simbus:baseline-{os.getpid()}", paced=True)
         stack.callback(simulator.stop)
+        answers_in_time(simulator)
         urls = robot_urls(robot, (simulator.bus,))
         with ExitStack() as booting:
             networks = open_networks(booting, robot, urls, PacedClock())
@@ -81,6 +87,7 @@ def _axes(robot: Robot, limits: Limits, channels: dict[str, str]) -> dict[str, A
         buses.setdefault(channels[axis.bus], {})[axis.node_id] = str(axis.winch.drive.eds)
     gains = design.gains
     return {
+        "robot": robot.reference,
         "buses": buses,
         "period_s": period_s,
         "counts_per_rad": winch.encoder_counts_per_turn / math.tau,

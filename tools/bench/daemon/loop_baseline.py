@@ -3,7 +3,8 @@
 The argument is JSON: {"buses": {NAME: {NODE: EDS}}, "period_s", "seconds", "counts_per_rad",
 "per_mille_per_Nm", "cable_m_per_rad", "gains", "limits", "speed_rad_s"}. Standard output gets
 {"running": true} when the motors turn under the loop, and at the end {"cycles", "late", "missed",
-"processor_s", "turned_rad", and for each cycle "lateness_s", "exchange_s", "compute_s"}.
+"stopped" (cycles without torque, a limit being exceeded), "processor_s", "turned_rad", and for each
+cycle "lateness_s", "exchange_s", "compute_s"}.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ class BaselineLoop:
     PDOs are read and written as the package's documentation shows it.
     """
 
+    warm_up_s = 0.0
+    """How long it moves before its cycles count."""
+
     def __init__(self, given: Mapping[str, Any]) -> None:
         nodes = [(bus, int(node)) for bus, of in given["buses"].items() for node in of]
         self.n = n = len(nodes)
@@ -64,10 +68,10 @@ class BaselineLoop:
             network.nmt.state = "OPERATIONAL"
         self.integral, self.velocity, self.last, self.torque = np.zeros((4, n))
         self.cable_m_per_rad = float(given["cable_m_per_rad"])
-        self.controlword = 0
+        self.controlword = self.stopped = 0
         fields = [("time_s", "f8"), *((name, "f8", (n,)) for name in _FLOATS)]
         fields += [("statusword", "u2", (n,)), ("state", "i1", (n,))]
-        self.kept = np.zeros(round((given["seconds"] + 10.0) / self.period_s), fields)
+        self.kept = np.zeros(round((given["seconds"] + 20.0) / self.period_s), fields)
 
     def _add(self, node: Any, i: int) -> None:
         node.tpdo.read()
@@ -105,12 +109,15 @@ class BaselineLoop:
 
     def control(self, k: int, start: Any, speed_rad_s: float) -> None:
         """Compute torques for a turn at constant speed, and stop where a limit is exceeded."""
-        limits = self.limits
         setpoint = start + speed_rad_s * k * self.period_s
         error = setpoint - self.position
         self.integral = np.clip(self.integral + error * self.period_s, -1.0, 1.0)
         wanted = self.kp * error + self.ki * self.integral
-        wanted = wanted + self.kd * (speed_rad_s - self.velocity)
+        self.command(k, setpoint, wanted + self.kd * (speed_rad_s - self.velocity))
+
+    def command(self, k: int, setpoint: Any, wanted: Any) -> None:
+        """Bound the torques that are wanted, none where a limit is exceeded; keep the cycle."""
+        limits, error = self.limits, setpoint - self.position
         step = limits["torque_rate_Nm_s"] * self.period_s
         torque = np.clip(wanted, self.torque - step, self.torque + step)
         torque = np.clip(torque, -limits["torque_Nm"], limits["torque_Nm"])
@@ -122,6 +129,7 @@ class BaselineLoop:
             or not np.all(np.isfinite(torque))
         ):
             torque = np.zeros(self.n)
+            self.stopped += 1
         self.torque = torque
         self.keep(k, setpoint, wanted)
 
@@ -161,13 +169,13 @@ class BaselineLoop:
             network.disconnect()
 
 
-def run(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Enable the drives, turn them for so many seconds, and return how it went."""
-    loop = BaselineLoop(given)
+def run(given: Mapping[str, Any], make: type[BaselineLoop] = BaselineLoop) -> dict[str, Any]:
+    """Enable the drives, move them for so many seconds, and return how it went."""
+    loop = make(given)
     freeze_memory()
     enable_realtime()
     begin_enable = len(_ENABLE) * _CYCLES_A_STEP
-    first = begin_enable + _WARM_UP
+    first = begin_enable + max(_WARM_UP, round(loop.warm_up_s / loop.period_s))
     cycles = first + round(given["seconds"] / loop.period_s)
     lateness, exchange, compute = np.zeros((3, cycles))
     late = missed = 0
@@ -180,7 +188,7 @@ def run(given: Mapping[str, Any]) -> dict[str, Any]:
             start = loop.last
         if k == first:
             print(json.dumps({"running": True}), flush=True)
-            processor_s, late, missed = time.process_time(), 0, 0
+            processor_s, late, missed, loop.stopped = time.process_time(), 0, 0, 0
         deadline += loop.period_s
         ahead = deadline - time.monotonic()
         if ahead > 0.0:
@@ -203,6 +211,7 @@ def run(given: Mapping[str, Any]) -> dict[str, Any]:
         "cycles": cycles - first,
         "late": int(late),
         "missed": int(missed),
+        "stopped": int(loop.stopped),
         "lateness_s": lateness[first:].tolist(),
         "exchange_s": exchange[first:].tolist(),
         "compute_s": compute[first:].tolist(),

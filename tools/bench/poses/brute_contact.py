@@ -43,19 +43,19 @@ class BruteRobot:
             ]
             one = self._counted(starts[:, i], ends[:, i], *shared)
             other = self._counted(starts[:, j], ends[:, j], *shared)
-            found[f"cable {i}", f"cable {j}"] = between_segments(*one, *other)
+            found[f"cable {i + 1}", f"cable {j + 1}"] = between_segments(*one, *other)
         if self.body is not None:
             for i in range(n):
                 inside = _outside(self.anchors[i], self.body) < c
                 one = self._counted(starts[:, i], ends[:, i], False, bool(inside))
                 start, end = (np.einsum("mji,mj->mi", Q, x - p) for x in one)
-                found[f"cable {i}", "platform"] = to_box(start, end, self.body)
+                found[f"cable {i + 1}", "platform"] = to_box(start, end, self.body)
         for k, box in enumerate(self.obstacles):
             for i in range(n):
                 reach = c + (0.0 if self.radius is None else 2.0 * self.radius[i])
                 inside = _outside(self.exits[i], box) < reach
                 one = self._counted(starts[:, i], ends[:, i], bool(inside), False)
-                found[f"cable {i}", f"obstacle {k}"] = to_box(*one, box)
+                found[f"cable {i + 1}", f"obstacle {k + 1}"] = to_box(*one, box)
         return found
 
     def _start(self, i: int, ends: Floats) -> Floats:

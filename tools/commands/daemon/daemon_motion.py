@@ -13,7 +13,7 @@ from cdpr_tools.client.axis_words import in_typed_words
 from cdpr_tools.client.client import Daemon, axis_values, key_values
 from cdpr_tools.client.motion import (
     RENEW_S,
-    Told,
+    ProgressNotes,
     await_end,
     finish,
     is_done,
@@ -52,14 +52,14 @@ def jog(
     values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
     key = "cable_velocity_m_s" if cable else "velocity_rad_s"
     wanted = {key: values, "timeout_s": _DEADMAN_S, "duration_s": seconds}
-    told = Told(out)
+    notes = ProgressNotes(out)
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
         begin = partial(control.post, "/program", {"program": "jog", "wanted": wanted})
         in_typed_words(begin, _names(daemon))
         while not stop_requested():
             time.sleep(RENEW_S)
             progress = require_program(daemon, "jog").get("program_progress", {})
-            told("jog", progress)
+            notes("jog", progress)
             if is_done(progress):
                 break
             control.post("/set", {"wanted": wanted})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -48,7 +49,7 @@ def tighten(
         _carry_out(daemon, out, "tighten", wanted)
     except (BadInputError, WorkFailedError) as error:
         told = str(error).replace("tighten: from:", f"{typed}:")
-        raise type(error)(told.replace("from: home", "--from home")) from None
+        raise type(error)(re.sub(r"\bfrom: (?=[a-z])", "--from ", told)) from None
 
 
 @app.command()
@@ -63,7 +64,8 @@ def lower(
 ) -> None:
     """Let the platform down onto its stand; the power stays on, the cables are loose."""
     wanted = {"blind": True} if blind else {}
-    where = "let down blind" if blind else "on its stand"
+    tight = (daemon.get("/status").get("program_progress") or {}).get("tight")
+    where = "let down blind" if blind else "on its stand" if tight else "where it is"
     _carry_out(daemon, out, "lower", wanted, f"{where}, cables loose, power on")
 
 

@@ -10,9 +10,10 @@ from rich.live import Live
 from rich.text import Text
 
 from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
-from cdpr_tools.client.motion import Told
+from cdpr_tools.client.dead_loop import DEAD, power_text
+from cdpr_tools.client.motion import ProgressNotes
 from cdpr_tools.client.status_text import status_text
-from cdpr_tools.commands.daemon.with_daemon import with_daemon
+from cdpr_tools.commands.daemon.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.commands.options import (
     JsonOption,
     KeyFileOption,
@@ -37,7 +38,7 @@ app = typer.Typer()
 
 
 @app.command()
-@with_daemon
+@with_daemon_at_once
 def status(
     daemon: Daemon,
     out: Output,
@@ -93,12 +94,21 @@ def enable(
     """
     status = _booted(daemon, out)
     if status["state"] == "active":
-        out.say(f"has power already, program {status['program']}")
+        out.say(f"has power already, program {status['program']}", *_next(status))
         out.result({"ok": True, "state": "active", "text": ""})
         return
     _confirm(status, yes)
     with daemon.control() as control:
-        _show(out, control.post("/enable", {"program": program}))
+        answer = control.post("/enable", {"program": program})
+    _show(out, answer, *_next(daemon.get("/status")))
+
+
+def _next(status: dict[str, Any]) -> list[str]:
+    """Return what a platform that has power and is not held yet takes to be moved."""
+    progress = status.get("program_progress") or {}
+    if progress.get("tight") is not False or status["program"] != "hold":
+        return []
+    return ["cables loose; next: `cdpr tighten`, then it can be moved"]
 
 
 def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
@@ -115,14 +125,14 @@ def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
 
 
 @app.command()
-@with_daemon
+@with_daemon_at_once
 def disable(daemon: Daemon, out: Output) -> None:
     """Stop the motion under control, then take the power off."""
     _show(out, daemon.post("/disable"))
 
 
 @app.command()
-@with_daemon
+@with_daemon_at_once
 def hold(daemon: Daemon, out: Output) -> None:
     """Stop the motion and stay there, whoever moves; the power stays on."""
     _show(out, daemon.post("/hold"))
@@ -157,25 +167,26 @@ def stop(
 def _end(daemon: Daemon, out: Output) -> None:
     """Ask the daemon to end and wait for it; raises WorkFailedError where it does not."""
     status = daemon.get("/status")
-    had_died = status["state"] == "dead"
+    had_died = status["state"] == DEAD
+    dead = f"ended; its loop had died: {power_text(status)}; next: `cdpr run` starts it anew"
     daemon.post("/shutdown")
-    told, deadline = Told(out), time.monotonic() + _END_S
+    notes, deadline = ProgressNotes(out), time.monotonic() + _END_S
     if status["state"] == "active":
         out.note("stopping: what moves is brought to rest, then the power goes off ...")
     while time.monotonic() < deadline:
         try:
             status = daemon.get("/status")
         except NoDaemonError:
-            dead = "; its loop had died, the drives stop by themselves without its heartbeat"
-            out.say(f"ended{dead}" if had_died else "stopped, power off")
+            out.say(dead if had_died else "stopped, power off")
             return
-        told(str(status["program"]), status.get("program_progress") or {})
+        if not had_died:
+            notes(str(status["program"]), status.get("program_progress") or {})
         time.sleep(_WATCH_S)
     raise WorkFailedError(f"the daemon still runs {_END_S:g} s after it was asked to end")
 
 
-def _show(out: Output, answer: dict[str, Any]) -> None:
-    out.say(answer["state"] + (f": {answer['text']}" if answer["text"] else ""))
+def _show(out: Output, answer: dict[str, Any], *more: str) -> None:
+    out.say(answer["state"] + (f": {answer['text']}" if answer["text"] else ""), *more)
     out.result({"ok": True, **answer})
 
 

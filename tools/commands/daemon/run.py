@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import socket
 import sys
 import time
@@ -31,15 +32,17 @@ from cdpr_rt.service.recordings.retention import BYTES_PER_AXIS, Retention, size
 from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
-from cdpr_tools.daemon.launcher import Launcher
+from cdpr_tools.daemon.launcher_file import named_launcher
 from cdpr_tools.daemon.loop_file import LoopFile
-from cdpr_tools.daemon.notify import ServiceManager
 from cdpr_tools.daemon.paths import SOCKET_SUFFIX, default_recordings, default_socket
+from cdpr_tools.daemon.processes.launcher import Launcher
+from cdpr_tools.daemon.processes.notify import ServiceManager
 from cdpr_tools.daemon.settings import Address, RunSettings
 from cdpr_tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
 from cdpr_tools.output import Output, to_json
 
 _KEPT_DAYS, _KEPT_GB = 30.0, 20.0
+_ORIGIN = re.compile(r"https?://[a-z0-9.-]+(:\d{1,5})?", re.IGNORECASE)
 _RING_S = 15.0  # longer than a service that hangs is waited for and started again
 
 _Robot = Annotated[
@@ -50,6 +53,10 @@ _Robot = Annotated[
 ]
 _Plant = Annotated[
     Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")
+]
+_Camera = Annotated[
+    Path | None,
+    typer.Option(help="Socket to make of a camera on the platform, for that simulator."),
 ]
 _Http = Annotated[
     str | None,
@@ -117,6 +124,7 @@ def run(
     robot: _Robot,
     bus: RobotBusOption = None,
     plant: _Plant = None,
+    camera: _Camera = None,
     http: _Http = None,
     unix: _Socket = None,
     key_file: _KeyFile = None,
@@ -164,18 +172,22 @@ def run(
         tension_port=tension_port,
         commissioned=commissioned,
     )
+    if camera is not None and not asks_for_own_simulator(bus or ()):
+        raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     _require_free(settings.socket)
     _require_no_master(profile, settings)
     _ask(profile, settings, yes)
     settings = settings.with_key_loaded().with_ports_bound()
     manager = ServiceManager()  # before any child is started: none of them speaks for the daemon
     with ExitStack() as stack:
+        stack.enter_context(named_launcher(settings.socket))
         if text := uncommissioned_text(with_commissioned(profile, commissioned)):
             out.note(text)
         simulator = None
         if asks_for_own_simulator(bus or ()):
             out.note(f"starting simulated drives: {len(profile.axes)} ...")
-            simulator = OwnSimulator(profile.reference, settings.buses[0], plant)
+            bus_url = settings.buses[0]
+            simulator = OwnSimulator(profile.reference, bus_url, plant, camera=camera)
             stack.callback(simulator.stop)
         _launch(profile, settings, out, manager, simulator)
 
@@ -229,7 +241,7 @@ def settings_for(
         record=None if no_record else record or default_recordings(),
         keep=_kept(record, keep_days, keep_gb),
         live=live,
-        live_origins=tuple(live_origin or ()),
+        live_origins=tuple(map(_checked_origin, live_origin or ())),
         stream=None if stream is None else Address.parse("--stream", stream),
         launcher_pid=os.getpid(),
     )
@@ -270,6 +282,7 @@ def _launch(
         _report_ready({**report, "socket": str(settings.socket), "pid": os.getpid()}, out)
 
     out.note(_recording_text(robot, settings))
+    out.note("starting the control loop ...")
     launcher = Launcher(settings, block, out.note, ready, manager, simulator)
     status = launcher.run()
     if status != DONE:
@@ -339,3 +352,13 @@ def _ask(robot: Robot, settings: RunSettings, yes: bool) -> None:
     if real and not settings.read_only:
         where = " and ".join(real)
         require_consent(f"{robot.name} on {where}: its motors will turn when told to.", yes)
+
+
+def _checked_origin(origin: str) -> str:
+    """Return the origin of a web page; raises BadInputError for what no browser names so."""
+    if not _ORIGIN.fullmatch(origin):
+        raise BadInputError(
+            f"--live-origin {origin}: allowed: where a web page is from, such as "
+            "https://app.foxglove.dev or http://localhost:8080, without a path"
+        )
+    return origin.lower()

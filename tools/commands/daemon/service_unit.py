@@ -18,6 +18,8 @@ from cdpr_tools.daemon.unit import service_unit
 
 _SOCKETS = Path("/run/cdpr-rt")
 _ASIDE = ("robot", "yes", "as_json")
+_OF_THE_SIMULATOR = "camera"
+"""An option that the daemon's own processes do not know."""
 
 _User = Annotated[
     str | None, typer.Option(help="Who runs it; by default you, or `cdpr` where that is root.")
@@ -45,7 +47,8 @@ def print_unit(
     asked = _as_run_reads_them([robot, *context.args])
     if asked["unix"] is None:
         asked["unix"] = _SOCKETS / f"{profile.profile}.sock"
-    run.settings_for(profile, **{k: v for k, v in asked.items() if k not in _ASIDE})
+    apart = (*_ASIDE, _OF_THE_SIMULATOR)
+    run.settings_for(profile, **{k: v for k, v in asked.items() if k not in apart})
     buses = asked["bus"] or []
     urls = [] if asks_for_own_simulator(buses) else list(robot_urls(profile, buses).values())
     typer.echo(service_unit(profile, urls, list(_words(asked)), user or _default_user()), nl=False)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from cdpr_tools.client.client import Daemon, open_daemon
+from cdpr_tools.client.starting import await_socket, await_start
 from cdpr_tools.commands.options import (
     JsonOption,
     KeyFileOption,
@@ -19,7 +20,7 @@ from cdpr_tools.output import Output
 
 @shares
 @contextmanager
-def with_daemon(
+def with_daemon_at_once(
     robot: RobotOption = None,
     socket: SocketOption = None,
     url: UrlOption = None,
@@ -29,3 +30,21 @@ def with_daemon(
     """Give a command the daemon that these options name, and where to write to."""
     with open_daemon(robot, socket, url, key_file) as daemon:
         yield daemon, Output(as_json)
+
+
+@shares
+@contextmanager
+def with_daemon(
+    robot: RobotOption = None,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> Iterator[tuple[Daemon, Output]]:
+    """Give it as `with_daemon_at_once` does, once the daemon has started."""
+    out = Output(as_json)
+    if url is None:
+        await_socket(robot, socket, out)
+    with open_daemon(robot, socket, url, key_file) as daemon:
+        await_start(daemon, out)
+        yield daemon, out

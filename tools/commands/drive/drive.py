@@ -14,17 +14,16 @@ from cdpr_drivers.errors import SdoError
 from cdpr_drivers.robot.session import Session
 from cdpr_profiles import Winch
 from cdpr_rt.control.pid import Pid
-from cdpr_rt.motion.trajectory import Leg
+from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.procedures.winch_operator import Tolerance
 from cdpr_rt.programs.model import position_loop
-from cdpr_tools.commands.drive import drive_configure, drive_import, drive_setup
 from cdpr_tools.commands.options import SafetyIoOption, YesOption
 from cdpr_tools.commands.with_winch import WinchOnBus, with_powered_winch, with_winch
 from cdpr_tools.composition.session import confirm_motion, open_winch
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
-app = typer.Typer(name="drive", help="One drive on the bus.", no_args_is_help=True)
+app = typer.Typer()
 
 _JOG_RAMP_S = 0.5
 _JOG_SETTLE_S = 1.0
@@ -33,10 +32,6 @@ _START_UP_LOOK_S = 0.01
 # a motor that turns the wrong way is to be stopped before half a turn
 _JOG_ERROR_RAD = 2.5
 _JOG_SPEEDS, _JOG_LEAST_RAD_S = 4.0, 40.0
-
-
-for _part in (drive_setup, drive_import, drive_configure):
-    app.add_typer(_part.app)
 
 
 @app.command()
@@ -173,7 +168,7 @@ def jog(
         start = session.device.feedback.position_rad.copy()
         # ramps included it turns by speed times seconds
         ramp_s = min(_JOG_RAMP_S, 0.5 * seconds)
-        leg = Leg(start, np.array([speed]), seconds - ramp_s, ramp_s, _JOG_SETTLE_S)
+        leg = TrapezoidalMove(start, np.array([speed]), seconds - ramp_s, ramp_s, _JOG_SETTLE_S)
         session.follow(_jog_controller(session), leg)
         moved = math.degrees(session.device.feedback.position_rad[0] - start[0])
         session.disable()

@@ -14,7 +14,7 @@ from cdpr_sim_bus.camera.camera_server import CameraServer
 from cdpr_sim_bus.camera.random_poses import Box, random_poses
 from cdpr_sim_bus.camera.sim_camera import SimCamera
 from cdpr_sim_bus.physics_board import PhysicsBoard
-from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption, OverwriteOption
+from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 from cdpr_tools.report.save import save
@@ -61,7 +61,9 @@ def photos(
         str, typer.Option(help="Highest position of the platform, m.", metavar='"X Y Z"')
     ] = "0.2 0.6 1.75",
     tilt_deg: Annotated[float, typer.Option(min=0.0, max=80.0, help="Most rotation.")] = 15.0,
-    overwrite: OverwriteOption = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace what is in FOLDER already.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write images of a simulated camera from random poses, without a robot; and its intrinsics.

@@ -27,6 +27,7 @@ class Fault(StrEnum):
     ENCODER_JUMP = "encoder-jump"
     DRIVE_FAULT = "drive-fault"
     SILENCE = "silence"
+    CELL_OFF = "cell-off"
 
 
 class _How(NamedTuple):
@@ -43,6 +44,7 @@ _HOW = {
     Fault.ENCODER_JUMP: _How(11, 500, -(2**31), 2**31 - 1, "counts"),
     Fault.DRIVE_FAULT: _How(1, 0x7305, 1, 0xFFFF, ""),
     Fault.SILENCE: _How(6, 0xFFFF, 1, 0xFFFF, "ms"),
+    Fault.CELL_OFF: _How(14, 40, -(2**15), 2**15 - 1, "N"),
 }
 
 
@@ -58,7 +60,8 @@ def fault(
     value: Annotated[
         str | None,
         typer.Argument(
-            help="How much: counts to jump, mm to slip, error code, ms of silence (65535: for good)"
+            help="How much: counts to jump, mm to slip, error code, ms of silence (65535: for "
+            "good), N that a load cell shows too much"
         ),
     ] = None,
     *,

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
 
 from cdpr_drivers.robot.bus_fit import require_fit
 from cdpr_drivers.robot.robot_buses import robot_urls
@@ -18,12 +23,13 @@ from cdpr_sim_bus.frame_log import FrameLog
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.board_pose import BoardPose
 from cdpr_sim_bus.robot.cable_robot import CableRobot
+from cdpr_sim_bus.robot.logs.platform_record import RobotShape
+from cdpr_sim_bus.robot.logs.pose_log import PoseLog
+from cdpr_sim_bus.robot.logs.pose_scanner import PoseScanner
 from cdpr_sim_bus.robot.motor_state import Transmission
 from cdpr_sim_bus.robot.plant import Plant
-from cdpr_sim_bus.robot.platform_record import RobotShape
-from cdpr_sim_bus.robot.pose_log import PoseLog
-from cdpr_sim_bus.robot.pose_scanner import PoseScanner
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
+from cdpr_tools.composition.simulator import OwnCamera
 from cdpr_tools.errors import BadInputError
 
 
@@ -39,15 +45,16 @@ def up(
     detached: bool = False,
     frame_log: FrameLog | None = None,
     scanner: Path | None = None,
+    camera: Path | None = None,
 ) -> None:
     """Run the simulated drives of `robot` until Ctrl-C; serial numbers count the axes from 1.
 
     `plant` is a plant file: of the whole robot where it has a platform, whose true pose goes into
     `truth_log`; otherwise that of each motor, which differ in their noise only. `detached` leaves
     the cables off the drums: the same motors turn freely. What is measured of the pose from outside
-    goes into `scanner`. `board` is a file to make, through which
-    other simulated devices share the axes' physics. All frames go to `frame_log`. Raises
-    BadInputError for a robot that does not fit its buses, and BusSetupError.
+    goes into `scanner`. A camera on the platform answers on the socket `camera`. `board` is a file
+    to make, through which other simulated devices share the axes' physics. All frames go to
+    `frame_log`. Raises BadInputError for a robot that does not fit its buses, and BusSetupError.
     """
     require_fit(robot)
     urls = robot_urls(robot, buses)
@@ -74,6 +81,9 @@ def up(
         if scanner is not None:
             # each drive keeps one log: the last one's is this, the first one's is the truth's
             drives[-1].record_with(_pose_scanner(scanner, body, plant))
+        if camera is not None and board is None:
+            folder = stack.enter_context(TemporaryDirectory(prefix="cdpr-board-"))
+            board = Path(folder) / "board"
         if board is not None:
             lockstep = mode is ClockMode.LOCKSTEP
             made = PhysicsBoard.create(board, len(drives), lockstep=lockstep)
@@ -83,6 +93,8 @@ def up(
             if body is not None:
                 # neither the truth's drive nor the scanner's: a platform has more than two cables
                 drives[1].record_with(BoardPose(body, shared.platform))
+        if camera is not None and board is not None:
+            stack.callback(_own_camera(camera, board, body, plant).stop)
         fleet = [
             FleetBus(
                 bus.name,
@@ -119,6 +131,37 @@ def _physics(
         raise BadInputError(f"--plant {plant}: {error}") from error
 
 
+@dataclass(frozen=True)
+class TrueGeometry:
+    """What a simulated robot's geometry truly is, for those who judge a calibration of it."""
+
+    exit_points_m: NDArray[np.float64]
+    """(n, 3)"""
+    drum_errors: NDArray[np.float64]
+    """Relative, of the cable that a turn of each motor pays out, (n,)."""
+    elongation_error: float
+    """Relative, of the cables' elongation without creep."""
+
+
+def true_geometry(robot: Robot, plant: Path | None) -> TrueGeometry:
+    """Return the truth of a robot's simulator; raises BadInputError."""
+    assert robot.platform is not None  # callers calibrate its cables
+    body, plants = _physics(robot, plant, detached=False)
+    assert body is not None  # a platform is on the cables
+    drives = [
+        SimDrive.for_winch(axis.winch, own, robot=member)
+        for axis, own, member in zip(robot.axes, plants, body.members(), strict=True)
+    ]
+    for drive in drives:
+        drive.close()
+    nominal = np.array([one.cable_m_per_rad for one in _transmissions(robot)])
+    return TrueGeometry(
+        body.platform["exit"][0][: body.n].copy(),
+        np.abs(body.motors["cable_gain"]) / np.abs(nominal) - 1.0,
+        1.0 / (1.0 + _robot_plant(plant).cables.stiffness_error) - 1.0,
+    )
+
+
 def _shape(robot: Robot, platform: Platform) -> RobotShape:
     return RobotShape(
         exit_points_m=platform.exit_points_m,
@@ -142,6 +185,16 @@ def _pose_scanner(path: Path, body: CableRobot | None, plant: Path | None) -> Po
         return PoseScanner(path, body, whole.scanner, whole.seed)
     except OSError as error:
         raise BadInputError(f"--scanner {path}: {error.strerror}") from error
+
+
+def _own_camera(
+    socket: Path, board: Path, body: CableRobot | None, plant: Path | None
+) -> OwnCamera:
+    """Start the camera of a robot in a process of its own."""
+    if body is None:
+        raise BadInputError("--camera: for a robot with its platform on the cables")
+    described = "camera" in _robot_plant(plant).model_fields_set
+    return OwnCamera(socket, board, plant if described else None)
 
 
 def _robot_plant(path: Path | None) -> RobotPlant:

@@ -73,10 +73,10 @@ def tension(
 def hang(
     mass_kg: Annotated[float, typer.Argument(min=0.0, max=_MOST_KG, metavar="MASS_KG")],
     board: Annotated[Path, typer.Option(help="Physics board of the simulator.")],
-    axis: Annotated[int, typer.Option(min=0, help="Axis, counted from 0.")] = 0,
+    axis: Annotated[int, typer.Option(min=1, help="Axis, counted from 1.")] = 1,
 ) -> None:
     """Hang a mass on a simulated cable whose plant has load.kind = "hung_mass"."""
     with PhysicsBoard.attach(board) as shared:
-        if axis >= shared.axes:
-            raise BadInputError(f"--axis {axis}: {board} has {shared.axes} axes, counted from 0")
-        shared.axis(axis).hung_mass_kg = mass_kg
+        if axis > shared.axes:
+            raise BadInputError(f"--axis {axis}: {board} has {shared.axes} axes")
+        shared.axis(axis - 1).hung_mass_kg = mass_kg

@@ -25,6 +25,7 @@ from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_tools.commands.options import ExitWithStdinOption
 from cdpr_tools.commands.sim import sim_robot
+from cdpr_tools.compiling import tell_of_compiling
 from cdpr_tools.errors import BadInputError
 
 app = typer.Typer()
@@ -96,10 +97,15 @@ def up(
         Path | None,
         typer.Option(help="Make this file, a physics board for simulated sensors and safety I/O."),
     ] = None,
+    camera: Annotated[
+        Path | None,
+        typer.Option(help="Unix socket to make of a camera on a robot's platform: sim:SOCKET."),
+    ] = None,
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
     """Run simulated drives until Ctrl-C; tells on standard output when they are up."""
     profile = load_machine(machine)
+    tell_of_compiling("the simulated drives")
     mode = ClockMode.LOCKSTEP if lockstep else ClockMode.PACED
     if isinstance(profile, Robot):
         if nodes > 1 or unconfigured or slcan or socketcand is not None:
@@ -111,10 +117,11 @@ def up(
             detached=detached,
             frame_log=_frame_log(frame_log),
             scanner=scanner,
+            camera=camera,
         )
         return
-    if scanner is not None:
-        raise BadInputError("--scanner: for a robot with a platform")
+    if scanner is not None or camera is not None:
+        raise BadInputError("--scanner, --camera: for a robot with a platform")
     if detached:
         raise BadInputError("--detached: for a robot; a winch's plant file says what it pulls")
     truth = Plant() if plant is None else Plant.load_file(plant)

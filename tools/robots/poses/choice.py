@@ -7,7 +7,12 @@ from enum import StrEnum
 
 import numpy as np
 
-from cdpr_rt.calibration.pose_choice import informative, predicted_deviation_m, spread
+from cdpr_rt.calibration.pose_choice import (
+    cable_geometry,
+    informative,
+    predicted_deviation_m,
+    spread,
+)
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.reach.reachable import Reach, Reached
@@ -48,7 +53,7 @@ def choose(
     if by is Choose.SPREAD:
         taken = spread(drawn.positions, model.wrench_scale, count)
     elif by is Choose.INFORMATION:
-        taken = informative(*points_of(model), model.poses(drawn.positions), count)
+        taken = informative(cable_geometry(model), model.poses(drawn.positions), count)
     positions = drawn.positions[taken]
     poses = model.poses(positions)
     clearances, _ = model.interference.clearances(poses)

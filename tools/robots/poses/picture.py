@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 
 import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_rt.core.exchange import FloatArray
@@ -26,7 +27,9 @@ def draw_poses(title: str, reach: Reach, chosen: Chosen, path: Path) -> None:
     k, turned = model.positions, model.size > model.positions
     views = [(0, 1)] if k == 2 else [(0, 2), (1, 2), (0, 1)]
     figure = Figure(figsize=(3.9 * len(views) + 1.2, 4.2), layout="constrained")
-    all_axes = figure.subplots(1, len(views), squeeze=False)[0]
+    box = np.subtract(model.platform.workspace_max_m, model.platform.workspace_min_m)
+    widths = [float(box[i]) for i, _ in views]  # one scale for all, about
+    all_axes = figure.subplots(1, len(views), squeeze=False, width_ratios=widths)[0]
     angle = np.degrees(np.linalg.norm(chosen.positions[:, k:], axis=1))
     for ax, view in zip(all_axes, views, strict=True):
         _draw_view(ax, reach, chosen, angle if turned else None, view)
@@ -34,7 +37,7 @@ def draw_poses(title: str, reach: Reach, chosen: Chosen, path: Path) -> None:
         bar = figure.colorbar(all_axes[-1].collections[-1], ax=list(all_axes), shrink=0.8)
         bar.set_label("turned from home's orientation (deg)")
         bar.outline.set_visible(False)
-    all_axes[0].set_title(title)
+    figure.suptitle(title)
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
     figure.savefig(path, format="png")
@@ -64,3 +67,4 @@ def _draw_view(
         shown = Normalize(0.0, max(float(angle_deg.max()), math.degrees(1e-3)))
         ax.scatter(x, y, s=16, c=angle_deg, cmap="viridis", norm=shown, zorder=3, label="pose")
     ax.set(xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal")
+    ax.xaxis.set_major_locator(MaxNLocator(6))

@@ -1,1 +1,1 @@
-"""The workspace of a robot for people: searched, told, drawn, as a mesh."""
+"""The workspace of a robot for people: searched, in words, drawn, as a mesh."""

@@ -95,8 +95,9 @@ def _draw_section(
     filled = ax.contourf(
         cells[0, :, 0], cells[:, 0, 1], np.maximum(margins, _OUTSIDE_N),
         np.unique(np.clip(levels, least, None)), cmap="YlGnBu", alpha=0.8,
+        extend="max",  # a section may meet places deeper than any of the grid's
     )  # fmt: skip
-    bar = figure.colorbar(filled, ax=ax, shrink=0.85, format="%.0f")
+    bar = figure.colorbar(filled, ax=ax, shrink=0.85, format="%g")
     bar.set_label("margin (N)")
     bar.outline.set_visible(False)
     _draw_borders(ax, found, view, cells)

@@ -58,7 +58,7 @@ def search(wanted: Search, out: Output) -> Found:
         out.progress("poses", checks / _CHECKS_A_SECOND) as advance,
     ):
 
-        def told(jobs: Sequence[Job], first: int, each: int) -> FloatArray:
+        def computed(jobs: Sequence[Job], first: int, each: int) -> FloatArray:
             results = []
             for k, result in enumerate(run(jobs), start=1):
                 results.append(result)
@@ -70,7 +70,7 @@ def search(wanted: Search, out: Output) -> Found:
         grid_jobs = [
             GridJob(wanted.criterion, points[k : k + count]) for k in range(0, len(points), count)
         ]
-        grid = Grid(wanted.box, told(grid_jobs, 0, count).reshape(shape))
+        grid = Grid(wanted.box, computed(grid_jobs, 0, count).reshape(shape))
         centre = _centre(wanted, grid)
         if wanted.criterion.contact_free:
             grid = _reached(wanted.criterion, grid, centre, run)
@@ -80,7 +80,7 @@ def search(wanted: Search, out: Output) -> Found:
             RayJob(wanted.criterion, centre, ways[k : k + count], wanted.box)
             for k in range(0, len(ways), count)
         ]
-        lengths = told(ray_jobs, len(points), count * _CHECKS_A_RAY)
+        lengths = computed(ray_jobs, len(points), count * _CHECKS_A_RAY)
     return Found(grid, Rays(centre, ways, lengths))
 
 

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.motion.stream_buttons import stream_buttons
 from cdpr_tools.trials.directions import Directions
-from cdpr_tools.trials.figures import Figure
-from cdpr_tools.trials.recorded import Recorded
+from cdpr_tools.trials.evaluation.figures import Figure
+from cdpr_tools.trials.evaluation.recorded import Recorded
 from cdpr_tools.trials.run import TrialRun
 from cdpr_tools.trials.streams.channel import Channel, Network
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from cdpr_rt.core.exchange import FloatArray
 
 
 def exponentials(vectors: FloatArray) -> FloatArray:

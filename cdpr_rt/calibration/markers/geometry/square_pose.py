@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_rt.calibration.markers.geometry.lens import directions
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray, cross_matrices, exponentials
-from cdpr_rt.calibration.markers.observations import Observations
+from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices, exponentials
+from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
+from cdpr_rt.core.exchange import FloatArray
 
 _STEPS = 8
 _DAMPING = 1e-9
@@ -30,7 +31,7 @@ class SquarePoses:
     """(n, 2), root of the mean square over coordinates, in units of X/Z."""
 
 
-def square_poses(seen: Observations, lens: FloatArray) -> SquarePoses:
+def square_poses(seen: SeenMarkers, lens: FloatArray) -> SquarePoses:
     """Return the poses of all squares that were seen.
 
     Those that follow from the homography and its derivative at the square's middle (Collins and

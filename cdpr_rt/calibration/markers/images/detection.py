@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray
 from cdpr_rt.calibration.markers.images.edge_fit import fit_corners
+from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 _DARK, _FLAT = 30.0, 12.0
@@ -21,25 +20,6 @@ _BRIGHT, _BURNT_SHARE = 250, 0.6
 _SOFT_SHARE = 0.12
 """Of its contrast, by which the steepest edges of an image must rise from pixel to pixel."""
 _BLURRED_px = 6.0
-
-
-@dataclass(frozen=True)
-class Sighting:
-    """What one image shows."""
-
-    name: str
-    corners_px: Mapping[int, FloatArray]
-    """Of each marker that is there once and sharp, (4, 2)."""
-    repeated: tuple[int, ...] = ()
-    """Ids that are there more than once."""
-    unsharp: tuple[int, ...] = ()
-    """Ids whose edges are hidden or blurred."""
-    mirrored: tuple[int, ...] = ()
-    """Ids that only a mirror image of it shows."""
-    edge_width_px: float = float("nan")
-    """Median over the markers, of their widest edges."""
-    problem: str | None = None
-    """What is wrong with the image as a whole, in words."""
 
 
 class MarkerDetector:
@@ -79,7 +59,7 @@ class MarkerDetector:
             sharp,
             repeated,
             tuple(unsharp),
-            self._mirrored(pixels, set(ids)) if mirrors else (),
+            self._mirrored(pixels, corners) if mirrors else (),
             width,
             _sharpness_problem(pixels, len(ids), width),
         )
@@ -89,17 +69,22 @@ class MarkerDetector:
         found = np.array(corners, float).reshape(-1, 4, 2)
         return ([] if ids is None else [int(marker) for marker in ids.ravel()]), found
 
-    def _mirrored(self, pixels: NDArray[np.uint8], known: set[int]) -> tuple[int, ...]:
-        """Return ids in the mirror image where the image itself shows no marker."""
+    def _mirrored(self, pixels: NDArray[np.uint8], read: FloatArray) -> tuple[int, ...]:
+        """Return ids in the mirror image where no marker of the image itself, (m, 4, 2), was read.
+
+        A sheet that reads as another one, or the same, the other way round is no mirrored one.
+        """
         flipped = np.ascontiguousarray(pixels[:, ::-1])
         ids, corners = self._find(flipped)
         if not ids:
             return ()
-        # a sheet that reads the same both ways is no mirrored one
-        good = fit_corners(flipped, corners, self._squares).good
-        return tuple(
-            sorted(i for i, sharp in zip(ids, good, strict=True) if sharp and i not in known)
-        )
+        middles = corners.mean(axis=1)
+        middles[:, 0] = pixels.shape[1] - 1 - middles[:, 0]
+        away = np.linalg.norm(middles[:, None] - read.mean(axis=1), axis=2)
+        width = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+        own = away.min(axis=1, initial=np.inf) > 0.5 * width
+        good = fit_corners(flipped, corners, self._squares).good & own
+        return tuple(sorted({i for i, right in zip(ids, good, strict=True) if right}))
 
 
 def _exposure_problem(pixels: NDArray[np.uint8]) -> str | None:

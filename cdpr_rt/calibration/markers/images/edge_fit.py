@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.calibration.markers.geometry.rotations import FloatArray
+from cdpr_rt.core.exchange import FloatArray
 
 _POINTS = 48
 """Along each edge."""

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.devices.camera import CameraIntrinsics
 from cdpr_rt.calibration.markers.geometry.lens import project
-from cdpr_rt.calibration.markers.images.detection import Sighting
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
-from cdpr_rt.calibration.markers.observations import CORNERS, Observations
+from cdpr_rt.calibration.markers.seen_markers import CORNERS, SeenMarkers
+from cdpr_rt.calibration.markers.sighting import Sighting
 
 LENS = np.array([604.0, 606.0, 322.3, 255.8, -0.112, 0.083, 4e-4, -3e-4, -0.012])
 WIDTH, HEIGHT = 640, 512
@@ -33,7 +33,7 @@ class Room:
     """What is true, and what was seen of it."""
 
     truth: MarkerMap
-    seen: Observations
+    seen: SeenMarkers
 
     def sightings(self) -> list[Sighting]:
         seen = self.seen
@@ -102,7 +102,7 @@ def room(
             if (corners > 2).all() and (corners < (WIDTH - 3, HEIGHT - 3)).all():
                 rows_seen.append((i, k, corners + chance.normal(0.0, noise_px, (4, 2))))
     names = [f"image {i}" for i in range(images)]
-    seen = Observations.of(names, rows_seen, dict.fromkeys(range(count), size_m))
+    seen = SeenMarkers.of(names, rows_seen, dict.fromkeys(range(count), size_m))
     k = list(seen.ids)
     truth = MarkerMap(
         *(seen.ids, seen.ids[0], seen.size_m, middle[k], turn[k]),

@@ -15,10 +15,10 @@ from cdpr_rt.calibration.markers.bundle import adjust
 from cdpr_rt.calibration.markers.coverage import coverage
 from cdpr_rt.calibration.markers.geometry.square_pose import square_poses
 from cdpr_rt.calibration.markers.graph import first_map
-from cdpr_rt.calibration.markers.images.detection import Sighting
 from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict
 from cdpr_rt.calibration.markers.marker_map import best_fit, difference
 from cdpr_rt.calibration.markers.reprojection import Estimate, residuals
+from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.errors import InvalidRequestError
 
 SHEETS = MarkerSheets(size_m=0.15)

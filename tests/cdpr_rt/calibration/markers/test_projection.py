@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from cdpr_rt.calibration.markers.geometry.lens import directions, project
 from cdpr_rt.calibration.markers.geometry.rotations import angles
 from cdpr_rt.calibration.markers.geometry.square_pose import square_poses
-from cdpr_rt.calibration.markers.observations import CORNERS, Observations
 from cdpr_rt.calibration.markers.reprojection import Estimate, residuals, residuals_and_jacobian
+from cdpr_rt.calibration.markers.seen_markers import CORNERS, SeenMarkers
 
 MATRIX = np.array([[LENS[0], 0, LENS[2]], [0, LENS[1], LENS[3]], [0, 0, 1.0]])
 
@@ -36,7 +36,7 @@ def test_one_of_a_squares_two_poses_is_the_true_one_and_the_other_is_tilted_othe
         place = chance.uniform((-0.3, -0.25, 0.9), (0.3, 0.25, 1.5))
         truth.append((turn, place))
         rows.append((i, 7, project(0.15 * CORNERS @ turn.T + place, LENS)))
-    seen = Observations.of(map(str, range(80)), rows, {7: 0.15})
+    seen = SeenMarkers.of(map(str, range(80)), rows, {7: 0.15})
     poses, flips = square_poses(seen, LENS), 0
     for i, (turn, place) in enumerate(truth):
         off = angles(poses.rotation[i] @ turn.T)
@@ -72,6 +72,6 @@ def test_the_sparse_jacobian_is_that_of_the_residuals() -> None:
 def test_what_is_seen_twice_in_an_image_or_has_no_size_is_refused() -> None:
     corners = np.zeros((4, 2))
     with pytest.raises(Exception, match="marker 3 is there twice in image number 0"):
-        Observations.of(["a"], [(0, 3, corners), (0, 3, corners)], {3: 0.1})
+        SeenMarkers.of(["a"], [(0, 3, corners), (0, 3, corners)], {3: 0.1})
     with pytest.raises(Exception, match="marker 4 was seen, but has no size"):
-        Observations.of(["a"], [(0, 3, corners), (0, 4, corners)], {3: 0.1})
+        SeenMarkers.of(["a"], [(0, 3, corners), (0, 4, corners)], {3: 0.1})

@@ -62,119 +62,79 @@ class TruePlant:
 
 
 @numba.njit(cache=True)
-def _run(par, cog, off, state, rnd, setp, setv, gains, mode, kp, limit, tables, cpar, cstate, rec):
-    (
-        coul,
-        brk,
-        vs,
-        visc,
-        s0,
-        s1,
-        asym,
-        kte,
-        J,
-        counts,
-        noise,
-        tau_c,
-        delay,
-        cpk,
-        fpk,
-        tct,
-        rise,
-    ) = par
-    n = setp.size
-    h = T / SUB
-    size = cog.size - 1
-    th, w, z, tau, pend, carry, t = (
-        state[0],
-        state[1],
-        state[2],
-        state[3],
-        state[4],
-        state[5],
-        state[6],
-    )
-    hist = state[8:]
-    nh = hist.size
-    dsub = delay / h
+def _advance(par, cog, off, applied, motion, hist, head):
+    """Return a motor's `motion`, th, w, z, tau and t, a cycle later, and the head of `hist`."""
+    (coul, brk, vs, visc, s0, s1, asym, kte, J, _, _, tau_c, _, cpk, fpk, tct, rise) = par
+    h, size = T / SUB, cog.size - 1
+    th, w, z, tau, t = motion
+    lag = 1 - math.exp(-h / tau_c)
+    rise_now = rise * (1 - math.exp(-t / tct))
+    fc, ff = 1 + cpk * rise_now, 1 + fpk * rise_now
+    for _ in range(SUB):
+        tau += (applied * (1 + kte) - tau) * lag
+        x = th / (2 * math.pi)
+        x = (x - math.floor(x)) * size
+        lo = int(x)
+        pt = x - lo
+        c = fc * (cog[lo] * (1 - pt) + cog[lo + 1] * pt)
+        c += (1 + kte) * (off[lo] * (1 - pt) + off[lo + 1] * pt)
+        g = coul + (brk - coul) * math.exp(-((w / vs) ** 2))
+        d = 1 + 0.5 * asym if w >= 0 else 1 - 0.5 * asym
+        g *= ff * d
+        aa = 1 + h * s0 * abs(w) / g
+        A = J / h + s0 * h / aa + s1 / aa + visc * ff
+        B = J / h * w + tau - c - s0 * z / aa - s1 * (z / aa - z) / h
+        w = B / A
+        z = (z + h * w) / aa
+        th += h * w
+        head = (head + 1) % hist.size
+        hist[head] = th
+    return (th, w, z, tau, t + T), head
+
+
+@numba.njit(cache=True)
+def _latched(par, hist, head, noise):
+    """Return the encoder's reading, of an instant before."""
+    counts, dsub = par[9], par[12] / (T / SUB)
     dlow = int(dsub)
     dpart = dsub - dlow
-    lag = 1 - math.exp(-h / tau_c)
-    pstate = np.zeros((1, 4))
-    pos = np.zeros(1)
-    ref = np.zeros(1)
-    vel = np.zeros(1)
-    known = np.zeros(1)
-    eff = np.zeros(1)
-    out = np.zeros(1)
-    lim = np.full(1, limit)
-    index = np.zeros(1)
-    yes = np.ones(1, np.bool_)
-    head = int(state[7])
-    for k in range(n):
-        # latch
-        i0 = (head - dlow) % nh
-        i1 = (head - dlow - 1) % nh
-        old = hist[i0] * (1 - dpart) + hist[i1] * dpart
-        meas = math.floor(old / (2 * math.pi) * counts + rnd[k] * noise) / counts * 2 * math.pi
+    nh = hist.size
+    old = hist[(head - dlow) % nh] * (1 - dpart) + hist[(head - dlow - 1) % nh] * dpart
+    return math.floor(old / (2 * math.pi) * counts + noise * par[10]) / counts * 2 * math.pi
+
+
+@numba.njit(cache=True)
+def _run(par, cog, off, state, rnd, setp, setv, gains, mode, kp, limit, tables, cpar, cstate, rec):
+    motion, pend, carry = (state[0], state[1], state[2], state[3], state[6]), state[4], state[5]
+    hist, head = state[8:], int(state[7])
+    pstate, means = np.zeros((1, 7)), np.zeros((1, 2))  # nothing looks at the cogging alone
+    pos, ref, vel, known = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1)
+    cogging, eff, out, index = np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1)
+    lim, yes = np.full(1, limit), np.ones(1, np.bool_)
+    for k in range(setp.size):
+        meas = _latched(par, hist, head, rnd[k])
         applied = pend  # computed in cycle k-1, acts from t_k
-        pos[0] = meas
-        ref[0] = setp[k]
-        vel[0] = setv[k]
+        pos[0], ref[0], vel[0] = meas, setp[k], setv[k]
         if mode == 0:
-            u = kp * (setp[k] - meas)
-            eff[0] = u
-            u = min(max(u, -limit), limit)
+            eff[0] = kp * (setp[k] - meas)
+            u = min(max(eff[0], -limit), limit)
         else:
             if mode == 2:
-                compensate(tables, cpar, cstate, T, T / 0.2, pos, index, yes, ref, vel, known)
-            pid_update(gains, lim, T, pstate, pos, ref, known, eff, out)
+                compensate(
+                    tables, means, cpar, cstate, T, T / 0.2, pos, index, yes, ref, vel, known,
+                    cogging,
+                )  # fmt: skip
+            pid_update(gains, lim, T, pstate, pos, ref, vel, known, eff, out)
             u = out[0]
         want = u + carry
-        q = round(want / QUANTUM) * QUANTUM
-        carry = want - q
-        pend = q
-        rec[k, 0] = t
-        rec[k, 1] = meas
-        rec[k, 2] = q
-        rec[k, 3] = eff[0]
-        rec[k, 4] = th
-        rec[k, 5] = w
-        rec[k, 6] = s0 * z + visc * w
-        rec[k, 7] = tau
-        rise_now = rise * (1 - math.exp(-t / tct))
-        fc = 1 + cpk * rise_now
-        ff = 1 + fpk * rise_now
-        for _ in range(SUB):
-            tau += (applied * (1 + kte) - tau) * lag
-            x = th / (2 * math.pi)
-            x = (x - math.floor(x)) * size
-            lo = int(x)
-            pt = x - lo
-            c = fc * (cog[lo] * (1 - pt) + cog[lo + 1] * pt)
-            c += (1 + kte) * (off[lo] * (1 - pt) + off[lo + 1] * pt)
-            g = coul + (brk - coul) * math.exp(-((w / vs) ** 2))
-            d = 1 + 0.5 * asym if w >= 0 else 1 - 0.5 * asym
-            g *= ff * d
-            aa = 1 + h * s0 * abs(w) / g
-            A = J / h + s0 * h / aa + s1 / aa + visc * ff
-            B = J / h * w + tau - c - s0 * z / aa - s1 * (z / aa - z) / h
-            w = B / A
-            z = (z + h * w) / aa
-            th += h * w
-            head = (head + 1) % nh
-            hist[head] = th
-        t += T
-    state[0], state[1], state[2], state[3], state[4], state[5], state[6] = (
-        th,
-        w,
-        z,
-        tau,
-        pend,
-        carry,
-        t,
-    )
-    state[7] = head
+        pend = round(want / QUANTUM) * QUANTUM
+        carry = want - pend
+        th, w, z, tau, t = motion
+        rec[k, 0], rec[k, 1], rec[k, 2], rec[k, 3] = t, meas, pend, eff[0]
+        rec[k, 4], rec[k, 5], rec[k, 6], rec[k, 7] = th, w, par[4] * z + par[3] * w, tau
+        motion, head = _advance(par, cog, off, applied, motion, hist, head)
+    state[0], state[1], state[2], state[3] = motion[:4]
+    state[4], state[5], state[6], state[7] = pend, carry, motion[4], head
 
 
 def leg_setpoint(start, speed, cruise, ramp):
@@ -223,7 +183,7 @@ class Bench:
 
     def leg(self, setp, setv, *, kp=0.0, gains=None, comp=None, limit=0.75):
         rec = np.empty((setp.size, 8))
-        gain = np.zeros((1, 4))
+        gain = np.zeros((1, 5))
         tables, cpar, cstate = np.zeros((1, 2, 2)), np.zeros((1, 10)), np.zeros((1, 4))
         mode = 0
         if gains is not None:
@@ -233,6 +193,7 @@ class Bench:
                 gains.integral_Nm_rad_s,
                 gains.derivative_Nms_rad,
                 gains.derivative_filter_s,
+                gains.following_Nm_rad_s,
             )
         if comp is not None:
             mode = 2

@@ -14,6 +14,8 @@ from tests.cdpr_rt.identification.cogging.bench import (
     validate,
 )
 
+pytestmark = pytest.mark.long
+
 FIGURES = ("rms_position_error_deg", "peak_pid_effort_Nm", "peak_velocity_error_deg_s")
 
 

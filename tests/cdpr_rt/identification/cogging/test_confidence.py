@@ -1,6 +1,7 @@
 """The intervals that are reported hold the truth about as often as they claim."""
 
 import numpy as np
+import pytest
 
 from cdpr_rt.control.tuning import design_pid
 from cdpr_rt.identification import identify_harmonic_model, refine
@@ -13,6 +14,8 @@ from tests.cdpr_rt.identification.cogging.bench import (
     TruePlant,
     fast_legs,
 )
+
+pytestmark = pytest.mark.long
 
 TERMS = ((1, 0.01, 5.0), (4, 0.05, 1.0), (24, 0.02, 9.0))
 

@@ -68,7 +68,7 @@ def test_corners_are_cut_as_the_file_says():
     assert [move.blend_m for move in path.moves] == [1e-3, 2.5e-3, 0.0, 1e-3]
 
 
-@settings(deadline=None, derandomize=True, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.floats(-math.pi, math.pi), st.floats(0.05, 2 * math.pi - 0.05), st.booleans(),
     st.floats(1.0, 400.0),
@@ -132,7 +132,7 @@ def test_words_may_be_skipped():
     assert len(path.moves) == 1
 
 
-@settings(deadline=None, derandomize=True, max_examples=150)
+@settings(max_examples=150)
 @given(st.text(alphabet="GMXYZABCFIJR0123456789.-+ %();\n", max_size=120))
 def test_any_text_is_read_or_refused(text):
     try:

@@ -59,7 +59,7 @@ points = st.lists(
 )
 
 
-@settings(deadline=None, derandomize=True, max_examples=25)
+@settings(max_examples=25)
 @given(points, st.sampled_from([0.0, 0.002, 0.02]), st.floats(0.02, 1.0))
 def test_every_sample_keeps_all_limits_and_every_corner_its_radius(places, blend_m, speed):
     path = polyline(places, blend_m, speed)
@@ -68,8 +68,11 @@ def test_every_sample_keeps_all_limits_and_every_corner_its_radius(places, blend
     check_limits(plan, LIMITS)
     np.testing.assert_allclose(plan.samples[[0, -1], 0], path.points[[0, -1]], atol=1e-9)
     moves = np.linalg.norm(plan.samples[:, 1, :3], axis=1)
-    turns_alone = np.linalg.norm(nodes.first[:, :3], axis=1) < 1e-6
-    assert (moves <= 1.01 * speed).all() or turns_alone.any()
+    turns = np.linalg.norm(plan.samples[:, 1, 3:], axis=1)
+    shifts = np.linalg.norm(nodes.first[:, :3], axis=1) > 1e-6
+    before, after = plan.node, np.minimum(plan.node + 1, len(nodes.s) - 1)
+    assert (moves <= 1.01 * speed)[shifts[before] & shifts[after]].all()
+    assert (turns <= 1.01 * speed)[~shifts[before] & ~shifts[after]].all()
     for corner in path.points[1:-1]:
         away = np.linalg.norm(SCALE * (nodes.q - corner), axis=1).min()
         assert away <= blend_m + 1e-9
@@ -155,3 +158,15 @@ def test_a_path_that_leads_nowhere_rests():
     plan = timed(nodes_of(path, SCALE))
     assert plan.duration_s == pytest.approx(0.5)
     assert not plan.samples[:, 1:].any()
+
+
+def test_pieces_of_which_next_to_nothing_is_left_between_corners_slow_nothing_down():
+    """As of arcs in lines of 2 mm, rounded to micrometres, whose corners are cut by half of it."""
+    angle = np.arange(4000) / 50.0
+    places = np.round(0.1 * np.stack([np.cos(angle), np.sin(angle)], axis=1), 6)
+    path = polyline([(x, y, 0.0, 0.0, 0.0, 0.0) for x, y in places], 0.001, 0.1)
+    nodes = nodes_of(path, SCALE)
+    assert 0.0 < np.diff(nodes.s).min() < 1e-6
+    plan = timed(nodes)
+    assert plan.rounds < 8
+    assert plan.duration_s < 1.6 * nodes.s[-1] / 0.1

@@ -77,5 +77,5 @@ def test_toml_that_is_refused(tmp_path):
     file.write_text(TOML.rstrip()[:-3])
     with pytest.raises((ProfileError, PathError)):
         read_path(file, PLANE, SETTINGS)
-    with pytest.raises(PathError, match=r"allowed: a file .toml"):
+    with pytest.raises(PathError, match=r"allowed: way points .toml .csv, G-code .nc"):
         read_path(tmp_path / "a.dxf", PLANE, SETTINGS)

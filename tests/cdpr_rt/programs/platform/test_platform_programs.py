@@ -2,97 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.programs.base import Program, ProgramError
+from cdpr_rt.core.exchange import AxisFeedback
+from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.model import model_of
-from cdpr_rt.programs.platform.index_path import index_path
-from cdpr_rt.programs.platform.pretension import home_pretension_N
+from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
-from cdpr_rt.programs.registry import build_programs, platform_parts, warm_up_programs
+from cdpr_rt.programs.registry import platform_parts
 from cdpr_rt.robots.robot_arrays import limits_of, winches_of
 from cdpr_rt.robots.statics import statics_of
-
-PERIOD_S = 1e-3
-CABLE_m = np.full(3, -0.026)
-COULOMB_Nm = 0.08
-STIFFNESS_N_m = 1e4
-ROBOT = load_robot("planar-3")
-HOME_m = np.array([0.0, 1.3])
-
-
-class Standing:
-    """Three rotors with friction, a spring behind the slack of each."""
-
-    def __init__(self) -> None:
-        limits = limits_of(ROBOT)
-        axes = ROBOT.axes
-        model = model_of(axes, PERIOD_S, [2.3e-3] * 3, limits)
-        self.block = SharedBlock.create(3, 1.0, 1000.0)
-        self.estimator = Estimator(3, PERIOD_S, winches_of(axes))
-        parts = platform_parts(ROBOT, limits, model, self.estimator)
-        assert parts is not None
-        self.parts = parts
-        self.programs = build_programs(model, self.block, parts)
-        warm_up_programs(self.programs, 3, parts)
-        self.cable_m = model.cable_m_per_rad
-        self.inertia = axes[0].winch.motor.rotor_inertia_kg_m2
-        self.feedback, self.setpoint, self.torque = AxisFeedback(3), Setpoint(3), np.zeros(3)
-        self.feedback.valid[:] = True
-        self.angle, self.speed, self.tension_N = np.zeros((3, 3))
-        self.slack_m = np.zeros(3)
-        self.program: Program = self.programs["hold"]
-
-    def loosen(self, slack_m: tuple[float, float, float]) -> None:
-        """Begin anew without torque, with so much slack."""
-        self.parts.forget()
-        self.estimator.reset()
-        self.speed[:] = self.torque[:] = self.tension_N[:] = 0.0
-        self.slack_m[:] = np.array(slack_m) - self.cable_m * self.angle
-        self.switch("idle")
-        self.run(0.05)
-        self.switch("hold")
-
-    def switch(self, name: str, wanted: Mapping[str, Any] | None = None) -> None:
-        program = self.programs[name]
-        program.check(wanted or {})
-        program.start(self.feedback, self.setpoint, self.torque)
-        program.command(wanted or {})
-        self.program = program
-
-    def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / PERIOD_S)):
-            self.feedback.cycle += 1
-            self.feedback.position_rad[:] = np.round(self.angle * 8192 / 6.2832) * 6.2832 / 8192
-            self.feedback.torque_Nm[:] = self.torque
-            self.estimator.update(self.feedback)
-            self.program.update(self.feedback, self.setpoint, self.torque)
-            for _ in range(10):
-                self._step(PERIOD_S / 10)
-
-    def _step(self, h: float) -> None:
-        stretched = -(self.slack_m + self.cable_m * self.angle)
-        self.tension_N = np.maximum(STIFFNESS_N_m * stretched, 0.0)
-        friction = COULOMB_Nm * np.tanh(self.speed / 0.2)
-        force = self.torque + self.cable_m * self.tension_N - friction - 2e-3 * self.speed
-        self.speed += h / self.inertia * force
-        self.angle += h * self.speed
-
-    def until_done(self, within_s: float) -> dict[str, Any]:
-        for _ in range(round(within_s / 0.1)):
-            self.run(0.1)
-            told = self.program.progress()
-            if told["done"] or told.get("trouble"):
-                return told
-        raise AssertionError(f"not done within {within_s} s: {told}")
+from tests.cdpr_rt.programs.platform.standing_robot import (
+    PERIOD_S,
+    ROBOT,
+    CABLE_m,
+    HOME_m,
+    Standing,
+    STIFFNESS_N_m,
+    home_pretension_N,
+)
 
 
 @pytest.fixture(scope="module")
@@ -140,15 +73,52 @@ def test_tensions_grow_together_and_no_cable_is_jerked(robot: Standing):
     assert np.abs(uneven_N[:-1]).max() < 15.0
 
 
+def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
+    model = robot.parts.model
+    there = model.pose(np.array([0.8, 1.6]))
+    slack_m = robot.slack_m + robot.cable_m * robot.angle
+    length_m = model.kinematics.lengths(there) + slack_m
+    robot.estimator.set_lengths(robot.feedback.position_rad, length_m)
+    robot.run(0.01)
+    robot.switch("tighten", {"from": "lengths"})
+    high_N = robot.program._winches.high_N  # type: ignore[attr-defined]
+    asked_N = []
+    while not robot.parts.tight:
+        robot.run(PERIOD_S)
+        asked_N.append(high_N.copy())
+        assert not robot.program.progress()["trouble"]
+    other_N = np.abs(asked_N[-1] - home_pretension_N(robot.parts)).max()
+    assert other_N > 5.0
+    # full tensions in a second, and from some to others in a second
+    fastest_N_s = np.max(asked_N) + 1.5 * other_N
+    assert np.abs(np.diff(asked_N, axis=0)).max() < fastest_N_s * PERIOD_S
+
+
 def test_a_cable_that_ends_nowhere_is_told_and_all_are_let_go(robot: Standing):
     robot.slack_m[1] = 5.0
     robot.switch("tighten")
     told = robot.until_done(60.0)
-    assert told["trouble"].startswith("cable 1: 1.00 m reeled in and not tight")
+    assert told["trouble"].startswith("cable 2: 1000 mm reeled in and not tight")
     robot.run(0.5)
     assert robot.program.at_rest
     assert not robot.torque.any()
     assert not robot.parts.tight
+
+
+@pytest.mark.parametrize("name", ["tighten", "lower"])
+def test_where_winches_are_driven_alone_no_loss_is_taken_from_what_is_measured(
+    robot: Standing, name: str
+):
+    """What the control wrote last does not say what these programs do."""
+    if name == "lower":
+        tightened(robot)
+    control = robot.parts.control
+    control.compensation_Nm[:] = control.motor_loss_Nm[:] = control.cogging_Nm[:] = 0.05
+    robot.switch(name)
+    robot.run(0.5)
+    expected_N = np.abs(robot.torque / robot.cable_m)
+    assert robot.estimator.estimate.tension_N == pytest.approx(expected_N, abs=2.0)
+    assert not control.compensation_Nm.any()
 
 
 def test_only_a_tight_robot_takes_positions_and_only_a_loose_one_rests(robot: Standing):
@@ -194,7 +164,7 @@ def test_a_cable_that_gives_way_while_they_are_tightened_ends_it(robot: Standing
             break
     robot.slack_m[0] += 5.0
     told = robot.until_done(20.0)
-    assert told["trouble"].startswith("cable 0: 0.0")
+    assert told["trouble"].startswith("cable 1: 5")
     assert "reeled in and not tight" in told["trouble"]
 
 
@@ -280,6 +250,24 @@ def test_letting_go_ends_without_torque(robot: Standing):
     assert not robot.torque.any()
     # the winches paid out no more than it took to take the load off
     assert robot.tension_N.max() < 12.0
+
+
+def test_a_broken_cable_that_runs_in_does_not_keep_a_standing_platform_waiting(
+    robot: Standing, monkeypatch: pytest.MonkeyPatch
+):
+    tightened(robot)
+    robot.slack_m[2] += 100.0
+    robot.switch("lower", {"blind": True})
+    winches = robot.programs["lower"]._winches  # type: ignore[attr-defined]
+    update = winches.update
+
+    def trembling(feedback: AxisFeedback, torque_Nm: np.ndarray) -> None:
+        update(feedback, torque_Nm)
+        winches.tension_N[2] += 8.0 * (feedback.cycle % 50 == 0)  # cogging, as it turns
+
+    monkeypatch.setattr(winches, "update", trembling)
+    robot.until_done(6.0)
+    assert np.abs(robot.tension_N[:2]).max() < 12.0
 
 
 def test_what_is_loose_already_is_not_wound_up_to_be_let_go(robot: Standing):

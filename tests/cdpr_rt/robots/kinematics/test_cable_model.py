@@ -15,7 +15,7 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.kinematics.cable_model import CableModel, unstretched_length
 
 DYNEEMA_N = 40e3
-quick = settings(derandomize=True, deadline=None, max_examples=40)
+quick = settings(max_examples=40)
 
 
 def end_of(length: float, t: float, angle: float, compliance: float, weight: float) -> np.ndarray:

@@ -24,7 +24,7 @@ from cdpr_rt.robots.kinematics.kinematics import (
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_tools.bench.geometries import COGIRO, SPATIAL_8
 
-quick = settings(derandomize=True, deadline=None, max_examples=60)
+quick = settings(max_examples=60)
 seeds = st.integers(0, 2**32 - 1)
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -198,7 +198,7 @@ def wound(exit_m: np.ndarray, anchor_m: np.ndarray, axis: np.ndarray, r: float) 
     return float(r * theta[best] + free[best])
 
 
-@settings(derandomize=True, deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(seeds, st.floats(0.01, 0.15))
 def test_a_pulley_is_left_along_its_tangent(seed: int, radius: float) -> None:
     rng = np.random.default_rng(seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -24,7 +24,6 @@ angle = st.one_of(
     st.floats(-9.0, -1.0).map(lambda e: np.pi - 10.0**e),
 )
 vectors = st.tuples(unit, angle).map(lambda ua: ua[0] * ua[1])
-quick = settings(derandomize=True, deadline=None)
 
 
 def turned(phi: np.ndarray) -> np.ndarray:
@@ -39,7 +38,6 @@ def vector_of(Q: np.ndarray) -> np.ndarray:
     return phi
 
 
-@quick
 @given(vectors)
 @example(np.zeros(3))
 @example(np.array([0.0, 0.0, 1e-4]))
@@ -49,7 +47,6 @@ def test_the_exponential_is_that_of_scipy(phi: np.ndarray) -> None:
     assert np.abs(Q @ Q.T - np.eye(3)).max() < 1e-14
 
 
-@quick
 @given(vectors)
 @example(np.zeros(3))
 def test_the_logarithm_inverts_it(phi: np.ndarray) -> None:
@@ -67,7 +64,6 @@ def test_half_a_turn_has_either_vector(axis: np.ndarray) -> None:
     assert turned(found) == pytest.approx(Q, abs=1e-12)
 
 
-@quick
 @given(vectors, vectors, vectors, vectors)
 def test_minus_undoes_plus(
     p: np.ndarray, phi: np.ndarray, dp: np.ndarray, dphi: np.ndarray

@@ -104,6 +104,7 @@ def test_all_of_what_is_reached_is_held_and_clear_and_hardly_more_would_be(name:
             assert model.interference.clearances(further)[0][0] < model.platform.clearance_m + 1e-5
 
 
+@pytest.mark.long
 def test_brute_force_at_every_millimetre_refuses_nothing() -> None:
     model = model_of("spatial-8")
     reach, brute = Reach(model), Brute(model)
@@ -159,7 +160,7 @@ def test_a_start_from_which_nothing_leads_is_refused_by_its_reason(
         Reach(model, np.array([1.5, 0.0, 1.5, 0.0, 0.0, 0.0]))
     low, high = (tuple(np.array(model.platform.home_m) + s * 0.05) for s in (-1, 1))
     inside = changed("spatial-8", obstacles=(BoxFile(min_m=low, max_m=high),))
-    with pytest.raises(GeometryError, match="platform and obstacle 0 touch"):
+    with pytest.raises(GeometryError, match="platform and obstacle 1 touch"):
         Reach(inside)
     caged = changed("spatial-8", workspace_min_m=(5.0, 5.0, 1.4), workspace_max_m=(5.1, 5.1, 1.5))
     with pytest.raises(GeometryError, match="ways 0 lead to a target; wanted: 2"):
@@ -189,3 +190,23 @@ def test_a_straight_way_is_the_thesis_way_where_home_is_the_start() -> None:
     turn = model.pose(end).minus(model.home_pose)
     assert halfway.minus(model.home_pose) == pytest.approx(0.5 * turn, abs=1e-12)
     assert math.isclose(float(np.linalg.norm(turn[3:])), float(np.linalg.norm(end[3:])))
+
+
+def test_a_turned_platform_is_not_sent_down_on_its_stand() -> None:
+    name = "suspended-8"
+    platform = model_of(name).platform
+    up = len(platform.home_m) - 1
+    low = [*platform.workspace_min_m[:up], platform.home_m[up] + 0.005]
+    model = changed(name, workspace_min_m=tuple(low))
+    start = model.home.copy()
+    start[: up + 1] = 0.5 * (np.array(low) + platform.workspace_max_m)
+    poses = model.poses(Reach(model, start).draw(200, 3).positions)
+    anchors = model.kinematics.geometry[3:6].T
+    home = model.home_pose
+    stand_m = (home.p + anchors @ home.Q.T)[:, up].min()
+    for pose in poses:
+        assert (pose[0] + anchors @ pose[1:].T)[:, up].min() > stand_m
+    below = changed(name, workspace_min_m=(*low[:up], platform.home_m[up] - 0.1))
+    # one whose targets reach below home does not stand on a floor there
+    lowest = Reach(below, start).draw(200, 3).positions[:, up].min()
+    assert lowest < platform.home_m[up]

@@ -52,7 +52,7 @@ def centroid(W: FloatArray, corners: FloatArray) -> FloatArray:
     return np.asarray((areas[:, None] * triangles.mean(axis=1)).sum(axis=0) / areas.sum())
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(seeds, st.integers(1, 6))
 def test_points_of_the_polygon_are_those_of_its_convex_hull(seed: int, d: int) -> None:
     n = d + 2
@@ -71,7 +71,7 @@ def test_points_of_the_polygon_are_those_of_its_convex_hull(seed: int, d: int) -
     assert t == pytest.approx(least, abs=1e-7)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(seeds, st.integers(1, 6))
 def test_with_one_cable_more_it_is_a_segment(seed: int, d: int) -> None:
     W, w_e, low, high = made_up(seed, d, d + 1, True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fork_server import FORKED
 from mcap.reader import make_reader
 
 from cdpr_rt.core.cycle_row import AXES, Row, cycle_dtype
@@ -86,7 +86,7 @@ class RecorderProcess:
     def __init__(self, block: SharedBlock, folder: Path, most_file_bytes: int = 0) -> None:
         arguments = [str(block.fd), str(folder), str(most_file_bytes)]
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _CHILD, *arguments],
+            [*FORKED, _CHILD, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

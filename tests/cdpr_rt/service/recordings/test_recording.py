@@ -152,6 +152,7 @@ def test_two_runs_at_other_times_give_the_same_messages(tmp_path: Path) -> None:
     assert first == second and len(first["/status"]) == 1 and len(first["/events"]) == 4
 
 
+@pytest.mark.long
 def test_killed_it_is_whole_and_the_next_goes_on_without_a_gap(tmp_path: Path) -> None:
     block = block_with_clock()
     writer = RowWriter(block)

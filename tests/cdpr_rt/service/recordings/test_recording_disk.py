@@ -24,6 +24,8 @@ from tests.cdpr_rt.service.recordings.recording_rig import (
     wait_until,
 )
 
+pytestmark = pytest.mark.long
+
 
 def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path) -> None:
     block = block_with_clock()

@@ -32,7 +32,7 @@ def _written(values: list[float]) -> list[float | None]:
 
 
 @given(st.lists(st.floats(), min_size=1, max_size=40))
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 def test_any_number_comes_back_to_a_billionth(values: list[float]) -> None:
     for value, read in zip(values, _written(values), strict=True):
         if not math.isfinite(value):
@@ -69,7 +69,7 @@ def test_numbers_are_as_short_as_they_can_be() -> None:
 
 
 @given(data=st.data())
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_every_bit_pattern_of_whole_fields(data: st.DataObject) -> None:
     rows = np.zeros(3, cycle_dtype(16))
     for name in (*SCALARS, *AXES):

@@ -5,9 +5,8 @@ import json
 import math
 import socket
 import struct
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -17,79 +16,20 @@ import numpy as np
 import pytest
 from websockets.asyncio.client import connect
 
-from cdpr_rt.core.cycle_row import Row
-from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.service.listening import listen_tcp
 from cdpr_rt.service.view import foxglove_server
 from cdpr_rt.service.view.foxglove_server import MOST_VIEWERS
 from cdpr_rt.service.view.foxglove_view import LiveView
-from tests.cdpr_rt.service.recordings.recording_rig import block_with_clock, made_rows, put
-
-_PROTOCOL = "foxglove.sdk.v1"
-_LONGEST_S = 60.0
-
-
-@contextmanager
-def _running(block: SharedBlock) -> Iterator[LiveView]:
-    view = LiveView(block, "bench", listen_tcp("127.0.0.1", 0))
-    view.start()
-    try:
-        yield view
-    finally:
-        view.stop()
-
-
-@contextmanager
-def _repeating(block: SharedBlock, row: Row) -> Iterator[None]:
-    """Write one row over and over, as a loop at 1 kHz would."""
-    end = threading.Event()
-    writer = RowWriter(block)
-
-    def write() -> None:
-        while not end.wait(0.005):
-            for _ in range(5):
-                put(writer, row)
-
-    thread = threading.Thread(target=write)
-    thread.start()
-    try:
-        yield
-    finally:
-        end.set()
-        thread.join()
-
-
-Messages = dict[str, list[tuple[int, bytes]]]
-
-
-def _seen(*topics: str, times: int = 1) -> Callable[[Messages], bool]:
-    return lambda messages: all(len(messages.get(topic, ())) >= times for topic in topics)
-
-
-async def _watch(
-    url: str, done: Callable[[Messages], bool]
-) -> tuple[dict[str, dict[str, Any]], Messages]:
-    """Subscribe to all topics; return the channels and the messages of each, with log times."""
-    channels: dict[int, dict[str, Any]] = {}
-    messages: Messages = {}
-    async with connect(url, subprotocols=[_PROTOCOL]) as socket:  # type: ignore[list-item]
-        while not done(messages):
-            text = await asyncio.wait_for(socket.recv(), _LONGEST_S)
-            if isinstance(text, bytes):
-                subscription, log_time = struct.unpack_from("<IQ", text, 1)
-                topic = channels[subscription]["topic"]
-                messages.setdefault(topic, []).append((log_time, text[13:]))
-            elif (told := json.loads(text))["op"] == "advertise":
-                new = {channel["id"]: channel for channel in told["channels"]}
-                names = {channel["topic"] for channel in channels.values()}
-                assert not names & {channel["topic"] for channel in new.values()}
-                channels |= new
-                wanted = [{"id": number, "channelId": number} for number in new]
-                await socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-            elif told["op"] == "unadvertise":
-                for number in told["channelIds"]:
-                    del channels[number]
-    return {channel["topic"]: channel for channel in channels.values()}, messages
+from tests.cdpr_rt.service.recordings.recording_rig import block_with_clock, made_rows
+from tests.cdpr_rt.service.view.live_view_rig import (
+    LONGEST_S,
+    PROTOCOL,
+    Messages,
+    repeating,
+    running,
+    seen,
+    watch,
+)
 
 
 def test_a_client_sees_axes_tensions_pose_and_times() -> None:
@@ -97,12 +37,12 @@ def test_a_client_sees_axes_tensions_pose_and_times() -> None:
     row = made_rows(100, 1)
     row["position_rad"], row["setpoint_rad"] = [[math.pi, 1.0]], [[math.pi / 2, 1.0]]
     row["tension_N"] = [[55.0, np.nan]]
-    row["compute_s"] = 2e-4
+    row["compute_s"], row["stream_age_s"] = 2e-4, 0.5
     row["pose"] = [1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]
-    with _running(block) as view, _repeating(block, row):
+    with running(block) as view, repeating(block, row):
         topics = ("/axes", "/tensions", "/cycle_time", "/state", "/pose")
         begin = time.monotonic()
-        watched = _watch(view.status()["url"], _seen(*topics, times=11))
+        watched = watch(view.status()["url"], seen(*topics, times=11))
         channels, messages = asyncio.run(watched)
         seconds = time.monotonic() - begin
     for topic in ("/axes", "/tensions", "/cycle_time", "/state"):
@@ -116,7 +56,9 @@ def test_a_client_sees_axes_tensions_pose_and_times() -> None:
     assert "cable_length_m" not in axes["right"]  # what is not known is not there
     assert time_ns == 1_800_000_000_100_000_000
     assert json.loads(messages["/tensions"][-1][1]) == {"left": 55.0}
-    assert json.loads(messages["/cycle_time"][-1][1])["compute_ms"] == pytest.approx(0.2)
+    cycle_time = json.loads(messages["/cycle_time"][-1][1])
+    assert cycle_time["compute_ms"] == pytest.approx(0.2)
+    assert cycle_time["stream_age_s"] == 0.5  # no wall time: as it is
     assert json.loads(messages["/state"][-1][1]) == {"state": "active", "reaction": "none"}
     assert channels["/pose"]["schemaName"] == "foxglove.PoseInFrame"
     assert struct.pack("<d", 3.0) in messages["/pose"][-1][1]
@@ -127,7 +69,7 @@ def test_a_client_sees_axes_tensions_pose_and_times() -> None:
 
 def test_what_happens_goes_into_the_log() -> None:
     block = block_with_clock()
-    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+    with running(block) as view, repeating(block, made_rows(100, 1)):
         trip = iter([{"state": "fault", "reason": "cable of left: 2 N"}])
 
         def tripped_and_told(messages: Messages) -> bool:
@@ -135,7 +77,7 @@ def test_what_happens_goes_into_the_log() -> None:
                 block.write_status(status)
             return any(b"cable of left: 2 N" in data for _, data in messages.get("/log", ()))
 
-        asyncio.run(_watch(view.status()["url"], tripped_and_told))
+        asyncio.run(watch(view.status()["url"], tripped_and_told))
 
 
 def test_where_it_ends_by_itself_it_says_why() -> None:
@@ -153,7 +95,7 @@ def test_where_it_ends_by_itself_it_says_why() -> None:
 def test_a_client_that_does_not_read_holds_nobody_up() -> None:
     block = block_with_clock()
 
-    lazily: Any = {"subprotocols": [_PROTOCOL], "max_queue": 1, "close_timeout": 0.1}
+    lazily: Any = {"subprotocols": [PROTOCOL], "max_queue": 1, "close_timeout": 0.1}
 
     async def beside_one_that_sleeps(url: str) -> None:
         async with connect(url, **lazily) as lazy:
@@ -161,9 +103,9 @@ def test_a_client_that_does_not_read_holds_nobody_up() -> None:
             told = json.loads(await lazy.recv())
             wanted = [{"id": c["id"], "channelId": c["id"]} for c in told["channels"]]
             await lazy.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-            await _watch(url, _seen("/axes", times=11))
+            await watch(url, seen("/axes", times=11))
 
-    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+    with running(block) as view, repeating(block, made_rows(100, 1)):
         asyncio.run(beside_one_that_sleeps(view.status()["url"]))
         assert view.status()["error"] == ""
 
@@ -171,15 +113,15 @@ def test_a_client_that_does_not_read_holds_nobody_up() -> None:
 def test_axes_whose_names_are_spelled_alike_are_all_shown() -> None:
     block = block_with_clock()
     block.write_description({"axes": [{"name": "top left"}, {"name": "top_left"}]})
-    with _running(block) as view, _repeating(block, made_rows(100, 1)):
-        _, messages = asyncio.run(_watch(view.status()["url"], _seen("/axes")))
+    with running(block) as view, repeating(block, made_rows(100, 1)):
+        _, messages = asyncio.run(watch(view.status()["url"], seen("/axes")))
     assert set(json.loads(messages["/axes"][-1][1])) == {"top_left", "top_left_"}
 
 
 def test_clients_that_talk_nonsense_leave_no_lines_in_the_log(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    with _running(block_with_clock()) as view:
+    with running(block_with_clock()) as view:
         port = int(view.status()["url"].rsplit(":", 1)[1])
         for _ in range(10):
             with socket.create_connection(("127.0.0.1", port)) as client:
@@ -191,7 +133,7 @@ def test_clients_that_talk_nonsense_leave_no_lines_in_the_log(
 
 UPGRADE = (
     "GET / HTTP/1.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
-    f"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: {_PROTOCOL}\r\n"
+    f"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: {PROTOCOL}\r\n"
 )
 FOXGLOVE = "https://app.foxglove.dev"
 
@@ -254,13 +196,13 @@ def _listening() -> set[str]:
 
 def test_there_is_one_port_and_none_behind_it() -> None:
     before = _listening()
-    with _running(block_with_clock()) as view:
-        asyncio.run(_watch(view.status()["url"], lambda _: True))
+    with running(block_with_clock()) as view:
+        asyncio.run(watch(view.status()["url"], lambda _: True))
         assert len(_listening() - before) == 1
 
 
 def test_who_connects_over_and_over_costs_few_descriptors() -> None:
-    with _running(block_with_clock()) as view:
+    with running(block_with_clock()) as view:
         address = ("127.0.0.1", int(view.status()["url"].rsplit(":", 1)[1]))
         before, most = len(list(Path("/proc/self/fd").iterdir())), 0
         open_here = []
@@ -294,7 +236,7 @@ def _frame(head: int, data: bytes) -> bytes:
 
 
 def _cut_off(view: LiveView) -> bool:
-    end = time.monotonic() + _LONGEST_S
+    end = time.monotonic() + LONGEST_S
     while view.status()["viewers"] and time.monotonic() < end:
         time.sleep(0.01)
     return not view.status()["viewers"]
@@ -304,14 +246,14 @@ def test_a_viewer_that_never_reads_is_cut_off(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(foxglove_server, "_PATIENCE_S", 0.2)
     monkeypatch.setattr(foxglove_server, "_MOST_UNSENT_BYTES", 4096)
     block = block_with_clock()
-    with _running(block) as view, _repeating(block, made_rows(100, 1)), _joined(view):
+    with running(block) as view, repeating(block, made_rows(100, 1)), _joined(view):
         assert _cut_off(view)
         assert view.status()["error"] == ""
 
 
 @pytest.mark.parametrize("head", [0x81, 0x82, 0x89, 0x01], ids=["text", "data", "ping", "part"])
 def test_a_viewer_that_talks_without_end_is_cut_off(head: int) -> None:
-    with _running(block_with_clock()) as view, _joined(view) as viewer:
+    with running(block_with_clock()) as view, _joined(view) as viewer:
         with suppress(ConnectionError):
             viewer.sendall(_frame(head, b"x" * 125) * 1000)
         assert _cut_off(view)
@@ -333,11 +275,11 @@ def test_what_is_no_wish_changes_nothing() -> None:
     ]
 
     async def beside_nonsense(url: str) -> None:
-        async with connect(url, subprotocols=[_PROTOCOL]) as client:  # type: ignore[list-item]
+        async with connect(url, subprotocols=[PROTOCOL]) as client:  # type: ignore[list-item]
             for one in nonsense:
                 await client.send(one)
             await client.send('{"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 1}]}')
-            while not isinstance(data := await asyncio.wait_for(client.recv(), _LONGEST_S), bytes):
+            while not isinstance(data := await asyncio.wait_for(client.recv(), LONGEST_S), bytes):
                 pass
             assert data[:5] == struct.pack("<BI", 1, 7)
             await client.send('{"op": "unsubscribe", "subscriptionIds": [7]}')
@@ -345,7 +287,7 @@ def test_what_is_no_wish_changes_nothing() -> None:
                 while True:
                     await asyncio.wait_for(client.recv(), 0.5)
 
-    with _running(block) as view, _repeating(block, made_rows(100, 1)):
+    with running(block) as view, repeating(block, made_rows(100, 1)):
         asyncio.run(beside_nonsense(view.status()["url"]))
         assert view.status()["error"] == ""
 
@@ -359,14 +301,14 @@ def test_axes_that_are_called_otherwise_are_other_topics() -> None:
             block.write_description({"axes": [{"name": "front"}, {"name": "rear"}]})
         return {"front", "rear"} in axes
 
-    with _running(block) as view, _repeating(block, made_rows(100, 1)):
-        channels, messages = asyncio.run(_watch(view.status()["url"], renamed))
+    with running(block) as view, repeating(block, made_rows(100, 1)):
+        channels, messages = asyncio.run(watch(view.status()["url"], renamed))
     assert "front" in json.loads(channels["/axes"]["schema"])["properties"]
     assert {"left", "right"} == set(json.loads(messages["/axes"][0][1]))
 
 
 def test_strange_letters_of_a_refused_page_can_be_told() -> None:
-    with _running(block_with_clock()) as view:
+    with running(block_with_clock()) as view:
         address = ("127.0.0.1", int(view.status()["url"].rsplit(":", 1)[1]))
         with socket.create_connection(address, 5.0) as client:
             client.sendall(f"{UPGRADE}Host: localhost\r\nOrigin: ".encode() + b"\xff\r\n\r\n")
@@ -377,7 +319,7 @@ def test_strange_letters_of_a_refused_page_can_be_told() -> None:
 def test_who_says_nothing_makes_room_and_too_many_are_told(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    with _running(block_with_clock()) as view:
+    with running(block_with_clock()) as view:
         port = int(view.status()["url"].rsplit(":", 1)[1])
         silent = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MOST_VIEWERS)]
         assert " 101 " in _asked(view, "Host: localhost")
@@ -393,7 +335,7 @@ def test_who_says_nothing_makes_room_and_too_many_are_told(
 
 
 def test_there_are_not_more_of_them_where_many_come_at_once() -> None:
-    with _running(block_with_clock()) as view:
+    with running(block_with_clock()) as view:
         port = int(view.status()["url"].rsplit(":", 1)[1])
         request = f"{UPGRADE}Host: localhost\r\n\r\n".encode()
         watching, answers = [], list[bytes]()
@@ -412,9 +354,9 @@ def test_there_are_not_more_of_them_where_many_come_at_once() -> None:
 
 def test_it_stays_where_no_cycles_run() -> None:
     block = block_with_clock()
-    with _running(block) as view:
+    with running(block) as view:
         time.sleep(0.2)
         assert view.status()["error"] == ""
-        with _repeating(block, made_rows(100, 1)):
-            _, messages = asyncio.run(_watch(view.status()["url"], _seen("/axes")))
+        with repeating(block, made_rows(100, 1)):
+            _, messages = asyncio.run(watch(view.status()["url"], seen("/axes")))
     assert messages["/axes"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_drivers.canopen.boot import concise_dcf
@@ -22,13 +22,11 @@ def test_the_layout_is_that_of_1f22h() -> None:
     )
 
 
-@settings(derandomize=True, deadline=None)
 @given(lists)
 def test_what_goes_in_comes_out(wanted: tuple[DcfEntry, ...]) -> None:
     assert concise_dcf.decode(concise_dcf.encode(wanted)) == wanted
 
 
-@settings(derandomize=True, deadline=None)
 @given(lists, st.data())
 def test_a_stream_cut_short_is_refused(wanted: tuple[DcfEntry, ...], data: st.DataObject) -> None:
     stream = concise_dcf.encode(wanted)
@@ -37,14 +35,12 @@ def test_a_stream_cut_short_is_refused(wanted: tuple[DcfEntry, ...], data: st.Da
         concise_dcf.decode(stream[:cut])
 
 
-@settings(derandomize=True, deadline=None)
 @given(lists, st.binary(min_size=1, max_size=9))
 def test_bytes_behind_the_end_are_refused(wanted: tuple[DcfEntry, ...], more: bytes) -> None:
     with pytest.raises(ConciseDcfError, match="follow the last"):
         concise_dcf.decode(concise_dcf.encode(wanted) + more)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.binary(max_size=60))
 def test_noise_is_decoded_or_refused_and_never_anything_else(noise: bytes) -> None:
     try:

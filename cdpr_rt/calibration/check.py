@@ -1,0 +1,238 @@
+"""Whether a calibrated robot is still as it was, from a few poses; which cable has changed, how.
+
+At the poses that lengths, and a camera or scanner where there is one, tell by the calibrated
+geometry, what residuals are left is explained by changes of single cables, each linearised:
+
+    r + P_⊥ (A θ + N ξ) ≈ 0
+
+with P_⊥ taking out what poses explain, A the derivatives by a cable's exit point, length or drum,
+and N those by the platform's place at home, from which lengths are counted. The change that lowers
+the sum of squares most is taken first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr_rt.calibration.estimation.fit import fit
+from cdpr_rt.calibration.estimation.parameters import DRUM, EXIT, OFFSET, CableGeometry
+from cdpr_rt.calibration.estimation.residuals import Linearised, length_std_m, linearise
+from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
+from cdpr_rt.robots.kinematics.cable_kernel import run_poses
+
+_HOME_m, _HOME_rad = 0.002, 0.004
+"""By how much the platform may stand elsewhere at home without anything having changed."""
+_GAIN = 30.0
+"""By which a change has to lower the sum of squares, in units of their variance."""
+_EACH_PARAMETER = 6.0
+"""Further, for each number that describes it."""
+_LEAST_NOISE = 0.1
+"""Variance of readings at the least, over that which is taken for known."""
+_ALIKE = 0.8
+_MOST_CHANGES = 3
+_MISFIT = 9.0
+_ADVICE = {
+    "exit": "look at its pulley, at what that is fixed to, and at its rail",
+    "length": "its cable has slipped on the drum or at the platform, or its encoder has",
+    "drum": "look at its drum, its belt and how its cable is wound",
+}
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something that is not as it was when the robot was calibrated."""
+
+    kind: str
+    """exit, length or drum."""
+    cable: int
+    """Counted from 0."""
+    size: FloatArray
+    """(k,) m, of a drum relative."""
+    std: FloatArray
+    effect_m: float
+    """By how much it puts positions off that lengths tell, at the worst of the poses."""
+    alike: tuple[int, ...] = ()
+    """Other cables whose change of this kind would explain it nearly as well."""
+
+    @property
+    def text(self) -> str:
+        """What has changed, by how much, and what to look at."""
+        others = ", ".join(str(other + 1) for other in self.alike)
+        who = f"cable {self.cable + 1}" + (f" (or {others})" if others else "")
+        many = ", ".join(f"{1e3 * x:+.1f}" for x in self.size)
+        sure = f"± {1e3 * float(self.std.max()):.1f} mm"
+        what = {
+            "exit": f"the exit point of {who} has moved by ({many}) {sure}",
+            "length": f"{who} is {many} {sure} longer than it is taken for",
+            "drum": f"a turn of the motor of {who} pays out {100 * float(self.size[0]):+.2f} ± "
+            f"{100 * float(self.std[0]):.2f} % of what it did",
+        }[self.kind]
+        effect = f"positions are off by up to {1e3 * self.effect_m:.1f} mm"
+        return f"{what}; {effect}: {_ADVICE[self.kind]}"
+
+    def told(self) -> dict[str, object]:
+        """Return it for JSON, cables counted from 1."""
+        return {
+            "kind": self.kind,
+            "cable": self.cable + 1,
+            "or_cables": [other + 1 for other in self.alike],
+            "size": self.size.tolist(),
+            "std": self.std.tolist(),
+            "effect_mm": 1e3 * self.effect_m,
+            "text": self.text,
+        }
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a few poses say of a calibration."""
+
+    poses: int
+    residual_m: float
+    """Root mean square of what lengths are off, at poses that they are to tell."""
+    misfit: float
+    """Mean square of what is left over its variance once the changes are taken out."""
+    changes: tuple[Change, ...]
+    wanted_m: float
+
+    @property
+    def effect_m(self) -> float:
+        """By how much positions are put off by what has changed."""
+        return sum(change.effect_m for change in self.changes)
+
+    @property
+    def moved(self) -> bool:
+        """Whether the robot is not as it was, as far as it matters."""
+        return self.effect_m > self.wanted_m or self.misfit > _MISFIT
+
+    def verdict(self) -> list[str]:
+        """Return it in words."""
+        off = f"lengths at {self.poses} poses are off by {1e3 * self.residual_m:.2f} mm rms"
+        if not self.moved:
+            small = [f"harmless so far: {change.text}" for change in self.changes]
+            return [f"UNCHANGED: {off}", *small]
+        told = [f"MOVED: {change.text}" for change in self.changes]
+        if self.misfit > _MISFIT:
+            told.append("MOVED: more than single cables explain: the frame, or several cables")
+        return [off, *told]
+
+
+def check_geometry(geometry: CableGeometry, seen: Observations, wanted_m: float) -> Check:
+    """Return whether readings agree with a geometry, the first of them at home.
+
+    `wanted_m` is the error of positions from which on a change matters.
+    """
+    whole = replace(geometry, identified=("exit", "offset", "drum"))
+    there = fit(replace(geometry, identified=()), seen, robust=False)
+    at = linearise(whole, seen, there.poses, np.zeros(len(seen.jumps)))
+    system = _System(whole, at, there.poses)
+    changes: list[Change] = []
+    columns: list[IntArray] = []
+    while len(changes) < _MOST_CHANGES and (found := system.best(columns)) is not None:
+        kind, cable, alike, own = found
+        columns.append(own)
+        changes.append(Change(kind, cable, np.zeros(0), np.zeros(0), 0.0, alike))
+    changes = system.sized(changes, columns)
+    off_m = there.length_residual_m * length_std_m(geometry, seen)
+    rms = float(np.sqrt((off_m**2).sum() / max(int(seen.used.sum()), 1)))
+    return Check(seen.poses, rms, system.misfit(columns), tuple(changes), wanted_m)
+
+
+class _System:
+    """Residuals that poses do not explain, and the columns of all changes that may."""
+
+    def __init__(self, geometry: CableGeometry, at: Linearised, poses: FloatArray) -> None:
+        self._geometry, self._at = geometry, at
+        inverse = np.linalg.pinv(at.by_pose)
+        free = np.eye(at.residual.shape[1]) - at.by_pose @ inverse
+        count, rows, size = at.by_parameter.shape
+        self._residual = np.einsum("jab,jb->ja", free, at.residual).ravel()
+        self._columns = (free @ at.by_parameter).reshape(count * rows, size)
+        self._freedom = max(
+            int((at.by_pose != 0.0).any(axis=2).sum()) - inverse.shape[1] * count, 1
+        )
+        q = len(geometry.rows)
+        self._own = {
+            ("exit", i): np.array([i * q + k for k, r in enumerate(geometry.rows) if r < EXIT.stop])
+            for i in range(geometry.n)
+        }
+        for kind, row in (("length", OFFSET), ("drum", DRUM)):
+            place = geometry.rows.index(row)
+            self._own |= {(kind, i): np.array([i * q + place]) for i in range(geometry.n)}
+        self._nuisance, self._known = self._of_home(poses[0])
+
+    def _of_home(self, home: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what the platform's place at home does to lengths, and how well it is known."""
+        geometry = self._geometry
+        cables = np.empty((1, KERNEL_ROWS, geometry.n))
+        run_poses(geometry.kernel_geometry(), home[None], cables)
+        chosen = [i for i in geometry.free if i < 6]
+        offsets = np.concatenate([self._own["length", i] for i in range(geometry.n)])
+        known = np.where(np.array(chosen) < 3, _HOME_m, _HOME_rad)
+        return self._columns[:, offsets] @ cables[0, chosen].T * known, known
+
+    def _solve(self, columns: Sequence[IntArray]) -> tuple[FloatArray, FloatArray, float]:
+        """Return changes, their covariance, and the sum of squares that is left."""
+        own = np.concatenate(columns) if columns else np.zeros(0, int)
+        A = np.hstack([self._columns[:, own], self._nuisance])
+        prior = np.append(np.zeros(len(own)), np.ones(self._nuisance.shape[1]))
+        normal = A.T @ A + np.diag(prior)
+        inverse = np.linalg.pinv(normal, hermitian=True)
+        x = -inverse @ (A.T @ self._residual)
+        left = self._residual + A @ x
+        cost = float(left @ left + (prior * x) @ x)
+        return x[: len(own)], inverse[: len(own), : len(own)], cost
+
+    def misfit(self, columns: Sequence[IntArray]) -> float:
+        """Return the mean square of what is left."""
+        used = sum(len(own) for own in columns)
+        return self._solve(columns)[2] / float(max(self._freedom - used, 1))
+
+    def _noise(self, columns: Sequence[IntArray]) -> float:
+        """Return the variance of what is left, which is no larger than readings are known to."""
+        return min(max(self.misfit(columns), _LEAST_NOISE), 1.0)
+
+    def best(
+        self, columns: Sequence[IntArray]
+    ) -> tuple[str, int, tuple[int, ...], IntArray] | None:
+        """Return the change that explains most beside those taken; None where none is sure."""
+        before = self._solve(columns)[2]
+        gains = {}
+        for key, own in self._own.items():
+            tried = [*columns, own]
+            gain = (before - self._solve(tried)[2]) / self._noise(tried)
+            gains[key] = gain - _EACH_PARAMETER * len(own)
+        kind, cable = max(gains, key=lambda key: gains[key])
+        if gains[kind, cable] < _GAIN:
+            return None
+        alike = tuple(
+            other
+            for (same, other), gain in gains.items()
+            if same == kind and other != cable and gain > _ALIKE * gains[kind, cable]
+        )
+        return kind, cable, alike, self._own[kind, cable]
+
+    def sized(self, changes: list[Change], columns: Sequence[IntArray]) -> list[Change]:
+        """Return the changes with their sizes when all are fitted together."""
+        x, covariance, _ = self._solve(columns)
+        std = np.sqrt(np.diag(covariance))
+        out, first = [], 0
+        for change, own in zip(changes, columns, strict=True):
+            part = slice(first, first + len(own))
+            first += len(own)
+            effect = self._effect_m(own, x[part])
+            out.append(replace(change, size=x[part], std=std[part], effect_m=effect))
+        return out
+
+    def _effect_m(self, own: IntArray, size: FloatArray) -> float:
+        """Return by how much poses that lengths tell are off by a change, at the worst."""
+        at, n = self._at, self._geometry.n
+        x = at.by_pose[:, :n]
+        moved = np.einsum("jra,a->jr", at.by_parameter[:, :n, own], size)
+        step = np.einsum("jdr,jr->jd", np.linalg.pinv(x), moved)
+        return float(np.linalg.norm(step[:, : self._geometry.coordinates], axis=1).max())

@@ -1,0 +1,1 @@
+"""The least-squares fit: parameters, residuals, and readings that contradict it."""

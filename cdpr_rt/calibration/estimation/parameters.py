@@ -1,0 +1,181 @@
+"""What of a robot's geometry is identified: its parameters, their names, and what is known before.
+
+A vector of parameters is, for each cable in turn, those of `CABLE_KINDS` that are identified, and
+after them the elongation where it is. Each is what to add to what the robot's file says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final, Literal, Self
+
+import numpy as np
+
+from cdpr_profiles import Robot
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.errors import InvalidRequestError
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
+from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
+
+Kind = Literal["exit", "offset", "drum", "anchor", "pulley", "elongation"]
+KINDS: Final[tuple[Kind, ...]] = ("exit", "offset", "drum", "anchor", "pulley", "elongation")
+USUAL: Final[tuple[Kind, ...]] = ("exit", "offset", "drum", "elongation")
+_ROWS: Final[dict[Kind, tuple[int, ...]]] = {
+    "exit": (0, 1, 2), "offset": (3,), "drum": (4,), "anchor": (5, 6, 7), "pulley": (8,),
+}  # fmt: skip
+CABLE_ROWS: Final = 9
+"""Parameters that a cable can have: exit point (3), offset, drum, anchor point (3), pulley."""
+EXIT, OFFSET, DRUM, ANCHORS, PULLEY = slice(0, 3), 3, 4, slice(5, 8), 8
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Standard deviations of what is known before: of the file's geometry, and of readings."""
+
+    exit_m: float = 0.05
+    """Of each coordinate of an exit point: a tape measure's."""
+    offset_m: float = 0.2
+    """Of a cable's length when the encoders began to count."""
+    drum: float = 0.005
+    """Relative, of the cable that a turn of the motor pays out."""
+    anchor_m: float = 0.002
+    pulley_m: float = 0.003
+    elongation: float = 0.5
+    """Relative, of the elongation by tension."""
+    length_m: float = 0.0003
+    """Of a cable length as the encoder has it, from one pose to the next."""
+    tension_N: float = 3.0
+    """Of a tension as the motor's torque tells it: its dry friction."""
+
+    def of_cable(self) -> FloatArray:
+        """Return the standard deviations of a cable's parameters, (9,)."""
+        anchors = [self.anchor_m] * 3
+        rows = [*[self.exit_m] * 3, self.offset_m, self.drum, *anchors, self.pulley_m]
+        return np.array(rows)
+
+
+@dataclass(frozen=True)
+class CableGeometry:
+    """A robot's geometry with the parameters that are identified, at their present values.
+
+    `cable` (n, 9) and `elongation` are what to add to the file's; all lengths in m, drum and
+    elongation relative.
+    """
+
+    model: PlatformModel
+    compliance_1_N: FloatArray
+    """1/EA of each cable by the file, 0 where cables are taken for rigid; (n,)."""
+    weight_N_m: FloatArray
+    identified: tuple[Kind, ...] = USUAL
+    knowledge: Knowledge = field(default_factory=Knowledge)
+    cable: FloatArray = field(default_factory=lambda: np.zeros((0, CABLE_ROWS)))
+    elongation: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        identified: Iterable[str] = USUAL,
+        knowledge: Knowledge | None = None,
+    ) -> Self:
+        """Return that of a robot as its file has it; raises InvalidRequestError without platform.
+
+        Elongation is left out where the file takes the cables for rigid.
+        """
+        if robot.platform is None:
+            raise InvalidRequestError(f"{robot.path}: has no platform, so no geometry to calibrate")
+        wanted = set(identified)
+        if unknown := wanted - set(KINDS):
+            allowed = ", ".join(KINDS)
+            raise InvalidRequestError(f"identified: {sorted(unknown)[0]!r}; allowed: {allowed}")
+        model, n = platform_model_of(robot), len(robot.axes)
+        how = robot.platform.cable_model
+        cables = [axis.winch.cable for axis in robot.axes]
+        soft = np.array([1.0 / cable.stiffness_N for cable in cables]) * (how != "rigid")
+        heavy = np.array([cable.weight_per_length_N_m for cable in cables]) * (how == "catenary")
+        if how == "rigid":
+            wanted -= {"elongation"}
+        kinds = tuple(kind for kind in KINDS if kind in wanted)
+        start = np.zeros((n, CABLE_ROWS))
+        return cls(model, soft, heavy, kinds, knowledge or Knowledge(), start)
+
+    @property
+    def n(self) -> int:
+        """How many cables there are."""
+        return self.model.kinematics.n
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates a point has."""
+        return self.model.positions
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Which entries of a twist a pose is looked for in; an angle that is free among them."""
+        directions = self.model.kinematics.directions
+        return (*directions, 5) if self.turns else directions
+
+    @property
+    def turns(self) -> bool:
+        """Whether the platform turns freely in its plane, to where tensions have no moment."""
+        return self.model.kinematics.turns_freely
+
+    @cached_property
+    def rows(self) -> tuple[int, ...]:
+        """Which of a cable's nine parameters are identified."""
+        return tuple(
+            row
+            for kind in self.identified
+            for row in _ROWS.get(kind, ())
+            if kind not in ("exit", "anchor") or row - _ROWS[kind][0] < self.coordinates
+        )
+
+    @property
+    def shared(self) -> int:
+        """How many parameters all cables share: the elongation, or none."""
+        return int("elongation" in self.identified)
+
+    @property
+    def size(self) -> int:
+        """How many parameters are identified."""
+        return self.n * len(self.rows) + self.shared
+
+    def values(self) -> FloatArray:
+        """Return the vector of parameters, (P,)."""
+        return np.append(self.cable[:, self.rows].ravel(), [self.elongation] * self.shared)
+
+    def with_values(self, values: FloatArray) -> CableGeometry:
+        """Return the same geometry with other parameters (P,)."""
+        cable, rows = self.cable.copy(), self.rows
+        cable[:, rows] = values[: self.n * len(rows)].reshape(self.n, len(rows))
+        elongation = float(values[-1]) if self.shared else self.elongation
+        return replace(self, cable=cable, elongation=elongation)
+
+    def known_std(self) -> FloatArray:
+        """Return the standard deviations of what is known of the parameters before, (P,)."""
+        each = np.tile(self.knowledge.of_cable()[list(self.rows)], self.n)
+        return np.append(each, [self.knowledge.elongation] * self.shared)
+
+    def kernel_geometry(self) -> FloatArray:
+        """Return the array that the kernels of the kinematics take, (10, n)."""
+        geometry = self.model.kinematics.geometry.copy()
+        geometry[:ANCHOR] += self.cable[:, EXIT].T
+        geometry[ANCHOR:RADIUS] += self.cable[:, ANCHORS].T
+        geometry[RADIUS] = np.maximum(geometry[RADIUS] + self.cable[:, PULLEY], 0.0)
+        return geometry
+
+    def compliance(self) -> FloatArray:
+        """Return 1/EA of each cable with the identified elongation, (n,)."""
+        return self.compliance_1_N * (1.0 + self.elongation)
+
+    def names(self) -> list[str]:
+        """Return the name of each parameter: cable, what of it, coordinate."""
+        axes = "xyz"
+        words = [
+            *(f"exit point {x}" for x in axes), "length offset", "drum",
+            *(f"anchor point {x}" for x in axes), "pulley radius",
+        ]  # fmt: skip
+        cables = [f"cable {i + 1} {words[row]}" for i in range(self.n) for row in self.rows]
+        return cables + ["elongation"] * self.shared

@@ -1,0 +1,233 @@
+"""How good a calibration is, and what it leaves open: in numbers and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cdpr_rt.calibration.camera.camera_model import SIZE
+from cdpr_rt.calibration.estimation.fit import Fit
+from cdpr_rt.calibration.estimation.parameters import (
+    CABLE_ROWS,
+    DRUM,
+    EXIT,
+    OFFSET,
+    CableGeometry,
+)
+from cdpr_rt.calibration.estimation.residuals import Linearised, lengths_told, linearise
+from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.errors import InvalidRequestError
+
+_OPEN = 0.5
+"""Share of the variance known before above which the observations have told next to nothing."""
+_EXPLAINED = 0.6
+_LEAST_SPARE = 4
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class OpenDirection:
+    """A combination of parameters that the observations do not tell."""
+
+    what: str
+    advice: str
+    share: float
+    """Of its variance before that is left, 0.5 to 1."""
+
+
+def require_enough(geometry: CableGeometry, seen: Observations) -> None:
+    """Raise InvalidRequestError where there are fewer readings than unknowns, and say by how many.
+
+    For known poses it is (3.21).
+    """
+    d, n = len(geometry.free), geometry.n
+    coordinates = np.isfinite(seen.position_std_m[:, : geometry.coordinates]).sum()
+    angles = np.isfinite(seen.rotation_std_rad).sum() if d > geometry.coordinates else 0
+    told = int(seen.used.sum() + coordinates + angles) + geometry.turns * seen.poses
+    unknown = d * seen.poses + n * (geometry.coordinates + int("offset" in geometry.identified))
+    if seen.markers is not None:  # an image tells the camera's pose on a map in a frame of its own
+        told += d * len(np.unique(seen.markers.image))
+        unknown += 12
+    each = told / max(seen.poses, 1) - d
+    if told >= unknown + _LEAST_SPARE:
+        return
+    if each <= 0.0:
+        raise InvalidRequestError(
+            f"{n} cables and {d} directions leave nothing over at a pose of which nothing else is "
+            "known; allowed: with measured points (--points)"
+        )
+    missing = int(np.ceil((unknown + _LEAST_SPARE - told) / each))
+    raise InvalidRequestError(
+        f"{seen.poses} poses with {told} readings for {unknown} unknowns are too few; allowed: at "
+        f"least {missing} poses more of this kind, or measured points"
+    )
+
+
+def open_directions(found: Fit) -> list[OpenDirection]:
+    """Return what the observations leave as it was known before, the widest first."""
+    geometry = found.geometry
+    size, known = geometry.size, geometry.known_std()
+    if size == 0:
+        return []
+    covariance = found.covariance[:size, :size] / max(found.variance_factor, 1.0)
+    share, vectors = np.linalg.eigh(covariance / np.outer(known, known))
+    left = vectors[:, share > _OPEN]
+    open_ones = []
+    for what, advice, motion in _motions(found):
+        whitened = motion / known
+        whitened /= np.linalg.norm(whitened)
+        part = left.T @ whitened
+        if float(part @ part) > _EXPLAINED:
+            open_ones.append(OpenDirection(what, advice, float(part @ part)))
+            # what is named is taken out of what is left
+            basis = part / np.linalg.norm(part)
+            rest = np.linalg.svd(np.eye(len(basis)) - np.outer(basis, basis))[0][:, :-1]
+            left = left @ rest
+    return open_ones + _of_single_cables(geometry, left, vectors, share)
+
+
+def _motions(found: Fit) -> Iterator[tuple[str, str, FloatArray]]:
+    """Yield what moves all of a robot alike: name, advice, and the change of its parameters."""
+    geometry, k = found.geometry, found.geometry.coordinates
+    if "exit" not in geometry.identified:
+        return
+    exits = geometry.kernel_geometry()[:3].T
+    middle = exits.mean(axis=0)
+    measure = "measure the platform at three poses or more, far apart (tape, laser or scanner)"
+    if found.camera is not None:
+        measure += ", or the places of three markers"
+    for axis in range(k):
+        cable = np.zeros((geometry.n, CABLE_ROWS))
+        cable[:, axis] = 1.0
+        yield (
+            f"where all exit points together are along {_AXES[axis]}",
+            measure,
+            _vector(geometry, cable),
+        )
+    for axis in range(3) if k == 3 else (2,):
+        cable = np.zeros((geometry.n, CABLE_ROWS))
+        cable[:, EXIT] = np.cross(np.eye(3)[axis], exits - middle)
+        what = f"how all exit points together are turned about {_AXES[axis]}"
+        yield what, measure, _vector(geometry, cable)
+    cable = np.zeros((geometry.n, CABLE_ROWS))
+    cable[:, EXIT] = exits - middle
+    cable[:, OFFSET] = found.seen.reference_m
+    cable[:, DRUM] = 1.0
+    advice = "measure one distance: the platform's position at two poses far apart"
+    yield "the scale of it all", advice, _vector(geometry, cable)
+
+
+def _vector(geometry: CableGeometry, cable: FloatArray) -> FloatArray:
+    return np.append(cable[:, geometry.rows].ravel(), [0.0] * geometry.shared)
+
+
+def _of_single_cables(
+    geometry: CableGeometry, left: FloatArray, vectors: FloatArray, share: FloatArray
+) -> list[OpenDirection]:
+    """Return the directions that are left, each by the parameters that have most of it."""
+    found = []
+    variance = (vectors * share) @ vectors.T
+    shown = left @ np.linalg.svd(left.T @ variance @ left)[0] if left.size else left
+    names = geometry.names()
+    for column in shown.T:
+        most = np.argsort(-np.abs(column))[:2]
+        told = [names[i] for i in most if column[i] ** 2 > 0.15] or [names[most[0]]]
+        cables = sorted({name.split(" ")[1] for name in told if name.startswith("cable")})
+        if told == ["elongation"]:
+            advice = "add poses at which tensions differ more, or take the cable's data sheet"
+        else:
+            advice = "add poses further apart, where its length and direction change more"
+            if len(geometry.free) > geometry.coordinates:
+                advice += ", and turned ones"
+            advice += f" (cable {', '.join(cables)})" if cables else ""
+        rest = float(column @ variance @ column)
+        found.append(OpenDirection(" with ".join(told), advice, rest))
+    return found
+
+
+def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> FloatArray:
+    """Return standard deviations of poses (M, 4, 3) that lengths tell with this geometry, (M, d).
+
+    By the parameters' covariance alone. `relative`: of what is left when all of the room is moved
+    as one to where it fits best, since without measured points nobody knows better where it is.
+    """
+    geometry, d = found.geometry, len(found.geometry.free)
+    size, count = geometry.size, len(poses)
+    at = _at(found, poses)
+    rows = geometry.n + int(geometry.turns)
+    x, p = at.by_pose[:, :rows], at.by_parameter[:, :rows, :size]
+    across = np.swapaxes(x, 1, 2)
+    A = np.asarray(-np.linalg.solve(across @ x, across @ p))
+    if relative:
+        A = _less_rigid_motion(A, poses, geometry.free)
+    covariance = found.covariance[:size, :size]
+    variance = np.einsum("jdp,pq,jdq->jd", A, covariance, A)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)).reshape(count, d))
+
+
+def _at(found: Fit, poses: FloatArray) -> Linearised:
+    geometry, seen = found.geometry, found.seen
+    tension = np.tile(np.median(seen.tension_N, axis=0), (len(poses), 1))
+    lengths = lengths_told(geometry, poses, tension)
+    there = Observations.of_lengths(lengths, tension, poses)
+    there = replace(there, reference_m=seen.reference_m)
+    return linearise(geometry, there, poses, np.zeros(0))
+
+
+def _less_rigid_motion(A: FloatArray, poses: FloatArray, free: tuple[int, ...]) -> FloatArray:
+    """Return derivatives (M, d, P) of what is left when the room is moved to where it fits best."""
+    count, d, size = A.shape
+    place = poses[:, 0] - poses[:, 0].mean(axis=0)
+    motions = np.zeros((count, 6, 6))
+    motions[:, :, :] = np.eye(6)
+    for axis in range(3):
+        motions[:, :3, 3 + axis] = np.cross(np.eye(3)[axis], place)
+    chosen = list(free)
+    used = [i for i in range(6) if i < 3 or (i in (3, 4, 5) and (len(free) > 3 or i in free))]
+    R = motions[:, chosen][:, :, used].reshape(count * d, len(used))
+    flat = A.reshape(count * d, size)
+    return np.asarray((flat - R @ np.linalg.lstsq(R, flat, rcond=None)[0]).reshape(A.shape))
+
+
+def parameter_table(found: Fit) -> list[dict[str, object]]:
+    """Return each identified parameter with unit, value and predicted standard deviation."""
+    geometry = found.geometry
+    values, stds = geometry.values(), found.std
+    kinds = [row for _ in range(geometry.n) for row in geometry.rows] + [-1] * geometry.shared
+    out: list[dict[str, object]] = []
+    for name, row, value, std in zip(geometry.names(), kinds, values, stds, strict=True):
+        relative = row in (DRUM, -1)
+        unit, scale = ("%", 100.0) if relative else ("mm", 1e3)
+        known = {"name": name, "unit": unit, "change": scale * float(value)}
+        out.append({**known, "std": scale * float(std)})
+    return out
+
+
+def camera_table(found: Fit) -> dict[str, object] | None:
+    """Return camera, lens and markers as they were fitted, for JSON; None without a camera."""
+    camera = found.camera
+    if camera is None:
+        return None
+    std, first = found.camera_std, camera.first_marker
+    of_markers = std[first:].reshape(-1, 6)
+    return {
+        "position_m": camera.position_m.tolist(),
+        "rotation": camera.rotation.tolist(),
+        "position_std_mm": (1e3 * std[:3]).tolist(),
+        "rotation_std_deg": np.degrees(std[3:SIZE]).tolist(),
+        "size_change_percent": 100.0 * camera.size_change,
+        "size_std_percent": 100.0 * float(std[SIZE]),
+        "lens": camera.lens.tolist(),
+        "markers": [
+            {
+                "id": marker,
+                "position_m": camera.marker_position_m[k].tolist(),
+                "rotation": camera.marker_rotation[k].tolist(),
+                "std_mm": (1e3 * of_markers[k, :3]).tolist(),
+            }
+            for k, marker in enumerate(camera.ids)
+        ],
+    }

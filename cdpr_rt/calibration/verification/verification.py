@@ -1,0 +1,136 @@
+"""How poses by lengths alone compare with what else was seen of them, on poses held out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from cdpr_rt.calibration.camera.camera_model import CameraModel
+from cdpr_rt.calibration.estimation.fit import fit, locate
+from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.estimation.residuals import length_std_m
+from cdpr_rt.calibration.markers.geometry.rotations import logarithms
+from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.core.exchange import FloatArray
+
+_LEAST_MARKERS = 2
+"""That an image must show for a pose: the tilt of one alone is not known well."""
+_LEAST_POSES = 3
+
+
+@dataclass(frozen=True)
+class Verification:
+    """How lengths alone tell poses that the fit has not seen, beside what was measured there."""
+
+    poses: int
+    errors_m: FloatArray
+    """Positions by lengths less those measured, (M, k)."""
+    turn_errors_rad: FloatArray
+    """Of the rotations, where those were measured, (M, 3)."""
+    residual_m: float
+    """Root mean square of what lengths contradict each other by."""
+    by_camera: bool = False
+    """Whether the camera measured the poses, on a map of the images of other poses alone."""
+
+    @property
+    def kind(self) -> Literal["camera", "points", "none"]:
+        """What told the poses that lengths are compared with, in a word."""
+        if not self.errors_m.size:
+            return "none"
+        return "camera" if self.by_camera else "points"
+
+    @property
+    def reference(self) -> str:
+        """The same in words."""
+        if self.kind != "camera":
+            return "measured points" if self.errors_m.size else "nothing but the lengths"
+        return (
+            "the camera, on a map by the images of the poses used alone, sheet sizes and lens as "
+            "calibrated"
+        )
+
+    @property
+    def mean_mm(self) -> float:
+        """Mean distance."""
+        return 1e3 * float(np.nanmean(self._distance())) if self.errors_m.size else float("nan")
+
+    @property
+    def worst_mm(self) -> float:
+        """Largest distance."""
+        return 1e3 * float(np.nanmax(self._distance())) if self.errors_m.size else float("nan")
+
+    @property
+    def mean_deg(self) -> float:
+        """Mean angle between rotations."""
+        turned = np.linalg.norm(self.turn_errors_rad, axis=1)
+        return float(np.degrees(turned.mean())) if turned.size else float("nan")
+
+    def _distance(self) -> FloatArray:
+        return np.asarray(np.linalg.norm(self.errors_m, axis=1))
+
+
+def verify(
+    geometry: CableGeometry,
+    jumps_m: FloatArray,
+    seen: Observations,
+    camera: CameraModel | None = None,
+) -> Verification:
+    """Return how poses by `geometry` and lengths alone compare with what was measured of them.
+
+    Where nothing was measured but by the camera, with the poses that it alone tells.
+    """
+    told = seen.without_jumps(jumps_m)
+    there = locate(geometry, told)
+    off = there.length_residual_m * length_std_m(geometry, told)
+    rms = float(np.sqrt((off**2).sum() / max(int(seen.used.sum()), 1)))
+    k = geometry.coordinates
+    if camera is not None and not seen.measured.any():
+        errors, turns = _beside_camera(geometry, camera, replace(seen, start=there.poses))
+        return Verification(seen.poses, errors[:, :k], turns, rms, by_camera=True)
+    p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
+    errors = np.where(np.isfinite(seen.position_std_m), p - seen.position_m, np.nan)[:, :k]
+    measured = np.isfinite(errors).all(axis=1)
+    turned = np.isfinite(seen.rotation_std_rad).all(axis=1)
+    turns = logarithms(there.poses[turned, 1:] @ np.swapaxes(seen.rotation[turned], 1, 2))
+    return Verification(seen.poses, errors[measured], turns, rms)
+
+
+def _beside_camera(
+    geometry: CableGeometry, camera: CameraModel, seen: Observations
+) -> tuple[FloatArray, FloatArray]:
+    """Return errors of positions (M, 3) and rotations (M, 3) of `seen.start`, where it saw."""
+    markers = seen.markers
+    shown = np.zeros(seen.poses, int)
+    if markers is not None:
+        shown = np.bincount(markers.image, minlength=seen.poses)
+    index = np.flatnonzero(shown >= _LEAST_MARKERS)
+    if len(index) < _LEAST_POSES:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    there = locate_by_camera(geometry, camera, seen.some(index))
+    p, Q = seen.start[index, 0], seen.start[index, 1:]
+    return p - there[:, 0], logarithms(Q @ np.swapaxes(there[:, 1:], 1, 2))
+
+
+def locate_by_camera(
+    geometry: CableGeometry, camera: CameraModel, seen: Observations
+) -> FloatArray:
+    """Return the poses (N, 4, 3) that images alone tell, by a map that is taken as it is."""
+    blind = replace(seen.unmeasured(), markers=seen.markers, used=np.zeros_like(seen.used))
+    still = replace(camera, held=True)
+    return fit(replace(geometry, identified=()), replace(blind, jumps=()), camera=still).poses
+
+
+def relative_errors(poses: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return errors of positions and rotations (N - 1, 3) of poses (N, 4, 3) seen from the first.
+
+    T_1^-1 T_j is compared, which no frame of the room changes.
+    """
+    (p, Q), (p_true, Q_true) = _seen_from_first(poses), _seen_from_first(true)
+    return p - p_true, logarithms(Q @ np.swapaxes(Q_true, 1, 2))
+
+
+def _seen_from_first(poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    back = poses[0, 1:].T
+    return (poses[1:, 0] - poses[0, 0]) @ back.T, back @ poses[1:, 1:]

@@ -1,0 +1,1 @@
+"""Tightening of a platform's cables, from slack ones to a pose that is controlled."""

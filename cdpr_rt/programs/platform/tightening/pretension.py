@@ -1,0 +1,394 @@
+"""Program `tighten`: take up slack, pretension the cables, find the platform's pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.programs.arguments import CommandArguments
+from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.platform.arrival import Arrival
+from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
+from cdpr_rt.programs.platform.tightening.index_path import index_path
+from cdpr_rt.programs.platform.tightening.standing import (
+    FALLEN,
+    FALLEN_ELSEWHERE,
+    disagreement,
+    hangs,
+    why_not_at_home,
+    why_not_to_hold,
+    why_not_to_pull,
+    why_not_to_wind_in,
+    would_move,
+)
+from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
+from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
+from cdpr_rt.robots.last_lengths import StoppedLengths, off_index_m
+
+TAKE_UP_m_s = 0.05
+"""Speed at which slack is taken up."""
+TAKE_UP_SHARE = 0.4
+"""Tension while some cables are slack, as a share of the pretension."""
+INDEX_m_s = 0.1
+"""Speed of the platform during the search for indices."""
+_SETTLING_S = 0.5
+_RISE_1_s = 1.0
+_FALL_S = 0.2
+_STILL_m = 0.0003
+_STILL_S = 0.3
+_PULLED = 0.95
+_MOST_m, _ONCE_TIGHT_m = 1.0, 0.05
+_MOST_S = 60.0
+
+_STAGES = (("slack", TAKE_UP_SHARE), ("pull", 1.0), ("beyond", OVERSHOOT), ("lengths", 1.0))
+_SOURCES = ("home", "lengths", "last")
+
+
+class PretensionProgram(PlatformProgram):
+    """Takes up slack until all cables are tight and still, pretensions them, then holds.
+
+    The platform stays on its stand meanwhile: tensions grow together to those whose wrench presses
+    it down where the cables can, and has no horizontal component. The cables' lengths follow from
+    home, where it has to stand then, from the estimate, or from the last stop. Where a motor's
+    cogging is known but not its index, the platform is lifted until all have passed theirs. A cable
+    that does not become tight, lengths that disagree, and a platform that by its cables' lengths is
+    not where or as it is to be, end it: the cables are slackened again. A platform that hangs, as
+    brakes have kept it, is held by its pose at once, from the torques of the last cycle on; where
+    the pose does not follow from the lengths, the command is refused, and nothing changes.
+    """
+
+    name = "tighten"
+    needs_lease = True
+
+    def __init__(self, parts: PlatformParts, torque_Nm: FloatArray, cable_m: FloatArray) -> None:
+        super().__init__(parts, torque_Nm)
+        self._arrival = Arrival(parts.period_s, parts.near_m, _SETTLING_S)
+        self._cable = np.array(cable_m)
+        most_N = torque_Nm / np.abs(cable_m)
+        self._standing = StandingTensions(parts.model, parts.control.low_N, most_N)
+        self._home_pretension_N = self._standing.at(parts.model.home_pose)[0].copy()
+        self._pretension_N = self._home_pretension_N.copy()
+        self._from_N, self._to_N = self._pretension_N.copy(), self._pretension_N.copy()
+        """Between which the pretension goes over to that for where the platform stands."""
+        self._blend = 1.0
+        self._hangs = False
+        self._checked = AxisFeedback(cable_m.size)
+        inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
+        self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
+        self._winches.paying_out_m_s[:] = -TAKE_UP_m_s
+        tight_m = parts.control.lengths_at_home(OVERSHOOT * self._pretension_N)
+        stretch_m = parts.control.lengths_at_home(np.zeros(cable_m.size)) - tight_m
+        self._once_tight_m = _ONCE_TIGHT_m + float(stretch_m.max())
+        self._start_rad, self._still_rad, self._rising_rad = np.zeros((3, cable_m.size))
+        self._home_rad = np.full(cable_m.size, np.nan)
+        """Angles at which lengths were taken at home, nan once they have been corrected."""
+        self._home_N = np.array(self._pretension_N)
+        """Tensions that stretched them then, and which of these load cells have measured."""
+        self._home_measured = np.zeros(cable_m.size, np.bool_)
+        self._stage = 0
+        self._share = 0.0
+        self._still = self._cycles = 0
+        self._source = "home"
+        self._last: StoppedLengths | None = None
+        self._feedback = AxisFeedback(cable_m.size)
+        self._path: list[FloatArray] = []
+        self._failure = ""
+
+    def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Go on from the torque of the last cycle."""
+        parts = self._parts
+        parts.follow_origins()
+        self._feedback = feedback
+        self._failure = ""
+        self._stopping = self._at_rest = False
+        self._source = self._default_source()
+        self._pretension_N[:] = self._from_N[:] = self._to_N[:] = self._home_pretension_N
+        self._blend, self._hangs = 1.0, False
+        self._last = None
+        self._stage = self._still = self._cycles = 0
+        if parts.tight:
+            super().start(feedback, setpoint, torque_Nm)
+            self._look_for_indices()
+            return
+        self._start_rad[:] = self._still_rad[:] = feedback.position_rad
+        self._winches.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
+        self._control.clear_compensation()
+        self._control.trust_cells()
+        self._share = min(
+            max(float(np.max(-torque_Nm / self._cable / self._pretension_N)), 0.0), 1.0
+        )
+
+    def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Write this cycle's set-point and torques, (n,) each, in place."""
+        if self._hangs:
+            self._hold_hanging(feedback, setpoint, torque_Nm)
+        if self._parts.tight:
+            super().update(feedback, setpoint, torque_Nm)
+            self._at_rest = self._at_rest and (self._stopping or self._arrival.over)
+            return
+        goal = 0.0 if self._stopping else _STAGES[self._stage][1]
+        step = self._parts.period_s * (1.0 / _FALL_S if self._stopping else _RISE_1_s)
+        self._share += min(max(goal - self._share, -step), step)
+        self._blend = min(self._blend + self._parts.period_s * _RISE_1_s, 1.0)
+        self._pretension_N[:] = self._from_N + self._blend * (self._to_N - self._from_N)
+        np.multiply(self._pretension_N, self._share, out=self._winches.high_N)
+        self._winches.update(feedback, torque_Nm)
+        setpoint.position_rad[:] = feedback.position_rad
+        setpoint.velocity_rad_s[:] = setpoint.acceleration_rad_s2[:] = 0.0
+        self._cycles += 1
+        if self._stopping:
+            self._at_rest = self._share == 0.0
+        elif self._stands_still(feedback, self._share == goal and self._blend == 1.0):
+            self._next_stage(feedback, setpoint, torque_Nm)
+        else:
+            self._fail_if(self._trouble(feedback))
+
+    def progress(self) -> dict[str, Any]:
+        """Return the stage, the cables' tensions, and what went wrong."""
+        tight = self._parts.tight
+        stage = _STAGES[self._stage][0] if not tight else "index" if self._path else "held"
+        done = tight and self._at_rest
+        state = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._failure}
+        if tight:
+            told = super().progress()
+            return {**told, **state, "trouble": self._failure or told["trouble"]}
+        return {"tension_N": self._winches.tension_N.tolist(), **state}
+
+    # -- commands
+
+    def _default_source(self) -> str:
+        return "lengths" if self._parts.known else "home"
+
+    def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
+        CommandArguments(self.name, arguments, ("from",))
+        if arguments and self._parts.tight:
+            raise ProgramError("tighten: from: the cables are tight already; lower it first")
+        source, last = arguments.get("from", self._default_source()), self._parts.last
+        if source not in _SOURCES:
+            allowed = ", ".join(_SOURCES)
+            raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
+        if last.fallen and not arguments:
+            raise ProgramError(FALLEN + (FALLEN_ELSEWHERE if self._parts.known else ""))
+        if source == "home" and last.displaced and not arguments:
+            raise ProgramError(
+                "tighten: from: the platform was let go elsewhere, and where it stands is not "
+                "known; stand it at home, then say from: home"
+            )
+        if source == "lengths" and not self._parts.known:
+            raise ProgramError("tighten: from: the cables' lengths are not known; allowed: home")
+        if source == "last" and last.lengths is None:
+            raise ProgramError(f"tighten: from: no lengths of the last stop: {last.why}")
+        if source == "home" and self._parts.known and not self._parts.tight:
+            length_m = self._parts.estimator.estimate.cable_length_m
+            if why := why_not_to_wind_in(self._parts, length_m):
+                raise ProgramError(f"tighten: from: {why}")
+        return str(source), source != "home" and self._is_to_hold(source)
+
+    def _is_to_hold(self, source: str) -> bool:
+        """Return whether the platform hangs where it is to be held; raises ProgramError.
+
+        The control's estimate is of no use to others while cables may be slack: it is taken anew.
+        """
+        parts, now = self._parts, self._checked
+        if parts.tight or not hangs(parts):
+            return False
+        now.position_rad[:] = parts.estimator.position_rad
+        length_m = self._lengths_before(source, now)
+        if length_m is None:
+            return False
+        if why := why_not_to_hold(parts, self._standing, length_m, now):
+            raise ProgramError(f"tighten: from: {why}")
+        return True
+
+    def _take(self, checked: tuple[str, bool]) -> None:
+        self._source, self._hangs = checked
+
+    def _hold_hanging(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> None:
+        """Go over to holding the platform where the check of the command found it."""
+        self._hangs = False
+        self._control.observe(feedback)
+        self._take_last()
+        self._home_rad[:] = np.nan
+        self._finish(feedback, setpoint, torque_Nm)
+
+    # -- taking up slack
+
+    def _stands_still(self, feedback: AxisFeedback, pulling: bool) -> bool:
+        winches = self._winches
+        pulling = pulling and bool((winches.tension_N > _PULLED * winches.high_N).all())
+        moved_m = np.abs((feedback.position_rad - self._still_rad) * self._cable).max()
+        if not pulling or moved_m > _STILL_m:
+            self._still_rad[:] = feedback.position_rad
+            self._still = 0
+        self._still += 1
+        return self._still * self._parts.period_s > _STILL_S
+
+    def _next_stage(
+        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
+    ) -> None:
+        self._still = 0
+        if self._stage == 0:
+            self._start_rad[:] = feedback.position_rad
+        if self._stage + 1 == len(_STAGES):
+            self._end_tight(feedback, setpoint, torque_Nm)
+            return
+        self._fail_if(self._why_not_to_pull(feedback))
+        if self._failure:
+            return
+        if _STAGES[self._stage][0] == "pull":
+            self._rising_rad[:] = feedback.position_rad
+        self._stage += 1
+
+    def _end_tight(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Take the lengths, and hold the platform where they have it, unless they disagree."""
+        self._take_last()
+        self._control.take_lengths(self._lengths(feedback), feedback)
+        self._control.begin(feedback)
+        self._fail_if(disagreement(self._parts))
+        if not self._failure:
+            self._finish(feedback, setpoint, torque_Nm)
+
+    def _take_last(self) -> None:
+        last = self._parts.last.take()
+        self._last = last if self._source == "last" else None
+
+    def _why_not_to_pull(self, feedback: AxisFeedback) -> str:
+        """Return why not to pull on; tensions for where it stands follow from known lengths."""
+        length_m, parts = self._lengths_before(self._source, feedback), self._parts
+        if length_m is None:
+            return ""
+        if self._source == "home":
+            return why_not_at_home(parts, length_m, self._winches.high_N, feedback)
+        why = why_not_to_pull(parts, length_m, feedback)
+        if why or self._stage > 0:
+            return why
+        tensions_N, stays = self._standing.at(parts.model.pose(parts.control.estimated))
+        self._to_N[:], self._blend = tensions_N, 0.0
+        return "" if stays else would_move(parts)
+
+    def _lengths_before(self, source: str, feedback: AxisFeedback) -> FloatArray | None:
+        """Return the lengths (n,) by what was known of them before, None for nothing."""
+        stopped, parts = self._parts.last.lengths, self._parts
+        if source == "last" and stopped is not None:
+            return stopped.at(feedback.position_rad, self._cable)
+        return parts.estimator.estimate.cable_length_m if parts.known else None
+
+    def _lengths(self, feedback: AxisFeedback) -> FloatArray:
+        """Return the cables' lengths, (n,), as they are now."""
+        self._home_rad[:] = np.nan
+        if self._source == "last" and self._last is not None:
+            return self._last.at(feedback.position_rad, self._cable)
+        if self._source == "lengths":
+            return self._parts.estimator.estimate.cable_length_m
+        told = self._parts.estimator.estimate
+        middle_rad = 0.5 * (feedback.position_rad + self._rising_rad)
+        self._home_rad[:] = np.where(told.tension_measured, feedback.position_rad, middle_rad)
+        self._home_measured[:] = told.tension_measured
+        self._home_N[:] = np.where(told.tension_measured, told.tension_N, self._pretension_N)
+        hysteresis = self._cable * (feedback.position_rad - self._home_rad)
+        return np.asarray(self._control.lengths_at_home(self._home_N) + hysteresis)
+
+    def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        parts, control = self._parts, self._control
+        parts.estimator.set_lengths(feedback.position_rad, control.free_lengths_m)
+        control.stand_still()
+        parts.loop.take_over(feedback, torque_Nm)
+        parts.cycle = feedback.cycle
+        parts.tight, parts.last.displaced, parts.last.fallen = True, False, False
+        super().start(feedback, setpoint, torque_Nm)
+        self._look_for_indices()
+
+    def _trouble(self, feedback: AxisFeedback) -> str:
+        moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
+        most = int(moved_m.argmax())
+        # what stands does not move once its cables are tight
+        allowed_m = self._once_tight_m if self._stage > 0 else _MOST_m
+        if moved_m[most] > allowed_m:
+            return (
+                f"cable {most + 1}: {1e3 * moved_m[most]:.0f} mm reeled in and not tight, "
+                f"{1e3 * allowed_m:.0f} mm allowed"
+            )
+        if self._cycles * self._parts.period_s > _MOST_S:
+            return f"not tight within {_MOST_S:g} s"
+        return ""
+
+    def _fail_if(self, trouble: str) -> None:
+        self._failure = trouble
+        self._stopping = bool(trouble)
+
+    # -- the search for indices
+
+    def _look_for_indices(self) -> None:
+        """Start along a path on which all motors turn, where an index is needed."""
+        parts, control = self._parts, self._control
+        self._path = []
+        if self._needs_index():
+            self._path = index_path(
+                parts.model, self._cable, lambda there: not control.feasible(there)
+            )
+        if self._path:
+            self._target[:] = self._path[0]
+            self._acceleration[:] = parts.acceleration
+            self._speed[:] = parts.speeds(INDEX_m_s)
+        else:
+            self._correct_motor_torque()
+
+    def _needs_index(self) -> bool:
+        """Whether an index is missing that compensation needs, or that checks the last lengths."""
+        last, known = self._last, self._feedback.index_known
+        if last is not None and bool((np.isfinite(last.cable_at_index_m) & ~known).any()):
+            return True
+        return self._parts.index_missing(self._feedback)
+
+    def _move(self) -> bool:
+        arrived = self._approach()
+        if not self._path:
+            return arrived
+        found = not self._needs_index()
+        if found or arrived:
+            self._path = [] if found else self._path[1:]
+            self._target[:] = self._path[0] if self._path else self._stopping_position()
+            if not found and not self._path:
+                self._failure = "a motor has not passed its index"
+            if found:
+                self._correct_motor_torque()
+                self._failure = self._compare_indices()
+        return False
+
+    def _correct_motor_torque(self) -> None:
+        """Correct lengths taken at home for cogging and friction, once the index is known.
+
+        These torques were part of the tensions by which the cables stretched.
+        """
+        parts, control, known = self._parts, self._control, self._parts.compensation
+        if known is None or np.isnan(self._home_rad).any():
+            return
+        torque_error_N = known.standing_Nm(self._home_rad, self._feedback) / self._cable
+        torque_error_N[self._home_measured] = 0.0
+        stretch_error_m = control.lengths_at_home(self._home_N + torque_error_N)
+        stretch_error_m -= control.lengths_at_home(self._home_N)
+        self._home_rad[:] = np.nan
+        length_m = parts.estimator.estimate.cable_length_m + stretch_error_m
+        parts.estimator.set_lengths(self._feedback.position_rad, length_m)
+        control.take_lengths(length_m, self._feedback)
+
+    def _compare_indices(self) -> str:
+        """Return which index contradicts the lengths of the last stop, or an empty text."""
+        last = self._last
+        if last is None:
+            return ""
+        length_m = self._parts.estimator.estimate.cable_length_m
+        off = np.abs(off_index_m(last, length_m, self._feedback, self._cable))
+        off[np.isnan(off)] = 0.0
+        worst, allowed_m = int(off.argmax()), self._parts.lengths_allowed_m
+        if off[worst] <= allowed_m:
+            return ""
+        return (
+            f"cable {worst + 1}: its motor's index is {1e3 * off[worst]:.0f} mm from where the "
+            f"last stop has it, {1e3 * allowed_m:.0f} mm allowed: lower, and tighten from home"
+        )

@@ -1,0 +1,167 @@
+"""Whether a platform stands where and as `tighten` takes it to, by cables that are just tight."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.programs.platform.platform_program import PlatformParts, distance_m
+from cdpr_rt.programs.platform.tightening.standing_tensions import StandingTensions
+from cdpr_rt.robots.interference.interference import in_words
+from cdpr_rt.robots.workspace import G_m_s2
+
+_TURNED_MORE_rad = math.radians(30.0)
+"""A platform may stand turned by so much more than it turns in use."""
+_MOST_LOOKS = 200
+_CARRIED_SHARE = 0.8
+"""Sum of the tensions over the weight, below which the cables do not carry the platform."""
+FALLEN = (
+    "tighten: from: the platform hung when the power was taken, or a drive lost: it has fallen, "
+    "may have turned over, and cables may lie around it. Look at it. Where it stands at home, "
+    "upright, all cables free: say from: home"
+)
+FALLEN_ELSEWHERE = "; where it stands so elsewhere: say from: lengths"
+
+
+def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
+    """Return why not to wind in the slack of a platform said to stand at home, "" for nothing.
+
+    That alone may drag along a platform that lies elsewhere. Where cables of length `length_m` (n,)
+    do not even reach home, within its tolerance and that of lengths, it is
+    not there, however slack they are. One may have slipped, as in `why_not_at_home`.
+    """
+    short_m = parts.control.lengths_at_home(np.zeros(length_m.size)) - length_m
+    allowed_m = parts.platform.home_tolerance_m + parts.lengths_allowed_m
+    many = np.count_nonzero(short_m > allowed_m)
+    if many <= 1:
+        return ""
+    return _not_at_home(
+        f"{many} cables are up to {1e3 * short_m.max():.0f} mm too short to reach there, "
+        f"{1e3 * allowed_m:.0f} mm allowed"
+    )
+
+
+def why_not_at_home(
+    parts: PlatformParts, length_m: FloatArray, tension_N: FloatArray, feedback: AxisFeedback
+) -> str:
+    """Return why not to pull at a platform said to stand at home, an empty text for nothing.
+
+    The cables' lengths `length_m` (n,), followed since they were known, are to be those of home at
+    `tension_N` (n,), each within the tolerance of home and that of lengths. One may be further off:
+    its cable has slipped where the lengths disagree. Where they agree, their pose is to be near
+    home; far from home a pose is not looked for, since more than one may belong to the lengths.
+    """
+    control = parts.control
+    off_m = np.abs(length_m - control.lengths_at_home(tension_N))
+    allowed_m = parts.platform.home_tolerance_m + parts.lengths_allowed_m
+    many = np.count_nonzero(off_m > allowed_m)
+    if many > 1:
+        return _not_at_home(
+            f"the lengths of {many} cables are up to {1e3 * off_m.max():.0f} mm from those there, "
+            f"{1e3 * allowed_m:.0f} mm allowed"
+        )
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback)
+    here, home = control.estimated, parts.model.home
+    near = distance_m(here, home, parts.scale_m) <= parts.platform.home_tolerance_m
+    if near or disagreement(parts):
+        return ""
+    return _not_at_home(f"it is {_place(here, parts.model.positions)}")
+
+
+def _not_at_home(why: str) -> str:
+    return (
+        f"the platform is not at home: by its cables' lengths, followed since they were known, "
+        f"{why}; stand it at home, upright, all cables free. Where these lengths are wrong: end "
+        "the daemon and start it again"
+    )
+
+
+def why_not_to_pull(parts: PlatformParts, length_m: FloatArray, feedback: AxisFeedback) -> str:
+    """Return why not to pull at the platform where it is, an empty text for nothing.
+
+    Its pose follows from the cables' lengths `length_m` (n,), which are to agree. It is not to be
+    turned much, with nothing in contact straight on the way home.
+    """
+    control, k = parts.control, parts.model.positions
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback)
+    if why := disagreement(parts):
+        return why
+    here, home = np.array(control.estimated), parts.model.home
+    contact = parts.model.interference.first_contact(np.array([here, home]), _MOST_LOOKS)
+    if not _turned_much(parts) and contact is None:
+        return ""
+    near = "" if contact is None else in_words(contact.things, contact.distance_m)
+    why = f"; on the way home from there, {near}" if near else ""
+    return _not_pulled(here, k, why)
+
+
+def would_move(parts: PlatformParts) -> str:
+    """Return that tight cables would move the platform where it is."""
+    why = ", where tight cables would pull it along"
+    return _not_pulled(parts.control.estimated, parts.model.positions, why)
+
+
+def hangs(parts: PlatformParts) -> bool:
+    """Return whether the cables' tensions may carry the platform, wherever it is."""
+    carried_N = float(np.nansum(parts.estimator.estimate.tension_N))
+    return carried_N > _CARRIED_SHARE * parts.platform.mass_kg * G_m_s2
+
+
+def why_not_to_hold(
+    parts: PlatformParts, standing: StandingTensions, length_m: FloatArray, feedback: AxisFeedback
+) -> str:
+    """Return why a platform that hangs is not to be held by its pose, an empty text for nothing.
+
+    The pose follows from the cables' lengths `length_m` (n,), which are to agree. It is not to be
+    turned much, and tensions within their bounds are to carry the platform there.
+    """
+    control, model = parts.control, parts.model
+    control.take_lengths(length_m, feedback)
+    control.begin(feedback)
+    why = _off(parts)
+    carried = standing.carry(model.pose(control.estimated))
+    if not why and (_turned_much(parts) or not carried):
+        place = _place(control.estimated, model.positions)
+        why = f"by its cables' lengths it is {place}, where they could not hold it"
+    if not why:
+        return ""
+    return (
+        f"the platform may hang on its cables, and {why}: each cable is held as it is; lower it, "
+        "stand it at home and tighten from: home"
+    )
+
+
+def _turned_much(parts: PlatformParts) -> bool:
+    turned_rad = float(np.linalg.norm(parts.control.estimated[parts.model.positions :]))
+    return turned_rad > parts.model.angle_rad + _TURNED_MORE_rad
+
+
+def _not_pulled(here: FloatArray, k: int, why: str) -> str:
+    return (
+        f"the platform is {_place(here, k)}{why}: it is not pulled at; stand it at home, upright, "
+        "all cables free, and tighten from: home"
+    )
+
+
+def disagreement(parts: PlatformParts) -> str:
+    """Return by how much the lengths that the control has contradict each other, if too much."""
+    off = _off(parts)
+    return f"{off}; stand the platform at home and tighten from it" if off else ""
+
+
+def _off(parts: PlatformParts) -> str:
+    off_m, allowed_m = parts.control.residual_m, parts.lengths_allowed_m
+    if off_m <= allowed_m:
+        return ""
+    return f"the cables' lengths disagree by {1e3 * off_m:.0f} mm, {1e3 * allowed_m:.0f} mm allowed"
+
+
+def _place(here: FloatArray, k: int) -> str:
+    place = "at " + ", ".join(f"{1e3 * x:.0f}" for x in here[:k]) + " mm"
+    if here.size == k:
+        return place
+    return f"{place}, turned by {math.degrees(np.linalg.norm(here[k:])):.0f} deg"

@@ -1,0 +1,64 @@
+"""Tensions that pull cables tight without moving the platform that stands on something."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
+
+OVERSHOOT = 1.5
+"""Tension over pretension, for a moment: on the way back friction acts in the other direction, so
+that its effect on the angles cancels out."""
+_STANDING = 0.85
+_HIGHEST = 0.9
+_PRESSING, _MODEST = (0.5, 0.25, 0.0), 0.4
+
+
+class StandingTensions:
+    """Tensions (n,) under which a platform stays where it stands.
+
+    Their wrench is along the weight: it presses the platform down where the cables can without
+    pulling hard, with none below the least tension; else it carries 0.57 of the weight, too little
+    to lift the platform even at the overshoot, with each at 0.57 of what would carry it all, which
+    may be below the least tension. Friction makes the tensions differ from what is asked
+    for by some newtons, which a platform whose weight is all but carried does not stand still for.
+    """
+
+    def __init__(self, model: PlatformModel, low_N: FloatArray, most_N: FloatArray) -> None:
+        """Take with what is planned at least, and what the motors can pull with, (n,) each."""
+        self._kinematics, self._weight = model.kinematics, model.weight()
+        self._most_N = most_N / OVERSHOOT
+        least_N = model.low_N
+        most = np.maximum(_HIGHEST * model.high_N / OVERSHOOT, 1.1 * least_N)
+        modest = np.minimum(most, np.maximum(_MODEST * model.high_N, 1.1 * least_N))
+        planned = model.least_tensions(np.minimum(low_N, 0.9 * most), most)
+        self._least = model.least_tensions(least_N, most)
+        pressing = model.least_tensions(least_N, modest)
+        self._pressed = [(planned, 1.0), (self._least, 1.0)]
+        self._pressed += [(pressing, share) for share in _PRESSING]
+        self._carrying = model.least_tensions(np.zeros(least_N.size), model.high_N)
+        self._W, self._t = np.zeros((model.size, least_N.size)), np.zeros(least_N.size)
+
+    def at(self, pose: Pose) -> tuple[FloatArray, bool]:
+        """Return the tensions (n,) at a pose, overwritten, and whether they leave it standing."""
+        t = self._t
+        self._kinematics.wrench_matrix(pose, self._W)
+        for tensions, share in self._pressed:
+            if tensions.solve(self._W, -share * self._weight, t) is TensionOutcome.FEASIBLE:
+                stays = True
+                break
+        else:
+            stays = self._least.solve(self._W, self._weight, t) is TensionOutcome.FEASIBLE
+            np.multiply(np.maximum(t, 0.0), _STANDING / OVERSHOOT, out=t)
+        # less than was solved for has another wrench
+        stays = stays and bool((t <= self._most_N).all())
+        return np.minimum(t, self._most_N, out=t), stays
+
+    def carry(self, pose: Pose) -> bool:
+        """Return whether tensions within their bounds, none of them a push, carry the weight."""
+        self._kinematics.wrench_matrix(pose, self._W)
+        outcome = self._carrying.solve(self._W, self._weight, self._t)
+        return outcome is TensionOutcome.FEASIBLE

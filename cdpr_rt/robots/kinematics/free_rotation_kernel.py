@@ -1,0 +1,77 @@
+"""Kernel of a platform's rotation in a plane that no cable controls.
+
+`rotation` (9,) is of the platform: its MASS, kg, INERTIA about its centre of mass, kg m2, and
+CENTRE_x, CENTRE_y of that in its frame, m; and of where it stands: MOMENT of the tensions about
+that centre, Nm, by how much it falls with the angle, STEEPNESS, Nm/rad, and, of its swinging with
+cables of lengths that stay, STIFFNESS κ, Nm/rad, SWINGING, the inertia I_s, kg m2, and REACH of the
+farthest anchor point from the middle of that swing, m.
+
+With its cables' lengths held the platform turns about the point where their lines all but meet:
+its centre of mass then moves by -B for each radian, u_i·(b_i⊥ - B) = 0 in the least squares of all
+cables, with u_i their directions and b_i their anchor points from that centre. So
+
+    I_s = I + m |B|²        κ = Σ t_i (((b_i⊥ - B)·u_i⊥)² / ρ_i + u_i·b_i)
+"""
+
+from __future__ import annotations
+
+import math
+
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.jit import jit
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR
+
+MASS, INERTIA, CENTRE_x, CENTRE_y, MOMENT, STEEPNESS, STIFFNESS, SWINGING, REACH, ROWS = range(10)
+
+DAMPING_RATIO = 0.005
+"""Of the swing to the critical damping: of air and cables alone, no cable winds."""
+
+
+@jit
+def turn_about_z(
+    geometry: FloatArray, tension: FloatArray, pose: FloatArray, rotation: FloatArray
+) -> None:
+    """Write what `rotation` says of where the platform stands, under tensions (n,)."""
+    cx = pose[1, 0] * rotation[CENTRE_x] + pose[1, 1] * rotation[CENTRE_y]
+    cy = pose[2, 0] * rotation[CENTRE_x] + pose[2, 1] * rotation[CENTRE_y]
+    moment, steepness = 0.0, 0.0
+    axx, axy, ayy, gx, gy = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(tension.size):
+        x, y, ux, uy, rho = _arm(geometry, pose, cx, cy, i)
+        across, along = x * uy - y * ux, x * ux + y * uy
+        moment += tension[i] * across
+        steepness += tension[i] * (along + along * along / rho)
+        axx, axy, ayy = axx + ux * ux, axy + ux * uy, ayy + uy * uy
+        gx, gy = gx + ux * across, gy + uy * across
+    determinant = axx * ayy - axy * axy
+    bx, by = (ayy * gx - axy * gy) / determinant, (axx * gy - axy * gx) / determinant
+    stiffness, reach = 0.0, 0.0
+    for i in range(tension.size):
+        x, y, ux, uy, rho = _arm(geometry, pose, cx, cy, i)
+        across = (x - by) * ux + (y + bx) * uy
+        stiffness += tension[i] * (across * across / rho + x * ux + y * uy)
+        reach = max(reach, math.hypot(x - by, y + bx))
+    rotation[MOMENT], rotation[STEEPNESS], rotation[STIFFNESS] = moment, steepness, stiffness
+    rotation[SWINGING] = rotation[INERTIA] + rotation[MASS] * (bx * bx + by * by)
+    rotation[REACH] = reach
+
+
+@jit
+def turn(pose: FloatArray, angle: float) -> None:
+    """Turn a pose about z."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    for k in range(3):
+        a, b = pose[1, k], pose[2, k]
+        pose[1, k], pose[2, k] = cosine * a - sine * b, sine * a + cosine * b
+
+
+@jit
+def _arm(
+    geometry: FloatArray, pose: FloatArray, cx: float, cy: float, i: int
+) -> tuple[float, float, float, float, float]:
+    """Return where cable i is fastened, from the centre of mass, its direction, and its length."""
+    x = pose[1, 0] * geometry[ANCHOR, i] + pose[1, 1] * geometry[ANCHOR + 1, i]
+    y = pose[2, 0] * geometry[ANCHOR, i] + pose[2, 1] * geometry[ANCHOR + 1, i]
+    ux, uy = geometry[0, i] - pose[0, 0] - x, geometry[1, i] - pose[0, 1] - y
+    rho = math.sqrt(ux * ux + uy * uy)
+    return x - cx, y - cy, ux / rho, uy / rho, rho

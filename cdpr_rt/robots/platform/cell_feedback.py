@@ -1,0 +1,97 @@
+"""Feedback of measured tensions: what the motors give beyond what their torque constants say.
+
+A cable's tension t is what the loop asks for, a, less what friction and cogging take up and torque
+constants are off, d, plus a correction b of this feedback: t = a - d + b. With ḃ = k (a - t), t
+becomes a - d s/(s + k), whatever the loop does with a: it neither disturbs the loop nor is it
+disturbed. a is low-passed as the reading is.
+
+A cell may lie without being silent. What the loop's force leaves of the reserve between planned
+tensions and their bounds is all that b may take: whatever a cell says, a + b is within the bounds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.jit import bound, jit
+from cdpr_rt.robots.platform.cell_check import CellCheck
+from cdpr_rt.robots.tension.tension_split import FAST
+
+RATE_1_s = 2.0
+"""k: slower by far than amplifiers filter and readings are old, some 0.1 s together."""
+LAG_S, FALL_BACK_S = 0.07, 1.0
+SHARE = 1.0 - FAST
+"""Of the reserve, up to which tensions are corrected."""
+
+
+@jit
+def follow(
+    period_s: float,
+    most_N: float,
+    measured_N: FloatArray,
+    measured: BoolArray,
+    m_per_rad: FloatArray,
+    lagging: FloatArray,
+    correction: FloatArray,
+    torque: FloatArray,
+    asked: FloatArray,
+) -> bool:
+    """Bring corrections (n,), N, up to date with a cycle, and write their torques (n,), Nm.
+
+    They stay within `most_N`, and return to 0 while there is no reading. Returns whether there is
+    any.
+    """
+    read = False
+    for i in range(asked.size):
+        lagging[i] += period_s / (LAG_S + period_s) * (asked[i] - lagging[i])
+        read = read or measured[i]
+        if measured[i]:
+            correction[i] += RATE_1_s * period_s * (lagging[i] - measured_N[i])
+            correction[i] = min(max(correction[i], -most_N), most_N)
+        else:
+            correction[i] -= period_s / FALL_BACK_S * correction[i]
+        torque[i] = -m_per_rad[i] * correction[i]
+    return read
+
+
+class CellFeedback:
+    """Corrects the torques of n motors by the tensions that load cells measure; see above."""
+
+    def __init__(
+        self,
+        measured_N: FloatArray,
+        measured: BoolArray,
+        m_per_rad: FloatArray,
+        reserve_N: float,
+        period_s: float,
+        check: CellCheck,
+        W: FloatArray,
+        wrench: FloatArray,
+    ) -> None:
+        """Take the arrays of readings (n,), which are written elsewhere, and whether they hold.
+
+        `reserve_N` is what planned tensions keep from their bounds. W (d, n) and the `wrench` (d,)
+        besides the cables' are those of the cycle, by which `check` holds the readings.
+        """
+        n = m_per_rad.size
+        self.torque_Nm = np.zeros(n)
+        """What is added for it, (n,)."""
+        self._lagging, self._correction = np.zeros((2, n))
+        self._follow = bound(
+            follow, period_s, SHARE * reserve_N, measured_N, measured, m_per_rad, self._lagging,
+            self._correction, self.torque_Nm, then=(np.zeros(n),),
+        )  # fmt: skip
+        self.check = check
+        check.bind(measured_N, measured, self._lagging, self._correction, W, wrench)
+
+    def restart(self, asked_N: FloatArray) -> None:
+        """Begin anew, with tensions asked for (n,)."""
+        self._lagging[:] = asked_N
+        self._correction[:] = self.torque_Nm[:] = 0.0
+        self.check.restart()
+
+    def update(self, asked_N: FloatArray) -> None:
+        """Bring `torque_Nm` up to date with the tensions asked for in the last cycle, (n,)."""
+        if self._follow(asked_N):
+            self.check.update()

@@ -1,0 +1,58 @@
+"""What of a robot's file the kernels of its control take, as rows of figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cdpr_profiles import RobotAxis
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.robots.kinematics import pose_tracking as tracking
+from cdpr_rt.robots.platform import loop_kernel as loop
+from cdpr_rt.robots.platform.loop_design import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
+from cdpr_rt.robots.platform_model import PlatformModel
+
+_REGULATOR_SHARE = 0.25
+_INTEGRAL_SHARE = 0.3
+_DEADBAND_m = 6e-5
+_STICTION_GAIN = 20.0
+_STICTION_m_s = 0.002
+
+
+def motor_rows(model: PlatformModel, axes: Sequence[RobotAxis]) -> FloatArray:
+    """Return what of the motors and cables does not change, (MOTOR_ROWS, n); the rest is 0."""
+    platform = model.platform
+    rows = np.zeros((tracking.MOTOR_ROWS, len(axes)))
+    rows[tracking.M_PER_RAD] = [axis.winch.cable_m_per_motor_rad for axis in axes]
+    rows[tracking.INERTIA] = [axis.winch.motor.rotor_inertia_kg_m2 for axis in axes]
+    if platform.cable_model != "rigid":
+        rows[tracking.COMPLIANCE] = [1.0 / axis.winch.cable.stiffness_N for axis in axes]
+    if platform.cable_model == "catenary":
+        rows[tracking.WEIGHT] = [axis.winch.cable.weight_per_length_N_m for axis in axes]
+    rows[tracking.STRETCH] = 1.0
+    return rows
+
+
+def tracking_filters(gains: LoopGains, period_s: float) -> FloatArray:
+    """Return the settings of the filters that find the platform's pose, (FILTERS,)."""
+    row = np.zeros(tracking.FILTERS)
+    row[tracking.PERIOD], row[tracking.OBSERVER] = period_s, OBSERVER_rad_s
+    row[tracking.SMOOTHER], row[tracking.SMOOTH] = gains.smoother_rad_s, gains.smooth
+    return row
+
+
+def loop_settings(gains: LoopGains, span_N: float, period_s: float) -> FloatArray:
+    """Return the settings of the loop's kernels for tensions of this span, (SETTINGS,)."""
+    row = np.zeros(loop.SETTINGS)
+    row[loop.PERIOD], row[loop.BANDWIDTH] = period_s, gains.bandwidth_rad_s
+    row[loop.DAMPING], row[loop.RATIO] = gains.damping_N_s_m, DAMPING_RATIO
+    row[loop.INTEGRAL], row[loop.NULL_DAMPING] = gains.integral_1_s, gains.null_damping_N_s_m
+    row[loop.ROTOR] = gains.rotor_kg
+    row[loop.REGULATOR_N], row[loop.MOST_N] = _REGULATOR_SHARE * span_N, _INTEGRAL_SHARE * span_N
+    row[loop.STICTION_GAIN], row[loop.STICTION_SPEED], row[loop.DEADBAND] = (
+        _STICTION_GAIN,
+        _STICTION_m_s,
+        _DEADBAND_m,
+    )
+    return row

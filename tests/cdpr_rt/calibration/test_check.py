@@ -1,0 +1,74 @@
+"""Whether a calibrated robot is as it was: one thing changed, and which, by readings made up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdpr_rt.calibration.check import Check, check_geometry
+from cdpr_rt.calibration.estimation.residuals import lengths_told
+from cdpr_rt.calibration.readings.observations import Observations
+from tests.cdpr_rt.calibration.made_up import made_up
+
+
+def checked(
+    robot: str,
+    *,
+    cable: int = 0,
+    exit_m: tuple[float, ...] = (0.0, 0.0, 0.0),
+    drum: float = 0.0,
+    home_m: tuple[float, ...] = (0.0, 0.0, 0.0),
+    scanner_m: float | None = None,
+) -> Check:
+    """Return the check of a robot as its file has it but for what is said."""
+    what = made_up(robot, 11, 4, exit_m=0.0, drum=0.0, elongation=0.0, home_first=True)
+    k, changed = what.file.coordinates, np.zeros((what.file.n, 9))
+    changed[cable, :k], changed[cable, 4] = exit_m[:k], drum
+    poses = np.array([pose.array for pose in what.poses])
+    poses[0, 0, :k] += home_m[:k]
+    tension = what.seen.tension_N
+    true = lengths_told(replace(what.file, cable=changed), poses, tension)
+    rng = np.random.default_rng(4)
+    # encoders count from what the lengths at home are taken for
+    paid_out = (true - true[0]) / (1.0 + changed[:, 4]) + rng.normal(0.0, 1.5e-4, true.shape)
+    told = lengths_told(what.file, what.seen.start[:1], tension[:1])[0] + paid_out
+    seen = Observations.of_lengths(told, tension, what.seen.start)
+    if scanner_m is not None:
+        p = poses[:, 0] + rng.normal(0.0, scanner_m, (len(poses), 3))
+        p[:, k:] = np.nan
+        seen = seen.with_positions(p, scanner_m)
+    return check_geometry(what.file, seen, 5e-4)
+
+
+@pytest.mark.parametrize("robot", ["spatial-8", "planar-4"])
+def test_a_robot_as_it_was_is_one_also_on_its_stand_a_little_off(robot: str) -> None:
+    for home_m in ((0.0, 0.0, 0.0), (0.002, -0.003, 0.001)):
+        found = checked(robot, home_m=home_m)
+        assert not found.moved and not found.changes
+        assert found.verdict()[0].startswith("UNCHANGED: lengths at")
+
+
+def test_the_exit_point_that_moved_is_named_with_its_way() -> None:
+    found = checked("spatial-8", cable=1, exit_m=(0.0, 0.0, 0.02))
+    assert found.moved
+    (change,) = found.changes
+    assert (change.kind, change.cable) == ("exit", 1)
+    np.testing.assert_allclose(change.size, (0.0, 0.0, 0.02), atol=0.006)
+    assert "cable 2" in found.verdict()[1] and "pulley" in found.verdict()[1]
+
+
+@pytest.mark.parametrize("robot", ["spatial-8", "planar-4"])
+def test_a_drum_that_is_another_is_named_and_a_scanner_leaves_no_doubt(robot: str) -> None:
+    by_lengths, with_scanner = (
+        checked(robot, cable=2, drum=0.01, scanner_m=std) for std in (None, 1e-3)
+    )
+    for found in (by_lengths, with_scanner):
+        assert found.moved
+        assert found.changes[0].kind == "drum"
+        assert 2 in (found.changes[0].cable, *found.changes[0].alike)
+    (change,) = with_scanner.changes
+    assert change.cable == 2 and not change.alike
+    assert change.size[0] == pytest.approx(0.01, abs=0.002)
+    assert change.effect_m > 1e-3

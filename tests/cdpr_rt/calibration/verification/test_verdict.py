@@ -1,0 +1,190 @@
+"""What a calibration says of bad data, of what stays open, and of itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_rt.calibration.error_model import Noise, predicted_errors, simulated_errors
+from cdpr_rt.calibration.estimation.faults import fit_without_faults
+from cdpr_rt.calibration.estimation.fit import fit
+from cdpr_rt.calibration.outcome import calibrate, calibration_of
+from cdpr_rt.calibration.verification.verdict import open_directions, predicted_std, require_enough
+from cdpr_rt.calibration.verification.verification import verify
+from cdpr_rt.errors import InvalidRequestError
+from tests.cdpr_rt.calibration.made_up import made_up, measured
+
+_NO_SLACK = np.zeros(8)
+
+
+@pytest.mark.parametrize("robot", ["planar-4", "point-4", "spatial-8"])
+def test_nothing_is_found_wrong_where_nothing_is(robot: str) -> None:
+    what = made_up(robot, 50, 9, noise_m=3e-4)
+    slack = np.zeros(what.file.n)
+    for seen in (measured(what, 1e-3, 2e-3, 4), what.seen):
+        assert fit_without_faults(what.file, seen, slack)[1] == []
+
+
+@pytest.mark.parametrize(("robot", "blind"), [("planar-4", False), ("spatial-8", True)])
+def test_a_slipped_encoder_and_a_caught_cable_are_named(robot: str, blind: bool) -> None:
+    what = made_up(robot, 50, 9, noise_m=2e-4)
+    seen = what.seen if blind else measured(what, 1e-3, 2e-3, 4)
+    lengths = seen.length_m.copy()
+    lengths[25:, 1] += 0.008
+    lengths[12, 0] += 0.025
+    found, faults = fit_without_faults(
+        what.file, replace(seen, length_m=lengths), np.zeros(what.file.n)
+    )
+    named = {(fault.kind, fault.pose): {fault.cable, *fault.alike} for fault in faults}
+    assert set(named) == {("jump", 25), ("outlier", 12)}
+    assert 1 in named["jump", 25]
+    assert 0 in named["outlier", 12]
+    assert abs(found.jumps_m) == pytest.approx([0.008], abs=2e-3)
+    assert any("slipped" in fault.text and "pose 26" in fault.text for fault in faults)
+
+
+def test_a_slack_cable_is_left_out_by_its_tension() -> None:
+    what = made_up("spatial-8", 40, 3, noise_m=2e-4)
+    tension, lengths = what.seen.tension_N.copy(), what.seen.length_m.copy()
+    tension[7, 3], lengths[7, 3] = 0.4, lengths[7, 3] + 0.05
+    seen = replace(what.seen, tension_N=tension, length_m=lengths)
+    found, faults = fit_without_faults(what.file, seen, np.full(8, 1.0))
+    assert [(f.kind, f.cable, f.pose) for f in faults] == [("slack", 3, 7)]
+    assert "0.4 N" in faults[0].text
+    assert not found.seen.used[7, 3]
+
+
+def test_a_wrong_drum_is_named_with_its_error() -> None:
+    what = made_up("spatial-8", 50, 5, noise_m=2e-4)
+    cable = what.true.cable.copy()
+    wrong = 0.05
+    lengths = what.seen.length_m.copy()
+    lengths[:, 4] = what.seen.reference_m[4] + (lengths[:, 4] - what.seen.reference_m[4]) / 1.05
+    seen = replace(measured(what, 1e-3, 2e-3, 4), length_m=lengths)
+    found, faults = fit_without_faults(what.file, seen, _NO_SLACK)
+    drums = [fault for fault in faults if fault.kind == "drum"]
+    assert [fault.cable for fault in drums] == [4]
+    assert drums[0].size == pytest.approx(wrong + cable[4, 4], abs=4e-3)
+    assert "drum_radius_m" in drums[0].text
+    assert found.converged
+
+
+def test_without_measured_points_frame_and_scale_are_said_to_be_open() -> None:
+    what = made_up("spatial-8", 60, 7, noise_m=2e-4)
+    blind = [one.what for one in open_directions(fit(what.file, what.seen))]
+    for axis in "xyz":
+        assert any(f"together are along {axis}" in text for text in blind)
+        assert any(f"turned about {axis}" in text for text in blind)
+    assert any("scale" in text for text in blind)
+    seen = measured(what, 1e-3, 2e-3, 4)
+    told = [one.what for one in open_directions(fit(what.file, seen))]
+    assert not any("together" in text or "scale" in text for text in told)
+
+
+def test_what_no_pose_tells_is_named_with_its_cable() -> None:
+    what = made_up("spatial-8", 40, 7, noise_m=2e-4)
+    seen = measured(what, 1e-3, 2e-3, 4)
+    used = seen.used.copy()
+    used[:, 5] = False
+    found = fit(what.file, replace(seen, used=used))
+    opened = [one for one in open_directions(found) if "cable 6" in one.what]
+    assert len(opened) >= 4
+    assert all("cable 6" in one.advice for one in opened)
+
+
+def test_too_few_poses_are_refused_with_how_many_are_missing() -> None:
+    what = made_up("spatial-8", 60, 7)
+    with pytest.raises(InvalidRequestError, match=r"at least \d+ poses more"):
+        require_enough(what.file, what.seen.some(np.arange(8)))
+    require_enough(what.file, what.seen)
+    robot = load_robot("spatial-8")
+    with pytest.raises(InvalidRequestError, match="15 and more"):
+        calibrate(robot, what.file, what.seen.some(np.arange(9)), "redundancy")
+
+
+def test_a_robot_without_redundancy_needs_points() -> None:
+    what = made_up("point-4", 20, 7)
+    used = what.seen.used.copy()
+    used[:, 0] = False
+    with pytest.raises(InvalidRequestError, match="--points"):
+        require_enough(what.file, replace(what.seen, used=used))
+
+
+@pytest.mark.parametrize("robot", ["planar-4", "spatial-8"])
+def test_predicted_deviations_of_poses_are_those_of_trials(robot: str) -> None:
+    squares = predicted = 0.0
+    for seed in range(6):
+        what = made_up(robot, 30, 100 + seed, noise_m=3e-4)
+        found = fit(what.file, measured(what, 1e-3, 2e-3, seed))
+        true = np.array([pose.array for pose in what.poses])
+        exact = made_up(robot, 30, 100 + seed)
+        k = what.file.coordinates
+        there = verify(found.geometry, np.zeros(0), measured(exact, 1e-9, None, 1))
+        squares += float((there.errors_m**2).mean())
+        predicted += float((predicted_std(found, true)[:, :k] ** 2).mean())
+    assert 0.15 < squares / predicted < 4.0
+
+
+def test_a_calibration_is_verified_on_other_poses_and_becomes_a_file() -> None:
+    robot = load_robot("spatial-8")
+    what = made_up("spatial-8", 50, 4, noise_m=2e-4, home_first=True)
+    outcome = calibrate(robot, what.file, measured(what, 1e-3, 2e-3, 8), "points")
+    assert outcome.good, outcome.objections()
+    assert outcome.verified.poses == 10
+    assert outcome.verified.mean_mm < 0.5 * outcome.before.mean_mm
+    found = calibration_of(outcome, 3, "data.json", simulated=True)
+    assert found.faults(robot) == []
+    soft = replace(outcome.found.geometry, elongation=-2.45)
+    wrong = replace(outcome, found=replace(outcome.found, geometry=soft))
+    assert not wrong.good and "elongation_scale" in wrong.objections()[-1]
+    told = found.applied(robot)
+    assert told.platform is not None
+    scale = told.axes[2].winch.drum_radius_m / robot.axes[2].winch.drum_radius_m
+    assert scale == pytest.approx(found.drum_scales[2])
+    words = "\n".join(outcome.verdict())
+    assert "verified on" in words
+    assert "3 sigma" in words
+
+
+def test_a_slip_next_to_a_pose_held_out_counts_on_neither_side_there() -> None:
+    what = made_up("planar-4", 45, 9, noise_m=2e-4)
+    seen = measured(what, 1e-3, 2e-3, 4)
+    lengths = seen.length_m.copy()
+    lengths[24:, 1] += 0.012  # pose 25 is held out: 24 and 26 do not tell when it was
+    outcome = calibrate(
+        load_robot("planar-4"), what.file, replace(seen, length_m=lengths), "points"
+    )
+    unused = outcome.unused
+    assert outcome.verified_left_out == 1 and 24 in unused.index
+    assert not unused.seen.used[unused.index == 24, 1].any()
+    assert outcome.verified.worst_mm < 5.0
+    assert outcome.verified.residual_m < 1e-3
+
+
+def test_contradictory_measurements_are_not_good() -> None:
+    robot = load_robot("planar-4")
+    what = made_up("planar-4", 25, 4, noise_m=2e-4)
+    rng = np.random.default_rng(1)
+    lengths = what.seen.length_m + rng.normal(0.0, 0.02, what.seen.length_m.shape)
+    outcome = calibrate(
+        robot, what.file, replace(measured(what, 1e-3, 2e-3, 8), length_m=lengths), "points"
+    )
+    assert not outcome.good
+    assert "NOT GOOD" in "\n".join(outcome.verdict())
+
+
+@pytest.mark.parametrize(
+    "noise", [Noise(length_m=5e-4), Noise(position_m=5e-4), Noise(rotation_rad=1e-3)]
+)
+def test_the_error_model_is_that_of_trials(noise: Noise) -> None:
+    what = made_up("spatial-8", 60, 2)
+    poses = np.array([pose.array for pose in what.poses])
+    kernel = what.file.kernel_geometry()
+    geometry = kernel[:3].T, kernel[3:6].T
+    told = predicted_errors(*geometry, poses, noise)
+    tried = simulated_errors(*geometry, poses, noise, 120, np.random.default_rng(3))
+    assert tried.exit_m == pytest.approx(told.exit_m, rel=0.1)
+    assert tried.offset_m == pytest.approx(told.offset_m, rel=0.1)

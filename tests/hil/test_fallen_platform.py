@@ -1,0 +1,127 @@
+"""A platform that hung when the power was taken at once: what `tighten` does with it then."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cdpr_rt.core.states import LoopState
+from cdpr_tools.trials.evaluation.pose_log import read_pose_log
+from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
+
+LOOSE_N, TAKES_UP_N = 15.0, 40.0
+"""What no winch pulls with that is not told to, and what slack is taken up with, and friction."""
+
+
+def turned_deg(robot: LockstepRobot) -> float:
+    angle_rad = Rotation.from_matrix(np.reshape(robot.truth()["rotation"], (3, 3))).magnitude()
+    return float(np.degrees(angle_rad))
+
+
+def highest_N(robot: LockstepRobot, since: int) -> float:
+    log = read_pose_log(robot.truth_log)
+    return float(log["tension_N"][log["sync_index"] >= since].max())
+
+
+@contextmanager
+def fallen(position_m: list[float], rotation_rad: list[float]) -> Iterator[LockstepRobot]:
+    """Yield a robot whose platform has fallen from there, and that has power again."""
+    with LockstepRobot("spatial-8") as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        robot.carry_out("pose", position_m=position_m, rotation_rad=rotation_rad)
+        robot.loop.request_power_off()
+        robot.run(3.0)
+        assert robot.state is LoopState.FAULT
+        robot.command("acknowledge")
+        robot.enable()
+        yield robot
+
+
+def test_one_that_has_turned_over_is_not_pulled_at() -> None:
+    with fallen([-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
+        assert turned_deg(robot) > 60.0
+        with pytest.raises(CommandRefusedError, match="it has fallen, may have turned over"):
+            robot.program("tighten")
+        since = robot.cycle + robot.sync_offset
+        with pytest.raises(CommandRefusedError, match=r"\d cables are up to \d+ mm too short"):
+            robot.program("tighten", **{"from": "home"})
+        robot.run(0.5)
+        assert highest_N(robot, since) < LOOSE_N
+        robot.program("tighten", **{"from": "lengths"})
+        robot.finish()
+        assert re.search(r"turned by \d+ deg.*: it is not pulled at", robot.progress["trouble"])
+        assert robot.progress["stage"] == "slack" and not robot.progress["tight"]
+        assert highest_N(robot, since) < TAKES_UP_N
+
+
+def test_one_that_still_stands_upright_is_tightened_where_it_is() -> None:
+    with fallen([0.15, 0.5, 1.7], [0.2, 0.0, 0.0]) as robot:
+        assert turned_deg(robot) < 20.0  # the platform may be turned by 15 in use
+        with pytest.raises(CommandRefusedError, match="say from: lengths"):
+            robot.program("tighten")
+        robot.carry_out("tighten", **{"from": "lengths"})
+        assert robot.progress["tight"], robot.progress["trouble"]
+        here_m, true_m = robot.progress["position_m"], robot.truth()["position_m"]
+        assert here_m == pytest.approx(np.ravel(true_m), abs=0.01)
+        robot.carry_out("lower")
+        robot.program("tighten")  # home again, nobody has to be told so
+
+
+@contextmanager
+def held_by_axes(name: str, position_m: list[float]) -> Iterator[LockstepRobot]:
+    """Yield a robot whose platform hangs, each cable held by itself, as after brakes."""
+    with LockstepRobot(name) as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        robot.carry_out("pose", position_m=position_m)
+        engine = robot.loop.engine
+        engine.parts.programs["tighten"]._parts.slacken()  # type: ignore[attr-defined]
+        engine.switch("hold")
+        robot.run(0.5)
+        yield robot
+
+
+@pytest.mark.parametrize(
+    ("name", "position_m"),
+    [("spatial-8", [-0.4, 0.5, 1.7]), ("suspended-8", [1.5, 1.0, 1.5])],
+)
+def test_one_that_brakes_have_held_is_held_where_it_hangs(
+    name: str, position_m: list[float]
+) -> None:
+    with held_by_axes(name, position_m) as robot:
+        engine = robot.loop.engine
+        known = engine.parts.estimator
+        length_m = known.estimate.cable_length_m.copy()
+        slipped_m = np.eye(8)[0] * 0.3
+        known.set_lengths(known.position_rad, length_m + slipped_m)
+        with pytest.raises(CommandRefusedError, match=r"disagree by .* held as it is; lower it"):
+            robot.program("tighten", **{"from": "lengths"})
+        robot.run(0.5)
+        assert np.ravel(robot.truth()["position_m"]) == pytest.approx(position_m, abs=0.01)
+        known.set_lengths(known.position_rad, known.estimate.cable_length_m - slipped_m)
+        robot.program("tighten", **{"from": "lengths"})
+        for _ in range(20):
+            robot.run(0.05)
+            assert np.ravel(robot.truth()["position_m"]) == pytest.approx(position_m, abs=0.01)
+        assert robot.progress["tight"], robot.progress["trouble"]
+
+
+def test_drives_that_lose_their_power_together_let_it_fall_as_well() -> None:
+    with LockstepRobot("spatial-8") as robot:
+        robot.enable()
+        robot.carry_out("tighten")
+        robot.carry_out("pose", position_m=[-0.4, 0.5, 1.7])
+        for axis in range(8):
+            robot.inject_fault(axis, 1, 0x3220)
+        robot.run(10.0)
+        assert robot.state is LoopState.FAULT
+        robot.command("acknowledge")
+        robot.enable()
+        with pytest.raises(CommandRefusedError, match="it has fallen, may have turned over"):
+            robot.program("tighten")

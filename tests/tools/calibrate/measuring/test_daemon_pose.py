@@ -1,0 +1,162 @@
+"""Poses read from a daemon's status, which is made up: what is kept, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_profiles.calibration.geometry import geometry_sha256
+from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.calibration.readings.data import CalibrationData, load_data
+from cdpr_tools.calibrate.measuring import daemon_pose
+from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+
+pytestmark = pytest.mark.long
+
+ROBOT = load_robot("planar-4")
+LENS = "width_px = 64\nheight_px = 48\nfocal_px = [50.0, 50.0]\ncentre_px = [32.0, 24.0]\n"
+
+
+class Told:
+    """A daemon whose robot stands somewhere, its clock going on with each question."""
+
+    def __init__(self) -> None:
+        self.description: dict[str, Any] = {
+            "reference": "planar-4", "calibration": None, "simulated": False,
+            "geometry_sha256": geometry_sha256(ROBOT),
+        }  # fmt: skip
+        assert ROBOT.platform is not None
+        self.place = [*ROBOT.platform.home_m, 0.0]
+        self.angle_rad, self.counted_m, self.moving_m = 1.0, 2.0, 0.0
+        self.time_s, self.state = 0.0, "active"
+
+    def get(self, path: str) -> dict[str, Any]:
+        if path == "/description":
+            return self.description
+        self.time_s += 0.05
+        per_rad = [axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes]
+        axes = [
+            {
+                "cable_length_m": self.counted_m + m * self.angle_rad + self.moving_m * self.time_s,
+                "tension_N": 40.0 + i,
+                "position_rad": self.angle_rad,
+            }
+            for i, m in enumerate(per_rad)
+        ]
+        progress = {"position_m": self.place[:2], "rotation_rad": self.place[2:]}
+        return {
+            "state": self.state, "program": "hold", "program_progress": progress, "axes": axes,
+            "cycle": {"time_s": self.time_s},
+        }  # fmt: skip
+
+
+def read(told: Told, folder: Path, **more: Any) -> CalibrationData:
+    robot, description = daemon_pose.robot_of(told)  # type: ignore[arg-type]
+    data = daemon_pose.data_of(folder, robot, description["simulated"])
+    return daemon_pose.read_into(told, robot, data, folder, **more)  # type: ignore[arg-type]
+
+
+def test_poses_follow_each_other_and_lengths_that_count_anew_are_noticed(tmp_path: Path) -> None:
+    told = Told()
+    home = read(told, tmp_path).poses[0]
+    assert home.target == tuple(told.place) and home.tension_N == (40.0, 41.0, 42.0, 43.0)
+    per_rad = np.array([axis.winch.cable_m_per_motor_rad for axis in ROBOT.axes])
+    assert home.length_m == pytest.approx(tuple(2.0 + per_rad))
+    told.place, told.angle_rad = [0.3, 1.6, 0.1], 5.0
+    assert read(told, tmp_path).restarts == ()
+    told.counted_m = 2.001
+    assert read(told, tmp_path).restarts == (2,)
+    assert read(told, tmp_path).restarts == (2,)
+    data = load_data(tmp_path / "data.json")
+    assert len(data.poses) == 4 and not data.simulated
+    assert data.poses[1].target == (0.3, 1.6, 0.1)
+    assert "have offsets of their own" in "".join(
+        daemon_pose.lines(ROBOT, data.model_copy(update={"poses": data.poses[:3]}))
+    )
+
+
+def shift(key: str, value: object) -> Callable[[Told, Path], None]:
+    return lambda told, _: told.description.update({key: value})
+
+
+def away(told: Told, _: Path) -> None:
+    told.place = [0.3, 1.6, 0.0]
+
+
+def unpowered(told: Told, _: Path) -> None:
+    told.state = "ready"
+
+
+def swinging(told: Told, _: Path) -> None:
+    told.moving_m = 0.01
+
+
+def of_the_simulator(told: Told, folder: Path) -> None:
+    told.description["simulated"] = True
+    read(told, folder)
+    told.description["simulated"] = False
+
+
+def of_a_run(told: Told, folder: Path) -> None:
+    read(told, folder)
+    (folder / daemon_pose.COUNTED).unlink()
+
+
+@pytest.mark.parametrize(
+    ("spoil", "kind", "named"),
+    [
+        (shift("reference", "bench-2"), BadInputError, "has no platform"),
+        (shift("calibration", {"version": 1}), BadInputError, "cdpr calibrate undo planar-4"),
+        (shift("geometry_sha256", "0"), BadInputError, "changed since the daemon"),
+        (away, BadInputError, "mm from home; allowed for the first pose: home"),
+        (unpowered, WorkFailedError, "not held on its cables .ready, hold."),
+        (swinging, WorkFailedError, "did not come to rest"),
+        (of_the_simulator, BadInputError, "of another robot, bus or state"),
+        (of_a_run, BadInputError, "of a run that moved by itself"),
+    ],
+)
+def test_what_would_not_belong_together_is_refused(
+    spoil: Callable[[Told, Path], None], kind: type[CommandError], named: str, tmp_path: Path
+) -> None:
+    told = Told()
+    spoil(told, tmp_path)
+    with pytest.raises(kind, match=named):
+        read(told, tmp_path)
+
+
+def test_an_image_goes_with_each_pose_and_the_files_with_the_first(tmp_path: Path) -> None:
+    lens, sheets = tmp_path / "lens.toml", tmp_path / "sheets.toml"
+    lens.write_text(LENS)
+    sheets.write_text("size_m = 0.1\n")
+    told, folder = Told(), tmp_path / "cal"
+
+    class Camera:
+        def see(self, number: int, wait: Callable[[float], None]) -> Sighting:
+            return Sighting(f"pose {number}", {number: np.zeros((4, 2))})
+
+    robot, _ = daemon_pose.robot_of(told)  # type: ignore[arg-type]
+    data = daemon_pose.data_of(folder, robot, False)
+    with pytest.raises(BadInputError, match="--intrinsics and --markers as well"):
+        daemon_pose.with_camera(data, lens, None)
+    for number in (1, 2):
+        data = daemon_pose.data_of(folder, robot, False)
+        files = (lens, sheets) if number == 1 else (None, None)
+        data = daemon_pose.with_camera(data, *files)
+        folder.mkdir(exist_ok=True)
+        daemon_pose.read_into(told, robot, data, folder, Camera())  # type: ignore[arg-type]
+    kept = json.loads((folder / "data.json").read_text())
+    assert [one["image"]["markers"][0]["id"] for one in kept["poses"]] == [1, 2]
+    assert kept["camera"]["intrinsics"]["width_px"] == 64
+    blind = load_data(folder / "data.json").model_copy(update={"camera": None, "poses": ()})
+    with pytest.raises(BadInputError, match="read without"):
+        other = tmp_path / "other"
+        other.mkdir()
+        read(told, other)
+        daemon_pose.with_camera(daemon_pose.data_of(other, robot, False), lens, sheets)
+    assert daemon_pose.with_camera(blind, lens, sheets).camera is not None

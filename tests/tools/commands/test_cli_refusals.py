@@ -1,0 +1,199 @@
+"""Bad input: one line that says what is allowed, status 2; and what needs no bus."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+from cdpr_here import cdpr_here
+
+from tests.tools.commands.cli_rig import OWN, WINCH, refused, usage_error
+
+
+@pytest.mark.parametrize(
+    ("bus", "words"),
+    [
+        ("bogus:", ("unknown interface 'bogus'", "simbus:NAME")),
+        ("simbus", ("colon", "simbus:NAME")),
+        ("simbus:a b", ("simbus:a b", "letters, digits")),
+        ("simbus:nobody-here", ("simbus:nobody-here", "cdpr sim up")),
+        ("socketcan:no/such", ("'no/such'", "15 characters")),
+        ("socketcand://host", ("socketcand://host:port/can0",)),
+    ],
+)
+def test_bad_bus(bus: str, words: tuple[str, ...]) -> None:
+    message = refused(2, "drive", "info", WINCH, "--bus", bus)
+    for word in words:
+        assert word in message
+
+
+def test_misspelt_winch_gets_the_name_that_was_meant() -> None:
+    assert f"did you mean '{WINCH}'?" in refused(2, "drive", "info", "winch-mpp0932d", *OWN)
+    assert "cdpr profiles list" in refused(2, "profiles", "show", "nothing-of-the-kind")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[motor]\ninertia_kg_m2 = 11.5\n", ("motor.inertia_kg_m2", "11.5", "equal to 10")),
+        ("[frictoin]\ncoulomb_Nm = 0.1\n", ("frictoin", "friction")),
+        ("[encoder]\ncounts_per_tum = 8192\n", ("counts_per_tum", "counts_per_turn")),
+        ("[encoder]\ncounts_per_turn = 8192.5\n", ("counts_per_turn", "8192.5")),
+        ('[[cogging]]\nkind = "magnetic"\n', ("kind", "magnetic", "current_offset")),
+        ("[motor\n", ("line 1",)),
+    ],
+    ids=["range", "section", "key", "type", "choice", "syntax"],
+)
+def test_bad_plant_file(tmp_path: Path, text: str, words: tuple[str, ...]) -> None:
+    plant = tmp_path / "plant.toml"
+    plant.write_text(text)
+    message = refused(2, "drive", "info", WINCH, *OWN, "--plant", plant)
+    assert str(plant) in message
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("od", WINCH, "60zz"), ("60zz", "hexadecimal")),
+        (("od", WINCH, "6072", "--set", "many"), ("--set many", "integer")),
+        (("home", WINCH, "--method", "77"), ("--method 77", "33, 34")),
+        (("jog", WINCH, "--speed-deg-s", "nan"), ("--speed-deg-s nan", "deg/s")),
+        (("jog", WINCH, "--speed-deg-s", "1e9"), ("--speed-deg-s 1e+09", "deg/s")),
+    ],
+    ids=lambda value: " ".join(value[2:]) if isinstance(value, tuple) else value,
+)
+def test_bad_argument_of_drive(arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
+    message = refused(2, "drive", *arguments, *OWN)
+    for word in words:
+        assert word in message
+
+
+def test_bad_usage_is_explained() -> None:
+    assert "'--bus'" in usage_error("drive", "info", WINCH)
+    assert "'nonsense'" in usage_error("nonsense")
+    assert "600" in usage_error("drive", "enable", WINCH, *OWN, "--seconds", "1000")
+    assert "'--bandwidth-hz'" in usage_error("commission", WINCH, *OWN, "--bandwidth-hz", "0")
+
+
+def test_a_real_bus_is_not_energised_unasked() -> None:
+    for answer in ("n\n", ""):
+        message = refused(
+            2, "drive", "enable", WINCH, "--bus", "socketcan:no-such-can", stdin=answer
+        )
+        assert "nothing was energised" in message
+    assert "socketcan:no-such-can" in refused(
+        2, "drive", "enable", WINCH, "--bus", "socketcan:no-such-can", "--yes"
+    )
+
+
+def test_files_that_are_not_there(tmp_path: Path) -> None:
+    nothing = tmp_path / "nothing"
+    assert str(nothing) in refused(2, "cogging", "fit", nothing)
+    assert str(nothing / "run.json") in refused(2, "cogging", "report", nothing)
+    missing = tmp_path / "missing.json"
+    arguments = ("cogging", "validate", WINCH, missing, *OWN, "--out", tmp_path / "out")
+    assert str(missing) in refused(2, *arguments)
+
+
+def test_an_earlier_run_is_not_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "raw").mkdir()
+    old = tmp_path / "raw" / "sweep-0.raw"
+    old.write_bytes(b"precious")
+    message = refused(2, "commission", WINCH, *OWN, "--out", tmp_path)
+    assert "--overwrite" in message
+    assert old.read_bytes() == b"precious"
+
+
+def test_a_folder_of_something_else_is_not_commissioned_into(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("precious")
+    message = refused(2, "commission", WINCH, *OWN, "--out", tmp_path)
+    assert message.startswith(f"--out {tmp_path}: holds other things")
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (("robot", "show", "planar-3", "--png", "a.jpg"), "--png a.jpg: allowed: a name that ends"),
+        (("poses", "planar-3", "--png", "a.pdf"), "--png a.pdf: allowed: a name that ends in .png"),
+        (("markers", "print", "0", "--out", "a.png"), "--out a.png: allowed: a name that ends in"),
+        (("doctor", "--report", "/nowhere/a"), "allowed: a file in a folder that is there"),
+        (("markers", "map", "/nowhere"), "/nowhere: allowed: a folder with images"),
+    ],
+)
+def test_what_could_not_be_written_or_read_is_refused_beforehand(
+    words: tuple[str, ...], problem: str
+) -> None:
+    assert problem in refused(2, *words)
+
+
+def test_an_error_is_json_too() -> None:
+    result = cdpr_here("drive", "info", "no-such-winch", *OWN, "--json")
+    told = json.loads(result.stdout.splitlines()[-1])
+    assert told["ok"] is False
+    assert told["exit_status"] == result.returncode == 2
+    assert told["error"] in result.stderr
+
+
+def test_ctrl_c_while_a_command_is_loaded_is_no_traceback() -> None:
+    code = (
+        "import os, signal, sys; from cdpr_tools import cli, command_group;"
+        "command_group.load = lambda module, name: os.kill(os.getpid(), signal.SIGINT);"
+        "sys.argv = ['cdpr', 'run', '--json']; cli.main()"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (told.returncode, told.stderr) == (1, "cdpr: interrupted\n")
+    assert json.loads(told.stdout)["error"] == "interrupted"
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    told = cdpr_here("--version")
+    assert (told.returncode, told.stdout) == (0, f"cdpr {version('cdpr-rt')}\n")
+
+
+def test_a_shell_completes_commands_and_those_of_a_group() -> None:
+    def completed(words: str, count: int) -> list[str]:
+        asked = {"_CDPR_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(count)}
+        done = subprocess.run(
+            [Path(sys.executable).with_name("cdpr")],
+            env=os.environ | asked,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return done.stdout.split()
+
+    assert completed("cdpr comm", 1) == ["commission"]
+    assert completed("cdpr drive en", 2) == ["enable"]
+
+
+@pytest.mark.parametrize(
+    ("module", "words"),
+    [("httpx", ["status"]), ("uvicorn", ["run", "planar-3", "--bus", "simbus:"])],
+)
+def test_a_part_that_is_not_installed_is_named(module: str, words: list[str]) -> None:
+    code = (
+        "import sys; from cdpr_tools.cli import main;"
+        f"sys.modules.pop({module!r}, None); sys.argv = ['cdpr', *{words!r}];"
+        "import importlib.abc, importlib.machinery\n"
+        "find = importlib.machinery.PathFinder.find_spec\n"
+        f"hidden = lambda name, *rest: None if name == {module!r} else find(name, *rest)\n"
+        "importlib.machinery.PathFinder.find_spec = hidden\n"
+        "main()"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert ended.returncode == 1
+    assert ended.stderr == (
+        f"cdpr: needs {module}, which comes with: pip install 'cdpr-rt[daemon]'\n"
+    )

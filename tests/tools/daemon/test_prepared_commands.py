@@ -1,0 +1,134 @@
+"""Commands that need a file to be read or the like: put off until that is done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import pytest
+
+from cdpr_rt.core.limits import Limit
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.programs.base import ProgramError
+from cdpr_rt.programs.idle import IdleProgram
+from cdpr_rt.programs.model import model_of
+from cdpr_rt.robots.robot_arrays import limits_of
+from tests.tools.daemon.loop_rig import LoopRig, opened
+from tests.tools.robot_rig import robot_file, simulated
+
+JOG = {"velocity_rad_s": [1.0], "timeout_s": 2.0}
+
+
+class Prepared(IdleProgram):
+    """Does nothing, once what it was asked for has been prepared."""
+
+    name = "prepared"
+    ready = ""
+
+    def preparation(self, arguments: Mapping[str, Any]) -> Callable[[], None] | None:
+        what = str(arguments.get("what"))
+        return None if self.ready == what else lambda: self.prepare(what)
+
+    def prepare(self, what: str) -> None:
+        if what == "bad":
+            raise ProgramError("what: value 'bad'")
+        self.ready = what
+
+    def check(self, arguments: Mapping[str, Any]) -> Any:
+        assert self.ready == arguments["what"]
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LoopRig]:
+    path = robot_file(tmp_path_factory.mktemp("robot"), [("can0", 1)])
+    with simulated(path) as url, opened(path, url) as made:
+        axes, period_s = made.robot.axes, made.robot.sync_period_s
+        program = Prepared(model_of(axes, period_s, [0.002], limits_of(made.robot)))
+        made.loop.engine.parts.programs["prepared"] = program
+        made.loop.engine.programs.append(program)
+        yield made
+
+
+def test_it_is_carried_out_once_it_is_prepared(rig: LoopRig) -> None:
+    rig.obeyed("enable")
+    rig.obeyed("program", program="prepared", wanted={"what": "plan"})
+    assert rig.loop.engine.program.name == "prepared"
+    rig.obeyed("hold")
+
+
+def test_what_cannot_be_prepared_is_refused_and_changes_nothing(rig: LoopRig) -> None:
+    rig.obeyed("hold")
+    answer = rig.command("program", program="prepared", wanted={"what": "bad"})
+    assert (answer["ok"], answer["text"]) == (False, "what: value 'bad'")
+    assert rig.loop.engine.program.name == "hold"
+
+
+@pytest.mark.parametrize("urgent", [False, True])
+def test_a_command_that_comes_meanwhile_ends_it(rig: LoopRig, urgent: bool) -> None:
+    rig.obeyed("hold")
+    asked = {"do": "program", "program": "prepared", "wanted": {"what": f"other {urgent}"}}
+    number = rig.block.post_command({**asked, "right": rig.right})
+    rig.turn(1)
+    if urgent:
+        rig.block.void_commands()
+    (rig.block.post_urgent if urgent else rig.block.post_command)({"do": "hold"})
+    rig.turn(20)
+    answers = {answer["to"]: answer for answer in iter(rig.block.take_reply, None)}
+    assert answers[number]["ok"] is False
+    assert "given up: " in answers[number]["text"]
+    assert rig.loop.engine.program.name == "hold"
+
+
+def begun_in_a_jog(rig: LoopRig, what: str) -> int:
+    """Jog, and ask for what takes until the next turn to be prepared; return the number."""
+    if rig.state is LoopState.READY:
+        rig.obeyed("enable")
+    rig.obeyed("program", program="jog", wanted=JOG)
+    asked = {"do": "program", "program": "prepared", "wanted": {"what": what}, "right": rig.right}
+    number = rig.block.post_command(asked)
+    rig.turn(1)
+    return number
+
+
+def answer_to(rig: LoopRig, number: int) -> str:
+    """Turn until a command has been refused; return why."""
+    rig.turn(20)
+    answers = {answer["to"]: answer for answer in iter(rig.block.take_reply, None)}
+    assert not answers[number]["ok"]
+    return str(answers[number]["text"])
+
+
+@pytest.mark.parametrize("limit", [Limit.SLACK, Limit.DRIVE])
+def test_what_the_supervisor_finds_meanwhile_ends_it(
+    rig: LoopRig, limit: Limit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    number = begun_in_a_jog(rig, f"with {limit}")
+    supervisor = rig.loop.engine.parts.supervisor
+    with monkeypatch.context() as found:
+        found.setattr(supervisor, "check", lambda *_: supervisor.report(limit, "this was found"))
+        rig.turn(1)
+    assert answer_to(rig, number) == "given up: this was found"
+    rig.turn_until(lambda: not rig.loop.busy)
+    assert rig.status["reason"].startswith("this was found")
+    faulty = limit is Limit.DRIVE
+    assert rig.loop.engine.program.name == ("idle" if faulty else "hold")
+    assert rig.state is (LoopState.FAULT if faulty else LoopState.ACTIVE)
+    if faulty:
+        rig.obeyed("acknowledge")
+
+
+def test_a_right_that_is_lost_meanwhile_ends_it(rig: LoopRig) -> None:
+    number = begun_in_a_jog(rig, "without a right")
+    rig.drop_right()
+    rig.take_right()
+    why = "jog: the right to move has changed hands; held"
+    assert answer_to(rig, number) == f"given up: {why}"
+    assert (rig.loop.engine.program.name, rig.status["reason"]) == ("hold", why)
+
+
+def test_power_comes_once_it_is_prepared(rig: LoopRig) -> None:
+    rig.obeyed("disable")
+    assert not rig.command("enable", program="prepared", wanted={"what": "bad"})["ok"]
+    assert rig.state is LoopState.READY
+    rig.obeyed("enable", program="prepared", wanted={"what": "power"})
+    assert rig.loop.engine.program.name == "prepared"

@@ -1,0 +1,66 @@
+"""Commands wait for a daemon that has no socket yet, and for none that nobody starts."""
+
+from __future__ import annotations
+
+import os
+import socket
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typing_extensions import override
+
+from cdpr_tools.client.starting import await_socket
+from cdpr_tools.daemon.launcher_file import launcher_runs, named_launcher
+from cdpr_tools.daemon.loop_file import started
+from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, default_socket
+from cdpr_tools.output import Output
+
+
+@pytest.fixture
+def path(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Where the socket of a daemon of `mine` is to be; names of sockets are short."""
+    with tempfile.TemporaryDirectory(prefix="cdpr-") as folder:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        yield default_socket("mine")
+
+
+class ComesUp(Output):
+    """Makes the socket as soon as it is said that it is waited for."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(as_json=True)
+        self.path, self.told = path, list[str]()
+        self.server = socket.socket(socket.AF_UNIX)
+
+    @override
+    def note(self, text: str) -> None:
+        self.told.append(text)
+        self.server.bind(str(self.path))
+        self.server.listen()
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_daemon_whose_launcher_runs_is_waited_for(path: Path, named: bool) -> None:
+    out = ComesUp(path)
+    with named_launcher(path), out.server:
+        await_socket("mine" if named else None, None if named else path, out)
+    assert out.told == [
+        "the daemon is still starting: its simulated drives and its processes come up ..."
+    ]
+    assert not path.with_suffix(LAUNCHER_SUFFIX).exists()
+
+
+def test_nobody_waits_for_one_that_nobody_starts(path: Path) -> None:
+    out = ComesUp(path)
+    await_socket(None, None, out)
+    mark = path.with_suffix(LAUNCHER_SUFFIX)
+    mark.write_text(f"{os.getpid()} {started(os.getpid()) - 1}")  # its number is another's now
+    await_socket("mine", None, out)
+    mark.write_text("no process")
+    await_socket("mine", None, out)
+    mark.unlink()
+    os.mkfifo(mark)
+    assert not launcher_runs(mark)
+    assert out.told == []

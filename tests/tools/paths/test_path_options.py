@@ -1,0 +1,54 @@
+"""Where G-code's zero is, as it is typed: what is no place, and what looks like metres."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdpr_rt.motion.path.description import PathError
+from cdpr_rt.service.http.models import PathFile
+from cdpr_tools.client.path_following import plain_name, require_held
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.paths.options import PathOptions
+
+
+@pytest.mark.parametrize("typed", ["foo", "", "1", "1 2 3 4", "nan 0", "0 2e6"])
+def test_an_origin_that_is_none_is_refused_in_the_words_that_were_typed(typed: str) -> None:
+    with pytest.raises(BadInputError, match=f"--origin {typed}: allowed: 2 or 3 numbers in mm"):
+        PathOptions(typed)
+
+
+def test_words_to_be_skipped_are_words() -> None:
+    assert PathOptions(ignore="s, t m3").ignored() == ["S", "T", "M3"]
+    with pytest.raises(BadInputError, match="--ignore M3;S: allowed: words of G-code"):
+        PathOptions(ignore="M3;S")
+
+
+def test_a_file_of_any_name_has_one_that_the_daemon_takes(tmp_path: Path) -> None:
+    for name in ("part.nc", "Träger (2).NC", "_a.csv", f"{200 * 'long'}.toml", "ü.tap"):
+        PathFile(name=plain_name(tmp_path / name), text="")
+    assert plain_name(tmp_path / "part 1.nc") == "part 1.nc"
+    with pytest.raises(PathError, match=r"README.md: no kind of path's file; allowed: way points"):
+        plain_name(tmp_path / "README.md")
+
+
+@pytest.mark.parametrize(
+    ("status", "told"),
+    [
+        ({"state": "ready"}, "not in state ready; allowed in active; `cdpr enable` gives power"),
+        ({"state": "fault"}, "not in state fault; .* `cdpr ack` acknowledges it"),
+        ({"state": "active", "program_progress": {"tight": False}}, "`cdpr tighten` first"),
+    ],
+)
+def test_what_cannot_be_followed_is_not_planned(status: dict[str, Any], told: str) -> None:
+    with pytest.raises(WorkFailedError, match=told):
+        require_held(status)
+    require_held({"state": "active", "program_progress": {"tight": True}})
+
+
+def test_an_origin_in_metres_is_noticed() -> None:
+    assert "In mm: --origin '300 1700'" in PathOptions("0.3 1.7").metres_hint()
+    for typed in ("300 1700", "0 0", "5 10", "-150.5 100 1550", None):
+        assert PathOptions(typed).metres_hint() == ""

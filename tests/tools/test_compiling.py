@@ -1,0 +1,99 @@
+"""What is compiled on this machine for the first time is told, and is told then only."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cdpr_tools.compiling import NOTICE
+
+KERNELS = """
+from cdpr_tools.compiling import tell_of_compiling
+from {module} import jit
+
+tell_of_compiling("the test")
+
+@jit
+def inner(x, k):
+    return x + k
+
+@jit
+def outer(x, k):
+    return inner(x, 0) + inner(x, -1) + inner(x, k)
+
+print(outer(1.0, 2), len(inner.signatures))
+"""
+
+
+@pytest.mark.parametrize("module", ["cdpr_rt.jit", "cdpr_sim_bus.jit"])
+def test_kernels_of_which_nothing_is_kept_are_told_once_and_compiled_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str
+) -> None:
+    """One machine code serves constants and numbers that are not known beforehand."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
+    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)  # by a command in this process
+    script = tmp_path / "kernels.py"
+    script.write_text(KERNELS.format(module=module))
+    first, again = (
+        subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
+        for _ in range(2)
+    )
+    assert first.stdout.split() == ["4.0", "1"]
+    assert first.stderr.startswith(f"{NOTICE} the test once") and first.stderr.count("\n") == 1
+    assert again.stdout.split()[0] == "4.0" and again.stderr == ""
+
+
+TWICE = """
+import subprocess, sys
+from cdpr_tools.compiling import tell_of_compiling
+
+tell_of_compiling()
+if len(sys.argv) == 1:
+    for _ in range(2):
+        subprocess.run([sys.executable, __file__, "child"], check=True)
+import logging
+logging.getLogger("cdpr.compiling").info("a kernel")
+"""
+
+
+def test_a_command_and_those_that_it_starts_tell_it_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)
+    script = tmp_path / "twice.py"
+    script.write_text(TWICE)
+    for _ in range(2):  # another command tells it again
+        done = subprocess.run(
+            [sys.executable, str(script)], capture_output=True, text=True, check=True
+        )
+        assert done.stderr.count(NOTICE) == 1
+
+
+LONG = """
+import logging, time
+from cdpr_tools import compiling
+
+compiling._EVERY_S = 0.5
+compiling.tell_of_compiling("the test")
+for _ in range(30):
+    logging.getLogger("cdpr.compiling").info("a kernel")
+    time.sleep(0.1)
+"""
+
+
+def test_what_is_compiled_for_long_is_told_again_and_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CDPR_COMPILING_TOLD", raising=False)
+    script = tmp_path / "long.py"
+    script.write_text(LONG)
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
+    first, *further = done.stderr.splitlines()
+    assert first == f"{NOTICE} the test once for this machine; this may take minutes ..."
+    assert further
+    for line in further:
+        assert re.fullmatch(rf"{NOTICE} the test goes on: \d+ kernels so far \.\.\.", line)

@@ -1,0 +1,123 @@
+"""Whole commands refuse files that are spoilt, or no files at all, and say why."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_sim_bus.robot.plant import Plant
+from tests.cdpr_here import cdpr_here
+from tests.tools.motor_profiles import leave_profiles
+
+
+@pytest.fixture
+def learnt(tmp_path: Path) -> Path:
+    """Return a folder of the cogging profiles of planar-3's motors."""
+    return leave_profiles(load_robot("planar-3"), [Plant()] * 3, tmp_path / "learnt")
+
+
+def said(done: subprocess.CompletedProcess[str]) -> str:
+    """Return the one line in which a command has refused its input."""
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("cdpr: ")
+    assert done.stderr.count("\n") == 1
+    return done.stderr
+
+
+def test_no_daemon_starts_with_a_cogging_profile_that_would_run_its_motors_away(
+    learnt: Path,
+) -> None:
+    path = learnt / "lower" / "cogging-profile.json"
+    table = json.loads(path.read_text())
+    table["better"]["table_Nm"][0][7] = 1e6
+    path.write_text(json.dumps(table))
+    told = said(cdpr_here("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt))
+    assert f"axis lower: {path}: better.table_Nm[0]: value 1e+06; allowed: -0.75 to 0.75" in told
+    out = learnt / "out"
+    told = said(
+        cdpr_here("cogging", "validate", "winch-mpp0923d", path, "--bus", "simbus:", "--out", out)
+    )
+    assert f"{path}: better.table_Nm[0]: value 1e+06" in told
+    assert not out.exists()
+
+
+def test_cogging_profiles_of_tables_that_differ_in_length_are_refused(learnt: Path) -> None:
+    path = learnt / "lower" / "cogging-profile.json"
+    table = json.loads(path.read_text())
+    table["better"]["table_Nm"] = [row[::2] for row in table["better"]["table_Nm"]]
+    path.write_text(json.dumps(table))
+    told = said(cdpr_here("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt))
+    assert "better.table_Nm of 512 and 256 values; allowed: as many for every axis" in told
+
+
+def make_deep(path: Path) -> None:
+    path.write_text("a = " + "[" * 200_000)
+
+
+def make_long(path: Path) -> None:
+    path.write_text("a = " + "1" * 6000)
+
+
+def make_pipe(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    os.mkfifo(path)
+
+
+def make_device(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    path.symlink_to("/dev/zero")
+
+
+def make_huge(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (make_deep, "line 1: is too deep; allowed: 16 levels"),
+        (make_long, "line 1: a number of 6000 digits; allowed: 99"),
+        (make_pipe, "is no regular file; allowed: a file, or a link to one"),
+        (make_device, "is no regular file; allowed: a file, or a link to one"),
+        (make_huge, "is too long; allowed: up to"),
+    ],
+)
+def test_what_is_no_file_of_ours_is_refused_by_every_command_that_reads_it(
+    tmp_path: Path, learnt: Path, make: Callable[[Path], None], told: str
+) -> None:
+    robot, plant = tmp_path / "robot.toml", tmp_path / "plant.toml"
+    profile = learnt / "lower" / "cogging-profile.json"
+    asked = tmp_path / "trial"
+    asked.mkdir()
+    for path in (robot, plant, profile, asked / "trial.json"):
+        make(path)
+    for path, command in (
+        (robot, ("run", robot, "--bus", "simbus:")),
+        (robot, ("bus", "budget", robot)),
+        (robot, ("robot", "show", robot)),
+        (plant, ("sim", "up", "winch-mpp0923d", "--bus", "simbus:x", "--plant", plant)),
+        (plant, ("sim", "up", "planar-3", "--bus", "simbus:x", "--plant", plant)),
+        (profile, ("run", "planar-3", "--bus", "simbus:", "--commissioned", learnt)),
+        (asked / "trial.json", ("robot", "trial", "planar-3", "line", "--again", "--out", asked)),
+    ):
+        answer = said(cdpr_here(*command))
+        assert str(path) in answer
+        assert told in answer
+
+
+@pytest.mark.parametrize("command", [("drive", "import"), ("log", "info"), ("bus", "replay")])
+def test_a_pipe_in_place_of_a_file_keeps_nobody_waiting(
+    tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    path = tmp_path / "file.eds"
+    make_pipe(path)
+    done = cdpr_here(*command, path)
+    assert done.returncode in (1, 2)
+    assert "is no regular file" in done.stderr

@@ -1,0 +1,1 @@
+"""The benches of buses and cycles: what exchanges cost, and when they come."""

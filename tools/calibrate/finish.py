@@ -1,0 +1,195 @@
+"""What follows once a calibration is measured: identify, tell, report, take over what is good."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.geometry import GeometryCalibration
+from cdpr_profiles.calibration.in_force import in_force, next_version, take_over
+from cdpr_profiles.errors import ProfileError
+from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.outcome import Method, Outcome, calibrate, calibration_of
+from cdpr_rt.calibration.readings.camera_data import Images
+from cdpr_rt.calibration.readings.data import CalibrationData, load_points, with_points
+from cdpr_rt.errors import ControlError, InvalidRequestError
+from cdpr_rt.robots.calibration_state import distrust, mark_calibrated, mark_not_calibrated
+from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+
+if TYPE_CHECKING:
+    from cdpr_tools.calibrate.report.judged import Judged
+
+_PICTURE, _REPORT, _IMAGES = "calibration.png", "calibration.html", "images"
+_LEAST_JUDGED = 20
+_LITTLE = 0.1
+"""What ten more poses have to bring at least, relative, for it to be worth it."""
+
+Judge = Callable[[Outcome], "Judged"]
+"""Compares an outcome with what a simulator knows, once it is there."""
+
+
+def identified(
+    robot: Robot, data: CalibrationData, points: Path | None, geometry: CableGeometry
+) -> Outcome:
+    """Return what data and measured points tell; raises InvalidRequestError, ProfileError."""
+    seen = data.observations(robot, geometry.model)
+    if points is not None:
+        try:
+            seen = with_points(seen, load_points(points), geometry.coordinates)
+        except InvalidRequestError as error:
+            raise BadInputError(f"--points {points}: {error}") from None
+    images = None if data.camera is None else Images(data.camera, data.sightings())
+    method: Method = "points" if seen.measured.any() else "redundancy"
+    return calibrate(robot, geometry, seen, "camera" if images else method, images)
+
+
+def enough(
+    out: Output, robot: Robot, points: Path | None, geometry: CableGeometry
+) -> Callable[[CalibrationData], str | None]:
+    """Return what a run asks after each batch of poses: what is wrong, and whether it is enough."""
+    told: set[str] = set()
+
+    def asked(data: CalibrationData) -> str | None:
+        if len(data.poses) < _LEAST_JUDGED:
+            return None
+        try:
+            outcome = identified(robot, data, points, geometry)
+        except ControlError:  # what is missing so far is said at the end if it still is
+            return None
+        for fault in outcome.faults:
+            who = " ".join([fault.kind, *fault.text.split()[:2]])  # sizes change with each fit
+            if who not in told:
+                told.add(who)
+                out.note(f"after {len(data.poses)} poses: {fault.text}")
+        if outcome.good and outcome.gain_of_more < _LITTLE:
+            return f"{len(data.poses)} poses are enough: {outcome.advice()}"
+        return None
+
+    return asked
+
+
+def finish(
+    out: Output,
+    robot: Robot,
+    data: CalibrationData,
+    points: Path | None,
+    geometry: CableGeometry,
+    source: Path,
+    folder: Path,
+    dry_run: bool,
+    judge: Judge | None = None,
+) -> None:
+    """Identify, tell, report, and take over what is good; `source` is the file of the data.
+
+    Raises typer.Exit with status 1 where nothing was taken over because it is not good.
+    """
+    with out.stage(f"fitting {len(data.poses)} poses"):
+        outcome = identified(robot, data, points, geometry)
+        known = None if judge is None else judge(outcome)
+    told: dict[str, Any] = {**outcome.told(), "data": str(source)}
+    out.say(*_lines(outcome, data))
+    if known is not None:
+        told["verification"] = {**told["verification"], **known.verification()}
+        told["truth"] = known.true_errors()
+        out.say(*known.lines())
+    taken, more = (
+        _taken(outcome, str(source.resolve()), data.simulated) if not dry_run else (None, [])
+    )
+    more.append(f"fit it again: cdpr calibrate fit {robot.reference} --data {source.parent}")
+    with out.stage("drawing the report"):
+        told |= _reported(outcome, data, known, more, folder, source.parent / _IMAGES)
+    out.say(*more, f"report: {told['report']}")
+    out.result({"ok": outcome.good, **told, "in_force": taken})
+    if not outcome.good:
+        raise typer.Exit(WorkFailedError.exit_status)
+
+
+def _taken(
+    outcome: Outcome, raw_data: str, simulated: bool
+) -> tuple[dict[str, Any] | None, list[str]]:
+    """Take a good calibration over; return it for JSON, and what there is to say and do."""
+    robot = outcome.robot
+    if not outcome.good:
+        return None, ["nothing was taken over"]
+    found, path = _take_over(outcome, raw_data, simulated)
+    lines = [
+        f"calibration {found.version} ({found.identity}) counts from the next start on: {path}",
+        f"take it back: cdpr calibrate undo {robot.reference}",
+        f"see whether it still holds, in two minutes: cdpr calibrate check {robot.reference}",
+    ]
+    if simulated:
+        lines.append(
+            "it was measured on a simulated robot: the robot does not start with it on any bus "
+            "other than simbus"
+        )
+    return {**found.summary(), "file": str(path)}, lines
+
+
+def _reported(
+    outcome: Outcome,
+    data: CalibrationData,
+    judged: Judged | None,
+    more: list[str],
+    folder: Path,
+    images: Path,
+) -> dict[str, str]:
+    """Write picture and report; return their paths for JSON. Raises WorkFailedError."""
+    from cdpr_tools.calibrate.report.page import write_report  # noqa: PLC0415
+    from cdpr_tools.calibrate.report.picture import found_figure  # noqa: PLC0415  # slow to load
+
+    report, path = folder / _REPORT, folder / _PICTURE
+    advice = dict.fromkeys(one.advice for one in outcome.open_directions)
+    next_steps = [*advice, outcome.advice(), *more]
+    write_report(report, outcome, data, judged, next_steps, images)
+    try:
+        found_figure(outcome).savefig(path, format="png")
+    except OSError as error:
+        raise WorkFailedError(f"{path}: cannot be written: {error.strerror}") from error
+    return {"picture": str(path), "report": str(report)}
+
+
+def _take_over(
+    outcome: Outcome, raw_data: str, simulated: bool
+) -> tuple[GeometryCalibration, Path]:
+    """Put a good calibration in force, if the robot can work with it; raises ProfileError."""
+    robot = outcome.robot
+    before = "" if simulated else distrust(robot.profile)
+    found = calibration_of(
+        outcome, next_version(robot), raw_data, simulated=simulated, distrusted_before=before
+    )
+    refuse_impossible(found.applied(robot))
+    path = take_over(robot, found)
+    if not simulated:
+        mark_calibrated(robot.profile, f"calibration {found.version} ({found.identity})")
+    return found, path
+
+
+def distrust_again(robot: Robot) -> None:
+    """Have the geometry not believed where it was not before the calibration in force."""
+    try:
+        known = in_force(robot)
+    except ProfileError:
+        mark_not_calibrated(robot.profile, "a calibration that cannot be read was taken back")
+        return
+    if known is not None and known.distrusted_before:
+        why = f"calibration {known.version} was taken back; before it: {known.distrusted_before}"
+        mark_not_calibrated(robot.profile, why)
+
+
+def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:
+    """Return the outcome for people."""
+    told = outcome.told()
+    lines = [f"{outcome.robot.name}: {told['poses']} poses, in the frame of {told['frame']}"]
+    if data.left_out:
+        lines.append(f"{len(data.left_out)} poses were refused, the last: {data.left_out[-1]}")
+    lines += [
+        f"  {row['name']:26}{row['change']:+9.2f} ± {row['std']:.2f} {row['unit']}"
+        for row in told["parameters"]
+    ]
+    return lines + outcome.verdict()

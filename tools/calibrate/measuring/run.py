@@ -1,0 +1,311 @@
+"""The measuring of a calibration: each pose is kept at once, and a run that ended goes on later."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydantic import Field
+
+from cdpr_drivers.errors import DriverError
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
+from cdpr_profiles.reading.reader import Profile, read_json_model
+from cdpr_rt.calibration.markers.coverage import coverage
+from cdpr_rt.calibration.outcome import Outcome
+from cdpr_rt.calibration.readings.camera_data import CameraSetup
+from cdpr_rt.calibration.readings.data import CalibrationData, load_data
+from cdpr_rt.calibration.verification.held_out import held_out
+from cdpr_rt.core.clock import Clock
+from cdpr_rt.errors import ControlError
+from cdpr_rt.procedures.calibration.measure_poses import (
+    Measured,
+    PoseRefusedError,
+    measure_poses,
+    read_pose,
+)
+from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
+from cdpr_tools.calibrate.measuring.places import Places, chosen_places
+from cdpr_tools.calibrate.measuring.rig import RigOperator, StoppedError, simulated_rig
+from cdpr_tools.calibrate.report.judged import Judged, judged
+from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
+from cdpr_tools.output import Advance, Output
+from cdpr_tools.signals import stop_on_signals
+
+if TYPE_CHECKING:
+    from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
+
+DATA, SETTINGS, OUTSIDE, IMAGES = "data.json", "run.json", "outside.json", "images"
+_MOST_POSES = 100
+"""Where nobody has said how many."""
+_FIRST_S, _HELD_OUT_S = 8.0, 3.0
+_SPARE = 10
+"""Further places, for those that the robot refuses."""
+
+Source = Literal["camera", "scanner", "redundancy", "points"]
+
+
+class RunSettings(Profile):
+    """What a run was asked for; one that goes on does the same."""
+
+    robot: str
+    plant: str | None
+    source: Source
+    poses: int | None = Field(ge=1)
+    """None: as many as bring something."""
+    seed: int = Field(ge=0)
+
+    def save(self, folder: Path) -> None:
+        """Write them into the folder of the run; raises ProfileError."""
+        write_text(folder / SETTINGS, self.model_dump_json(indent=1) + "\n")
+
+    @classmethod
+    def load(cls, folder: Path) -> RunSettings:
+        """Read them; raises ProfileError."""
+        return read_json_model(folder / SETTINGS, cls)
+
+
+Enough = Callable[[CalibrationData], str | None]
+"""Is asked after each batch; says why no more poses are needed, None where some are."""
+
+
+@dataclass
+class Kept:
+    """What a run has read, in the files of its folder; on pose after pose these are complete."""
+
+    folder: Path
+    data: CalibrationData
+    outside: list[OutsidePose] = field(default_factory=list)
+
+    @classmethod
+    def new(cls, folder: Path, robot: Robot, camera: CameraSetup | None) -> Kept:
+        """Return what has read nothing yet."""
+        data = CalibrationData(
+            robot=robot.profile,
+            geometry_sha256=geometry_sha256(robot),
+            simulated=True,
+            date=datetime.now(UTC).isoformat(timespec="seconds"),
+            camera=camera,
+            poses=(),
+        )
+        return cls(folder, data)
+
+    @classmethod
+    def of_before(cls, folder: Path, robot: Robot) -> Kept:
+        """Return what a run has left that ended early; raises ProfileError, BadInputError."""
+        data = load_data(folder / DATA)
+        if data.geometry_sha256 != geometry_sha256(robot):
+            raise BadInputError(
+                f"{folder / DATA}: of another state of {robot.profile!r}; allowed: --overwrite"
+            )
+        outside = list(OutsidePoses.load_file(folder / OUTSIDE).poses)[: len(data.poses)]
+        # killed between the two files: what was read without the other is not known to belong
+        return cls(folder, data.model_copy(update={"poses": data.poses[: len(outside)]}), outside)
+
+    def keep(self, measured: Measured, restarts: tuple[int, ...], outside: OutsidePose) -> None:
+        """Write what there is now, with another pose; raises ProfileError."""
+        self.outside.append(outside)
+        OutsidePoses(poses=tuple(self.outside)).save(self.folder / OUTSIDE)
+        self.data = self.data.model_copy(
+            update={"poses": tuple(measured.readings), "restarts": restarts}
+        )
+        self.save(measured)
+
+    def save(self, measured: Measured) -> None:
+        """Write what there is now, where no pose has been read since; raises ProfileError."""
+        self.data = self.data.model_copy(
+            update={"left_out": tuple(measured.refused), "tried": tuple(measured.tried)}
+        )
+        self.data.save(self.folder / DATA)
+
+
+def measure(
+    out: Output, robot: Robot, settings: RunSettings, kept: Kept, enough: Enough
+) -> CalibrationData:
+    """Measure what is missing, on a simulator of its own; return all.
+
+    What is read is kept whatever ends it, and the error says how to go on. Raises what the robot
+    and its camera do, WorkFailedError where somebody stops it.
+    """
+    wanted = settings.poses or _MOST_POSES
+    if len(kept.data.poses) >= wanted:
+        return kept.data
+    with out.stage("choosing poses"):
+        places = chosen_places(robot, wanted + _SPARE, settings.seed)
+    plant = None if settings.plant is None else Path(settings.plant)
+
+    def camera(url: str, clock: Clock) -> PoseCamera:
+        from cdpr_tools.calibrate.measuring.pose_camera import (  # noqa: PLC0415  # needs an extra
+            PoseCamera,
+        )
+
+        setup = kept.data.camera
+        assert setup is not None  # of a run with a camera
+        images = kept.folder / IMAGES
+        return PoseCamera(url, clock, setup.intrinsics, setup.sheets, images, out.note)
+
+    try:
+        with (
+            stop_on_signals("the robot is brought to rest and switched off") as stop,
+            ExitStack() as stack,
+        ):
+            with out.stage(f"{robot.profile}: starting the simulated robot"):
+                operator = stack.enter_context(
+                    simulated_rig(
+                        str(robot.path),
+                        plant=plant,
+                        scanner=settings.source == "scanner",
+                        camera=camera if settings.source == "camera" else None,
+                        stop=stop,
+                    )
+                )
+            up_to = "" if settings.poses else "up to "
+            advance = stack.enter_context(
+                out.progress(f"reading {up_to}{wanted} poses", float(wanted))
+            )
+            _Measuring(out, operator, kept, wanted, advance).go(
+                robot, places, enough if settings.poses is None else _told_only(enough)
+            )
+    except StoppedError:
+        raise WorkFailedError(f"stopped; {_going_on(robot, kept)}") from None
+    except (CommandError, ControlError, DriverError) as error:
+        error.add_note(_going_on(robot, kept))
+        raise
+    return kept.data
+
+
+def _told_only(enough: Enough) -> Enough:
+    """Return what tells what is wrong and never has enough: somebody has said how many."""
+
+    def asked(data: CalibrationData) -> str | None:
+        enough(data)
+        return None
+
+    return asked
+
+
+def judge_of(robot: Robot, settings: RunSettings, folder: Path) -> Callable[[Outcome], Judged]:
+    """Return what compares the outcome of a run with what its simulator knows."""
+
+    def judge(outcome: Outcome) -> Judged:
+        plant = None if settings.plant is None else Path(settings.plant)
+        return judged(robot, plant, outcome, OutsidePoses.load_file(folder / OUTSIDE))
+
+    return judge
+
+
+def judge_of_folder(robot: Robot, folder: Path) -> Callable[[Outcome], Judged] | None:
+    """Return what compares an outcome of a run's folder; None of one that holds readings alone."""
+    if not (folder / SETTINGS).exists() or not (folder / OUTSIDE).exists():
+        return None
+    return judge_of(robot, RunSettings.load(folder), folder)
+
+
+def _going_on(robot: Robot, kept: Kept) -> str:
+    if not kept.data.poses:
+        return "nothing was read yet"
+    return (
+        f"{len(kept.data.poses)} poses are kept in {kept.folder}; go on with: cdpr calibrate run "
+        f"{robot.reference} --resume --out {kept.folder}"
+    )
+
+
+def _scanned_s(pose: int) -> float:
+    """Return how much longer the scanner measures a pose, counted from 0, that it judges by.
+
+    All errors are counted from the first one, so that its own is in all of them.
+    """
+    if pose == 0:
+        return _FIRST_S
+    return _HELD_OUT_S if held_out(pose + 1)[pose] else 0.0
+
+
+class _Measuring:
+    """A robot that stands ready at home, and what is read of it from there."""
+
+    def __init__(
+        self, out: Output, operator: RigOperator, kept: Kept, wanted: int, advance: Advance
+    ) -> None:
+        self._out, self._operator, self._kept = out, operator, kept
+        self._wanted, self._advance = wanted, advance
+        before = kept.data
+        self._restarts = before.restarts
+        if before.poses:
+            self._restarts += (len(before.poses),)
+            out.note(f"going on after {len(before.poses)} poses: home is read again first")
+        self._measured = Measured(
+            self._keep, list(before.poses), list(before.left_out), list(before.tried)
+        )
+        operator.number = len(before.poses) + 1
+
+    def _keep(self) -> None:
+        operator, count = self._operator, len(self._measured.readings)
+        outside = operator.outside()
+        try:
+            if longer_s := _scanned_s(count - 1):
+                operator.stay(longer_s)
+                outside = operator.outside()
+        finally:  # the pose is read, whatever ends the stay
+            self._kept.keep(self._measured, self._restarts, outside)
+        operator.number = count + 1
+        self._advance(float(count))
+
+    def go(self, robot: Robot, places: Places, enough: Enough) -> None:
+        """Read home, then a batch of places after another until it is enough."""
+        try:
+            self._go(robot, places, enough)
+        finally:
+            if self._kept.data.poses:
+                self._kept.save(self._measured)
+
+    def _go(self, robot: Robot, places: Places, enough: Enough) -> None:
+        operator, measured = self._operator, self._measured
+        done = {reading.target for reading in measured.readings} | set(measured.tried)
+        try:
+            measured.add(read_pose(operator, operator.tighten()))
+        except PoseRefusedError as error:
+            raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
+        self._look_at_home()
+        for batch in places.batches():
+            left = np.array([place for place in batch if tuple(place.tolist()) not in done])
+            left = left[: self._wanted - len(measured.readings)]
+            measure_poses(operator, left, places.middle, measured, self._out)
+            if len(measured.readings) >= self._wanted:
+                return
+            if len(left) and self._judged(enough):
+                return
+        self._out.note(f"{len(measured.readings)} poses only: all others were refused")
+
+    def _look_at_home(self) -> None:
+        """Say what the camera lacks before anything moves far; raises WorkFailedError."""
+        seen, setup = self._measured.readings[-1].image, self._kept.data.camera
+        if seen is None or setup is None or seen.problem is not None:
+            return  # what is wrong with an image is told already; the next one may be better
+        if not seen.markers:
+            raise WorkFailedError(
+                f"at home the camera sees no marker of {setup.sheets.dictionary}: was another set "
+                "printed, or does the camera not look at the sheets?"
+            )
+        self._out.note(f"at home the camera sees {len(seen.markers)} markers")
+
+    def _judged(self, enough: Enough) -> bool:
+        """Tell what the poses so far are good for; return whether no more are needed."""
+        data = self._kept.data
+        if data.camera is not None:
+            cover = coverage(data.sightings(), data.camera.sheets.placed)
+            texts = list(cover.advice)
+            if cover.share_seen is not None:
+                texts.insert(0, f"{cover.share_seen:.0%} of the markers seen")
+            for text in texts:
+                self._out.note(f"after {len(data.poses)} poses: {text}")
+            if not any(len(island) > 1 for island in cover.islands):
+                raise WorkFailedError("no image shows two markers together: put them closer")
+        why = enough(data)
+        if why is not None:
+            self._out.note(why)
+        return why is not None

@@ -1,0 +1,1 @@
+"""How good a calibration is: judged beside what a simulator knows, drawn and reported."""

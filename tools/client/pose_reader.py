@@ -1,0 +1,77 @@
+"""Lengths and tensions of a platform that a daemon holds, read from its status."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.procedures.calibration.measure_poses import Look
+from cdpr_tools.client.client import Daemon
+from cdpr_tools.errors import WorkFailedError
+
+_ASK_S = 0.02
+_KEYS = ("cable_length_m", "tension_N", "position_rad")
+
+
+class DaemonReader:
+    """Reads a robot that a daemon runs, by its status; a `PoseReader`. Moves nothing.
+
+    `image` is what takes one, given what lets time pass. All raise WorkFailedError where the
+    platform is not held on its cables, as `Daemon.get` does otherwise.
+    """
+
+    def __init__(
+        self,
+        daemon: Daemon,
+        m_per_rad: FloatArray,
+        image: Callable[[Callable[[float], None]], Sighting | None],
+    ) -> None:
+        self._daemon, self._m_per_rad, self._image = daemon, m_per_rad, image
+        self.counted_m = np.zeros(len(m_per_rad))
+        """The lengths at which the motors' angles are zero, (n,), as last read."""
+
+    def place(self) -> FloatArray:
+        """Return where the platform is, (d,)."""
+        told = self._status()["program_progress"]
+        return np.array([*told["position_m"], *told.get("rotation_rad", ())])
+
+    def stay(self, seconds: float) -> None:
+        """Let bus time pass."""
+        self._rows(seconds)
+
+    def look(self, seconds: float) -> Look:
+        """Let bus time pass and return what was read."""
+        lengths, tensions, angles = self._rows(seconds).swapaxes(0, 1)
+        if not np.isfinite([lengths, tensions]).all():
+            raise WorkFailedError("not all lengths and tensions are known; run tighten first")
+        self.counted_m = (lengths - self._m_per_rad * angles).mean(axis=0)
+        return Look(lengths, tensions)
+
+    def image(self) -> Sighting | None:
+        """Return what the camera sees, None without one."""
+        return self._image(self.stay)
+
+    def _rows(self, seconds: float) -> FloatArray:
+        """Return lengths, tensions and angles (k, 3, n), two at least, while bus time passes."""
+        status = self._status()
+        begun_s = status["cycle"]["time_s"]
+        rows: list[list[list[float | None]]] = []
+        while status["cycle"]["time_s"] < begun_s + seconds or len(rows) < 2:
+            rows.append([[axis[key] for axis in status["axes"]] for key in _KEYS])
+            time.sleep(_ASK_S)
+            status = self._status()
+        return np.array(rows, float)
+
+    def _status(self) -> dict[str, Any]:
+        status = self._daemon.get("/status")
+        if status["state"] != "active" or "position_m" not in status["program_progress"]:
+            raise WorkFailedError(
+                f"the platform is not held on its cables ({status['state']}, "
+                f"{status['program']}); allowed: after `cdpr enable`, `cdpr tighten`, `cdpr move`"
+            )
+        return status

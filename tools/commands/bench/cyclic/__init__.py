@@ -1,0 +1,1 @@
+"""`cdpr bench` of buses, cycles and the loop."""

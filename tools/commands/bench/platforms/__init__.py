@@ -1,0 +1,1 @@
+"""`cdpr bench` of platforms: kinematics, tensions, control, paths, workspace."""

@@ -1,0 +1,1 @@
+"""`cdpr calibrate`, `camera` and `markers`."""

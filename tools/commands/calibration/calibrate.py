@@ -1,0 +1,348 @@
+"""`cdpr calibrate`: a robot's geometry from its own cables and from measured points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import undo as take_back
+from cdpr_tools.commands.calibration.calibrate_read import read
+from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption
+from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.output import Output
+
+if TYPE_CHECKING:
+    from cdpr_rt.calibration.estimation.parameters import CableGeometry
+    from cdpr_tools.calibrate.measuring.run import Source
+
+app = typer.Typer(
+    name="calibrate",
+    help="Calibrate a robot's geometry, drums and elongation.",
+    no_args_is_help=True,
+)
+
+_Robot = Annotated[
+    str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
+]
+_Points = Annotated[
+    Path | None,
+    typer.Option(
+        help="Measured positions, CSV with these columns: pose (from 1),x_mm,y_mm,z_mm,sigma_mm.",
+        metavar="FILE",
+    ),
+]
+_Identify = Annotated[
+    str | None,
+    typer.Option(
+        help="What is identified: exit,offset,drum,elongation where left out; anchor, pulley too.",
+        metavar="LIST",
+    ),
+]
+_KnownMm = Annotated[
+    float | None,
+    typer.Option(
+        "--known-mm", min=0.1, max=500.0,
+        help="How well the exit points of the robot's file are known, one standard deviation; as "
+        "with a tape where left out.",
+    ),
+]  # fmt: skip
+_Plant = Annotated[
+    Path | None,
+    typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
+]
+_DryRun = Annotated[bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")]
+_DRAWS, _FEW = 200, 5
+
+
+@app.callback()
+def _group() -> None:
+    """Calibrate a robot's geometry, drums and elongation."""
+
+
+app.command()(read)
+
+
+@app.command(name="fit")
+def fit_data(
+    robot: _Robot,
+    data: Annotated[
+        Path,
+        typer.Option(help="Folder of a run, or readings as its data.json.", metavar="FOLDER|FILE"),
+    ],
+    points: _Points = None,
+    identify: _Identify = None,
+    known_mm: _KnownMm = None,
+    out_dir: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
+    dry_run: _DryRun = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify from what was measured before, as in a run that is complete; nothing moves.
+
+    Of a run's folder the poses not used are compared with its simulator's scanner and truth as
+    well. Ends with status 1, and takes nothing over, where the result is not good.
+    """
+    from cdpr_rt.calibration.readings.data import load_data  # noqa: PLC0415
+    from cdpr_tools.calibrate.finish import finish  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    profile = load_robot(robot)
+    judge = None
+    if data.is_dir():
+        judge = runs.judge_of_folder(profile, data)
+        data /= runs.DATA
+    finish(
+        *(out, profile, load_data(data), points, _geometry(profile, identify, known_mm)),
+        *(data, out_dir or data.parent, dry_run, judge),
+    )
+
+
+@app.command()
+def run(
+    robot: _Robot,
+    camera: Annotated[
+        bool,
+        typer.Option(
+            "--camera", help="With the camera on the platform; so without any of these in space."
+        ),
+    ] = False,
+    redundancy: Annotated[
+        bool, typer.Option("--redundancy", help="From encoder lengths and tensions alone.")
+    ] = False,
+    scanner: Annotated[
+        bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
+    ] = False,
+    points: _Points = None,
+    poses: Annotated[
+        int | None,
+        typer.Option(
+            min=15,
+            max=1000,
+            help="Poses to go to; else up to 100, while more bring something.",
+        ),
+    ] = None,
+    plant: _Plant = None,
+    intrinsics: Annotated[
+        Path | None,
+        typer.Option(help="Of the camera; else found by a board first.", metavar="FILE"),
+    ] = None,
+    markers: Annotated[
+        Path | None,
+        typer.Option(help="Sizes of the sheets, known places; else as ordered.", metavar="FILE"),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the poses.")] = 1,
+    identify: _Identify = None,
+    known_mm: _KnownMm = None,
+    out_dir: Annotated[
+        Path | None, typer.Option("--out", help="Folder for data, images, result and report.")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what a run has left that ended early.")
+    ] = False,
+    overwrite: OverwriteOption = False,
+    dry_run: _DryRun = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Move a simulated robot through poses, read its cables, identify, verify and take over.
+
+    It runs on a simulator of its own, over the bus, from home and with the geometry of its file.
+    Ends with status 1, and takes nothing over, where the result is not good.
+    """
+    out = Output(as_json)
+    with out.stage("looking at the robot's file"):
+        from cdpr_rt.calibration.readings.data import load_points  # noqa: PLC0415
+        from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
+        from cdpr_tools.calibrate.finish import enough, finish  # noqa: PLC0415
+        from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
+
+        profile = load_robot(robot)
+        refuse_impossible(profile)
+        geometry = _geometry(profile, identify, known_mm)
+        if points is not None:
+            load_points(points)
+
+    given: dict[runs.Source, bool] = {
+        "camera": camera,
+        "redundancy": redundancy,
+        "scanner": scanner,
+        "points": points is not None,
+    }
+
+    folder = out_dir or Path("out") / f"calibrate-{profile.profile}"
+    if resume:
+        settings = runs.RunSettings.load(folder)
+        source = settings.source
+        settings = settings.model_copy(update={"poses": poses or settings.poses})
+        kept = runs.Kept.of_before(folder, profile)
+    else:
+        _require_new(folder, runs.DATA, overwrite)
+        source = _source(profile, [name for name, asked in given.items() if asked])
+        settings = runs.RunSettings(
+            robot=profile.profile,
+            plant=None if plant is None else str(plant.resolve()),
+            source=source,
+            poses=poses,
+            seed=seed,
+        )
+        setup = None
+        if source == "camera":
+            from cdpr_tools.calibrate.measuring.camera_setup import camera_setup  # noqa: PLC0415
+
+            setup = camera_setup(out, plant, intrinsics, markers)
+        settings.save(folder)
+        kept = runs.Kept.new(folder, profile, setup)
+    if source == "points" and points is None:
+        raise BadInputError("--points: the run that goes on was begun with it; allowed: the file")
+    data = runs.measure(out, profile, settings, kept, enough(out, profile, points, geometry))
+    judge = runs.judge_of(profile, settings, folder)
+    finish(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, judge)
+
+
+def _source(robot: Robot, asked: list[Source]) -> Source:
+    """Return what a run is to use besides lengths and tensions; raises BadInputError."""
+    if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
+        return "camera"
+    if len(asked) != 1:
+        raise BadInputError("give one of --camera, --redundancy, --scanner and --points")
+    if asked[0] == "camera" and robot.platform is not None and len(robot.platform.controlled) < 6:
+        raise BadInputError(
+            f"--camera: {robot.profile} does not turn its platform about two axes, which is what "
+            "tells where the camera sits on it; allowed: --scanner, --points, --redundancy"
+        )
+    return asked[0]
+
+
+def _require_new(folder: Path, name: str, overwrite: bool) -> None:
+    if (folder / name).exists() and not overwrite:
+        raise BadInputError(
+            f"{folder / name}: is there already; allowed: --resume to go on with it, --overwrite"
+        )
+
+
+@app.command()
+def check(
+    robot: _Robot,
+    scanner: Annotated[
+        bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
+    ] = False,
+    plant: _Plant = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the poses.")] = 1,
+    out_dir: Annotated[
+        Path | None, typer.Option("--out", help="Folder for the readings, check.json.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Take a calibrated simulated robot to ten poses and say whether it is as it was.
+
+    Ends with status 1 where it has moved: a cable, a drum or an exit point has changed so much
+    that it matters.
+    """
+    out = Output(as_json)
+    with out.stage("looking at the robot's file"):
+        from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
+        from cdpr_tools.calibrate import check as checks  # noqa: PLC0415  # slow to load
+
+        profile = load_robot(robot)
+        refuse_impossible(profile)
+    folder = out_dir or Path("out") / f"check-{profile.profile}"
+    found = checks.checked(out, profile, plant, scanner, seed, folder)
+    out.say(*checks.lines(found, profile))
+    out.result({"ok": not found.moved, **checks.as_json(found), "data": folder / checks.CHECK})
+    if found.moved:
+        raise typer.Exit(WorkFailedError.exit_status)
+
+
+@app.command()
+def undo(robot: _Robot, as_json: JsonOption = False) -> None:
+    """Take back the calibration in force: the one before it, or the robot's file, counts again.
+
+    A robot that runs goes on as it is; its next start takes it.
+    """
+    out = Output(as_json)
+    profile = load_robot(robot)
+    from cdpr_tools.calibrate.finish import distrust_again  # noqa: PLC0415  # slow to load
+
+    distrust_again(profile)
+    before = take_back(profile)
+    if before is None:
+        out.say(f"{profile.profile}: the geometry of {profile.path} counts from the next start on")
+    else:
+        out.say(
+            f"{profile.profile}: calibration {before.version} of {before.date:%Y-%m-%d %H:%M} "
+            f"({before.identity}) counts from the next start on"
+        )
+    out.result({"ok": True, "in_force": None if before is None else before.summary()})
+
+
+@app.command()
+def study(
+    robot: Annotated[
+        str, typer.Argument(help="A robot whose platform has six directions.", metavar="ROBOT")
+    ] = "spatial-8",
+    draws: Annotated[
+        int | None,
+        typer.Option(
+            min=2, max=100_000, help=f"Trials of each case; else {_DRAWS}, of --ablation {_FEW}."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of poses and noise.")] = 1,
+    png: PngOption = None,
+    ablation: Annotated[
+        bool,
+        typer.Option(
+            "--ablation", help="Tell instead what makes the error of a calibration with a camera."
+        ),
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell how errors of measurement become errors of the geometry: by a model and by trial.
+
+    Table 3.1 and figures 3.7 and 3.8 of the thesis for a robot of ours, on all cores. With
+    --ablation: what made the thesis' 31 mm, and what each improvement takes off.
+    """
+    from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    if ablation:
+        _ablation(out, robot, draws or _FEW, seed, png)
+        return
+    draws = draws or _DRAWS
+    with out.progress("cases", float(len(studies.cases()))) as advance:
+        rows = studies.study(robot, draws, seed, advance)
+    out.say(*studies.lines(rows))
+    if png is not None:
+        try:
+            studies.draw(png, rows)
+        except OSError as error:
+            raise BadInputError(f"--png {png}: cannot be written: {error.strerror}") from error
+    out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, "cases": rows})
+
+
+def _ablation(out: Output, robot: str, draws: int, seed: int, png: Path | None) -> None:
+    try:
+        from cdpr_tools.calibrate import ablation as ablations  # noqa: PLC0415  # slow to load
+    except ModuleNotFoundError as error:
+        raise BadInputError(
+            f"--ablation needs {error.name}, which comes with: pip install 'cdpr-rt[camera]'"
+        ) from None
+    if png is not None:
+        raise BadInputError("--png and --ablation: give one of them")
+    with out.progress("trials", float(ablations.count(draws))) as advance:
+        tables = ablations.ablation(robot, draws, seed, advance)
+    out.say(*ablations.lines(tables))
+    out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, **tables})
+
+
+def _geometry(robot: Robot, identify: str | None, known_mm: float | None) -> CableGeometry:
+    from cdpr_rt.calibration.estimation.parameters import (  # noqa: PLC0415  # slow to load
+        USUAL,
+        CableGeometry,
+        Knowledge,
+    )
+
+    known = Knowledge() if known_mm is None else Knowledge(exit_m=1e-3 * known_mm)
+    kinds = USUAL if identify is None else tuple(part.strip() for part in identify.split(","))
+    return CableGeometry.of(robot, kinds, known)

@@ -1,0 +1,37 @@
+"""`cdpr drive`: one drive on the bus."""
+
+from __future__ import annotations
+
+import typer
+
+from cdpr_tools.command_group import group_of
+
+MODULES = {
+    "drive.drive": {
+        "info": "Say who the drive is and how it is; reads only.",
+        "enable": "Enable the drive in torque mode without torque for a while, then switch it off.",
+        "reset": "Acknowledge the drive's fault; nothing is enabled by it.",
+        "home": "Find the encoder index by homing; the motor turns by up to a turn.",
+        "jog": "Turn the motor at a constant speed under the PID, then switch it off.",
+        "od": "Read or write an object of the drive's dictionary.",
+    },
+    "drive.drive_setup": {
+        "lss": "Find drives by LSS (CiA 305) and give one a node id and a bit rate.",
+    },
+    "drive.drive_import": {
+        "import": "Make a drive profile from an EDS or DCF, and list what it could not know.",
+    },
+    "drive.drive_configure": {
+        "configure": "Write into the drive what differs from its profile; nothing is enabled.",
+        "errors": "Show the errors that a drive remembers (1003h), the newest first; reads only.",
+    },
+}
+
+app = typer.Typer(
+    name="drive", cls=group_of(MODULES), help="One drive on the bus.", no_args_is_help=True
+)
+
+
+@app.callback()
+def _group() -> None:
+    """One drive on the bus."""

@@ -1,0 +1,1 @@
+"""`cdpr robot`, `path` and `poses`."""

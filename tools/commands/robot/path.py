@@ -1,0 +1,148 @@
+"""`cdpr path`: look at a path before it is followed, follow it, take it up again."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.errors import ProfileError
+from cdpr_tools.commands.options import JsonOption, KeyFileOption, SocketOption, UrlOption
+from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.output import Output
+
+app = typer.Typer()
+
+
+@app.command()
+def path(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Way points (.toml, .csv) or G-code (.nc, .ngc, .gcode, .tap, .cnc).",
+            metavar="[FILE]",
+        ),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot",
+            help="Robot profile, a name or a file, or the name of a daemon's robot; with --run, "
+            "--resume and --back which daemon's, where several run.",
+        ),
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw it into this file, a PNG.")] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option(metavar="'X Y Z'", help="Where G-code's zero is in the room, in mm."),
+    ] = None,
+    blend: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=1000.0,
+            help="Within so many mm G-code's corners may be cut, where it has no G61 or G64 P.",
+        ),
+    ] = 1.0,
+    ignore: Annotated[
+        str, typer.Option(metavar="'S T M3 ...'", help="Words of G-code that are skipped.")
+    ] = "",
+    run: Annotated[
+        bool, typer.Option("--run", help="Follow it on the running daemon; Ctrl-C holds on it.")
+    ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Take up the path that was left, where it was left.")
+    ] = False,
+    back: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="Step back by so many mm along the path that was left."),
+    ] = None,
+    feed: Annotated[
+        float, typer.Option(min=1.0, max=100.0, help="Percent of the planned speed.")
+    ] = 100.0,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Leave the plan to the robot's daemon, by a name.")
+    ] = False,
+    socket: SocketOption = None,
+    url: UrlOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Look at a path before it is followed, follow it, take it up again.
+
+    Ends with status 2 where the robot cannot follow it, with the first place named. With --run the
+    running daemon plans and follows it.
+    """  # fmt: skip
+    from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
+    from cdpr_tools.paths.options import PathOptions  # noqa: PLC0415  # slow to load
+
+    out, options = Output(as_json), PathOptions(origin, blend, ignore)
+    if hint := options.metres_hint():
+        out.note(hint)
+    follows = run or resume or back is not None
+    if sum((run, resume, back is not None)) > 1:
+        raise BadInputError("--run, --resume, --back: allowed: one of them")
+    looks = ["--picture"] * (picture is not None) + ["--keep"] * keep
+    if follows and looks:
+        raise BadInputError(f"{', '.join(looks)}: allowed: without --run, --resume and --back")
+    if (file is None) != (resume or back is not None):
+        raise BadInputError(
+            "FILE: allowed: a path's file, or none with --resume and --back, which go on with "
+            "the path that was left"
+        )
+    if follows:
+        where = following.Where(robot, socket, url, key_file)
+        if file is not None:
+            following.follow(where, out, file, options, 0.01 * feed)
+        else:
+            following.take_up(where, out, back, 0.01 * feed)
+        return
+    assert file is not None  # see above
+    if robot is None:
+        raise BadInputError("--robot: missing; allowed: a robot's name or file, or --run")
+    _preview(robot_called(robot), file, options, out, picture, keep)
+
+
+def robot_called(name: str) -> Robot:
+    """Return the robot of a profile's name or file, else the one that a daemon of this name runs.
+
+    Raises ProfileError.
+    """
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
+
+    try:
+        return load_calibrated(name)
+    except ProfileError:
+        if Path(name).suffix == ".toml":
+            raise
+        with suppress(CommandError, KeyError), open_daemon(name, None, None, None) as daemon:
+            return load_calibrated(str(daemon.get("/description")["reference"]))
+        raise
+
+
+def _preview(
+    robot: Robot, file: Path, options: Any, out: Output, picture: Path | None, keep: bool
+) -> None:
+    from cdpr_tools.paths import preview as previews  # noqa: PLC0415  # slow to load
+
+    with out.progress("planning", 10.0) as advance:
+        shown = previews.preview(robot, file, options, lambda _, part: advance(10.0 * part))
+    told = previews.figures(shown)
+    out.say(*previews.lines(shown, robot, told))
+    if picture is not None:
+        from cdpr_tools.paths.picture import draw_path  # noqa: PLC0415  # slow to load
+
+        try:
+            draw_path(shown, robot, picture)
+        except OSError as error:
+            raise BadInputError(f"--picture {picture}: {error.strerror}") from None
+        out.say(f"picture: {picture}")
+    if wrong := previews.obstacle_text(shown):
+        raise BadInputError(wrong)
+    if keep:
+        told["plan"] = previews.keep(shown, robot)
+    out.result({"ok": True, **told})

@@ -1,0 +1,176 @@
+"""`cdpr robot new|show|mark-calibrated`: describe a cable robot, and look at it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from shlex import quote
+from typing import Annotated
+
+import typer
+
+from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import load_calibrated
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import Platform
+from cdpr_rt.robots import checks
+from cdpr_rt.robots.calibration_state import mark_calibrated
+from cdpr_tools.calibrate.words import calibration_lines
+from cdpr_tools.commands.options import JsonOption, PngOption
+from cdpr_tools.errors import BAD_INPUT, BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.robots import new_robot, summary
+from cdpr_tools.robots.kinds import KINDS, SKETCH
+from cdpr_tools.robots.questions import Question
+
+app = typer.Typer()
+
+_Robot = Annotated[
+    str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
+]
+
+
+@app.command()
+def show(robot: _Robot, png: PngOption = None, as_json: JsonOption = False) -> None:
+    """Show a robot's platform, cables and workspace, and check whether it can work.
+
+    Ends with status 2 where something about it is impossible.
+    """
+    out = Output(as_json)
+    profile = load_calibrated(robot)
+    platform = profile.platform
+    if platform is None:
+        raise BadInputError(
+            f"{profile.path}: platform: this robot has none, its winches have nothing in common; "
+            f"`cdpr profiles show` tells what else there is"
+        )
+    with out.stage(f"{profile.profile}: reckoning tensions, control and what cannot work"):
+        figures = summary.figures(profile, platform)
+        found = checks.findings(profile)
+    out.say(*summary.lines(profile, platform, figures))
+    known = profile.calibration
+    figures["calibration"] = None if known is None else known.summary()
+    if known is not None:
+        out.say("", *calibration_lines(known, profile))
+    if png is not None:
+        _draw(profile, platform, png, out)
+    out.say("")
+    _say_findings(out, found)
+    if not found:
+        out.say("nothing to object to")
+    figures["findings"] = [
+        {"key": f.key, "text": f.text, "impossible": f.impossible} for f in found
+    ]
+    possible = not any(finding.impossible for finding in found)
+    out.result({"ok": possible, **figures})
+    if not possible:
+        raise typer.Exit(BAD_INPUT)
+
+
+@app.command("mark-calibrated")
+def mark_calibrated_(
+    robot: _Robot,
+    why: Annotated[str, typer.Option("--why", help="How the exit points in its file are known.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Say that a robot's geometry is as its file has it, as after its rails were moved."""
+    out = Output(as_json)
+    state = mark_calibrated(load_robot(robot).profile, why)
+    out.say(f"robot {state.robot}: calibrated since {state.date}: {state.why}")
+    out.result({"ok": True, "calibration": asdict(state)})
+
+
+@app.command()
+def new(
+    path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
+    answers: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="An answer beforehand; several times."),
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Take the defaults for all that is not answered.")
+    ] = False,
+    png: PngOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Ask what is to be known of a cable robot, and write its file.
+
+    It describes robots in a plane and in space, with 3 to 8 cables; the first question says which
+    kinds there are, and why each takes as many cables. Each question has a default, most of them
+    following from the answers before. Never writes over a file, nor one of a robot that cannot
+    work: that is refused with the answers as they were given, to be changed.
+    """
+    out = Output(as_json)
+    if path.exists():
+        raise BadInputError(f"{path}: is never written over; allowed: a file that is not there yet")
+    if path.suffix != ".toml" or not path.parent.is_dir():
+        raise BadInputError(f"{path}: allowed: NAME.toml in a folder that is there")
+    given = dict(_key_and_value(text) for text in answers or ())
+    if "kind" not in given and not yes:
+        typer.echo(SKETCH, err=True)
+        for name, what in KINDS.items():
+            typer.echo(f"{name:12} {what}", err=True)
+    typed = dict(given)
+
+    def ask(question: Question, default: str, problem: str) -> str:
+        typed[question.key] = _ask(question, default, problem)
+        return typed[question.key]
+
+    complete = new_robot.answers_of(path, given, _default if yes else ask)
+    try:
+        with out.stage("checking whether it can work"):
+            profile = new_robot.write_robot(complete, path)
+            found = checks.findings(profile)
+    except ProfileError as error:
+        options = " ".join(f"--set {quote(f'{key}={text}')}" for key, text in typed.items())
+        again = f"cdpr robot new {path} {options} --yes"
+        raise BadInputError(f"{error}\nnothing was written; with other answers: {again}") from None
+    out.say(f"{path}: written")
+    _say_findings(out, found)
+    if png is not None and profile.platform is not None:
+        _draw(profile, profile.platform, png, out)
+    out.say(f"next: cdpr robot show {path}")
+    out.say(f"      cdpr run {path} --bus simbus:      # on simulated winches")
+    out.result({"ok": True, "file": str(path)})
+
+
+def _key_and_value(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise BadInputError(f"--set {text}: allowed: KEY=VALUE")
+    return key.strip(), value.strip()
+
+
+def _default(question: Question, default: str, problem: str) -> str:
+    if problem:
+        raise BadInputError(f"{question.key}: {problem}; answer it with --set")
+    return default
+
+
+def _ask(question: Question, default: str, problem: str) -> str:
+    if problem:
+        typer.echo(f"  {problem}", err=True)
+    try:
+        return str(typer.prompt(question.text, default=default, err=True))
+    except typer.Abort:
+        typer.echo(err=True)  # the question's line is not at its end
+        raise BadInputError(
+            f"no answer to {question.key!r} (--yes takes the defaults); nothing was written"
+        ) from None
+
+
+def _say_findings(out: Output, found: list[checks.Finding]) -> None:
+    for finding in found:
+        kind = "impossible" if finding.impossible else "mind"
+        out.say(f"{kind}: {finding.key}: {finding.text}")
+
+
+def _draw(profile: Robot, platform: Platform, path: Path, out: Output) -> None:
+    from cdpr_tools.robots.picture import draw_robot  # noqa: PLC0415  # slow to load
+
+    try:
+        with out.stage(f"{path.name}: drawing the workspace"):
+            draw_robot(profile, platform, path)
+    except OSError as error:
+        raise BadInputError(f"--png {path}: {error.strerror}") from None
+    out.say(f"\npicture: {path}")

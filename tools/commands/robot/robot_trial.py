@@ -1,0 +1,121 @@
+"""`cdpr robot trial`: try a whole robot on its simulator and judge it by what was true."""
+
+from __future__ import annotations
+
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cdpr_profiles import load_robot
+from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import interrupted_by_sigterm
+
+
+class KindOfTrial(StrEnum):
+    """What the robot is to do."""
+
+    TARGETS = "targets"
+    LINE = "line"
+    RANDOM = "random"
+    STREAM = "stream"
+    PATH = "path"
+    TAPE = "tape"
+
+
+app = typer.Typer()
+
+
+@app.command()
+def trial(
+    robot: Annotated[
+        str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
+    ],
+    kind: Annotated[
+        KindOfTrial,
+        typer.Argument(
+            help="targets: accuracy at rest; line: lines and turns with compensation and without; "
+            "random: targets at the limits; path: lines, arcs and cut corners of a G-code file; "
+            "stream: a hand that leads through a bad network; "
+            "tape: exit points 20 to 50 mm off what the robot's file says."
+        ),
+    ],
+    plant: Annotated[
+        Path | None, typer.Option(help="Plant file: the truth about robot, cables and motors.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of all that is left to chance.")] = 1,
+    minutes: Annotated[
+        float | None,
+        typer.Option(min=0.05, max=600.0, help="How long, in the robot's time; not for line."),
+    ] = None,
+    speed_mm_s: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="Of lines, 10 where left out; of a path, what the robot has."),
+    ] = None,
+    commissioned: Annotated[
+        Path | None,
+        typer.Option(help="Folder that `cdpr commission ROBOT` has left.", metavar="DIR"),
+    ] = None,
+    without_compensation: Annotated[
+        bool,
+        typer.Option("--without-compensation", help="Use nothing that commissioning has learnt."),
+    ] = False,
+    out_dir: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="New folder for recordings, true poses and picture.", metavar="DIR"
+        ),
+    ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Judge what --out holds once more; nothing moves.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Try a robot on a simulator of its own; the figures come from what was recorded and true.
+
+    Every cycle crosses the simulated bus to the daemon's own loop, in bus time: ten minutes take a
+    few. Ends with exit status 0 once it has judged, whether all that is wanted is reached or not.
+    """
+    from cdpr_tools.trials import trial as trials  # noqa: PLC0415  # slow to load
+
+    out = Output(as_json)
+    if again:
+        if out_dir is None:
+            raise BadInputError("--again: needs --out, the folder of a trial that was run")
+        result = trials.judge(out_dir)
+        if result["kind"] != kind.value:
+            raise BadInputError(f"{out_dir}: holds a trial of {result['kind']}, not {kind}")
+    else:
+        profile = load_robot(robot)
+        name = f"trial-{profile.profile}-{kind}-{time.strftime('%Y%m%d-%H%M%S')}"
+        folder = out_dir or Path("out") / name
+        if folder.exists() and any(folder.iterdir()):
+            raise BadInputError(f"--out {folder}: holds something already; allowed: a new folder")
+        usual = trials.KINDS[kind]
+        if minutes is not None and usual.compares:
+            raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
+        if speed_mm_s is not None and kind not in (KindOfTrial.LINE, KindOfTrial.PATH):
+            raise BadInputError(f"--speed-mm-s {speed_mm_s:g}: allowed: with line and path")
+        if minutes is not None and kind is KindOfTrial.PATH:
+            raise BadInputError(f"--minutes {minutes:g}: {kind} lasts as long as it lasts")
+        if speed_mm_s is None and kind is KindOfTrial.PATH and profile.platform is not None:
+            speed_mm_s = 1e3 * profile.platform.speed_m_s
+        settings = trials.TrialSettings(
+            kind=kind.value,
+            robot=robot,
+            plant=None if plant is None else str(plant.absolute()),
+            seed=seed,
+            minutes=usual.minutes if minutes is None else minutes,
+            commissioned=None if commissioned is None else str(commissioned.absolute()),
+            compensated=not without_compensation,
+            **({} if speed_mm_s is None else {"speed_m_s": 1e-3 * speed_mm_s}),
+        )
+        with interrupted_by_sigterm():
+            result = trials.perform(settings, folder, out)
+    out.say(*result.pop("lines"))
+    out.say(f"picture: {result['picture']}")
+    out.result({"ok": True, **result})

@@ -1,0 +1,93 @@
+"""Say that kernels are compiled: the first time on a machine this takes minutes."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import sys
+import threading
+
+from typing_extensions import override
+
+NOTICE = "compiling"
+"""What each line begins with: a command that hides what its simulator says passes these on."""
+
+_EVERY_S = 5.0
+_LOG = logging.getLogger("cdpr.compiling")
+
+
+_NAME = "CDPR_COMPILING_TOLD"
+"""Variable with the name of a socket that has room for one: who gets in tells of compiling."""
+_sockets: list[socket.socket] = []
+"""Kept open as long as the process lasts."""
+
+
+def _first_to_tell() -> bool:
+    """Whether no other process of the command, and none that it has started, has told of it."""
+    visitor = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    visitor.setblocking(False)
+    try:
+        visitor.connect("\0" + os.environ.get(_NAME, ""))
+    except BlockingIOError:
+        return False
+    except OSError:  # the command that has started this process has ended
+        pass
+    finally:
+        visitor.close()  # it stays in the queue, which nobody serves
+    return True
+
+
+def _share_with_children() -> None:
+    """Make the socket that this process and those that it starts share."""
+    if _NAME in os.environ:
+        return
+    name, listener = f"cdpr-compiling-{os.getpid()}", socket.socket(socket.AF_UNIX)
+    try:
+        listener.bind("\0" + name)
+        listener.listen(0)
+    except OSError:
+        listener.close()
+        return
+    _sockets.append(listener)
+    os.environ[_NAME] = name
+
+
+class _Notice(logging.Handler):
+    """Says it once in a command, then how far each of its processes is; on standard error."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__()
+        self._what = what
+        self._kernels = 0
+        self._teller: threading.Thread | None = None
+
+    @override
+    def emit(self, record: logging.LogRecord) -> None:
+        self._kernels += 1
+        if self._kernels == 1 and _first_to_tell():
+            self._say("once for this machine; this may take minutes ...")
+        if self._teller is None:
+            self._teller = threading.Thread(target=self._go_on_telling, daemon=True)
+            self._teller.start()
+
+    def _go_on_telling(self) -> None:
+        """Tell now and then how many kernels there are, as long as there are more and more."""
+        noted, never = 0, threading.Event()
+        while noted != self._kernels:
+            noted = self._kernels
+            never.wait(_EVERY_S)
+            if noted != self._kernels:
+                self._say(f"goes on: {self._kernels} kernels so far ...")
+        self._teller = None
+
+    def _say(self, text: str) -> None:
+        print(f"{NOTICE} {self._what} {text}", file=sys.stderr, flush=True)
+
+
+def tell_of_compiling(what: str = "the numerics") -> None:
+    """Say it from now on where something has to be compiled, with `what` as the name of all."""
+    _share_with_children()
+    _LOG.handlers[:] = [_Notice(what)]
+    _LOG.propagate = False
+    _LOG.setLevel(logging.INFO)

@@ -1,0 +1,1 @@
+"""The daemon's processes, and the launcher above them."""

@@ -1,0 +1,1 @@
+"""What a trial has recorded, its figures and its pictures."""
