@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import time
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from test_daemon_kills import Ear
 
 import cdpr_profiles
 from cdpr_drivers.cia402 import POWER_OFF, state_of
+from cdpr_tools.composition.simulator import OwnSimulator
 
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots" / "planar-3.toml"
 PERIOD_S = 0.004
@@ -44,7 +46,14 @@ def hanging(tmp_path: Path) -> Iterator[RealDaemon]:
     robot = tmp_path / "planar.toml"
     period = f"sync_period_s = {PERIOD_S}"
     robot.write_text(SHIPPED.read_text().replace("sync_period_s = 0.001", period))
-    one = RealDaemon(tmp_path, "--no-record", robot=robot, env={"XDG_STATE_HOME": str(tmp_path)})
+    bus = f"simbus:second-{os.getpid()}"
+    env = {"XDG_STATE_HOME": str(tmp_path)}
+    simulator = OwnSimulator(str(robot), bus)  # outlives the daemon, so the fall is kept
+    try:
+        one = RealDaemon(tmp_path, "--no-record", robot=robot, bus=bus, env=env)
+    except BaseException:
+        simulator.stop()
+        raise
     try:
         for command in (("enable",), ("tighten",), ("move", "--to", "0", "1800")):
             done = cdpr(*command, *one.at)
@@ -52,6 +61,7 @@ def hanging(tmp_path: Path) -> Iterator[RealDaemon]:
         yield one
     finally:
         one.end()
+        simulator.stop()
 
 
 def test_a_platform_that_hangs_is_not_let_down_then(
@@ -65,7 +75,7 @@ def test_a_platform_that_hangs_is_not_let_down_then(
         ear.close()
     assert "\nthe power is taken at once" in hanging.errors()
     assert "; the platform was not let down" in hanging.errors()
-    kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar.json").read_text())
+    kept = json.loads((tmp_path / "cdpr-rt" / "lengths.planar.simulated.json").read_text())
     assert kept["stopped"] is False  # it has fallen since its lengths were seen last
     told_s, off_s, cycles = 0.0, 0.0, 0
     for node in NODES:

@@ -127,6 +127,7 @@ class BenchDaemon:
             robot=self.robot.reference,
             name="bench",
             buses=(self._bus,),
+            own_simulator=True,
             socket=self._folder / "bench.sock",
             record=self._folder / "recordings" if serving else None,
             live=0 if serving else None,
@@ -221,6 +222,7 @@ class BenchDaemon:
         assert self.loop is not None  # about to be entered
         deadline = time.monotonic() + _PATIENCE_S
         status: dict[str, Any] = {}
+        refusal = ""
         while time.monotonic() < deadline and not self.loop.end:
             self._keep_right_to_move()
             status = self.block.status()
@@ -230,11 +232,17 @@ class BenchDaemon:
                 not done or status["program_progress"].get("done")
             ):
                 return
-            if status.get("state") in ("fault", "inactive") and status.get("reason"):
+            refusal = self._refusal()
+            if refusal or (status.get("state") in ("fault", "inactive") and status.get("reason")):
                 break
             time.sleep(_TURN_S)
-        reason = self.loop.end or status.get("reason", "")
+        reason = self.loop.end or refusal or status.get("reason", "")
         raise WorkFailedError(f"{self.robot.name}: does not become {state}: {reason}")
+
+    def _refusal(self) -> str:
+        """Return why the loop has refused a command, "" where it has not."""
+        reply = self.block.take_reply()
+        return "" if reply is None or reply["ok"] else str(reply["text"])
 
 
 def _ends(platform: Platform) -> tuple[dict[str, Any], ...]:

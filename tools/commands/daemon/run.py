@@ -231,6 +231,7 @@ def settings_for(
         robot=robot.reference,
         name=robot.profile,
         buses=(f"simbus:own-{os.getpid()}",) if own else tuple(bus or ()),
+        own_simulator=own,
         read_only=read_only,
         safety_io=safety_io,
         tension_port=tension_port,

@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 from dataclasses import asdict
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -80,7 +81,7 @@ def main() -> int:
     simulated = any(url.is_simulated for url in robot_urls(robot, settings.buses).values())
     block.write_description({**description(robot, limits, parts), "simulated": simulated})
     if parts.last is not None and robot.platform is not None:
-        parts.last.path = state_path("lengths", robot.profile)
+        parts.last.path = _lengths_file(robot, settings, simulated=simulated)
         parts.last.geometry = robot.geometry_identity
         parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
     if parts.paths is not None:
@@ -102,6 +103,16 @@ def main() -> int:
         print(f"cdpr: {unconfirmed}", file=sys.stderr)
         return FAILED
     return DONE
+
+
+def _lengths_file(robot: Robot, settings: RunSettings, *, simulated: bool) -> Path | None:
+    """Return where the lengths of the last stop are kept, a simulation's apart from a robot's.
+
+    A simulator that begins with the daemon begins at home, whatever became of the one before.
+    """
+    if settings.own_simulator:
+        return None
+    return state_path("lengths", f"{robot.profile}.simulated" if simulated else robot.profile)
 
 
 def _open_paths(paths: PathStore, robot: Robot, block: SharedBlock) -> None:
