@@ -270,7 +270,7 @@ class Hub(Switch):
                 if not self._control(client, packet):
                     return
                 packet = client.receive(PACKET_BYTES)
-        except BlockingIOError:
+        except (BlockingIOError, ConnectionResetError):  # see `_serve_client`
             return
         except OSError as error:
             self._remove(client, f"lost: {error.strerror}")
@@ -292,6 +292,8 @@ class Hub(Switch):
                     return
         except BlockingIOError:
             return
+        except ConnectionResetError:
+            return  # it has left with frames unread: what it had sent comes after this, then the end
         except OSError as error:
             self._remove(client, f"lost: {error.strerror}")
 

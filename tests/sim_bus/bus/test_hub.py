@@ -46,6 +46,19 @@ def test_filters_are_those_of_raw_can(start_bus: StartBus) -> None:
     assert picky.recv_id() == 0x606
 
 
+def test_what_a_client_sends_last_arrives_though_it_left_frames_unread(start_bus: StartBus) -> None:
+    bus = start_bus()
+    other, hasty = bus.join(), bus.join()
+    other.send(0x181)
+    other.status()  # so that the frame waits for the hasty one, which does not read it
+    hasty.send(0x123)
+    hasty.send(0x124)
+    hasty.sock.close()
+    assert [other.recv_id(), other.recv_id()] == [0x123, 0x124]
+    while len(bus.hub._clients) > 1:
+        time.sleep(0.01)
+
+
 def test_long_filter_lists_come_in_parts(start_bus: StartBus) -> None:
     bus = start_bus()
     sender, picky = bus.join(), bus.join()
