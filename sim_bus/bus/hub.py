@@ -293,7 +293,7 @@ class Hub(Switch):
         except BlockingIOError:
             return
         except ConnectionResetError:
-            return  # it has left with frames unread: what it had sent comes after this, then the end
+            return  # it left with frames unread; what it had sent comes next, then the end
         except OSError as error:
             self._remove(client, f"lost: {error.strerror}")
 
