@@ -26,7 +26,7 @@ from cdpr_rt.programs.platform.platform_axes import PlatformHold, PlatformIdle, 
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.pose import PoseProgram
 from cdpr_rt.programs.platform.tightening.pretension import PretensionProgram
-from cdpr_rt.robots.platform_control import platform_control
+from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of
 
 _WARM_UP_CYCLES = 5
@@ -46,7 +46,7 @@ def platform_parts(
     if any(axis is not None for axis in model.compensation):
         known = Compensation(list(model.compensation), model.period_s)
     of_platform = platform_model_of(robot)
-    control = platform_control(
+    control = CableControl(
         of_platform, robot.axes, model.torque_Nm, model.period_s, known, learns=learns
     )
     return PlatformParts(

@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.robots.platform_control import platform_control
+from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import RESERVE, directions_of, platform_model_of
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
@@ -51,7 +51,7 @@ def test_the_reserve_is_a_part_of_what_tensions_can_keep_from_their_bounds() -> 
     middle = suspended.poses(box.mean(axis=0)[None])
     margins, _ = suspended.workspace(0.0, 0.0).margins(middle)
     assert 0.0 < suspended.reserve_N < 0.5 * margins[0] < RESERVE * 1990.0
-    control = platform_control(planar, PLANAR.axes, np.full(3, 4.5), 1e-3)
+    control = CableControl(planar, PLANAR.axes, np.full(3, 4.5), 1e-3)
     assert control.position == pytest.approx(planar.platform.home_m)
 
 

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from cdpr_tools.client.client import Daemon, open_daemon
 from cdpr_tools.client.starting import await_socket, await_start
+from cdpr_tools.commands.option_decorator import shares
 from cdpr_tools.commands.options import (
     JsonOption,
     KeyFileOption,
@@ -14,7 +15,6 @@ from cdpr_tools.commands.options import (
     SocketOption,
     UrlOption,
 )
-from cdpr_tools.commands.shared_options import shares
 from cdpr_tools.output import Output
 
 

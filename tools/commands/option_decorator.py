@@ -1,4 +1,4 @@
-"""Options that several commands share: declared, and made use of, in one place."""
+"""A decorator by which several commands share options: declared, and made use of, in one place."""
 
 from __future__ import annotations
 
