@@ -280,7 +280,7 @@ class RobotMachine:
 
     @property
     def safety(self) -> str:
-        """What guards the power besides the bus, for people."""
+        """Name of the safety I/O, which guards the power besides the bus; empty without one."""
         return "" if self._safety is None else self._safety.io.name
 
     @_as_machine_error

@@ -49,9 +49,9 @@ def _of_tensions(
 ) -> dict[str, Any]:
     statics, limits = statics_of(robot), limits_of(robot)
     home, points, turns = np.array(platform.home_m), statics.points(), statics.orientations
-    still = np.array([statics.reserve_N(points, 0.0, turn) for turn in turns])
+    still = np.array([statics.margin_N(points, 0.0, turn) for turn in turns])
     wanted = platform.acceleration_m_s2
-    moving = np.array([statics.reserve_N(points, wanted, turn) for turn in turns])
+    moving = np.array([statics.margin_N(points, wanted, turn) for turn in turns])
     lengths = np.array([statics.lengths(points, turn) for turn in turns])
     at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
     for figures, swing in zip(axes, worst_swings(platform), strict=True):
@@ -73,7 +73,7 @@ def _of_tensions(
         "held_share": float(np.mean(still >= 0.0)),
         "target_share": float(np.mean(moving >= statics.model.reserve_N)),
         "kept_for_control_N": statics.model.reserve_N,
-        "reserve_at_home_N": _finite(float(statics.reserve_N(home))),
+        "reserve_at_home_N": _finite(float(statics.margin_N(home))),
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
         "lowest_resonance_Hz": float(lowest_resonance_Hz(robot, points).min()),
@@ -248,7 +248,7 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     box = (points >= np.array(platform.workspace_min_m)).all(axis=-1)
     box &= (points <= np.array(platform.workspace_max_m)).all(axis=-1)
     statics = statics_of(robot)
-    cells[statics.reserve_N(points) >= 0.0] = "."
+    cells[statics.margin_N(points) >= 0.0] = "."
     cells[box] = np.where(statics.is_target(points[box], statics.orientations), "#", "!")
 
     def put(position_m: Sequence[float], letter: str) -> None:

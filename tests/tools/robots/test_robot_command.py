@@ -260,7 +260,7 @@ def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
     statics = statics_of(robot)
     spare = RESERVE * (statics.high_N - statics.low_N).min()
     points = statics.box.grid(21, 21)
-    assert statics.reserve_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
+    assert statics.margin_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
     again = cdpr_here("robot", "new", path, "--yes")
     assert again.returncode == 2 and "not there yet" in again.stderr
     assert load_robot(path) == robot
