@@ -162,7 +162,9 @@ def _tell_version(asked: bool) -> None:
 def _group(
     _version: Annotated[
         bool,
-        typer.Option("--version", callback=_tell_version, is_eager=True, help="Tell the version."),
+        typer.Option(
+            "--version", callback=_tell_version, is_eager=True, help="Show the version and exit."
+        ),
     ] = False,
 ) -> None:
     """Commission, run and simulate the winches of cable-driven parallel robots."""

@@ -123,7 +123,7 @@ def _taken(
         return None, ["nothing was taken over"]
     found, path = _take_over(outcome, raw_data, simulated)
     lines = [
-        f"calibration {found.version} ({found.identity}) counts from the next start on: {path}",
+        f"calibration {found.version} ({found.identity}) takes effect at the next start: {path}",
         f"take it back: cdpr calibrate undo {robot.reference}",
         f"see whether it still holds, in two minutes: cdpr calibrate check {robot.reference}",
     ]

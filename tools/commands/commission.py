@@ -100,7 +100,7 @@ def commission(
     ] = DEFAULT_BANDWIDTH_HZ,
     overwrite: OverwriteOption = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A rough look in a fifth of the time.")
+        bool, typer.Option("--quick", help="A rough result in a fifth of the time.")
     ] = False,
     index: IndexOption = "homing",
     safety_io: SafetyIoOption = None,

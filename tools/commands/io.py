@@ -201,7 +201,7 @@ def _keep(
     seconds: float,
     ended: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Set an output and keep the device's watchdog content for a while."""
+    """Set an output and feed the device's watchdog for a while."""
     link.feed_watchdog()  # a device whose watchdog has run out takes no outputs
     link.write(coil, on)
     deadline_s = link.clock.now_s + seconds

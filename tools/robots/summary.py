@@ -178,9 +178,10 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     reserve, kept = figures["reserve_in_motion_N"], figures["kept_for_control_N"]
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
-        f"tensions   hold it in {held:.0f} % of the box; targets are taken where they stay "
-        f"{kept:.0f} N from their",
-        f"           limits in motion, which the control needs: in {taken:.0f} % of it{least}",
+        f"tensions   hold the platform in {held:.0f} % of the box; targets are accepted in "
+        f"{taken:.0f} % of it,",
+        f"           where tensions in motion keep the {kept:.0f} N of the control from their "
+        f"limits{least}",
     ]
     lowest = figures["lowest_resonance_Hz"]
     lines.append(
@@ -201,7 +202,7 @@ def _loop_lines(loop: dict[str, float]) -> list[str]:
     return [
         f"loop       the platform's modes at {slowest:.1f} to {fastest:.1f} Hz; with cables up to "
         f"{_STIFFNESS_OFF:.0%} softer or stiffer",
-        f"           its gain may still be {loop['gain_margin']:.1f} times off, or its phase "
+        f"           gain margin {loop['gain_margin']:.1f}, phase margin "
         f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
     ]
 

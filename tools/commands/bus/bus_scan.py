@@ -35,7 +35,7 @@ def scan(
         Path | None, typer.Option("--profiles", help="Folder with drive profiles of your own.")
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Also while another master makes SDO transfers.")
+        bool, typer.Option("--force", help="Scan even while another master makes SDO transfers.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -45,7 +45,7 @@ def path(
         typer.Option(
             min=0.0,
             max=1000.0,
-            help="Within so many mm G-code's corners may be cut, where it has no G61 or G64 P.",
+            help="Tolerance, mm, for cutting G-code's corners where it has no G61 or G64 P.",
         ),
     ] = 1.0,
     ignore: Annotated[

@@ -55,7 +55,7 @@ def up(
         ),
     ] = True,
     nodes: Annotated[
-        int, typer.Option(min=1, max=16, help="So many drives, node ids counted up.")
+        int, typer.Option(min=1, max=16, help="Number of drives, node ids counted up.")
     ] = 1,
     truth_log: Annotated[
         Path | None,
