@@ -169,15 +169,11 @@ def calibrate(
     speed_mm_s: Annotated[
         float | None,
         typer.Option(
-            "--speed-mm-s",
-            min=0.5,
-            max=200.0,
-            help="Cable speed: 40 with masses, 5 without, by default.",
+            "--speed-mm-s", min=0.5, max=200.0, help="Cable speed: 40 with masses, 5 without."
         ),
     ] = None,
     lead_mm: Annotated[
-        float,
-        typer.Option("--lead-mm", min=20.0, max=2000.0, help="Cable wound in before measuring."),
+        float, typer.Option("--lead-mm", min=20.0, max=2000.0, help="Wound in before measuring.")
     ] = 160.0,
     turns: Annotated[int, typer.Option(min=1, max=20, help="Motor turns measured each way.")] = 2,
     gravity: Annotated[
@@ -186,8 +182,7 @@ def calibrate(
     lowest_N: Annotated[float, typer.Option("--lowest-n", help="Lowest tension, N.")] = 10.0,
     highest_N: Annotated[float, typer.Option("--highest-n", help="Highest tension, N.")] = 80.0,
     travel_mm: Annotated[
-        float,
-        typer.Option("--travel-mm", min=1.0, help="Most cable wound in, with its end made fast."),
+        float, typer.Option("--travel-mm", min=1.0, help="Most cable wound in, its end made fast.")
     ] = 500.0,
     board: Annotated[
         Path | None,

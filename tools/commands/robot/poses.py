@@ -38,9 +38,7 @@ def poses(
         str | None,
         typer.Option("--from", metavar="X Y [Z]", help="Where ways begin, in mm; else home."),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, help="Random seed; the same gives the same poses.")
-    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     by: Annotated[
         Choose,
         typer.Option(
@@ -61,9 +59,7 @@ def poses(
     share: Annotated[
         float,
         typer.Option(
-            min=0.01,
-            max=1.0,
-            help="How far to go along a path that stops short of its target, 0 to 1.",
+            min=0.01, max=1.0, help="Share followed of a path that stops short of its target."
         ),
     ] = SHARE,
     out_file: Annotated[

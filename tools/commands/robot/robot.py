@@ -85,12 +85,10 @@ def new(
     path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
     answers: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Answer a question in advance; may be repeated."
-        ),
+        typer.Option("--set", metavar="KEY=VALUE", help="Answer in advance; may be repeated."),
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Use the default for every question not answered.")
+        bool, typer.Option("--yes", help="Use the defaults for all other questions.")
     ] = False,
     png: PngOption = None,
     as_json: JsonOption = False,
