@@ -31,7 +31,7 @@ _Seconds = Annotated[float, typer.Option(min=0.1, max=86400.0, help="How long; C
 
 @app.command()
 def show(io: _IoArgument, as_json: JsonOption = False) -> None:
-    """Say what every point reads; changes nothing."""
+    """Show what every point reads; changes nothing."""
     out = Output(as_json)
     with _link(io) as link:
         state = link.state()
@@ -44,7 +44,7 @@ def show(io: _IoArgument, as_json: JsonOption = False) -> None:
 
 @app.command()
 def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = False) -> None:
-    """Say what changes, as it changes; changes nothing."""
+    """Show each change as it happens; changes nothing."""
     out = Output(as_json)
     before: list[str] = []
     with _link(io) as link:

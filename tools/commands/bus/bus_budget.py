@@ -32,7 +32,7 @@ def budget(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell the worst-case time of the cycle on each bus, the highest rate, and what is left.
+    """Compute the worst-case time of the cycle on each bus, the highest rate, and what is left.
 
     Exit status 2 when the cycle does not fit.
     """

@@ -39,7 +39,7 @@ def scan(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell who is on one or several buses: state, identity, modes, profile; reads only."""
+    """List the nodes on one or several buses: state, identity, modes, profile; reads only."""
     out = Output(as_json)
     urls = [running_bus(text) for text in bus]
     node_ids = parse_node_ids(nodes)

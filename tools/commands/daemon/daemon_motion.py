@@ -105,7 +105,7 @@ def move(
         ),
     ] = None,
 ) -> None:
-    """Take axes or the platform to positions and wait until there; Ctrl-C stops the motion."""
+    """Move axes or the platform to positions and wait; Ctrl-C holds and exits with 1."""
     if to is not None or rotate is not None:
         if axes or cable:
             raise BadInputError("--to, --rotate: not together with axes or --cable")

@@ -46,7 +46,7 @@ def status(
         bool, typer.Option("--watch", help="Show it continuously until Ctrl-C.")
     ] = False,
 ) -> None:
-    """Say how a daemon and its robot are; changes nothing."""
+    """Show the state of a daemon and its robot; changes nothing."""
     state = daemon.get("/status")
     if watch:
         state = _watch(daemon, out, state)

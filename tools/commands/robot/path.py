@@ -72,7 +72,7 @@ def path(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Look at a path before it is followed, follow it, take it up again.
+    """Preview a path, follow it on the running daemon, resume it.
 
     Ends with status 2 where the robot cannot follow it, with the first place named. With --run the
     running daemon plans and follows it.
