@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # two more than there are cores: some tests wait for time-outs, or for a kernel that another test compiles
 JOBS ?= $(shell expr $$(nproc) + 2)
 SOAK_MINUTES ?= 10
-# tests that are not about the wall's clock, which one after another runs at the end
+# tests that are not about the wall clock, which one after another runs at the end
 WHICH ?= not alone
 
 .PHONY: demo test test-all tests soak check docs lock clean

@@ -187,8 +187,10 @@ def _axes(path: Path, file: RobotFile) -> list[RobotAxis]:
         )
         name = axis.name or default_name(i)
         known = _calibration(path, i, axis.calibration, winch)
-        learnt = None if axis.commissioned is None else _path_from(path, axis.commissioned)
-        axes.append(RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name, known, learnt))
+        commissioning = None if axis.commissioned is None else _path_from(path, axis.commissioned)
+        axes.append(
+            RobotAxis(winch, axis.bus, axis.node_id, axis.mandatory, name, known, commissioning)
+        )
     return axes
 
 
@@ -207,7 +209,11 @@ def _limit_faults(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[
     """Yield (key, problem) for limits that motors or cables do not bear."""
     for key, ratings, of in (
         ("torque_Nm", [a.winch.motor.peak_torque_Nm for a in axes], "the motor's peak torque"),
-        ("speed_rad_s", [_speed_rad_s(a) for a in axes], "twice the motor's rated speed"),
+        (
+            "speed_rad_s",
+            [_speed_rad_s(a) for a in axes],
+            f"{MOST_SPEED_RATIO:g} times the motor's rated speed",
+        ),
         ("tension_max_N", [a.winch.cable.breaking_force_N for a in axes], "the breaking force"),
     ):
         limits = getattr(file.limits, key) or ()
@@ -252,7 +258,7 @@ def _path_from(file: Path, text: str) -> Path:
     return resolved(path_of(file.parent, text))
 
 
-def load_machine(name: str | Path) -> Winch | Robot:
+def load_winch_or_robot(name: str | Path) -> Winch | Robot:
     """Return the robot or the winch of this name or path; raises ProfileError."""
     robot = find("robots", name, None)
     if robot is None:

@@ -6,11 +6,11 @@ from cdpr_profiles.catalogue import (
     load_all,
     load_cable,
     load_drive,
-    load_machine,
     load_motor,
     load_motor_ratings,
     load_robot,
     load_winch,
+    load_winch_or_robot,
 )
 from cdpr_profiles.drive import DriveProfile, Pdo, PdoEntry
 from cdpr_profiles.errors import ProfileError
@@ -36,9 +36,9 @@ __all__ = [
     "load_all",
     "load_cable",
     "load_drive",
-    "load_machine",
     "load_motor",
     "load_motor_ratings",
     "load_robot",
     "load_winch",
+    "load_winch_or_robot",
 ]

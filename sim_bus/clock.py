@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 HOLD_S = 0.5
-"""Wall time without SYNC after which a bus without a leader runs with the wall again."""
+"""Wall time without SYNC after which a bus without a leader runs with the wall clock again."""
 
 
 class ClockMode(Enum):
@@ -14,13 +14,13 @@ class ClockMode(Enum):
     PACED = "paced"
     """Bus time is wall time."""
     LOCKSTEP = "lockstep"
-    """SYNC and the master that leads the bus move bus time; without a leader, the wall too."""
+    """SYNC and the master that leads the bus move bus time; without a leader, wall time too."""
 
 
 class BusClock:
     """Bus time in seconds since the bus was started; wall times are monotonic seconds.
 
-    A paced clock runs with the wall. One in lockstep is stopped at 0 at first.
+    A paced clock runs with wall time. One in lockstep is stopped at 0 at first.
     """
 
     def __init__(self, mode: ClockMode, wall_s: float) -> None:
@@ -57,7 +57,7 @@ class BusClock:
         self._base_s = self._last_s = to_s
 
     def run(self, wall_s: float) -> None:
-        """Let a stopped clock run with the wall from `wall_s`."""
+        """Let a stopped clock run with the wall clock from `wall_s`."""
         if self.stopped:
             self._base_wall_s = wall_s
             self.stopped = False
@@ -66,7 +66,7 @@ class BusClock:
         """Take a SYNC into account and return the bus time of it.
 
         In lockstep, with `period_s` > 0, bus time moves by exactly `period_s`; a clock that had
-        run with the wall is held then.
+        run with the wall clock is held then.
         """
         if self.mode is ClockMode.PACED or period_s <= 0.0:
             return self.now(wall_s)
@@ -81,7 +81,7 @@ class BusClock:
         return self._base_s
 
     def wall_wait(self, wall_s: float, event_s: float) -> float:
-        """Return how long on the wall until bus time `event_s`, or until a held clock runs."""
+        """Return how much wall time until bus time `event_s`, or until a held clock runs."""
         if self.held:
             return max(self._base_wall_s - wall_s, 0.0)
         return max(event_s - self.peek(wall_s), 0.0)

@@ -24,7 +24,7 @@ MODULES = {
         "commission": "Measure, identify, validate and report motors, each detached from its load.",
     },
     "doctor": {
-        "doctor": "Look at this machine and say what to mend before a robot runs on it.",
+        "doctor": "Check this machine and tell what to fix before a robot runs on it.",
     },
     "daemon.estop": {
         "estop": "Take the power from a robot's drives at once: no braking, no lowering; brakes "
@@ -41,8 +41,7 @@ MODULES = {
     "daemon.daemon_motion": {
         "jog": "Turn axes at a speed for a while; they stop when this command does, however it "
         "ends.",
-        "move": "Take axes or the platform to positions and wait until there; Ctrl-C holds and "
-        "fails.",
+        "move": "Move axes or the platform to positions and wait; Ctrl-C holds and exits with 1.",
         "controller": "Change over to a program and stay with it until it is done; hold follows "
         "then.",
     },
@@ -54,7 +53,7 @@ MODULES = {
         "resume": "Go on to the position, or along the path, that was left when it was paused.",
     },
     "daemon.daemon_state": {
-        "status": "Say how a daemon and its robot are; changes nothing.",
+        "status": "Show the state of a daemon and its robot; changes nothing.",
         "check": "Boot the drives anew and check the bus without power; ready afterwards.",
         "enable": "Give the drives power; they hold where they are.",
         "disable": "Stop the motion under control, then take the power off.",
@@ -93,7 +92,7 @@ MODULES = {
         "poses": "Draw poses that a robot reaches straight from home, or from another place.",
     },
     "robot.path": {
-        "path": "Look at a path before it is followed, follow it, take it up again.",
+        "path": "Preview a path, follow it on the running daemon, resume it.",
     },
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
@@ -162,7 +161,9 @@ def _tell_version(asked: bool) -> None:
 def _group(
     _version: Annotated[
         bool,
-        typer.Option("--version", callback=_tell_version, is_eager=True, help="Tell the version."),
+        typer.Option(
+            "--version", callback=_tell_version, is_eager=True, help="Show the version and exit."
+        ),
     ] = False,
 ) -> None:
     """Commission, run and simulate the winches of cable-driven parallel robots."""

@@ -19,7 +19,7 @@ _T = TypeVar("_T")
 _BLOCKING_POLL_S = 0.002
 """How often is looked whether work beside the thread is done."""
 _MADE_UP_S = 0.02
-"""Of what simulated time has fallen behind the wall's, so much is made up for."""
+"""Of what simulated time has fallen behind wall-clock time, so much is made up for."""
 _LONGEST_GRANT_S = 0.1
 """Bus time goes on by so much at a time, so that a request to end is seen between."""
 
@@ -197,7 +197,7 @@ class Clock(ABC):
     def run_blocking(self, work: Callable[[], _T]) -> _T:
         """Return what `work` does, which touches no bus and may take its time, such as a file.
 
-        Beside this thread where time is the wall's, at once where it stands still meanwhile.
+        Beside this thread where time is wall-clock time, at once where it stands still meanwhile.
         """
         return work()
 
@@ -255,7 +255,7 @@ class LockstepClock(Clock):
     """The time of simulated buses which this process leads; it goes on in waits only.
 
     All buses are kept at the same instant. Without any, time passes as soon as it is waited for.
-    With `real_time` it goes no faster than the wall's: a process that was held up finds it slower,
+    With `real_time` it goes no faster than wall-clock time: a process held up finds it slower,
     never later.
     """
 
@@ -286,7 +286,7 @@ class LockstepClock(Clock):
         self._await_wall()
 
     def _await_wall(self) -> None:
-        """Wait until the wall's time has come as far; little of what it is ahead is made up for."""
+        """Wait until the wall clock has come as far; little of what it is ahead is made up for."""
         if not self._real_time:
             return
         now_s, wall_s = self.now_s, time.monotonic()

@@ -43,7 +43,7 @@ class Field:
 
     @property
     def is_wall_time(self) -> bool:
-        """Whether it is a duration by the wall's clock, in seconds."""
+        """Whether it is a duration by the wall clock, in seconds."""
         return self.wall and self.kind == "<f8"
 
 

@@ -79,7 +79,7 @@ class AxisEstimate:
         self.length_known: BoolArray = np.zeros(n, np.bool_)
         self.tension_N: FloatArray = np.full(n, np.nan)
         """Measured, or estimated from the torque; nan where neither can be."""
-        self.may_be_slack = False
+        self.slack_allowed = False
         """Whether cables are being tightened or let go, so that none is missed."""
         self.tension_measured: BoolArray = np.zeros(n, np.bool_)
         self.sensor_ok: BoolArray = np.ones(n, np.bool_)

@@ -27,7 +27,7 @@ class LoopState(IntEnum):
 
 
 CUT_SHORT: Final = "the power was taken at once while the loop was ending"
-"""The reason of a fault that an impatient launcher, or user, has made."""
+"""Reason of a fault: power was taken at once, on a second request, while the loop ended."""
 
 
 class Transition(IntEnum):

@@ -39,8 +39,8 @@ _PAST: Final = np.dtype(
         ("low_s", "<f8"),  # since the tension was last sufficient
         ("slack_s", "<f8"),
         ("tight_rad", "<f8"),  # motor angle when it was
-        ("may_be_low", "<f8"),  # whether it was since enabling, or since this was told last
-        ("may_be_slack", "<f8"),
+        ("low_armed", "<f8"),  # whether it was since enabling, or since this was told last
+        ("slack_armed", "<f8"),
         ("mean_N", "<f8"),  # its tension, low-passed
         ("valid_count", "<f8"),  # valid angles since enabling, up to 2
         ("valid_rad", "<f8"),  # the last valid angle
@@ -152,7 +152,7 @@ def _has_snapped(lim: Any, past: Any, elapsed: float, tension: float, winding_in
     before = past["mean_N"]
     if np.isfinite(tension):
         past["mean_N"] += elapsed / (elapsed + _MEAN_S) * (tension - before)
-    runs_away = past["may_be_slack"] != 0.0 and winding_in > lim["speed_rad_s"]
+    runs_away = past["slack_armed"] != 0.0 and winding_in > lim["speed_rad_s"]
     return bool(runs_away and tension < _SNAPPED_SHARE * before)
 
 
@@ -165,34 +165,34 @@ def _watch_tension(
     verdict: Any,
     elapsed: float,
     tension: float,
-    may_be_slack: bool,
+    slack_allowed: bool,
     position: float,
     cable_m_per_rad: float,
 ) -> None:
     if tension > lim["tension_max_N"]:
         _judge(verdict, reactions, _TENSION_HIGH, i, tension, lim["tension_max_N"])
-    if may_be_slack:
-        past["may_be_low"] = past["may_be_slack"] = 0.0
+    if slack_allowed:
+        past["low_armed"] = past["slack_armed"] = 0.0
         return
     if not tension < lim["tension_min_N"]:
         past["low_s"] = past["slack_s"] = 0.0
         past["tight_rad"] = position
         if tension >= lim["tension_min_N"]:
-            past["may_be_low"] = past["may_be_slack"] = 1.0
+            past["low_armed"] = past["slack_armed"] = 1.0
         return
     past["low_s"] += elapsed
     past["slack_s"] = past["slack_s"] + elapsed if tension < lim["slack_N"] else 0.0
     paid_out = (position - past["tight_rad"]) * cable_m_per_rad
     at_once = past["low_s"] <= lim["broken_within_s"] and paid_out < _PAID_OUT_m
     # each is told once, so that the cable can be tightened, and again when it was tight
-    if past["may_be_slack"] and past["slack_s"] > 0.0 and at_once:
-        past["may_be_low"] = past["may_be_slack"] = 0.0
+    if past["slack_armed"] and past["slack_s"] > 0.0 and at_once:
+        past["low_armed"] = past["slack_armed"] = 0.0
         _judge(verdict, reactions, _BROKEN_CABLE, i, tension, lim["tension_min_N"])
-    elif past["may_be_slack"] and past["slack_s"] > lim["slack_s"]:
-        past["may_be_low"] = past["may_be_slack"] = 0.0
+    elif past["slack_armed"] and past["slack_s"] > lim["slack_s"]:
+        past["low_armed"] = past["slack_armed"] = 0.0
         _judge(verdict, reactions, _SLACK, i, tension, lim["slack_N"])
-    elif past["may_be_low"] and past["low_s"] > lim["slack_s"]:
-        past["may_be_low"] = 0.0
+    elif past["low_armed"] and past["low_s"] > lim["slack_s"]:
+        past["low_armed"] = 0.0
         _judge(verdict, reactions, _TENSION_LOW, i, tension, lim["tension_min_N"])
 
 
@@ -216,7 +216,7 @@ def _check(
     sensor_ok: BoolArray,
     torque: FloatArray,
     elapsed: float,
-    may_be_slack: bool,
+    slack_allowed: bool,
 ) -> int:
     verdict[0]["reaction"] = verdict[0]["limit"] = 0
     period = limits[0]["period_s"]
@@ -243,8 +243,9 @@ def _check(
             continue
         per_rad = cable_m_per_rad[i]
         _watch_tension(
-            i, lim, own, reactions, verdict, elapsed, tension[i], may_be_slack, position[i], per_rad
-        )
+            i, lim, own, reactions, verdict, elapsed, tension[i], slack_allowed, position[i],
+            per_rad,
+        )  # fmt: skip
     return int(verdict[0]["reaction"])
 
 
@@ -299,7 +300,7 @@ class Supervisor:
             or torque_Nm is not judged[3]
         ):
             self._bind(feedback, estimate, setpoint, torque_Nm)
-        return self._check(estimate.elapsed_s, estimate.may_be_slack)
+        return self._check(estimate.elapsed_s, estimate.slack_allowed)
 
     def _bind(
         self,

@@ -6,7 +6,7 @@ from cdpr_rt.control.base import Idle
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 from cdpr_rt.programs.program_base import ProgramDefaults
 
 _FILTER_S = 0.01
@@ -38,7 +38,7 @@ class IdleProgram(ProgramDefaults):
     name = "idle"
     needs_lease = False
 
-    def __init__(self, model: RobotModel) -> None:
+    def __init__(self, model: AxesModel) -> None:
         self._loop = BumplessTransfer(Idle(model.n), model.torque_Nm, model.period_s)
         self.controller = self._loop.controller
         self._period_s = model.period_s

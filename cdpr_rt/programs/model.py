@@ -25,8 +25,8 @@ FOLLOWING_SHARE = 0.2
 
 
 @dataclass(frozen=True)
-class RobotModel:
-    """The axes of a robot as arrays (n,) and what holds for all of them, motor side."""
+class AxesModel:
+    """Bounds and gains of a robot's axes as arrays (n,), and what holds for all, motor side."""
 
     period_s: float
     torque_Nm: FloatArray
@@ -69,7 +69,7 @@ def model_of(
     latency_s: Sequence[float],
     limits: Limits,
     compensation: Sequence[AxisCompensation | None] = (),
-) -> RobotModel:
+) -> AxesModel:
     """Return the model of axes whose loops are as stiff as the latency of each allows.
 
     `latency_s` (n,) is from the instant an angle was true to the middle of the cycle in which its
@@ -83,7 +83,7 @@ def model_of(
         (J, latency): position_loop(J, latency, period_s).gains
         for J, latency in dict.fromkeys(pairs)
     }
-    return RobotModel(
+    return AxesModel(
         period_s=period_s,
         torque_Nm=np.broadcast_to(limits.torque_Nm, cable.shape).astype(float),
         speed_rad_s=SETPOINT_SPEED_SHARE * np.broadcast_to(limits.speed_rad_s, cable.shape),

@@ -19,13 +19,13 @@ from cdpr_rt.programs.axes.position_loop import PositionLoop
 from cdpr_rt.programs.axes.sweep import SweepProgram
 from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.idle import IdleProgram
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 from cdpr_rt.programs.platform.lower import LowerProgram
 from cdpr_rt.programs.platform.paths.path import PathProgram
 from cdpr_rt.programs.platform.platform_axes import PlatformHold, PlatformIdle, PlatformJog
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.pose import PoseProgram
-from cdpr_rt.programs.platform.tightening.pretension import PretensionProgram
+from cdpr_rt.programs.platform.tightening.tighten import TightenProgram
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of
 
@@ -33,7 +33,7 @@ _WARM_UP_CYCLES = 5
 
 
 def platform_parts(
-    robot: Robot, limits: Limits, model: RobotModel, estimator: Estimator, *, learns: bool = True
+    robot: Robot, limits: Limits, model: AxesModel, estimator: Estimator, *, learns: bool = True
 ) -> PlatformParts | None:
     """Return what the programs of a platform share; None where there is none.
 
@@ -55,7 +55,7 @@ def platform_parts(
 
 
 def build_programs(
-    model: RobotModel, block: SharedBlock, parts: PlatformParts | None = None
+    model: AxesModel, block: SharedBlock, parts: PlatformParts | None = None
 ) -> dict[str, Program]:
     """Return a robot's programs by name, in the order of their numbers in its description.
 
@@ -77,7 +77,7 @@ def build_programs(
 
 
 def _of_platform(
-    model: RobotModel, loop: PositionLoop, stream: PoseStream, parts: PlatformParts
+    model: AxesModel, loop: PositionLoop, stream: PoseStream, parts: PlatformParts
 ) -> tuple[Program, ...]:
     torque_Nm, cable_m = model.torque_Nm, model.cable_m_per_rad
     path = PathProgram(parts, torque_Nm)
@@ -85,7 +85,7 @@ def _of_platform(
         PlatformIdle(parts, model),
         PlatformHold(parts, model, loop, path),
         PlatformJog(parts, model, loop),
-        PretensionProgram(parts, torque_Nm, cable_m),
+        TightenProgram(parts, torque_Nm, cable_m),
         PoseProgram(parts, torque_Nm, stream),
         LowerProgram(parts, torque_Nm, cable_m),
         path,

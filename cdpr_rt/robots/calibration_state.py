@@ -21,14 +21,14 @@ class CalibrationState:
     """ISO 8601, UTC; empty where nothing was ever written down."""
 
 
-def calibration_file(robot: str) -> Path:
+def calibrated_flag_file(robot: str) -> Path:
     """Return the file that holds the robot's state."""
     return state_path("calibration", robot)
 
 
 def calibration_state(robot: str) -> CalibrationState:
     """Return the robot's state; without a file, or with a damaged one, it is not calibrated."""
-    path = calibration_file(robot)
+    path = calibrated_flag_file(robot)
     try:
         held = read_state(path)
     except StateFileError as error:
@@ -52,12 +52,12 @@ def mark_not_calibrated(robot: str, why: str) -> CalibrationState:
     return _mark(robot, False, why)
 
 
-def distrust(robot: str) -> str:
+def not_calibrated_reason(robot: str) -> str:
     """Return why the geometry of a robot may not be believed any more; empty where it may.
 
     A robot that has never been calibrated has the geometry of its file.
     """
-    if not calibration_file(robot).exists():
+    if not calibrated_flag_file(robot).exists():
         return ""
     state = calibration_state(robot)
     if state.calibrated:
@@ -73,5 +73,5 @@ def _mark(robot: str, calibrated: bool, why: str) -> CalibrationState:
     date = datetime.now(UTC).isoformat(timespec="seconds")
     state = CalibrationState(robot, calibrated, why, date)
     held = {"robot": robot, "calibrated": calibrated, "why": why, "date": date}
-    write_state(calibration_file(robot), held)
+    write_state(calibrated_flag_file(robot), held)
     return state

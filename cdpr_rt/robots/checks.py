@@ -118,7 +118,7 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
             yield Finding("platform.home_m", text, impossible=True)
             break
     points, turns = statics.points(), statics.orientations
-    moving_N = np.array([statics.reserve_N(points, platform.acceleration_m_s2, t) for t in turns])
+    moving_N = np.array([statics.margin_N(points, platform.acceleration_m_s2, t) for t in turns])
     taken = float(np.mean(moving_N >= statics.model.reserve_N))
     if taken < 1.0:
         text = f"in {100 * taken:.0f} % of the box targets are taken; "
@@ -133,7 +133,7 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
 
 def _not_held(statics: PlatformStatics, position_m: FloatArray, turn_rad: FloatArray) -> str:
     """Say why the platform is not moved there, and what would help."""
-    where, reserve = f"at {_point(position_m)} m", float(statics.reserve_N(position_m, 0, turn_rad))
+    where, reserve = f"at {_point(position_m)} m", float(statics.margin_N(position_m, 0, turn_rad))
     if turn_rad.any():
         where += f", turned {_turn(turn_rad)}"
     if not math.isfinite(reserve):

@@ -144,7 +144,7 @@ def _turn_to_rest(
     """Turn a pose to where tensions have no moment, by Newton's method; return the angle."""
     angle = 0.0
     for _ in range(_NEWTON_STEPS):
-        kernel.turn_about_z(geometry, tension, pose, rotation)
+        kernel.rotational_stiffness(geometry, tension, pose, rotation)
         if rotation[kernel.STEEPNESS] <= 0.0:
             break
         step = rotation[kernel.MOMENT] / rotation[kernel.STEEPNESS]

@@ -121,10 +121,10 @@ class PlatformControl(Controller, Protocol):
         """Hold the cables' tensions by readings (n,), kept up to date by others, where valid."""
 
     @property
-    def cell_trouble(self) -> str:
+    def load_cell_fault(self) -> str:
         """Which load cell is off and by how much, an empty text for none; kept once it is told."""
 
-    def trust_cells(self) -> None:
+    def clear_load_cell_fault(self) -> None:
         """Forget which load cell was off."""
 
     def begin(self, feedback: AxisFeedback) -> None:
@@ -145,27 +145,27 @@ class PlatformControl(Controller, Protocol):
     def take_lengths(self, length_m: FloatArray, feedback: AxisFeedback) -> None:
         """Take the cables to have these lengths without tension at the motors' angles."""
 
-    def missing(self) -> str:
+    def tension_infeasibility(self) -> str:
         """Return why the last cycle's tensions are not feasible, an empty text where they are."""
 
     def stands(self, position: FloatArray) -> bool:
         """Return whether the platform can be held, and accelerated, at a position."""
 
-    def nears(self, position: FloatArray) -> int:
+    def contact_ahead(self, position: FloatArray) -> int:
         """Return a pair of things in contact on a short straight way from the set-point, -1: none.
 
         Cables, platform and boxes of the frame, by the clearance of the robot's file; what is in
         contact at the set-point already may leave.
         """
 
-    def touches(self, position: FloatArray) -> int:
+    def contact_at(self, position: FloatArray) -> int:
         """Return a pair of things in contact at a position, nearer than at the set-point."""
 
     def contact(self, pair: int) -> str:
         """Return in words that a pair is in contact."""
 
-    def feasible(self, position: FloatArray) -> str:
+    def infeasibility(self, position: FloatArray) -> str:
         """Return why the platform cannot stand at a position, an empty text where it can."""
 
-    def feasible_path(self, position: FloatArray, start: FloatArray | None = None) -> str:
+    def path_obstacle(self, position: FloatArray, start: FloatArray | None = None) -> str:
         """Return what is in the straight way to a position, from where it is or from `start`."""

@@ -15,7 +15,7 @@ from cdpr_rt.robots.interference.interference import Interference
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
-from cdpr_rt.robots.kinematics.pose_setpoint import place_all
+from cdpr_rt.robots.kinematics.pose_setpoint import poses_of_coordinates
 from cdpr_rt.robots.rigid_body import home_rotation, in_space, inertia_kg_m2
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
@@ -173,7 +173,7 @@ class PlatformModel:
         q[:, : given.shape[1]] = given
         poses, scratch = np.zeros((len(q), 4, 3)), np.zeros((4, 3))
         directions = np.array(self.kinematics.directions)
-        place_all(q, directions, self.home_pose.array, scratch, poses)
+        poses_of_coordinates(q, directions, self.home_pose.array, scratch, poses)
         return poses
 
     def _each(self, linear: float, angular: float) -> FloatArray:

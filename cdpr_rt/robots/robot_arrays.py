@@ -78,18 +78,18 @@ def limits_of(robot: Robot) -> Limits:
     )
 
 
-def frame_m(platform: Platform) -> float:
+def exit_point_diagonal_m(platform: Platform) -> float:
     """Return the diagonal of the box around a platform's exit points."""
     return float(np.linalg.norm(np.ptp(np.array(platform.exit_points_m), axis=0)))
 
 
 def _disagreement_m(platform: Platform | None) -> float:
     """Return by how much lengths may disagree: on a small frame a slip tells less."""
-    share_m = np.inf if platform is None else DISAGREE_SHARE * frame_m(platform)
+    share_m = np.inf if platform is None else DISAGREE_SHARE * exit_point_diagonal_m(platform)
     return float(min(DISAGREE_m, share_m))
 
 
-def supervised(limits: Limits, robot: Robot) -> Limits:
+def supervisor_limits(limits: Limits, robot: Robot) -> Limits:
     """Return what a robot's supervisor holds its cables against.
 
     What is planned with are the limits themselves. A tension that is known from torques alone is

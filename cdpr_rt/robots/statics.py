@@ -113,13 +113,13 @@ class PlatformStatics:
         turn = [turn_rad[i - 3] for i in model.kinematics.directions if i >= 3]
         return model.poses(np.hstack([flat, np.tile(turn, (len(flat), 1))]))
 
-    def reserve_N(
+    def margin_N(
         self,
         position_m: FloatArray,
         acceleration_m_s2: float = 0.0,
         turns_rad: FloatArray = NONE_rad,
     ) -> FloatArray:
-        """Return how far all tensions can stay from both their bounds, N, (...).
+        """Return how far all tensions can stay from both their bounds, the margin, N, (...).
 
         Below zero by how much some cable must be outside. With an acceleration: the least over its
         both signs along all directions at once, and as much of the angular acceleration where
@@ -138,7 +138,7 @@ class PlatformStatics:
 
         At every one of the turns (k, 3).
         """
-        moving_N = self.reserve_N(position_m, self.platform.acceleration_m_s2, turns_rad)
+        moving_N = self.margin_N(position_m, self.platform.acceleration_m_s2, turns_rad)
         return np.asarray(moving_N >= self.model.reserve_N)
 
     def tensions_N(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:

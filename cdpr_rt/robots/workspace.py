@@ -125,12 +125,12 @@ class CableWorkspace:
         self._one.run_margins()
         return bool(self._one.margins[0] >= 0.0)
 
-    def feasible(self, pose: Pose) -> str:
+    def infeasibility(self, pose: Pose) -> str:
         """Return why the platform is not held at a pose, an empty text where it is."""
         if self.stands(pose):
             return ""
         self._one.run()
-        return self._missing()
+        return self._infeasibility_at_one()
 
     def first_obstacle(self, poses: FloatArray) -> tuple[Pose, str] | None:
         """Return the first of the poses (33, 4, 3) of a way that is not held, and why; or None.
@@ -145,14 +145,14 @@ class CableWorkspace:
             return None
         k = first + int(held[first:].argmin())
         self._there.array[:] = poses[k]
-        return self._there, self.feasible(self._there)
+        return self._there, self.infeasibility(self._there)
 
     def _pass(self, m: int, most_N: float) -> _Pass:
         return _Pass(self, m, most_N)
 
-    def _missing(self) -> str:
+    def _infeasibility_at_one(self) -> str:
         margin_N = float(self._one.margins[0])
-        why = missing(margin_N, self._one.tensions[0], self.low, self.high)
+        why = infeasibility_text(margin_N, self._one.tensions[0], self.low, self.high)
         return f"{why} (with a reserve of {self.reserve_N:.1f} N)" if self.reserve_N else why
 
 
@@ -208,7 +208,9 @@ class _Pass:
         self._kinematics.wrench_matrices(self._centred, self.matrices)
 
 
-def missing(margin_N: float, tension_N: FloatArray, low_N: FloatArray, high_N: FloatArray) -> str:
+def infeasibility_text(
+    margin_N: float, tension_N: FloatArray, low_N: FloatArray, high_N: FloatArray
+) -> str:
     """Return in words why tensions (n,) are not feasible that are outside by a negative margin."""
     if not math.isfinite(margin_N):
         return "the cables cannot hold one direction, whatever their tensions"

@@ -14,7 +14,11 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.jit import bound, copy_bytes, jit
 
-_CODES: Final = {"<u8": "Q", "<i8": "q", "<f8": "d", "<u2": "H", "<i2": "h", "<u1": "B"}
+_CODES: Final = {
+    "<u8": "Q", "<i8": "q", "<f8": "d", "<u4": "I", "<i4": "i", "<u2": "H", "<i2": "h", "<u1": "B",
+    "?": "?",
+}  # fmt: skip
+"""Codes of `struct` by those of NumPy."""
 _SCALARS = struct.Struct("<" + "".join(_CODES[field.kind] for field in SCALAR_FIELDS))
 _scalars_of = attrgetter(*(field.source for field in SCALAR_FIELDS))
 _axes_of = attrgetter(*(field.source for field in AXIS_FIELDS))
@@ -42,7 +46,7 @@ class CycleRows:
     """Fills one row a cycle in place, without allocating memory that stays.
 
     The scalars, which come first in a row, are packed in one call. Arrays over the axes are copied
-    from their addresses: passing 18 arrays to compiled code costs more than copying them.
+    from their addresses: passing them all to compiled code costs more than copying them.
     """
 
     def __init__(self, block: SharedBlock) -> None:

@@ -41,7 +41,7 @@ class Machine(Protocol):
 
     @property
     def safety(self) -> str:
-        """Text of the safety I/O's state, for the status."""
+        """Name of the safety I/O, for the status; empty without one."""
 
     @property
     def has_brakes(self) -> bool:

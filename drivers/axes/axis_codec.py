@@ -19,7 +19,7 @@ Ints = NDArray[np.int64]
 EMCY, HEARTBEAT = 100, 101
 
 MAX_FIELDS = 8
-# columns of `answer`
+# columns of `command_offsets`
 CONTROLWORD_FRAME, CONTROLWORD, TORQUE_FRAME, TARGET_TORQUE = range(4)
 
 # rows of `ints`; the first ones are filled from TPDOs as they come
@@ -48,8 +48,8 @@ CONTROLWORD_FRAME, CONTROLWORD, TORQUE_FRAME, TARGET_TORQUE = range(4)
     EMERGENCY,
     NMT_STATE,
     MISSED,
-    AWAITED,
-    SEEN,
+    TPDOS_EXPECTED,
+    TPDOS_RECEIVED,
     EXTRA,
     REPEATED,
     LATE,
@@ -90,7 +90,7 @@ _FAULT_RESET = 0x80
 _OPERATIONAL, _NOT_HEARD = 5, 0
 _DATA = 8
 _CYCLE_OVER = 1 << 62
-"""Bit of SEEN from the end of a cycle to the next SYNC."""
+"""Bit of TPDOS_RECEIVED from the end of a cycle to the next SYNC."""
 _MEMORY_CYCLES = 64.0
 _FAIR_SHARE, _WORST_SHARE = 0.05, 0.4
 """Share of cycles without exactly one answer, above which the rate is bad or a trip."""
@@ -212,11 +212,12 @@ def _take_tpdo(
         words[0, i] = ints[STATUSWORD, i]
         _follow_state(i, state_table[ints[STATUSWORD, i] & 0x7F], ints)
     # of two of the same the later one counts: the first may be late from the cycle before
-    ints[EXTRA, i] += (ints[SEEN, i] & ints[AWAITED, i]) >> pdo & 1
-    ints[SEEN, i] |= 1 << pdo
-    if flags[VALID, i] or ints[SEEN, i] & ints[AWAITED, i] != ints[AWAITED, i]:
+    expected = ints[TPDOS_EXPECTED, i]
+    ints[EXTRA, i] += (ints[TPDOS_RECEIVED, i] & expected) >> pdo & 1
+    ints[TPDOS_RECEIVED, i] |= 1 << pdo
+    if flags[VALID, i] or ints[TPDOS_RECEIVED, i] & expected != expected:
         return 0
-    if ints[SEEN, i] & _CYCLE_OVER:
+    if ints[TPDOS_RECEIVED, i] & _CYCLE_OVER:
         ints[LATE, i] += 1
         return 0
     flags[VALID, i] = True
@@ -265,25 +266,25 @@ def end_answers(ints: Ints, floats: FloatArray, flags: BoolArray) -> int:
 @jit
 def encode(
     frames: Frames,
-    answer: Ints,
+    command_offsets: Ints,
     controlwords: Ints,
     ints: Ints,
     floats: FloatArray,
 ) -> int:
     """Write controlword and target torque of n axes into their RPDOs `frames` (k, 16).
 
-    `answer` (n, 4) holds frame and first byte of either, `controlwords` (9, 9) the word by target
-    and present state. Returns the alarm bits of all axes.
+    `command_offsets` (n, 4) holds frame and first byte of either, `controlwords` (9, 9) the word by
+    target and present state. Returns the alarm bits of all axes.
     """
     alarms = 0
     for i in range(ints.shape[1]):
         units = _torque_units(i, ints, floats)
         floats[SENT_NM, i] = units * floats[NM_PER_UNIT, i]
         word = _controlword(i, controlwords, ints)
-        row, at = answer[i, CONTROLWORD_FRAME], _DATA + answer[i, CONTROLWORD]
+        row, at = command_offsets[i, CONTROLWORD_FRAME], _DATA + command_offsets[i, CONTROLWORD]
         frames[row, at] = word & 0xFF
         frames[row, at + 1] = (word >> 8) & 0xFF
-        row, at = answer[i, TORQUE_FRAME], _DATA + answer[i, TARGET_TORQUE]
+        row, at = command_offsets[i, TORQUE_FRAME], _DATA + command_offsets[i, TARGET_TORQUE]
         frames[row, at] = units & 0xFF
         frames[row, at + 1] = (units >> 8) & 0xFF
         alarms |= ints[ALARM, i]
@@ -295,7 +296,7 @@ def _watch(i: int, ints: Ints, floats: FloatArray, flags: BoolArray) -> None:
     regular = flags[VALID, i] and ints[EXTRA, i] == 0
     ints[REPEATED, i] += ints[EXTRA, i]
     ints[EXTRA, i] = 0
-    ints[SEEN, i] |= _CYCLE_OVER
+    ints[TPDOS_RECEIVED, i] |= _CYCLE_OVER
     floats[IRREGULAR, i] += ((0.0 if regular else 1.0) - floats[IRREGULAR, i]) / _MEMORY_CYCLES
     flags[RATE_OK, i] = regular and floats[IRREGULAR, i] < _FAIR_SHARE
     if floats[IRREGULAR, i] > _WORST_SHARE:

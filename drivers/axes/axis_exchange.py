@@ -67,7 +67,7 @@ class AxisExchange:
         self._words, self._flags = state.words, state.flags
         self.feedback, self.command = state.feedback, state.command
         self._valid = state.feedback.valid
-        self._seen = state.ints[codec.SEEN]
+        self._seen = state.ints[codec.TPDOS_RECEIVED]
         network.set_extra_filters(self._layout.identifiers)
         layout, rows = self._layout, (state.ints, state.floats)
         # bound, and so compiled, here: a first cycle of seconds would be a silent master
@@ -77,7 +77,7 @@ class AxisExchange:
         )  # fmt: skip
         self._end_answers = bound(codec.end_answers, *rows, state.flags)
         self._encode = bound(
-            codec.encode, layout.rpdos.bytes, layout.answer, CONTROLWORD_TABLE, *rows
+            codec.encode, layout.rpdos.bytes, layout.command_offsets, CONTROLWORD_TABLE, *rows
         )
 
     def sync(self) -> None:

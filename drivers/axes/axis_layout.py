@@ -86,7 +86,7 @@ class AxisConfig:
         return max(1, round(acceleration_rad_s2 / unit))
 
     @property
-    def awaited_tpdos(self) -> int:
+    def expected_tpdos(self) -> int:
         """The TPDOs that make the answer to a SYNC, as bits by their place in the profile."""
         return sum({1 << pdo for pdo in _feedback_tpdos(self.drive).values()})
 
@@ -102,7 +102,7 @@ class GroupLayout:
         """Axis and kind (TPDO number in the profile, EMCY, HEARTBEAT) by identifier."""
         self.fields: NDArray[np.int64] = np.zeros((len(axes), codec.MAX_FIELDS, 5), np.int64)
         """By axis: TPDO, target row, first byte, bytes, signed; 0 bytes end the list."""
-        self.answer: NDArray[np.int64] = np.zeros((len(axes), 4), np.int64)
+        self.command_offsets: NDArray[np.int64] = np.zeros((len(axes), 4), np.int64)
         """By axis: row in `rpdos` and first byte of controlword, the same of target torque."""
         commands = [_command_rpdos(axis.drive) for axis in axes]
         self.rpdos = FrameBuffer(sum(len(pdos) for pdos in commands))
@@ -161,7 +161,10 @@ class GroupLayout:
             for index, start, _ in _places(pdo):
                 if index in _RPDO_FIELDS:
                     frame_column, byte_column = _RPDO_FIELDS[index]
-                    self.answer[i, frame_column], self.answer[i, byte_column] = row, start
+                    self.command_offsets[i, frame_column], self.command_offsets[i, byte_column] = (
+                        row,
+                        start,
+                    )
 
 
 def _feedback_tpdos(drive: DriveProfile) -> dict[int, int]:

@@ -87,7 +87,7 @@ class GroupState:
         for i, axis in enumerate(axes):
             floats[codec.RAD_PER_COUNT, i] = axis.rad_per_count
             floats[codec.NM_PER_UNIT, i] = axis.Nm_per_unit
-            ints[codec.AWAITED, i] = axis.awaited_tpdos
+            ints[codec.TPDOS_EXPECTED, i] = axis.expected_tpdos
             most = whole_units(axis.torque_limit_Nm, abs(axis.Nm_per_unit))
             # 6071h has 16 bits: in mNm no more than 32.767 Nm can be asked for
             floats[codec.LIMIT_UNITS, i] = min(most, 0x7FFF)

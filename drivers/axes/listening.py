@@ -220,7 +220,7 @@ class _BusMonitor:
             state.ints, state.floats, state.words, state.flags,
         )  # fmt: skip
         self.valid = state.feedback.valid
-        self._seen = state.ints[codec.SEEN]
+        self._seen = state.ints[codec.TPDOS_RECEIVED]
         self._rx = FrameBuffer(_FRAMES_PER_AXIS * len(self.axes) + _SPARE_FRAMES)
         self._others = np.zeros(len(self._rx.rows) + 1, np.int64)
         self._missing = 0

@@ -169,7 +169,7 @@ class SimulatedBusClock(LockstepClock):
             time.sleep(_LOST_S)
 
     def close(self) -> None:
-        """Give the lead back, in order; if this process died, time would run with the wall."""
+        """Give the lead back, in order; if this process died, time would run with wall time."""
         super().close()
         self.sleep(_LAST_S)
         for bus in self._by_url.values():
@@ -180,7 +180,7 @@ def open_clock(urls: Iterable[BusUrl], *, real_time: bool = False) -> Clock:
     """Return the clock of the robot on these buses.
 
     Where all are simulated buses in lockstep that no other process leads, this process leads them
-    from now on and their time is the clock's, in `real_time` no faster than the wall's; otherwise
+    from now on and their time is the clock's, in `real_time` no faster than wall time; otherwise
     the clock is CLOCK_MONOTONIC.
     """
     buses: dict[str, SimulatedBus] = {}

@@ -64,7 +64,7 @@ class RobotMachine:
 
     There is power only while the `safety_io` allows it: the robot's own where none is named, unless
     all buses are simulated. Tensions are measured where their sensors are at a `tension_port`.
-    Simulated buses in lockstep go on as fast as they can, in `real_time` no faster than the wall.
+    Simulated buses in lockstep go on as fast as they can, in `real_time` no faster than wall time.
     Axes that are not mandatory are left out where they do not boot, if they may be `optional`.
     """
 
@@ -280,7 +280,7 @@ class RobotMachine:
 
     @property
     def safety(self) -> str:
-        """What guards the power besides the bus, for people."""
+        """Name of the safety I/O, which guards the power besides the bus; empty without one."""
         return "" if self._safety is None else self._safety.io.name
 
     @_as_machine_error

@@ -100,7 +100,7 @@ class Session(WinchOperator):
         self.run_task(homing.configure)
         self.set_mode(Mode.HOMING)
         try:
-            # the procedure keeps its own time; this one is there for a drive gone deaf
+            # the procedure keeps its own time; this one is there for a drive that stops responding
             self.let_drive(homing.update, 2.0 * _INDEX_TIMEOUT_S, "the encoder index (homing)")
         except BaseException:
             homing.abort()

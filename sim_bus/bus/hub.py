@@ -198,7 +198,7 @@ class Hub(Switch):
         return None if wait_s == math.inf else wait_s
 
     def _begin(self) -> None:
-        """Let bus time run with the wall: a client sends and none leads."""
+        """Let bus time run with the wall clock: a client sends and none leads."""
         self.advance(self.clock.now(0.0))
         wall_s = time.monotonic()
         for hub in self.robot_hubs:
@@ -218,7 +218,7 @@ class Hub(Switch):
     def _follow(self, now_s: float) -> None:
         """Run the nodes' timers, each at its time, until `now_s`, a limited number in each call.
 
-        What the nodes do does not depend on when the wall's time is looked at.
+        What the nodes do does not depend on when wall-clock time is looked at.
         """
         for _ in range(_BURST):
             event_s = self.next_event_s()

@@ -55,7 +55,7 @@ class Lead:
             self._end()
 
     def lose(self, client: Client) -> None:
-        """Let bus time run with the wall where `client`, which has disconnected, was the leader."""
+        """Let bus time run with wall time where the disconnected `client` was the leader."""
         if client is self.leader:
             self._end()
             self._clock.run(time.monotonic())

@@ -42,7 +42,7 @@ def dictionary(node_id: int) -> canopen.ObjectDictionary:
 
 @contextmanager
 def open_network(bus: str, nodes: list[int], *, lead: bool = True) -> Iterator[CanNetwork]:
-    """Join a bus; who does not `lead` it goes by the wall, so that other programs can answer."""
+    """Join a bus; who does not `lead` it goes by wall time, so that other programs can answer."""
     url = BusUrl.parse(bus)
     clock = open_clock([url]) if lead else PacedClock()
     network = CanNetwork(url, clock, nodes, MASTER, HEARTBEAT_S)

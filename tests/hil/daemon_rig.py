@@ -75,7 +75,7 @@ def alive(pid: int) -> bool:
 class RealDaemon:
     """`cdpr run` of a slow robot with two axes, or of `robot`; `ready` is the line that it is up.
 
-    Its drives live by the wall's clock where they are `paced`, else their time waits for the loop.
+    Its drives live by the wall clock where they are `paced`, else their time waits for the loop.
     """
 
     def __init__(
@@ -190,7 +190,7 @@ class RealDaemon:
 def held_right(daemon: RealDaemon, client: str) -> Iterator[httpx.Headers]:
     """Yield the headers of the right to move; it is renewed, then the axes hold and it is released.
 
-    It expires by the wall's clock, but an unpaced robot's time waits for the loop: what takes it a
+    It expires by the wall clock, but an unpaced robot's time waits for the loop: what takes it a
     second may take a busy machine longer than the right lasts.
     """
     taken = daemon.http.post("/control", json={"client": client, "ttl_s": _RIGHT_S})

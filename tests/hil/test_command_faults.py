@@ -330,7 +330,7 @@ def test_a_killed_master_leaves_no_power(lab: Lab, tmp_path: Path) -> None:
         command.kill()
         command.wait()
         # half a second until bus time runs by itself, half a second until the heartbeat is missed,
-        # then the quick stop; on a busy machine the wall is later than bus time
+        # then the quick stop; on a busy machine wall time is later than bus time
         deadline = time.monotonic() + 60.0
         while lab.state() != OFF:
             assert time.monotonic() < deadline

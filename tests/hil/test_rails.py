@@ -242,7 +242,7 @@ def test_a_drive_that_does_not_do_as_it_is_told_is_not_moved(
     assert rails.position_m("modbus") == before
 
 
-@pytest.mark.alone  # load cells and who reads them live by the wall's clock
+@pytest.mark.alone  # load cells and who reads them live by the wall clock
 def test_tight_cables_refuse_the_move_and_end_it(rails: Rails) -> None:
     before = rails.position_m("cia402")
     cells = ("--tension", "rtu-load-cell-1", "--tension-port", rails.tension_port)

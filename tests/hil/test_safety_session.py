@@ -130,7 +130,7 @@ def lab(
 ) -> Iterator[Lab]:
     bus, path = simulator
     with PhysicsBoard.attach(path) as board:
-        _mend_drive(bus)  # a master that does not lead: bus time goes on with the wall
+        _mend_drive(bus)  # a master that does not lead: bus time goes on with the wall clock
         module_io_device.mend()
         yield Lab(bus, path, board.axis(0), tmp_path, module_io_device)
 

@@ -76,6 +76,6 @@ def test_a_motor_is_measured_over_socketcan(tmp_path: Path) -> None:
         assert result.returncode == 0, result.stderr[-2000:]
     told = json.loads(cdpr_here("cogging", "fit", out, "--json").stdout.splitlines()[-1])
     found = told["identification"]
-    # by how much is judged where the bus is led; here time runs with the wall once a SYNC is late
+    # by how much is judged where the bus is led; here wall time counts once a SYNC is late
     strongest = max(zip(found["amplitudes_Nm"], found["orders"], strict=True))
     assert strongest[1] == 4

@@ -387,4 +387,4 @@ def test_own_profiles_are_found_by_name_before_shipped_ones(
     assert cdpr_profiles.load_winch("winch-mpp0923d").path.parent == winches
     hidden = cdpr_profiles.load_winch(SHIPPED / "winches" / "winch-mpp0923d.toml")
     assert hidden.reference == str(hidden.path)
-    assert cdpr_profiles.load_machine("mine") == mine
+    assert cdpr_profiles.load_winch_or_robot("mine") == mine

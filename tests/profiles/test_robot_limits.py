@@ -92,7 +92,7 @@ def test_figures_are_one_for_all_or_one_for_each(tmp_path: Path) -> None:
         (
             {"limits": "speed_rad_s = 1037.0"},
             "limits.speed_rad_s[0]",
-            "twice the motor's rated speed",
+            "2 times the motor's rated speed",
         ),
         ({"limits": "torque_Nm = 12.0"}, "limits.torque_Nm[0]", "the motor's peak torque (11.55)"),
         ({"limits": "torque_Nm = 0.0"}, "limits.torque_Nm[0]", "greater than 0"),

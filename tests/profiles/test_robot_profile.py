@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import cdpr_profiles
-from cdpr_profiles import ProfileError, Robot, Winch, load_machine, load_robot
+from cdpr_profiles import ProfileError, Robot, Winch, load_robot, load_winch_or_robot
 
 TWO_AXES = """
 name = "Two"
@@ -87,16 +87,16 @@ def test_two_buses_of_one_name_are_refused(tmp_path: Path):
 
 
 def test_a_machine_is_a_winch_or_a_robot(tmp_path: Path):
-    assert isinstance(load_machine("winch-mpp0923d"), Winch)
-    assert isinstance(load_machine("spatial-8"), Robot)
-    assert isinstance(load_machine(robot_file(tmp_path)), Robot)
+    assert isinstance(load_winch_or_robot("winch-mpp0923d"), Winch)
+    assert isinstance(load_winch_or_robot("spatial-8"), Robot)
+    assert isinstance(load_winch_or_robot(robot_file(tmp_path)), Robot)
     winch = tmp_path / "winch.toml"
     winch.write_text(
         (cdpr_profiles.reading.places.SHIPPED / "winches/winch-mpp0923d.toml").read_text()
     )
-    assert isinstance(load_machine(winch), Winch)
+    assert isinstance(load_winch_or_robot(winch), Winch)
     with pytest.raises(ProfileError, match="did you mean 'spatial-8'"):
-        load_machine("spatial8")
+        load_winch_or_robot("spatial8")
 
 
 def test_devices_beside_the_drives_are_found_from_anywhere(tmp_path: Path):

@@ -1,4 +1,4 @@
-"""The same packets of a master that leads give the same bytes, whatever the wall's clock does."""
+"""The same packets of a master that leads give the same bytes, whatever the wall clock does."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def simulator(log: Path) -> Iterator[tuple[subprocess.Popen[bytes], list[Bus]]]:
         buses += [Bus(f"{name}-{letter}") for letter in "ab"]
         yield process, buses
     finally:
-        # the simulator first, so that no time passes by the wall
+        # the simulator first, so that no time passes by the wall clock
         process.stdin.close()
         process.wait(120)
         process.stdout.close()

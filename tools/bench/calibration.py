@@ -72,7 +72,7 @@ def _off_mm(found: CableGeometry, true: CableGeometry) -> float:
 def _timed(work: Callable[[], Any], repeats: int) -> tuple[float, Any]:
     """Return the least processor time of some repetitions, ms, and what they find.
 
-    All of it runs on one thread: that is the wall's time of a machine with nothing else to do.
+    All of it runs on one thread: that is the wall-clock time of a machine with nothing else to do.
     """
     cpu, _ = timed(work, repeats, warm_up=int(repeats > 1))
     return 1e-6 * float(cpu.min()), work()

@@ -17,7 +17,11 @@ from cdpr_rt.calibration.outcome import Method, Outcome, calibrate, calibration_
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.data import CalibrationData, load_points, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
-from cdpr_rt.robots.calibration_state import distrust, mark_calibrated, mark_not_calibrated
+from cdpr_rt.robots.calibration_state import (
+    mark_calibrated,
+    mark_not_calibrated,
+    not_calibrated_reason,
+)
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
@@ -119,7 +123,7 @@ def _taken(
         return None, ["nothing was taken over"]
     found, path = _take_over(outcome, raw_data, simulated)
     lines = [
-        f"calibration {found.version} ({found.identity}) counts from the next start on: {path}",
+        f"calibration {found.version} ({found.identity}) takes effect at the next start: {path}",
         f"take it back: cdpr calibrate undo {robot.reference}",
         f"see whether it still holds, in two minutes: cdpr calibrate check {robot.reference}",
     ]
@@ -159,7 +163,7 @@ def _take_over(
 ) -> tuple[GeometryCalibration, Path]:
     """Put a good calibration in force, if the robot can work with it; raises ProfileError."""
     robot = outcome.robot
-    before = "" if simulated else distrust(robot.profile)
+    before = "" if simulated else not_calibrated_reason(robot.profile)
     found = calibration_of(
         outcome, next_version(robot), raw_data, simulated=simulated, distrusted_before=before
     )

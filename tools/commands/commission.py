@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_drivers.bus import BusUrl
-from cdpr_profiles import Robot, Winch, load_machine
+from cdpr_profiles import Robot, Winch, load_winch_or_robot
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.finding_index import Index
 from cdpr_rt.procedures.commissioning.identified import identify
@@ -100,7 +100,7 @@ def commission(
     ] = DEFAULT_BANDWIDTH_HZ,
     overwrite: OverwriteOption = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A rough look in a fifth of the time.")
+        bool, typer.Option("--quick", help="A rough result in a fifth of the time.")
     ] = False,
     index: IndexOption = "homing",
     safety_io: SafetyIoOption = None,
@@ -109,7 +109,7 @@ def commission(
 ) -> None:
     """Measure, identify, validate and report motors, each detached from its load."""
     out = Output(as_json)
-    profile = load_machine(machine)
+    profile = load_winch_or_robot(machine)
     folder = out_dir or Path("out") / f"commission-{profile.profile}"
     wanted = _Wanted(QUICK if quick else THOROUGH, bandwidth_Hz, index, safety_io)
     if isinstance(profile, Robot):

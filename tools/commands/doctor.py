@@ -34,7 +34,7 @@ def doctor(
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Look at this machine and say what to mend before a robot runs on it.
+    """Check this machine and tell what to fix before a robot runs on it.
 
     Changes nothing. A `problem` must be mended, a `note` makes cycles more punctual. With --report
     versions, findings, robot files and the end of the last recording go into a text file.

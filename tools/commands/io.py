@@ -31,7 +31,7 @@ _Seconds = Annotated[float, typer.Option(min=0.1, max=86400.0, help="How long; C
 
 @app.command()
 def show(io: _IoArgument, as_json: JsonOption = False) -> None:
-    """Say what every point reads; changes nothing."""
+    """Show what every point reads; changes nothing."""
     out = Output(as_json)
     with _link(io) as link:
         state = link.state()
@@ -44,7 +44,7 @@ def show(io: _IoArgument, as_json: JsonOption = False) -> None:
 
 @app.command()
 def watch(io: _IoArgument, seconds: _Seconds = 3600.0, as_json: JsonOption = False) -> None:
-    """Say what changes, as it changes; changes nothing."""
+    """Show each change as it happens; changes nothing."""
     out = Output(as_json)
     before: list[str] = []
     with _link(io) as link:
@@ -201,7 +201,7 @@ def _keep(
     seconds: float,
     ended: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Set an output and keep the device's watchdog content for a while."""
+    """Set an output and feed the device's watchdog for a while."""
     link.feed_watchdog()  # a device whose watchdog has run out takes no outputs
     link.write(coil, on)
     deadline_s = link.clock.now_s + seconds

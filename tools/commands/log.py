@@ -34,7 +34,7 @@ _EVENTS_SHOWN = 30
 
 @app.command()
 def info(files: _FilesArgument, as_json: JsonOption = False) -> None:
-    """Say what is in recordings: how long, what happened, what is missing, how they ended."""
+    """Summarise recordings: duration, events, gaps, and how they ended."""
     out = Output(as_json)
     results = []
     for path in files_of(files):

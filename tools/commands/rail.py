@@ -38,7 +38,7 @@ _BusOption = Annotated[
 
 @app.command()
 def show(rail: _RailArgument, bus: _BusOption = None, as_json: JsonOption = False) -> None:
-    """Say where the carriage is and whether the robot is calibrated; moves nothing."""
+    """Show where the carriage is and whether the robot is calibrated; moves nothing."""
     out = Output(as_json)
     profile = load_rail(rail)
     position = position_of(rail, profile, bus)

@@ -66,7 +66,7 @@ def watch(
     sensors: _SensorsOption,
     port: _PortOption,
     seconds: Annotated[
-        float | None, typer.Option(min=0.1, help="How long; until Ctrl-C by default.")
+        float | None, typer.Option(min=0.1, help="Duration; until Ctrl-C by default.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -169,7 +169,7 @@ def calibrate(
     speed_mm_s: Annotated[
         float | None,
         typer.Option(
-            "--speed-mm-s", min=0.5, max=200.0, help="Of the cable: 40 with masses, 5 without."
+            "--speed-mm-s", min=0.5, max=200.0, help="Cable speed: 40 with masses, 5 without."
         ),
     ] = None,
     lead_mm: Annotated[
@@ -179,10 +179,10 @@ def calibrate(
     gravity: Annotated[
         float, typer.Option(min=9.7, max=9.9, help="Local gravity, m/s2.")
     ] = _STANDARD_GRAVITY,
-    lowest_N: Annotated[float, typer.Option("--lowest-n", help="Paid out to, in N.")] = 10.0,
-    highest_N: Annotated[float, typer.Option("--highest-n", help="Wound in to, in N.")] = 80.0,
+    lowest_N: Annotated[float, typer.Option("--lowest-n", help="Lowest tension, N.")] = 10.0,
+    highest_N: Annotated[float, typer.Option("--highest-n", help="Highest tension, N.")] = 80.0,
     travel_mm: Annotated[
-        float, typer.Option("--travel-mm", min=1.0, help="Wound in at most, the cable made fast.")
+        float, typer.Option("--travel-mm", min=1.0, help="Most cable wound in, its end made fast.")
     ] = 500.0,
     board: Annotated[
         Path | None,

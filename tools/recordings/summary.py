@@ -51,7 +51,7 @@ class _Count:
     last: dict[str, int] = field(default_factory=dict)
     stamps_ns: list[FloatArray] = field(default_factory=list)
     elapsed_s: list[FloatArray] = field(default_factory=list)
-    """When some of the rows were, by the wall's clock and by the bus'."""
+    """When some of the rows were, by the wall clock and by the bus'."""
     runs: list[dict[str, Any]] = field(default_factory=list)
     """What ran one after the other: program, seconds, where axes and platform were at its end."""
 
@@ -114,10 +114,10 @@ class _Count:
             run.setdefault("cut_ns", int(stamps_ns[0]))
 
     def when_s(self, stamp_ns: float) -> float:
-        """Return the recording's time, as `cdpr log plot` counts it, at one of the wall's clock."""
+        """Return the recording's time, as `cdpr log plot` counts it, at a wall-clock time."""
         stamps_ns, elapsed_s = np.concatenate(self.stamps_ns), np.concatenate(self.elapsed_s)
         at_s = float(np.interp(stamp_ns, stamps_ns, elapsed_s)) - self.first_s
-        # before the first row and after the last one only the wall's clock goes on
+        # before the first row and after the last one only the wall clock goes on
         before_s, after_s = stamps_ns[0] - stamp_ns, stamp_ns - stamps_ns[-1]
         return at_s + 1e-9 * float(max(after_s, 0.0) - max(before_s, 0.0))
 

@@ -1,4 +1,4 @@
-"""The parts of a file that are compared; those that depend on the wall's clock are left out."""
+"""The parts of a file that are compared; those that depend on the wall clock are left out."""
 
 from __future__ import annotations
 

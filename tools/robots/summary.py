@@ -49,9 +49,9 @@ def _of_tensions(
 ) -> dict[str, Any]:
     statics, limits = statics_of(robot), limits_of(robot)
     home, points, turns = np.array(platform.home_m), statics.points(), statics.orientations
-    still = np.array([statics.reserve_N(points, 0.0, turn) for turn in turns])
+    still = np.array([statics.margin_N(points, 0.0, turn) for turn in turns])
     wanted = platform.acceleration_m_s2
-    moving = np.array([statics.reserve_N(points, wanted, turn) for turn in turns])
+    moving = np.array([statics.margin_N(points, wanted, turn) for turn in turns])
     lengths = np.array([statics.lengths(points, turn) for turn in turns])
     at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
     for figures, swing in zip(axes, worst_swings(platform), strict=True):
@@ -73,7 +73,7 @@ def _of_tensions(
         "held_share": float(np.mean(still >= 0.0)),
         "target_share": float(np.mean(moving >= statics.model.reserve_N)),
         "kept_for_control_N": statics.model.reserve_N,
-        "reserve_at_home_N": _finite(float(statics.reserve_N(home))),
+        "reserve_at_home_N": _finite(float(statics.margin_N(home))),
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
         "lowest_resonance_Hz": float(lowest_resonance_Hz(robot, points).min()),
@@ -178,9 +178,10 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     reserve, kept = figures["reserve_in_motion_N"], figures["kept_for_control_N"]
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
-        f"tensions   hold it in {held:.0f} % of the box; targets are taken where they stay "
-        f"{kept:.0f} N from their",
-        f"           limits in motion, which the control needs: in {taken:.0f} % of it{least}",
+        f"tensions   hold the platform in {held:.0f} % of the box; targets are accepted in "
+        f"{taken:.0f} % of it,",
+        f"           where tensions in motion keep the {kept:.0f} N of the control from their "
+        f"limits{least}",
     ]
     lowest = figures["lowest_resonance_Hz"]
     lines.append(
@@ -201,7 +202,7 @@ def _loop_lines(loop: dict[str, float]) -> list[str]:
     return [
         f"loop       the platform's modes at {slowest:.1f} to {fastest:.1f} Hz; with cables up to "
         f"{_STIFFNESS_OFF:.0%} softer or stiffer",
-        f"           its gain may still be {loop['gain_margin']:.1f} times off, or its phase "
+        f"           gain margin {loop['gain_margin']:.1f}, phase margin "
         f"{math.degrees(loop['phase_margin_rad']):.0f} deg",
     ]
 
@@ -248,7 +249,7 @@ def _sketch(robot: Robot, platform: Platform) -> list[str]:
     box = (points >= np.array(platform.workspace_min_m)).all(axis=-1)
     box &= (points <= np.array(platform.workspace_max_m)).all(axis=-1)
     statics = statics_of(robot)
-    cells[statics.reserve_N(points) >= 0.0] = "."
+    cells[statics.margin_N(points) >= 0.0] = "."
     cells[box] = np.where(statics.is_target(points[box], statics.orientations), "#", "!")
 
     def put(position_m: Sequence[float], letter: str) -> None:

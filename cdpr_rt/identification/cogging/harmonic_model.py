@@ -255,7 +255,7 @@ def _result(
         cogging_trend_1_s=fitted.cogging_trend_1_s,
         excluded_fraction=lost / rows,
         residual_rms_Nm=float(np.sqrt(np.mean(fitted.residual_Nm**2))),
-        held_back_error_Nm=choice.error_Nm,
+        held_out_error_Nm=choice.error_Nm,
     )
 
 

@@ -51,7 +51,7 @@ class HarmonicResult:
     excluded_fraction: float
     """Share of the windows in which it stood still or turned against the ramp."""
     residual_rms_Nm: float
-    held_back_error_Nm: FloatArray
+    held_out_error_Nm: FloatArray
     """Error of prediction of held-back turns with 0, 1, 2, ... orders, (k + 1,)."""
 
     @property

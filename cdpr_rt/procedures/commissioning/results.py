@@ -133,7 +133,7 @@ def identification(found: Identified) -> dict[str, Any]:
         "repaired_fraction": thesis.repaired_fraction,
         "coverage": better.coverage,
         "excluded_fraction": better.excluded_fraction,
-        "held_back_error_Nm": better.held_back_error_Nm,
+        "held_back_error_Nm": better.held_out_error_Nm,
         "coulomb_forward_Nm": better.coulomb_forward_Nm.value,
         "coulomb_backward_Nm": better.coulomb_backward_Nm.value,
         "viscous_Nms_rad": better.viscous_Nms_rad.value,

@@ -150,7 +150,7 @@ class PathPlanner:
         available = available_wrenches(model, positions)
         if not available.holds.all():
             i = int((~available.holds).argmax())
-            why = self.missing(positions[i])
+            why = self.infeasibility(positions[i])
             return WrenchBounds.none(0, model.size), Obstacle(
                 int(nodes.line[chosen[i]]), positions[i].copy(), why
             )
@@ -216,11 +216,11 @@ class PathPlanner:
         fresh[nodes.runs.ravel()] = True
         return np.flatnonzero(fresh).astype(np.int64)
 
-    def missing(self, position: FloatArray) -> str:
+    def infeasibility(self, position: FloatArray) -> str:
         """Return why the platform is not held at rest at a position (d,)."""
         model = self.model
         workspace = model.workspace(0.0)
-        why = workspace.feasible(model.pose(position))
+        why = workspace.infeasibility(model.pose(position))
         return why or "the motors' torque does not hold it"
 
     # -- figures

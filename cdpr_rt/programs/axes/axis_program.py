@@ -9,7 +9,7 @@ import numpy as np
 from cdpr_rt.control.base import Controller
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.motion.approach import ramp_velocity
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 from cdpr_rt.programs.program_base import CommandedProgram
 
 
@@ -36,7 +36,7 @@ class AxisProgram(CommandedProgram):
     name = "hold"
     needs_lease = False
 
-    def __init__(self, model: RobotModel, loop: BumplessController) -> None:
+    def __init__(self, model: AxesModel, loop: BumplessController) -> None:
         self._model = model
         self._loop = loop
         self.controller = loop.controller

@@ -11,7 +11,7 @@ from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach
 from cdpr_rt.motion.pose_stream import PoseStream, StreamState
 from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 
 _LEAD_S = 0.3
 
@@ -46,7 +46,7 @@ class FollowProgram(AxisProgram):
     name = "follow"
     needs_lease = True
 
-    def __init__(self, model: RobotModel, loop: BumplessController, stream: PoseStream) -> None:
+    def __init__(self, model: AxesModel, loop: BumplessController, stream: PoseStream) -> None:
         super().__init__(model, loop)
         self.stream = stream
         self._epoch = -1

@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 
 DEFAULT_TIMEOUT_S = 0.5
 LONGEST_TIMEOUT_S = 2.0
@@ -35,7 +35,7 @@ class JogProgram(AxisProgram):
     name = "jog"
     needs_lease = True
 
-    def __init__(self, model: RobotModel, loop: BumplessController) -> None:
+    def __init__(self, model: AxesModel, loop: BumplessController) -> None:
         super().__init__(model, loop)
         self._speed = np.zeros(model.n)
         self._cycles_left = self._cycles = 0

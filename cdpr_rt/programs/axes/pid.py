@@ -11,7 +11,7 @@ from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
 from cdpr_rt.programs.axes.point_to_point import PointToPoint
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 
 FURTHEST_RAD = 1e4
 """How far one command may send an axis."""
@@ -26,7 +26,7 @@ class PidProgram(AxisProgram):
     name = "pid"
     needs_lease = True
 
-    def __init__(self, model: RobotModel, loop: BumplessController) -> None:
+    def __init__(self, model: AxesModel, loop: BumplessController) -> None:
         super().__init__(model, loop)
         self._motion = PointToPoint(model)
         self._has_target = False

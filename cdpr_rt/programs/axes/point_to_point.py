@@ -6,7 +6,7 @@ import numpy as np
 
 from cdpr_rt.core.exchange import FloatArray, Setpoint
 from cdpr_rt.motion.approach import approach
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 
 _LEAST_SHARE = 1e-6
 _LEAST_DISTANCE_RAD = 1e-9
@@ -20,7 +20,7 @@ class PointToPoint:
     within the bounds of each.
     """
 
-    def __init__(self, model: RobotModel) -> None:
+    def __init__(self, model: AxesModel) -> None:
         self._model = model
         self.target_rad = np.zeros(model.n)
         self._distance = np.zeros(model.n)

@@ -7,13 +7,13 @@ import numpy as np
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.control.pid import Pid
 from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 
 
 class PositionLoop:
     """One PID for all programs that follow a position; it keeps its state from one to the next."""
 
-    def __init__(self, model: RobotModel) -> None:
+    def __init__(self, model: AxesModel) -> None:
         known = None
         if any(axis is not None for axis in model.compensation):
             known = Compensation(list(model.compensation), model.period_s)

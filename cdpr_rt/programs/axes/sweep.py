@@ -14,7 +14,7 @@ from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.axes.axis_program import AxisProgram
 from cdpr_rt.programs.axes.point_to_point import PointToPoint
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 
 DEFAULT_SPEED_RAD_S = math.radians(3.0)
 FURTHEST_RAD = 100.0 * math.tau
@@ -34,7 +34,7 @@ class SweepProgram(AxisProgram):
     name = "sweep"
     needs_lease = True
 
-    def __init__(self, model: RobotModel) -> None:
+    def __init__(self, model: AxesModel) -> None:
         controller = Proportional(model.sweep_gain_Nm_rad, model.torque_Nm)
         super().__init__(model, BumplessTransfer(controller, model.torque_Nm, model.period_s))
         self._motion = PointToPoint(model)

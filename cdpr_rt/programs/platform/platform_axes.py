@@ -12,7 +12,7 @@ from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
 from cdpr_rt.programs.axes.jog import JogProgram
 from cdpr_rt.programs.base import Program, ProgramError
 from cdpr_rt.programs.idle import IdleProgram
-from cdpr_rt.programs.model import RobotModel
+from cdpr_rt.programs.model import AxesModel
 from cdpr_rt.programs.platform.paths.path import PathProgram
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.standing import hangs
@@ -29,7 +29,7 @@ class PlatformHold(ProgramDefaults):
     needs_lease = False
 
     def __init__(
-        self, parts: PlatformParts, model: RobotModel, loop: BumplessController, path: PathProgram
+        self, parts: PlatformParts, model: AxesModel, loop: BumplessController, path: PathProgram
     ) -> None:
         self._parts, self._path = parts, path
         self._axes = AxisProgram(model, loop)
@@ -80,7 +80,7 @@ class PlatformHold(ProgramDefaults):
 class PlatformIdle(IdleProgram):
     """Fades the torque out; refused while the platform hangs on its cables."""
 
-    def __init__(self, parts: PlatformParts, model: RobotModel) -> None:
+    def __init__(self, parts: PlatformParts, model: AxesModel) -> None:
         super().__init__(model)
         self._parts = parts
 
@@ -105,7 +105,7 @@ class PlatformIdle(IdleProgram):
 class PlatformJog(JogProgram):
     """Turns single winches; the cables count as slack from then on."""
 
-    def __init__(self, parts: PlatformParts, model: RobotModel, loop: BumplessController) -> None:
+    def __init__(self, parts: PlatformParts, model: AxesModel, loop: BumplessController) -> None:
         super().__init__(model, loop)
         self._parts = parts
 

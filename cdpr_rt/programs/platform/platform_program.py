@@ -20,10 +20,10 @@ from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.programs.program_base import CommandedProgram
 from cdpr_rt.robots.free_rotation import SWINGS_m
 from cdpr_rt.robots.interface import PlatformControl
-from cdpr_rt.robots.kinematics.pose_setpoint import place, write_quaternion
+from cdpr_rt.robots.kinematics.pose_setpoint import pose_of_coordinates, write_quaternion
 from cdpr_rt.robots.last_lengths import LastLengths
 from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.robot_arrays import frame_m
+from cdpr_rt.robots.robot_arrays import exit_point_diagonal_m
 
 _SLOWED_m, _WAITING_m = 0.02, 0.05
 _LEAST_PACE = 1e-3
@@ -80,7 +80,7 @@ class PlatformParts:
         self.model, self.platform = model, model.platform
         self.lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
         """The largest residual of the forward kinematics that is allowed."""
-        self.near_m = max(NEAR_m, NEAR_SHARE * frame_m(model.platform))
+        self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))
         """How far from its set-point a platform has arrived."""
         self.compensation = compensation
         self.last = LastLengths()
@@ -97,7 +97,7 @@ class PlatformParts:
         """The most along each direction, (d,)."""
         self.scale_m = model.wrench_scale
         """How far an anchor point moves with each direction, (d,): 1, and for angles an arm."""
-        self.distrust = ""
+        self.not_calibrated_reason = ""
         """Why the geometry may not be believed, as after a rail has moved; else empty."""
         self.cycle = -2
         """The last cycle in which one of the programs moved the platform."""
@@ -108,11 +108,11 @@ class PlatformParts:
     @property
     def tight(self) -> bool:
         """Whether all cables are tight and carry the platform, where it is known to be."""
-        return not self.estimator.estimate.may_be_slack
+        return not self.estimator.estimate.slack_allowed
 
     @tight.setter
     def tight(self, tight: bool) -> None:
-        self.estimator.estimate.may_be_slack = not tight
+        self.estimator.estimate.slack_allowed = not tight
 
     @property
     def known(self) -> bool:
@@ -130,7 +130,7 @@ class PlatformParts:
 
     def notices(self) -> list[str]:
         """Return what an operator should know of the robot."""
-        return [text for text in (self.control.cell_trouble,) if text]
+        return [text for text in (self.control.load_cell_fault,) if text]
 
     def lengths_disagree_m(self) -> float:
         """Return the residual of the forward kinematics, 0 while cables are slack."""
@@ -183,7 +183,7 @@ class PlatformProgram(CommandedProgram):
         self._target, self._rest, self._paced = np.zeros((3, model.size))
         self._speed, self._acceleration = np.array(parts.speed), np.array(parts.acceleration)
         self._directions = np.array(model.kinematics.directions)
-        self._wanted, self._room, self._seen = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(7)
+        self._wanted, self._scratch, self._seen = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(7)
         self._arrival = Arrival(parts.period_s, parts.near_m)
         # compiled here, not when the first pose is recorded
         self._write_setpoint(self._target)
@@ -220,8 +220,8 @@ class PlatformProgram(CommandedProgram):
 
     def _require_pose(self) -> None:
         """Raise ProgramError where the platform is not to be moved to a pose."""
-        if self._parts.distrust:
-            raise ProgramError(f"{self.name}: {self._parts.distrust}")
+        if self._parts.not_calibrated_reason:
+            raise ProgramError(f"{self.name}: {self._parts.not_calibrated_reason}")
         if not self._parts.tight:
             raise ProgramError(f"{self.name}: the cables are not tight; run tighten first")
 
@@ -240,7 +240,7 @@ class PlatformProgram(CommandedProgram):
 
     def _write_setpoint(self, position: FloatArray) -> None:
         home = self._parts.model.home_pose.array
-        place(position, self._directions, home, self._room, self._wanted)
+        pose_of_coordinates(position, self._directions, home, self._scratch, self._wanted)
         write_quaternion(self._wanted, self._seen)
 
     def progress(self) -> dict[str, Any]:
@@ -259,7 +259,7 @@ class PlatformProgram(CommandedProgram):
             "target_m": self._target[:k].tolist(),
             **(turned if self._about.size else {}),
             "tension_N": control.tension_N.tolist(),
-            "missing": control.missing(),
+            "missing": control.tension_infeasibility(),
             "held_back": self._held_back(),
             "done": float(self._at_rest and self._arrival.over),
             "trouble": self._arrival.text() or self._swing_text(),

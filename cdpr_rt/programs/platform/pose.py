@@ -99,11 +99,11 @@ class PoseProgram(PlatformProgram):
     def progress(self) -> dict[str, Any]:
         """Return the platform's state, the target, and the state of the stream."""
         state, aim, k = super().progress(), self._aim, self._k
-        state["left_m"] = None if aim is None else aim[:k].tolist()
+        state["interrupted_target_m"] = None if aim is None else aim[:k].tolist()
         if self._about.size:
-            state["left_rotation_rad"] = None if aim is None else aim[k:].tolist()
+            state["interrupted_target_rotation_rad"] = None if aim is None else aim[k:].tolist()
         if self._blocked:
-            state["trouble"] = f"no way on, {self._missing_at(self._seen_goal)}"
+            state["trouble"] = f"no way on, {self._infeasibility_at(self._seen_goal)}"
         if self._following:
             state |= {"stream": self.stream.state.name.lower(), **self.stream.counts()}
         return state
@@ -115,16 +115,16 @@ class PoseProgram(PlatformProgram):
             return lags
         if self._near >= 0:
             return self._control.contact(self._near)
-        return self._missing_at(self._seen_goal) or _HELD_BACK[self._hindrance]
+        return self._infeasibility_at(self._seen_goal) or _HELD_BACK[self._hindrance]
 
-    def _missing_at(self, position: FloatArray) -> str:
+    def _infeasibility_at(self, position: FloatArray) -> str:
         """Return where and why a position is not feasible, an empty text where it is."""
-        missing = self._control.feasible(position)
-        if not missing:
+        why_not = self._control.infeasibility(position)
+        if not why_not:
             return ""
         k = self._k
         turned = f" turned by {_listed(position[k:])} rad" if position[k:].any() else ""
-        return f"at {_listed(position[:k])} m{turned}: {missing}"
+        return f"at {_listed(position[:k])} m{turned}: {why_not}"
 
     # -- commands
 
@@ -148,9 +148,9 @@ class PoseProgram(PlatformProgram):
         if what == "resume":
             if aim is None:
                 raise ProgramError("pose: resume: no target has been left; allowed: position_m")
-            missing = self._control.feasible_path(aim)
-            if missing:
-                raise ProgramError(f"pose: resume: on the way, {missing}")
+            why_not = self._control.path_obstacle(aim)
+            if why_not:
+                raise ProgramError(f"pose: resume: on the way, {why_not}")
         return what, aim, speed
 
     def _position(self, keys: CommandArguments) -> FloatArray:
@@ -168,12 +168,12 @@ class PoseProgram(PlatformProgram):
         else:
             turned, most = float(np.linalg.norm(wanted[k:])), self._parts.model.angle_rad
             wanted[k:] *= 1.0 if turned <= most else most / turned
-        missing = control.feasible(wanted)
-        if missing:
-            raise ProgramError(f"pose: {', '.join(asked)}: {missing}")
-        missing = control.feasible_path(wanted)
-        if missing:
-            raise ProgramError(f"pose: {', '.join(asked)}: on the way, {missing}")
+        why_not = control.infeasibility(wanted)
+        if why_not:
+            raise ProgramError(f"pose: {', '.join(asked)}: {why_not}")
+        why_not = control.path_obstacle(wanted)
+        if why_not:
+            raise ProgramError(f"pose: {', '.join(asked)}: on the way, {why_not}")
         return wanted
 
     def _checked_position(self, keys: CommandArguments) -> FloatArray:
@@ -288,7 +288,7 @@ class PoseProgram(PlatformProgram):
             control.position, target, self._hand, goal,
         )  # fmt: skip
         self._seen_goal[:] = goal
-        near = control.touches(goal)
+        near = control.contact_at(goal)
         if near >= 0 or distance_m(goal, target, self._parts.scale_m) > 0.0:
             self._near = near
         if near < 0 and (control.stands(goal) or not control.stands(target)):
@@ -297,7 +297,7 @@ class PoseProgram(PlatformProgram):
         # along the edge in one direction, where not in all; turning is one of them
         for part in self._steps:
             self._kept[part], target[part] = target[part], goal[part]
-            if control.stands(target) and control.touches(target) < 0:
+            if control.stands(target) and control.contact_at(target) < 0:
                 return
             target[part] = self._kept[part]
 
@@ -312,7 +312,7 @@ class PoseProgram(PlatformProgram):
             self._stop_straight()
         stops = control.stands(self._rest)
         # all of the way to a pose has been looked at before
-        near = control.nears(self._rest) if self._following else -1
+        near = control.contact_ahead(self._rest) if self._following else -1
         if near >= 0:
             self._near = near
         if near >= 0 or (self._inside and not stops):

@@ -126,7 +126,7 @@ class Interference:
             return ""
         return in_words(self.things(int(pair[0])), float(clearance[0]))
 
-    def nears(self, start: FloatArray, end: FloatArray) -> int:
+    def contact_ahead(self, start: FloatArray, end: FloatArray) -> int:
         """Return a pair that comes into contact on a short way straight between positions (d,).
 
         -1 for none. For use in every cycle: allocates no arrays, and may see contact where things
@@ -134,8 +134,8 @@ class Interference:
         """
         return self._on_way(start, end, _PARTS)
 
-    def touches(self, start: FloatArray, end: FloatArray) -> int:
-        """Return a pair that is in contact at the end of a way, as for `nears`."""
+    def contact_at(self, start: FloatArray, end: FloatArray) -> int:
+        """Return a pair that is in contact at the end of a way, as for `contact_ahead`."""
         return self._on_way(start, end, 0)
 
     def _on_way(self, start: FloatArray, end: FloatArray, parts: int) -> int:

@@ -36,7 +36,7 @@ def nears(
     cables: FloatArray,
     ends: FloatArray,
     poses: FloatArray,
-    rooms: FloatArray,
+    scratch: FloatArray,
     before: FloatArray,
     parts: int,
 ) -> int:
@@ -44,10 +44,10 @@ def nears(
 
     What is in contact at its start may leave, but not get nearer. With no `parts` only its end is
     looked at. `arm` is that of the platform's farthest point. Overwritten are `cables`, `ends`
-    (2, 2, n, 3), `poses` (3, 4, 3), `rooms` (5, 8, 3) and `before` (pairs,), of the last part.
+    (2, 2, n, 3), `poses` (3, 4, 3), `scratch` (5, 8, 3) and `before` (pairs,), of the last part.
     """
     points, near, corners, scratch, twist = (
-        rooms[0, :4], rooms[1, :2], rooms[2], rooms[3, :4], rooms[4, :2],
+        scratch[0, :4], scratch[1, :2], scratch[2], scratch[3, :4], scratch[4, :2],
     )  # fmt: skip
     moved = size_of(way[STEP]) + arm * size_of(way[TURN])
     for j in range(2):

@@ -28,7 +28,7 @@ DAMPING_RATIO = 0.005
 
 
 @jit
-def turn_about_z(
+def rotational_stiffness(
     geometry: FloatArray, tension: FloatArray, pose: FloatArray, rotation: FloatArray
 ) -> None:
     """Write what `rotation` says of where the platform stands, under tensions (n,)."""

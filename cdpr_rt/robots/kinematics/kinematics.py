@@ -76,7 +76,7 @@ class CableKinematics:
         self.solver = np.zeros((normal_equations.SOLVER_ROWS, 6))
         self.solver[normal_equations.DIRECTIONS, self._chosen] = 1.0
         self.solver[normal_equations.ACCEPTED] = (_ACCEPTED_SIGMAS * length_std_m) ** 2 * redundant
-        kept = self.solver[normal_equations.KEPT :].reshape(4, 4, 3)
+        kept = self.solver[normal_equations.SAVED_POSES :].reshape(4, 4, 3)
         kept[pose_search.HOME] = (home or Pose(np.zeros(3))).array
         self._solution = PoseSolution(Pose(np.zeros(3)))
         self._target, self._slack_free = np.zeros(self.n), np.zeros(self.n)

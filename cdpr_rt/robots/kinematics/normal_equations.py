@@ -4,7 +4,7 @@ Arrays besides those of `cable_kernel`, of float64:
 
     solver    (24, 6)     scratch: NORMAL, FACTOR, GRADIENT, STEP; DIRECTIONS: 1 for those of the
                           twist that are solved for, 0 for those that stay as they are; ACCEPTED,
-                          the sum of squares up to which lengths agree; and from KEPT on four
+                          the sum of squares up to which lengths agree; and from SAVED_POSES on four
                           poses (4, 4, 3), of which the last one's rotation is that at home
 """
 
@@ -16,7 +16,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ERROR, FREE, TINY
 
-FACTOR, GRADIENT, STEP, DIRECTIONS, ACCEPTED, KEPT, SOLVER_ROWS = 6, 12, 13, 14, 15, 16, 24
+FACTOR, GRADIENT, STEP, DIRECTIONS, ACCEPTED, SAVED_POSES, SOLVER_ROWS = 6, 12, 13, 14, 15, 16, 24
 _LEAST_PIVOT = 1e-13
 
 

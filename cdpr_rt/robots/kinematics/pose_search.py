@@ -10,7 +10,7 @@ from cdpr_rt.robots.kinematics.cable_kernel import ARC, ERROR, FREE, compare, ru
 from cdpr_rt.robots.kinematics.normal_equations import (
     ACCEPTED,
     DIRECTIONS,
-    KEPT,
+    SAVED_POSES,
     STEP,
     add_curvature,
     assemble,
@@ -73,7 +73,7 @@ def descend(
             return STALLED, k, cost
         copy_pose(pose, kept[_BEFORE])
         move(pose, solver[STEP])
-        if damping == 0.0 and _is_there(size, before, cost - gain):
+        if damping == 0.0 and _converged(size, before, cost - gain):
             return CONVERGED, k, max(cost - gain, 0.0)
         new = compare(geometry, lengths, pose, cables)
         fresh = new <= cost or size < TOLERANCE
@@ -108,7 +108,7 @@ def _factorise_damped(cables: FloatArray, solver: FloatArray, damping: float) ->
 
 
 @jit
-def _is_there(size: float, before: float, cost: float) -> bool:
+def _converged(size: float, before: float, cost: float) -> bool:
     """Return whether what is left to go behind a step of this size, and cost, is of no account.
 
     It shrinks as the last two steps did, faster where lengths agree.
@@ -131,7 +131,7 @@ def find_pose(
     Where the sum of the errors' squares stays above ACCEPTED it is tried again from up to
     `restarts` other poses. Writes `pose`; returns how the search ended, all steps, and the sum.
     """
-    kept = solver[KEPT:].reshape(4, 4, 3)
+    kept = solver[SAVED_POSES:].reshape(4, 4, 3)
     accepted = solver[ACCEPTED, 0]
     if restarts == 0:
         status, steps, cost = descend(geometry, lengths, pose, cables, solver, kept, math.inf)

@@ -19,7 +19,7 @@ _SMALL = 1e-4
 
 
 @jit
-def place(
+def pose_of_coordinates(
     q: FloatArray, directions: IntArray, home: FloatArray, scratch: FloatArray, pose: FloatArray
 ) -> None:
     """Write the pose of a set-point `q` (d,); what is not controlled is as at `home` (4, 3)."""
@@ -41,19 +41,19 @@ def place(
 
 
 @jit
-def place_all(
+def poses_of_coordinates(
     q: FloatArray, directions: IntArray, home: FloatArray, scratch: FloatArray, poses: FloatArray
 ) -> None:
     """Write the poses (m, 4, 3) of set-points (m, d)."""
     for j in range(q.shape[0]):
-        place(q[j], directions, home, scratch, poses[j])
+        pose_of_coordinates(q[j], directions, home, scratch, poses[j])
 
 
 @jit
-def locate(
+def coordinates_of_pose(
     pose: FloatArray, directions: IntArray, home: FloatArray, scratch: FloatArray, q: FloatArray
 ) -> None:
-    """Write the set-point `q` (d,) of a pose: the inverse of `place`."""
+    """Write the set-point `q` (d,) of a pose: the inverse of `pose_of_coordinates`."""
     _turn_between(pose, home, scratch)
     for k in range(q.size):
         q[k] = pose[0, directions[k]] if directions[k] < 3 else scratch[0, directions[k] - 3]
@@ -79,7 +79,7 @@ def _turn_between(pose: FloatArray, other: FloatArray, scratch: FloatArray) -> N
 
 
 @jit
-def _spin(phi: FloatArray, x: float, y: float, z: float, out: FloatArray) -> None:
+def _angular_velocity(phi: FloatArray, x: float, y: float, z: float, out: FloatArray) -> None:
     """Write the angular velocity J(φ) (x, y, z) of a rotation vector that changes so, (3,).
 
     J(φ) = 1 + (1 - cos θ)/θ² [φ]× + (θ - sin θ)/θ³ [φ]×², θ = |φ|.
@@ -122,17 +122,17 @@ def move_with(
             phi[i - 3], rate[i - 3], slope[i - 3] = shaped[0, k], shaped[1, k], shaped[2, k]
             turns = turns or shaped[1, k] != 0.0 or shaped[2, k] != 0.0
     if turns:
-        _spin(phi, rate[0], rate[1], rate[2], twist[3:6])
-        _spin(phi, slope[0], slope[1], slope[2], acceleration[3:6])
+        _angular_velocity(phi, rate[0], rate[1], rate[2], twist[3:6])
+        _angular_velocity(phi, slope[0], slope[1], slope[2], acceleration[3:6])
         for k in range(3):
             phi[k] += period * rate[k]
-        _spin(phi, rate[0], rate[1], rate[2], after)
+        _angular_velocity(phi, rate[0], rate[1], rate[2], after)
         for k in range(3):
             acceleration[3 + k] += (after[k] - twist[3 + k]) / period
 
 
 @jit
-def refer(
+def motor_references(
     shaped: FloatArray,
     directions: IntArray,
     home: FloatArray,
@@ -156,7 +156,7 @@ def refer(
     ⊟ pose. The motors' are (n,) each, eqs. (2.2), (2.4), (3.2), (3.11), with the stretch of each
     cable taken off. Where no angle is controlled the platform is taken to stay as it is turned.
     """
-    place(shaped[0], directions, home, scratch, wanted)
+    pose_of_coordinates(shaped[0], directions, home, scratch, wanted)
     if directions[directions.size - 1] < 3:
         for i in range(1, 4):
             for j in range(3):

@@ -8,9 +8,9 @@ Arrays besides those of `cable_kernel` and `normal_equations`, of float64:
                        length over that without tension; AT_ZERO, length without tension at the
                        motor's zero; and what does not change: M_PER_RAD paid out, COMPLIANCE
                        1/EA, WEIGHT in N/m, INERTIA of the motor in kg m2
-    filters   (4,)     PERIOD, s; OBSERVER, SMOOTHER, rad/s; SMOOTH, share of smooth velocity
+    filters   (4,)     PERIOD, s; OBSERVER, SMOOTHER, rad/s; LOWPASS_SHARE, of low-passed velocity
     rotation  (9,)     of a platform that turns freely, as of `free_rotation_kernel`
-    swing     (4,)     likewise: SWUNG, rad from where its tensions have no moment; SPINNING, rad/s;
+    swing     (4,)     likewise: ANGLE, rad from where its tensions have no moment; SPIN, rad/s;
                        AMPLITUDE, rad, and AMPLITUDE_m of an anchor point
 """
 
@@ -30,8 +30,8 @@ from cdpr_rt.robots.kinematics.pose_search import find_pose
 
 THETA, OMEGA, LOWPASSED_ONCE, LOWPASSED, LENGTH, RATE, TENSION, STRETCH, AT_ZERO = range(9)
 M_PER_RAD, COMPLIANCE, WEIGHT, INERTIA, MOTOR_ROWS = 9, 10, 11, 12, 13
-PERIOD, OBSERVER, SMOOTHER, SMOOTH, FILTERS = range(5)
-SWUNG, SPINNING, AMPLITUDE, AMPLITUDE_m, SWING = range(5)
+PERIOD, OBSERVER, SMOOTHER, LOWPASS_SHARE, FILTERS = range(5)
+ANGLE, SPIN, AMPLITUDE, AMPLITUDE_m, SWING = range(5)
 _MOST_TURN_rad = 0.02
 # of the type that comes from Python: for a literal numba compiles the search anew
 _NO_RESTARTS: int = np.int64(0)  # type: ignore[assignment]
@@ -54,8 +54,9 @@ def observe(motors: FloatArray, position: FloatArray, filters: FloatArray) -> No
         motors[OMEGA, i] += (1.0 - decay) ** 2 / period * error
         motors[LOWPASSED_ONCE, i] += weight * (motors[OMEGA, i] - motors[LOWPASSED_ONCE, i])
         motors[LOWPASSED, i] += weight * (motors[LOWPASSED_ONCE, i] - motors[LOWPASSED, i])
-        fast, calm = motors[OMEGA, i], motors[LOWPASSED, i]
-        motors[RATE, i] = motors[M_PER_RAD, i] * (fast + filters[SMOOTH] * (calm - fast))
+        omega, omega_filtered = motors[OMEGA, i], motors[LOWPASSED, i]
+        damped = omega + filters[LOWPASS_SHARE] * (omega_filtered - omega)
+        motors[RATE, i] = motors[M_PER_RAD, i] * damped
         free = motors[AT_ZERO, i] + motors[M_PER_RAD, i] * motors[THETA, i]
         motors[LENGTH, i] = free * motors[STRETCH, i]
 
@@ -95,13 +96,13 @@ def track_pose(
         for k in range(6):
             twist[k] = solver[GRADIENT, k]
         substitute(solver, twist)
-    apart = 0.0
+    inconsistency = 0.0
     for i in range(n):
         rate = motors[RATE, i]
         for k in range(6):
             rate -= cables[k, i] * twist[k]
-        apart += rate * rate
-    return math.sqrt(cost / n), math.sqrt(apart / n)
+        inconsistency += rate * rate
+    return math.sqrt(cost / n), math.sqrt(inconsistency / n)
 
 
 @jit
@@ -133,7 +134,7 @@ def _turn_to_equilibrium(
     The true one swings about there, since it does not follow at once: its `swing` is reckoned from
     its inertia, and is told; where it is at an instant is not known well enough to be used.
     """
-    free.turn_about_z(geometry, motors[TENSION], pose, rotation)
+    free.rotational_stiffness(geometry, motors[TENSION], pose, rotation)
     if rotation[free.STEEPNESS] > 0.0:
         angle = rotation[free.MOMENT] / rotation[free.STEEPNESS]
         angle = min(max(angle, -_MOST_TURN_rad), _MOST_TURN_rad)
@@ -151,9 +152,9 @@ def _swing(filters: FloatArray, rotation: FloatArray, moved: float, swing: Float
     if rotation[free.STIFFNESS] <= 0.0:
         return
     omega = math.sqrt(rotation[free.STIFFNESS] / rotation[free.SWINGING])
-    drag = 2.0 * free.DAMPING_RATIO * omega * swing[SPINNING]
-    swing[SPINNING] -= filters[PERIOD] * (omega * omega * swing[SWUNG] + drag)
+    drag = 2.0 * free.DAMPING_RATIO * omega * swing[SPIN]
+    swing[SPIN] -= filters[PERIOD] * (omega * omega * swing[ANGLE] + drag)
     share = rotation[free.INERTIA] / rotation[free.SWINGING]
-    swing[SWUNG] += filters[PERIOD] * swing[SPINNING] - share * moved
-    swing[AMPLITUDE] = math.hypot(swing[SWUNG], swing[SPINNING] / omega)
+    swing[ANGLE] += filters[PERIOD] * swing[SPIN] - share * moved
+    swing[AMPLITUDE] = math.hypot(swing[ANGLE], swing[SPIN] / omega)
     swing[AMPLITUDE_m] = rotation[free.REACH] * swing[AMPLITUDE]

@@ -23,7 +23,7 @@ from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
-from cdpr_rt.robots.platform.cell_check import CellCheck, balance_doubt_N
+from cdpr_rt.robots.platform.cell_check import CellCheck, balance_std_N
 from cdpr_rt.robots.platform.cell_feedback import CellFeedback
 from cdpr_rt.robots.platform.control_rows import loop_settings, motor_rows, tracking_filters
 from cdpr_rt.robots.platform.loop_design import designed_loop
@@ -31,10 +31,9 @@ from cdpr_rt.robots.platform.motor_learning import MotorLearning
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
 from cdpr_rt.robots.tension.tension_split import OK, split
-from cdpr_rt.robots.workspace import SHARES, missing
+from cdpr_rt.robots.workspace import SHARES, infeasibility_text
 
-_SETTLING_STEPS = 60
-_LIFT_S = 0.05
+_SETTLING_STEPS, _LIFT_S = 60, 0.05
 _MOST_LOOKS = 200
 """At the contacts of a way, between two cycles."""
 
@@ -74,11 +73,10 @@ class CableControl:
         self.torque_Nm = np.array(torque_Nm, float)
         self._begin_set_point()
         self.tension_N = np.array(self.low_N)
-        self.outcome, self.share = 0, 1.0
+        self.outcome, self.share, self._limited = 0, 1.0, False
         self.effort_Nm, self.compensation_Nm, self.motor_loss_Nm = np.zeros((3, n))
-        self._limited = False
         self.cogging_Nm = np.zeros(n) if compensation is None else compensation.cogging_Nm
-        self.residual_m, self._apart_m_s = np.inf, 0.0
+        self.residual_m, self._rate_inconsistency_m_s = np.inf, 0.0
         self.estimated = np.array(model.home)
         """Where the platform is, (d,)."""
         self._compensation = compensation
@@ -116,8 +114,8 @@ class CableControl:
         rated_N = np.array([axis.winch.motor.rated_torque_Nm for axis in axes]) / cable_m
         names, scale = [axis.name for axis in axes], model.wrench_scale
         weight_N = float(np.abs(model.weight()[: model.positions]).max())
-        doubt_N = balance_doubt_N(weight_N, model.positions - 1, scale)
-        return CellCheck(names, rated_N, doubt_N, scale, self._period_s)
+        std_N = balance_std_N(weight_N, model.positions - 1, scale)
+        return CellCheck(names, rated_N, std_N, scale, self._period_s)
 
     def _bind_pose(self, moves: FloatArray) -> None:
         """Fix the arrays of the kernels that find the pose and follow it, which write `moves`."""
@@ -127,24 +125,24 @@ class CableControl:
         self._home, self._pose = model.home_pose, Pose(np.zeros(3))
         self._pose.array[:] = self._home.array
         self._wanted, self._to = Pose(np.zeros(3)), Pose(np.zeros(3))
-        self._room3, self._cables = np.zeros((4, 3)), np.zeros((CABLE_ROWS, n))
+        self._scratch, self._cables = np.zeros((4, 3)), np.zeros((CABLE_ROWS, n))
         filters = tracking_filters(self.gains, self._period_s)
         self._swing, self._seven, position = np.zeros(tracking.SWING), np.zeros(7), np.zeros(n)
         self._track = bound(
             tracking.track_pose, motors, filters, kinematics.geometry, self._up, self._pose.array,
-            self._cables, kinematics.solver, moves[3], rotation_of(model.platform), self._swing,
-            kinematics.turns_freely, then=(position,),
+            self._cables, kinematics.solver, moves[loop.TWIST], rotation_of(model.platform),
+            self._swing, kinematics.turns_freely, then=(position,),
         )  # fmt: skip
-        self._locate = bound(
-            pose_setpoint.locate,
-            self._pose.array, self._directions, self._home.array, self._room3, self.estimated,
+        self._write_coordinates = bound(
+            pose_setpoint.coordinates_of_pose,
+            self._pose.array, self._directions, self._home.array, self._scratch, self.estimated,
         )  # fmt: skip
         self._shape = bound(loop.shape, self._past, then=(0, self._setpoint, self._shaped))
-        self._refer = bound(
-            pose_setpoint.refer, self._shaped, self._directions, self._home.array, self._period_s,
-            kinematics.geometry, motors, self._pose.array, self._room3, self._wanted.array,
-            np.zeros((CABLE_ROWS, n)), moves[1], moves[2], moves[0],
-            then=(position, position, position),
+        self._motor_references = bound(
+            pose_setpoint.motor_references, self._shaped, self._directions, self._home.array,
+            self._period_s, kinematics.geometry, motors, self._pose.array, self._scratch,
+            self._wanted.array, np.zeros((CABLE_ROWS, n)), moves[loop.WANTED_TWIST],
+            moves[loop.WANTED_ACCELERATION], moves[loop.POSE_ERROR], then=(position,) * 3,
         )  # fmt: skip
 
     def _bind_force(self, moves: FloatArray) -> None:
@@ -173,17 +171,17 @@ class CableControl:
         if method != "minimum-deviation":
             self._distribution = tension_distribution(method, self.low_N, self.high_N, scale)
         plan, size = np.array([self.low_N, self.high_N]), max(n, 8)
-        self._slow, self._carried = plan[0].copy(), plan[0].copy()
+        self._slow_N, self._feedforward_N = plan[0].copy(), plan[0].copy()
         space, position = np.zeros((n + 1, n)), np.zeros(n)
         self._split = bound(
             split, self._W, self._wrench, self._force, scale, plan, model.reserve_N,
             self._period_s / (self._period_s + _LIFT_S), self._distribution is not None,
-            self._slow, self._carried, self.tension_N, np.zeros(d), np.zeros((3, n)),
+            self._slow_N, self._feedforward_N, self.tension_N, np.zeros(d), np.zeros((3, n)),
             np.zeros((2, n)), np.zeros((d, n + 1)), space, np.zeros((4, size, size)),
         )  # fmt: skip
         self._drive = bound(
             loop.drive, self._settings, motors[tracking.M_PER_RAD], motors[tracking.INERTIA],
-            motors[tracking.OMEGA], motors[tracking.TENSION], self.tension_N, self._carried,
+            motors[tracking.OMEGA], motors[tracking.TENSION], self.tension_N, self._feedforward_N,
             space[1:], self.compensation_Nm, self.torque_Nm, self.effort_Nm,
             then=(0, position, position),
         )  # fmt: skip
@@ -194,7 +192,7 @@ class CableControl:
         """Forget what was integrated."""
         self._state[:] = 0.0
         self._state[self.model.size] = 1.0
-        self._slow[:] = self.low_N
+        self._slow_N[:] = self.low_N
         self.share = 1.0
         if self._compensation is not None:
             self._compensation.reset()
@@ -224,11 +222,11 @@ class CableControl:
         )  # fmt: skip
 
     @property
-    def cell_trouble(self) -> str:
-        """Which load cell is off and by how much; stays until `trust_cells`."""
+    def load_cell_fault(self) -> str:
+        """Which load cell is off and by how much; stays until `clear_load_cell_fault`."""
         return self._check.trouble
 
-    def trust_cells(self) -> None:
+    def clear_load_cell_fault(self) -> None:
         """Forget which load cell was off."""
         self._check.clear()
 
@@ -237,22 +235,22 @@ class CableControl:
         self.observe(feedback)
         self._place = self._shape(self._place, self._setpoint, self._shaped)
         slope = setpoint.acceleration_rad_s2
-        self._refer(setpoint.position_rad, setpoint.velocity_rad_s, slope)
+        self._motor_references(setpoint.position_rad, setpoint.velocity_rad_s, slope)
         if self.learning is not None:
             self.learning.learn(self._was_exerted())
-        self._correct(self.share, self._apart_m_s)
-        self._make_up(feedback, setpoint)
+        self._correct(self.share, self._rate_inconsistency_m_s)
+        self._compensate(feedback, setpoint)
         if self._distribution is not None:
-            self._distribution.solve(self._W, self._wrench, self._carried)
+            self._distribution.solve(self._W, self._wrench, self._feedforward_N)
         self.outcome, self.share, null_directions = self._split()
         self._limited = self._drive(null_directions, slope, torque_Nm)
 
     def _was_exerted(self) -> bool:
         """Return whether the last cycle's force was had from the cables, all of it."""
-        plausible = self._apart_m_s <= loop.PLAUSIBLE_m_s
+        plausible = self._rate_inconsistency_m_s <= loop.PLAUSIBLE_m_s
         return plausible and self.share >= 1.0 and self.outcome == OK and not self._limited
 
-    def _make_up(self, feedback: AxisFeedback, setpoint: Setpoint) -> None:
+    def _compensate(self, feedback: AxisFeedback, setpoint: Setpoint) -> None:
         """Write the torques against what is known, or learnt, or measured of the motors."""
         learning, cells, torque = self.learning, self._cells, self.compensation_Nm
         if self._compensation is not None:
@@ -294,8 +292,8 @@ class CableControl:
 
     def observe(self, feedback: AxisFeedback) -> None:
         """Bring the estimate of the platform's pose up to date, by one cycle."""
-        self.residual_m, self._apart_m_s = self._track(feedback.position_rad)
-        self._locate()
+        self.residual_m, self._rate_inconsistency_m_s = self._track(feedback.position_rad)
+        self._write_coordinates()
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
         """Return the lengths (n,) without tension of cables that hold `tension_N` (n,) at home."""
@@ -344,45 +342,45 @@ class CableControl:
 
     # -- where it can be
 
-    def missing(self) -> str:
+    def tension_infeasibility(self) -> str:
         """Return why the last cycle's tensions are not feasible, an empty text where they are."""
         if not self.outcome:
             return ""
-        return self._held.feasible(self._wanted) or self._missing_in_motion()
+        return self._held.infeasibility(self._wanted) or self._infeasibility_in_motion()
 
-    def _missing_in_motion(self) -> str:
+    def _infeasibility_in_motion(self) -> str:
         """Return which cable limits the wanted motion where the platform could stand."""
-        W, low_N, high_N = self._W, self.low_N, self.high_N
-        needed_N = self._carried - np.linalg.pinv(W) @ (W @ self._carried + self._wrench)
+        W, t, low_N, high_N = self._W, self._feedforward_N, self.low_N, self.high_N
+        needed_N = t - np.linalg.pinv(W) @ (W @ t + self._wrench)
         margin_N = float(np.minimum(needed_N - low_N, high_N - needed_N).min())
-        return f"for this motion, {missing(margin_N, needed_N, low_N, high_N)}"
+        return f"for this motion, {infeasibility_text(margin_N, needed_N, low_N, high_N)}"
 
     def stands(self, position: FloatArray) -> bool:
         """Return whether the platform can be held, and accelerated, at a position (d,)."""
         self._turn_to(position)
         return self.workspace.stands(self._to)
 
-    def nears(self, position: FloatArray) -> int:
+    def contact_ahead(self, position: FloatArray) -> int:
         """Return a pair of things in contact on a short way from the set-point, -1 for none."""
-        return self._interference.nears(self.position, position)
+        return self._interference.contact_ahead(self.position, position)
 
-    def touches(self, position: FloatArray) -> int:
+    def contact_at(self, position: FloatArray) -> int:
         """Return a pair of things in contact at a position (d,), -1 for none."""
-        return self._interference.touches(self.position, position)
+        return self._interference.contact_at(self.position, position)
 
     def contact(self, pair: int) -> str:
         """Return in words that a pair is in contact."""
         return self._interference.within_clearance(pair)
 
-    def feasible(self, position: FloatArray) -> str:
+    def infeasibility(self, position: FloatArray) -> str:
         """Return why the platform cannot stand at a position (d,), an empty text where it can.
 
         Tensions keep a reserve to their bounds there while it is accelerated in any direction.
         """
         self._turn_to(position)
-        return self.workspace.feasible(self._to)
+        return self.workspace.infeasibility(self._to)
 
-    def feasible_path(self, position: FloatArray, start: FloatArray | None = None) -> str:
+    def path_obstacle(self, position: FloatArray, start: FloatArray | None = None) -> str:
         """Return what is in the straight way to a position (d,), an empty text for nothing.
 
         The way begins at `start` (d,), or where the set-point is.
@@ -398,5 +396,5 @@ class CableControl:
         return f"at {place} m {why}"
 
     def _turn_to(self, position: FloatArray) -> None:
-        home, room3 = self._home.array, self._room3
-        pose_setpoint.place(position, self._directions, home, room3, self._to.array)
+        home, scratch = self._home.array, self._scratch
+        pose_setpoint.pose_of_coordinates(position, self._directions, home, scratch, self._to.array)

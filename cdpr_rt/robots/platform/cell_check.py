@@ -32,21 +32,21 @@ _OWN_SHARE = 0.5
 _CALM_S, _SETTLING_S = 1.5, 4.0
 
 
-def balance_doubt_N(weight_N: float, up: int, scale: FloatArray) -> FloatArray:
+def balance_std_N(weight_N: float, up: int, scale: FloatArray) -> FloatArray:
     """Return what mass and payload leave of σ of ε, (d,), where direction `up` is vertical.
 
     `scale` (d,) is how far a unit of each direction counts, the first ones being positions.
     """
-    doubt_N = WEIGHT_SHARE * weight_N * scale
-    doubt_N[:up] = ACROSS_SHARE * weight_N
-    return doubt_N
+    std_N = WEIGHT_SHARE * weight_N * scale
+    std_N[:up] = ACROSS_SHARE * weight_N
+    return std_N
 
 
 @jit
 def compare(
     period_s: float,
     rated_N: FloatArray,
-    doubt_N: FloatArray,
+    std_N: FloatArray,
     scale: FloatArray,
     measured_N: FloatArray,
     measured: BoolArray,
@@ -84,7 +84,7 @@ def compare(
         off, weight = difference[i] / of_motor, 1.0 / of_motor
         if whole:
             for k in range(d):
-                of_direction = (BALANCE_SHARE * scale[k]) ** 2 * square + doubt_N[k] ** 2
+                of_direction = (BALANCE_SHARE * scale[k]) ** 2 * square + std_N[k] ** 2
                 off += W[k, i] * balance[k] / of_direction
                 weight += W[k, i] ** 2 / of_direction
         found[0, i], found[1, i] = off / weight, SIGMAS / math.sqrt(weight)
@@ -102,16 +102,16 @@ class CellCheck:
         self,
         names: Sequence[str],
         rated_N: FloatArray,
-        doubt_N: FloatArray,
+        std_N: FloatArray,
         scale: FloatArray,
         period_s: float,
     ) -> None:
         """Take the cables' names, and what tensions their motors are rated for (n,).
 
-        `doubt_N` (d,) is that of `balance_doubt_N`, for the same `scale`.
+        `std_N` (d,) is that of `balance_std_N`, for the same `scale`.
         """
         self._names, self._rated_N = tuple(names), rated_N
-        self._doubt_N, self._scale, self._period_s = doubt_N, scale, period_s
+        self._std_N, self._scale, self._period_s = std_N, scale, period_s
         self._named, self._off_N, self._allowed_N = -1, 0.0, 0.0
         self._difference, self._balance = np.zeros(len(names)), np.zeros(scale.size)
         self._found = np.zeros((2, len(names)))
@@ -128,7 +128,7 @@ class CellCheck:
     ) -> None:
         """Fix the arrays of readings, tensions asked for, and of the platform; see `compare`."""
         self._compare = bound(
-            compare, self._period_s, self._rated_N, self._doubt_N, self._scale, measured_N,
+            compare, self._period_s, self._rated_N, self._std_N, self._scale, measured_N,
             measured, asked_N, correction_N, W, wrench, self._difference, self._balance,
             self._found,
         )  # fmt: skip

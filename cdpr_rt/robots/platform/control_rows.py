@@ -1,4 +1,4 @@
-"""What of a robot's file the kernels of its control take, as rows of figures."""
+"""Parameters of the platform controller's kernels, from the robot's file."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def tracking_filters(gains: LoopGains, period_s: float) -> FloatArray:
     """Return the settings of the filters that find the platform's pose, (FILTERS,)."""
     row = np.zeros(tracking.FILTERS)
     row[tracking.PERIOD], row[tracking.OBSERVER] = period_s, OBSERVER_rad_s
-    row[tracking.SMOOTHER], row[tracking.SMOOTH] = gains.smoother_rad_s, gains.smooth
+    row[tracking.SMOOTHER], row[tracking.LOWPASS_SHARE] = gains.smoother_rad_s, gains.smooth
     return row
 
 

@@ -14,6 +14,8 @@ All is taken along the modes of the platform without cables' stretch: J = Q R an
 U λ U^T, so that the tensions' directions Q U are orthonormal, λ is what each mode has of mass, and
 the loop's damping and stiffness are diagonal. G is a sum over the modes of rotors and platform on
 their cables, whose damping is proportional to their stiffness: Σ φ φ^T/(s² + (1 + b s) ω²).
+
+The drives' delay is assumed, the same for all robots: it is not read from their profiles.
 """
 
 from __future__ import annotations
@@ -43,6 +45,7 @@ STIFFNESS_SHARES = (0.7, 1.0, 1.3)
 OBSERVER_rad_s = 2.0 * math.pi * 400.0
 DAMPING_RATIO = 0.55
 _DRIVE_LATENCY_s, _LATENCY_CYCLES = 0.8e-3, 1.5
+"""Assumed delay of any drive, whatever its profile has; cycles of transfer and of holding."""
 _SMOOTHERS_Hz = ((0.0, 25.0), (0.55, 25.0), (0.55, 12.0), (0.8, 12.0), (0.8, 8.0), (0.9, 12.0))
 """Shares of smooth velocity that are tried, each with the frequency of its low-pass."""
 _ROTOR_SHARES = (1.6, 0.8, 0.4)
@@ -100,7 +103,7 @@ class LoopMargins:
 
 
 def latency_s(period_s: float) -> float:
-    """Return how late the loop acts: drive, transfer, and half a cycle of holding."""
+    """Return how late the loop acts: an assumed drive, transfer, and half a cycle of holding."""
     return _DRIVE_LATENCY_s + _LATENCY_CYCLES * period_s
 
 

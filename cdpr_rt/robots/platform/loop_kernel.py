@@ -4,13 +4,13 @@ The cables are to exert F = D (ė + M^-1 D e/(4 ζ²)) and an integral part besi
 beforehand: in each mode of the platform a loop of damping ratio ζ, whose bandwidth is ω, or less
 where its damping D = (1/(2 ζ ω) M^-1 + 1/c (J^T J)^-1)^-1 would ask for more than c of the cables.
 The proportional part is saturated, not the damping: far from its target the platform comes back at
-the speed at which both are equal. The integral part goes to sleep by a sigmoid where the error is
-within what cannot be told from friction, so that the platform stands still at its target; two
-thresholds, as in Tremblay (thesis), fig. 2.3: once asleep it takes twice the error to wake it.
+the speed at which both are equal. The integral part has a deadband where the error is within what
+cannot be told from friction, so that the platform stands still at its target. A sigmoid leads into
+it, with hysteresis as in Tremblay (thesis), fig. 2.3: it takes twice the error to leave it again.
 
 Arrays besides those of the kinematics' kernels: a loop's row of SETTINGS, and its STATE: the
-integral part (d,), N and Nm; behind it how much it is AWAKE, 0 to 1; and the twist (d,), low-passed
-until an encoder's counts are no speed any more.
+integral part (d,), N and Nm; behind it the share of its rate that the deadband leaves, 0 to 1; and
+the twist (d,), low-passed until an encoder's counts are no speed any more.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ feels it; the most that the proportional and the integral part ask for, N; by ho
 sticks is integrated, the speed, m/s, below which it does, and the error, m, around which the
 integral part fades out and in."""
 
+POSE_ERROR, WANTED_TWIST, WANTED_ACCELERATION, TWIST = range(4)
+"""Rows of a platform's `moves` (4, 6)."""
 MASS, TWIST_ERROR = 1, (6, 2)
 """Where `correct` leaves M (d, d), its lower half, and the error of the twist (d,) in `scratch`."""
 
@@ -154,17 +156,16 @@ def correct(
     wrench: FloatArray,
     force: FloatArray,
     share: float,
-    apart: float,
+    rate_inconsistency_m_s: float,
 ) -> None:
     """Write what acts on the platform besides its cables (d,), and the loop's correction (d,).
 
-    `moves` (4, 6) are error of the pose, wanted twist, wanted acceleration and twist. `wrench` is
-    known beforehand: weight, and what the wanted motion takes. `force` is F of the law above.
-    `share` is how much of the last cycle's force could be had: while it was not all, nothing is
-    integrated that asks for more. `apart` is by how much the cables' rates contradict each other,
-    m/s: where that is more than motion can explain, as of a cable that has broken, the force is not
-    to follow it. `scale` (d,) is what of each direction counts as much as 1 N, or 1 m. `J` (n, d)
-    and `W` (d, n) are written from `cables`.
+    `moves` (4, 6) has the rows above. `wrench` is known beforehand: weight, and what the wanted
+    motion takes. `force` is F of the law above. `share` is how much of the last cycle's force could
+    be had: while it was not all, nothing is integrated that asks for more. Where the cables' rates
+    contradict each other by more than motion can explain, as of a cable that has broken, the force
+    is not to follow them. `scale` (d,) is what of each direction counts as much as 1 N, or 1 m.
+    `J` (n, d) and `W` (d, n) are written from `cables`.
     """
     d, n = W.shape
     for k in range(d):
@@ -173,7 +174,8 @@ def correct(
             W[k, i] = -J[i, k]
     whole, all_of_it = scratch[4, :6, :6], scratch[6, 0, :6]
     write_mass_matrix(body, pose, scratch[5, :4, :3], whole)
-    write_wrench(body, whole, scratch[5, :4, :3], moves[1], moves[2], all_of_it)
+    twist, acceleration = moves[WANTED_TWIST], moves[WANTED_ACCELERATION]
+    write_wrench(body, whole, scratch[5, :4, :3], twist, acceleration, all_of_it)
     e, v, De, y = scratch[6, 1, :d], scratch[6, 2, :d], scratch[6, 3, :d], scratch[6, 4, :d]
     for k in range(d):
         wrench[k] = all_of_it[directions[k]]
@@ -189,7 +191,7 @@ def correct(
     _saturate(settings, scale, y)
     _damp(settings, A, M, both, v, De)
     _integrate(settings, state, scale, y, size, speed, moving, share)
-    trust = min(1.0, (PLAUSIBLE_m_s / max(apart, PLAUSIBLE_m_s)) ** 2)
+    trust = min(1.0, (PLAUSIBLE_m_s / max(rate_inconsistency_m_s, PLAUSIBLE_m_s)) ** 2)
     for k in range(d):
         force[k] = trust * (De[k] + y[k]) + state[k]
 
@@ -214,24 +216,24 @@ def _write_errors(
     calming = settings[PERIOD] / (settings[PERIOD] + _CALMING_S)
     for k in range(d):
         i = directions[k]
-        e[k], v[k] = moves[0, i], moves[1, i] - moves[3, i]
+        e[k], v[k] = moves[POSE_ERROR, i], moves[WANTED_TWIST, i] - moves[TWIST, i]
         size += (scale[k] * e[k]) ** 2
-        state[d + 1 + k] += calming * (moves[3, i] - state[d + 1 + k])
+        state[d + 1 + k] += calming * (moves[TWIST, i] - state[d + 1 + k])
         speed += (scale[k] * state[d + 1 + k]) ** 2
-        wanted_speed += abs(moves[1, i])
+        wanted_speed += abs(moves[WANTED_TWIST, i])
     return math.sqrt(size), speed, wanted_speed > 0.0
 
 
 @jit
-def _saturate(settings: FloatArray, scale: FloatArray, pull: FloatArray) -> None:
-    """Make D M^-1 D e, `pull` (d,), the proportional part."""
-    quarter, much = 0.25 / settings[RATIO] ** 2, 0.0
-    for k in range(pull.size):
-        pull[k] *= quarter
-        much += (pull[k] / scale[k]) ** 2
-    much = math.sqrt(much) / settings[REGULATOR_N]
-    for k in range(pull.size):
-        pull[k] /= max(much, 1.0)
+def _saturate(settings: FloatArray, scale: FloatArray, proportional: FloatArray) -> None:
+    """Make D M^-1 D e, `proportional` (d,), the proportional part."""
+    quarter, norm = 0.25 / settings[RATIO] ** 2, 0.0
+    for k in range(proportional.size):
+        proportional[k] *= quarter
+        norm += (proportional[k] / scale[k]) ** 2
+    norm = math.sqrt(norm) / settings[REGULATOR_N]
+    for k in range(proportional.size):
+        proportional[k] /= max(norm, 1.0)
 
 
 @jit
@@ -239,14 +241,14 @@ def _integrate(
     settings: FloatArray,
     state: FloatArray,
     scale: FloatArray,
-    pull: FloatArray,
+    proportional: FloatArray,
     error: float,
     speed: float,
     moving: bool,
     share: float,
 ) -> None:
-    """Integrate the proportional part `pull` (d,); `speed` is a square."""
-    d = pull.size
+    """Integrate the proportional part `proportional` (d,); `speed` is a square."""
+    d = proportional.size
     threshold = settings[DEADBAND] * (2.0 - state[d])
     state[d] = 1.0 if moving else 1.0 / (1.0 + math.exp(-8.0 * (error / threshold - 1.0)))
     gain = state[d] * settings[INTEGRAL] * settings[PERIOD]
@@ -255,7 +257,7 @@ def _integrate(
             -min(speed / settings[STICTION_SPEED] ** 2, 50.0)
         )
     for k in range(d):
-        step, most = gain * pull[k], settings[MOST_N] * scale[k]
+        step, most = gain * proportional[k], settings[MOST_N] * scale[k]
         if share >= 1.0 or step * state[k] < 0.0:
             state[k] = min(max(state[k] + step, -most), most)
 
@@ -268,27 +270,27 @@ def drive(
     omega: FloatArray,
     stretching: FloatArray,
     tensions: FloatArray,
-    carried: FloatArray,
+    feedforward_tensions: FloatArray,
     null: FloatArray,
-    known: FloatArray,
+    compensation: FloatArray,
     most: FloatArray,
     effort: FloatArray,
     null_directions: int,
     reference_slope: FloatArray,
     torque: FloatArray,
 ) -> bool:
-    """Write the motors' torques (n,) for the tensions wanted, and what is known of the motors.
+    """Write the motors' torques (n,) for the tensions wanted, with the motors' `compensation`.
 
     Returns whether a motor's limit was reached.
 
-    `carried` are the tensions without the loop's correction, which is there to overcome friction
-    in the winches: with those the cables are stretched. The rows of `null` are tensions that move
-    nothing: cables that pull against each other are damped along them, so that they do not sing. A
+    `feedforward_tensions` lack the loop's correction, which is there to overcome friction in the
+    winches: with those the cables are stretched. The rows of `null` are tensions that move nothing:
+    damping along them prevents null-space oscillation of cables that pull against each other. A
     cable is asked for its tension whatever its speed: the mechanism is back-drivable.
     """
     n, limited = tensions.size, False
     for i in range(n):
-        stretching[i] += _STRETCH_SHARE * (carried[i] - stretching[i])
+        stretching[i] += _STRETCH_SHARE * (feedforward_tensions[i] - stretching[i])
         effort[i] = tensions[i]
     for k in range(null_directions):
         against = 0.0
@@ -298,6 +300,6 @@ def drive(
             effort[i] += settings[NULL_DAMPING] * null[k, i] * against
     for i in range(n):
         effort[i] = inertia[i] * reference_slope[i] - m_per_rad[i] * effort[i]
-        torque[i] = min(max(effort[i] + known[i], -most[i]), most[i])
+        torque[i] = min(max(effort[i] + compensation[i], -most[i]), most[i])
         limited = limited or abs(torque[i]) == most[i]
     return limited

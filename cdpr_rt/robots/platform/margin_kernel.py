@@ -37,13 +37,13 @@ def keeps_margin(
                     for b in range(d):
                         S[a, b] = C * plants[j, i, w, a, b]
                     S[a, a] += 1.0
-                if not _is_longer(S, H, least * least):
+                if not _is_positive_definite(S, H, least * least):
                     return False
     return True
 
 
 @jit
-def _is_longer(S: ComplexArray, H: ComplexArray, square: float) -> bool:
+def _is_positive_definite(S: ComplexArray, H: ComplexArray, square: float) -> bool:
     """Return whether S^H S - square 1 is positive definite; its factor goes into `H`."""
     d = S.shape[0]
     for b in range(d):

@@ -55,10 +55,10 @@ class Reach:
             allowed = f"allowed: up to {d + MOST_NULL_DIRECTIONS} to control {d} directions"
             raise GeometryError(f"{n} cables; {allowed}")
         workspace, there = model.workspace(), model.pose(self.start)
-        missing = workspace.feasible(there) or model.interference.contact(there.array)
-        if missing:
+        why_not = workspace.infeasibility(there) or model.interference.contact(there.array)
+        if why_not:
             place = ", ".join(f"{x:.3f}" for x in there.p[: model.positions])
-            raise GeometryError(f"the start at {place} m: {missing}")
+            raise GeometryError(f"the start at {place} m: {why_not}")
         centre, wrenches, generators, scale, bounds = workspace.arrays
         self._arrays = (
             np.array(model.kinematics.directions), *model.interference.arrays,

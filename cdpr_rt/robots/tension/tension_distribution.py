@@ -87,7 +87,7 @@ class TensionDistribution(ABC):
         self._limit = CARRIED
         self._directions, self._cables, size = directions, n, max(n, 8)
         self._scaled, self._space = np.zeros((directions, n + 1)), np.zeros((n + 1, n))
-        self._room = np.zeros((4, size, size))
+        self._scratch = np.zeros((4, size, size))
 
     def solve(self, W: FloatArray, w_e: FloatArray, t_out: FloatArray) -> TensionOutcome:
         """Write the tensions (n,) for W (d, n) and w_e (d,) into `t_out`.
@@ -98,14 +98,14 @@ class TensionDistribution(ABC):
         if t_out.size != self._cables:
             return _REFUSED
         rank = null_space(
-            W, w_e, self.wrench_scale, self._bounds, self._scaled, self._space, self._room
+            W, w_e, self.wrench_scale, self._bounds, self._scaled, self._space, self._scratch
         )
         if rank < 0:
             return _REFUSED
         outcome = self._choose(self._cables - rank, t_out)
         self._limit = nearest_wrench(
             self._scaled, self._bounds, self.wrench_scale,
-            outcome is not _NEAREST, t_out, self.missing, self._room,
+            outcome is not _NEAREST, t_out, self.missing, self._scratch,
         )  # fmt: skip
         if rank < self._directions:
             return _SINGULAR
@@ -135,7 +135,7 @@ class MinimumDeviation(TensionDistribution):
     """The tensions within bounds nearest to wanted ones; continuous in W, w_e and bounds."""
 
     def _choose(self, null_directions: int, t: FloatArray) -> TensionOutcome:
-        found = project(self._space, null_directions, self._bounds, t, self._room)
+        found = project(self._space, null_directions, self._bounds, t, self._scratch)
         return _FEASIBLE if found else _NEAREST
 
 
@@ -146,9 +146,9 @@ class ClosedForm(TensionDistribution):
     """
 
     def _choose(self, null_directions: int, t: FloatArray) -> TensionOutcome:
-        if closed_form(self._space, null_directions, self._bounds, t, self._room):
+        if closed_form(self._space, null_directions, self._bounds, t, self._scratch):
             return _FEASIBLE
-        found = project(self._space, null_directions, self._bounds, t, self._room)
+        found = project(self._space, null_directions, self._bounds, t, self._scratch)
         return _SUBSTITUTED if found else _NEAREST
 
 
@@ -178,9 +178,9 @@ class PolygonPoint(TensionDistribution):
 
     def _choose(self, null_directions: int, t: FloatArray) -> TensionOutcome:
         space, bounds = self._space, self._bounds
-        if not project(space, null_directions, bounds, t, self._room):
+        if not project(space, null_directions, bounds, t, self._scratch):
             return _NEAREST
-        if choose(space, null_directions, bounds, self._point, t, self._room):
+        if choose(space, null_directions, bounds, self._point, t, self._scratch):
             return _FEASIBLE
         return _SUBSTITUTED
 

@@ -27,15 +27,15 @@ OK, INFEASIBLE, SINGULAR = 0, 1, 2
 @jit
 def split(
     W: FloatArray,
-    known: FloatArray,
+    feedforward: FloatArray,
     force: FloatArray,
     scale: FloatArray,
     plan: FloatArray,
     reserve: float,
-    pace: float,
-    given: bool,
-    slow: FloatArray,
-    carried: FloatArray,
+    slow_share: float,
+    external: bool,
+    slow_tensions: FloatArray,
+    feedforward_tensions: FloatArray,
     t: FloatArray,
     missing: FloatArray,
     bounds: FloatArray,
@@ -44,38 +44,39 @@ def split(
     space: FloatArray,
     scratch: FloatArray,
 ) -> tuple[int, float, int]:
-    """Write tensions `t` (n,) that exert `force` (d,) besides carrying the wrench `known` (d,).
+    """Write tensions `t` (n,) that exert `force` (d,) besides carrying wrench `feedforward` (d,).
 
-    `plan` (2, n) are the planned bounds. `slow` (n,), kept from cycle to cycle, follows with `pace`
-    what the force needs; `carried` (n,) is written, or taken where it is `given`. `missing` (d,) is
-    what of the wrench they leave out; where they do, `t` comes nearest to it. The arrays behind are
-    overwritten, as of `null_space`. Returns OK, INFEASIBLE where no tensions within the plan carry
-    what is known, or SINGULAR; the share of the force exerted; the null directions in `space`.
+    `plan` (2, n) are the planned bounds. `slow_tensions` (n,), kept from cycle to cycle, go by
+    `slow_share` of the way to what the force needs. `feedforward_tensions` (n,) are written, or
+    taken where they are `external`. `missing` (d,) is what of the wrench they leave out; where they
+    do, `t` comes nearest to it. The arrays behind are overwritten, as of `null_space`. Returns OK,
+    INFEASIBLE where nothing within the plan carries `feedforward`, or SINGULAR; the share of the
+    force exerted; the null directions in `space`.
     """
     d, n = W.shape
     for k in range(d):
-        missing[k] = known[k] - force[k]
+        missing[k] = feedforward[k] - force[k]
     _widen(plan, 0.0, bounds)
     _copy(plan[0], bounds[2])
-    if null_space(W, known, scale, bounds, scaled, space, scratch) < d:
+    if null_space(W, feedforward, scale, bounds, scaled, space, scratch) < d:
         _copy(plan[0], t)
-        _copy(plan[0], carried)
+        _copy(plan[0], feedforward_tensions)
         return SINGULAR, 0.0, 0
     r = n - d
     _copy(space[0], particular[0])
     other_wrench(missing, scale, scaled, scratch, particular[1])
     outcome = OK
-    if not given:
+    if not external:
         outcome = _carry(
-            known, scale, plan, reserve, pace, r, slow, carried, t, missing, bounds, particular,
-            scaled, space, scratch,
+            feedforward, scale, plan, reserve, slow_share, r, slow_tensions, feedforward_tensions,
+            t, missing, bounds, particular, scaled, space, scratch,
         )  # fmt: skip
     _widen(plan, reserve if outcome == INFEASIBLE else FAST * reserve, bounds)
-    _copy(carried, bounds[2])
+    _copy(feedforward_tensions, bounds[2])
     _copy(particular[1], space[0])
     found = project(space, r, bounds, t, scratch)
     for k in range(d):
-        scaled[k, n] = (force[k] - known[k]) / scale[k]
+        scaled[k, n] = (force[k] - feedforward[k]) / scale[k]
     nearest_wrench(scaled, bounds, scale, found, t, missing, scratch)
     if found:
         return outcome, 1.0, r
@@ -93,14 +94,14 @@ def _square(wrench: FloatArray, scale: FloatArray) -> float:
 
 @jit
 def _carry(
-    known: FloatArray,
+    feedforward: FloatArray,
     scale: FloatArray,
     plan: FloatArray,
     reserve: float,
-    pace: float,
+    slow_share: float,
     r: int,
-    slow: FloatArray,
-    carried: FloatArray,
+    slow_tensions: FloatArray,
+    feedforward_tensions: FloatArray,
     t: FloatArray,
     missing: FloatArray,
     bounds: FloatArray,
@@ -109,21 +110,21 @@ def _carry(
     space: FloatArray,
     scratch: FloatArray,
 ) -> int:
-    """Write the tensions that carry what is known; `t` is overwritten. Returns the outcome."""
+    """Write tensions that carry `feedforward`; `t` is overwritten. Returns the outcome."""
     n = t.size
     _widen(plan, _SLOW * reserve, bounds)
     _copy(particular[1], space[0])
     if project(space, r, bounds, t, scratch):
         for i in range(n):
-            slow[i] += pace * (t[i] - slow[i])
+            slow_tensions[i] += slow_share * (t[i] - slow_tensions[i])
     _widen(plan, 0.0, bounds)
-    _copy(slow, bounds[2])
+    _copy(slow_tensions, bounds[2])
     _copy(particular[0], space[0])
-    if project(space, r, bounds, carried, scratch):
+    if project(space, r, bounds, feedforward_tensions, scratch):
         return OK
     for k in range(scale.size):
-        scaled[k, n] = -known[k] / scale[k]
-    nearest_wrench(scaled, bounds, scale, False, carried, missing, scratch)
+        scaled[k, n] = -feedforward[k] / scale[k]
+    nearest_wrench(scaled, bounds, scale, False, feedforward_tensions, missing, scratch)
     return INFEASIBLE
 
 

@@ -76,11 +76,11 @@ class InertialWrenches:
         linear = self._linear(acceleration)
         rate, slope = self._vectors(velocity), self._vectors(acceleration)
         # the angular velocity is J(φ) φ'
-        spin = _spin(self._turn, rate)
+        spin = _angular_velocity(self._turn, rate)
         size = np.maximum(np.linalg.norm(rate, axis=1), 1.0)[:, None]
         step = _STEP / size
-        ahead = _spin(self._turn + step * rate, rate)
-        turning = _spin(self._turn, slope) + (ahead - spin) / step
+        ahead = _angular_velocity(self._turn + step * rate, rate)
+        turning = _angular_velocity(self._turn, slope) + (ahead - spin) / step
         arm = self._centre
         linear = linear + np.cross(turning, arm) + np.cross(spin, np.cross(spin, arm))
         momentum = np.einsum("mij,mj->mi", self._inertia, spin)
@@ -101,7 +101,7 @@ class InertialWrenches:
         return out
 
 
-def _spin(turn: FloatArray, rate: FloatArray) -> FloatArray:
+def _angular_velocity(turn: FloatArray, rate: FloatArray) -> FloatArray:
     """Return the angular velocities (m, 3) of rotation vectors that change at a rate.
 
     J(φ) = 1 + (1 - cos θ)/θ² [φ]× + (θ - sin θ)/θ³ [φ]×².

@@ -30,7 +30,8 @@ Judge = Callable[[Cycle, FloatArray], int]
 class Engine:
     """Runs the machine's axes under the active program; knows neither commands nor stops.
 
-    A cycle neither allocates memory that stays, nor waits, nor logs.
+    A cycle allocates no memory that stays and does not log. It waits in its exchange alone: for its
+    deadline, and for the axes' answers.
     """
 
     def __init__(

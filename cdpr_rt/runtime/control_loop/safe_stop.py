@@ -133,7 +133,7 @@ class SafeStop:
         last, lowering, engine = self._engine.parts.last, self._lowering, self._engine
         if last is None or lowering is None or not self.lowers:
             return
-        hangs = self.without_pose or not self._estimator.estimate.may_be_slack
+        hangs = self.without_pose or not self._estimator.estimate.slack_allowed
         last.fallen = last.fallen or hangs or engine.program.name == lowering.program
 
     def _method(self, reaction: Reaction, then: LoopState) -> StopMethod:

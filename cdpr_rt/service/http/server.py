@@ -1,4 +1,4 @@
-"""Connections that nobody can hold open for nothing."""
+"""HTTP server with time-outs and stop priority."""
 
 from __future__ import annotations
 

@@ -209,11 +209,11 @@ class Recorder:
         self._block.counters["recorded"][0] = self._reader.next
         if not file.is_there:
             raise RecordingError(f"{file.path}: recording ended: the file has been removed")
-        room, size = file.room()
+        free, size = file.free_space()
         least = reserve_of(size) if self._reserve_bytes is None else self._reserve_bytes
-        if room < least:
+        if free < least:
             raise RecordingError(
-                f"{self._folder}: recording ended: {size_text(room)} free, less than the "
+                f"{self._folder}: recording ended: {size_text(free)} free, less than the "
                 f"{size_text(least)} that are left to others"
             )
         if file.size >= self._most_bytes:

@@ -108,7 +108,7 @@ class RecordingFile:
         """Whether the file can still be found by somebody."""
         return os.fstat(self._fd).st_nlink > 0
 
-    def room(self) -> tuple[int, int]:
+    def free_space(self) -> tuple[int, int]:
         """Return the bytes that are free on its disk, and how many the disk has."""
         usage = os.fstatvfs(self._fd)
         return usage.f_bavail * usage.f_frsize, usage.f_blocks * usage.f_frsize

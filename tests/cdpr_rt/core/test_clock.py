@@ -1,4 +1,4 @@
-"""Time and cooperative tasks: fixed order, waits, time-outs, ends; on the wall and without it."""
+"""Time and cooperative tasks: fixed order, waits, time-outs, ends; in wall time and without it."""
 
 from __future__ import annotations
 

@@ -93,10 +93,10 @@ class IdealControl:
     def pose(self) -> FloatArray:
         return seven(self.model, self.estimated)
 
-    cell_trouble = ""
+    load_cell_fault = ""
     learnt_Nm = None
 
-    def trust_cells(self) -> None: ...
+    def clear_load_cell_fault(self) -> None: ...
 
     def measure_tensions(self, tension_N: FloatArray, measured: BoolArray) -> None: ...
     def forget_motors(self) -> None: ...
@@ -114,7 +114,7 @@ class IdealControl:
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
         return self.model.kinematics.lengths(self.model.pose(self.model.home))
 
-    def missing(self) -> str:
+    def tension_infeasibility(self) -> str:
         return ""
 
     def _at(self, position: FloatArray) -> Any:
@@ -124,19 +124,19 @@ class IdealControl:
     def stands(self, position: FloatArray) -> bool:
         return self.workspace.stands(self._at(position))
 
-    def nears(self, position: FloatArray) -> int:
-        return self.model.interference.nears(self.position, position)
+    def contact_ahead(self, position: FloatArray) -> int:
+        return self.model.interference.contact_ahead(self.position, position)
 
-    def touches(self, position: FloatArray) -> int:
-        return self.model.interference.touches(self.position, position)
+    def contact_at(self, position: FloatArray) -> int:
+        return self.model.interference.contact_at(self.position, position)
 
     def contact(self, pair: int) -> str:
         return self.model.interference.within_clearance(pair)
 
-    def feasible(self, position: FloatArray) -> str:
-        return self.workspace.feasible(self._at(position))
+    def infeasibility(self, position: FloatArray) -> str:
+        return self.workspace.infeasibility(self._at(position))
 
-    def feasible_path(self, position: FloatArray, start: FloatArray | None = None) -> str:
+    def path_obstacle(self, position: FloatArray, start: FloatArray | None = None) -> str:
         share, begin = SHARES[:, None], self.position if start is None else start
         self.ways.append((np.array(begin), np.array(position)))
         poses = self.model.poses((1.0 - share) * begin + share * position)

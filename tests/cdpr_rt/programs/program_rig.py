@@ -12,7 +12,7 @@ from cdpr_rt.control.tuning import sweep_gain
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.shared_block import SAMPLE, SharedBlock
 from cdpr_rt.programs.base import Program
-from cdpr_rt.programs.model import RobotModel, position_loop
+from cdpr_rt.programs.model import AxesModel, position_loop
 from cdpr_rt.programs.registry import build_programs
 
 N = 3
@@ -23,11 +23,11 @@ COULOMB_Nm = 0.03
 COUNT_RAD = 2.0 * np.pi / 8192
 
 
-def rig_model() -> RobotModel:
+def rig_model() -> AxesModel:
     """Axes that differ in all their bounds; the last one's friction is known."""
     gains = position_loop(INERTIA_kg_m2, LATENCY_S, PERIOD_S).gains
     friction = FrictionFeedforward(COULOMB_Nm, COULOMB_Nm)
-    return RobotModel(
+    return AxesModel(
         period_s=PERIOD_S,
         torque_Nm=np.array([3.0, 2.0, 1.0]),
         speed_rad_s=np.array([40.0, 30.0, 50.0]),

@@ -76,7 +76,8 @@ def test_progress_tells_position_and_rotation(robot: IdealPlatform) -> None:
         [*position, *rotation]
     )
     assert [*told["position_m"], *told["rotation_rad"]] == pytest.approx(robot.path[-1])
-    assert [*told["left_m"], *told["left_rotation_rad"]] == pytest.approx([*position, *rotation])
+    interrupted = [*told["interrupted_target_m"], *told["interrupted_target_rotation_rad"]]
+    assert interrupted == pytest.approx([*position, *rotation])
 
 
 def test_what_is_left_out_stays_as_it_is(robot: IdealPlatform) -> None:

@@ -159,15 +159,15 @@ def test_a_place_that_tensions_cannot_hold_is_told() -> None:
     control = planar().control()
     control.stand_still()
     control.position[:] = 0.0, 1.9
-    assert not control.feasible(np.array([0.0, 1.9]))
+    assert not control.infeasibility(np.array([0.0, 1.9]))
     assert control.stands(np.array([0.0, 1.9]))
     for place in ((-1.5, 1.0), (0.0, 2.95), (0.0, 3.5)):
-        told = control.feasible(np.array(place))
+        told = control.infeasibility(np.array(place))
         assert "cable" in told
         assert "reserve" in told
         assert not control.stands(np.array(place))
-    assert "at " in control.feasible_path(np.array([-1.5, 1.0]))
-    assert not control.feasible_path(np.array([0.3, 1.6]))
+    assert "at " in control.path_obstacle(np.array([-1.5, 1.0]))
+    assert not control.path_obstacle(np.array([0.3, 1.6]))
 
 
 def test_an_obstacle_in_the_way_is_told() -> None:
@@ -177,21 +177,21 @@ def test_an_obstacle_in_the_way_is_told() -> None:
     blocked = replace(robot.platform, obstacles=(box,))
     model = platform_model_of(replace(robot, platform=blocked))
     control = CableControl(model, robot.axes, np.full(8, 6.0), PERIOD_S)
-    told = control.feasible_path(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
+    told = control.path_obstacle(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
     assert "at -0.050, 0.100, 1.810 m: platform and obstacle 1 come within 10 mm" in told
-    assert not control.feasible_path(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
+    assert not control.path_obstacle(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
 
 
 def test_an_orientation_that_tensions_cannot_hold_is_told() -> None:
     control = spatial().control()
     assert control.stands(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 0.1]))
-    assert "cable" in control.feasible(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 1.5]))
+    assert "cable" in control.infeasibility(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 1.5]))
 
 
 def test_a_target_in_an_exit_point_is_told() -> None:
     machine = planar()
     place = np.subtract(machine.platform.exit_points_m[0], machine.platform.anchor_points_m[0])
-    assert machine.control().feasible(place)
+    assert machine.control().infeasibility(place)
 
 
 @pytest.mark.parametrize(("place", "told"), [((0.0, 1.9), False), ((-1.5, 1.0), True)])
@@ -204,7 +204,7 @@ def test_tensions_that_are_missing_are_told(place: tuple[float, float], told: bo
     control.stand_still()
     for _ in range(50):
         control.update(feedback, setpoint, torque)
-    assert ("cable" in control.missing()) == told
+    assert ("cable" in control.tension_infeasibility()) == told
     assert (control.outcome != 0) == told
     model = control.model
     assert control.tension_N.min() >= model.low_N[0] - 1e-9
@@ -222,7 +222,7 @@ def test_an_acceleration_that_tensions_cannot_give_is_told() -> None:
     for _ in range(100):
         control.update(feedback, setpoint, torque)
     assert control.stands(place)
-    assert control.missing().startswith("for this motion, cable")
+    assert control.tension_infeasibility().startswith("for this motion, cable")
 
 
 def test_lengths_of_this_very_cycle_stay_and_home_is_found() -> None:

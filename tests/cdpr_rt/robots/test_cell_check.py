@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdpr_rt.robots.platform.cell_check import CellCheck, balance_doubt_N
+from cdpr_rt.robots.platform.cell_check import CellCheck, balance_std_N
 
 PERIOD_S, RATED_N, WEIGHT_N = 1e-3, 150.0, 50.0
 ANGLES = np.radians([35.0, 145.0, 215.0, 325.0])
@@ -21,8 +21,8 @@ class Cells:
     def __init__(self) -> None:
         names = ["one", "two", "three", "four"]
         scale = np.ones(2)
-        doubt_N = balance_doubt_N(WEIGHT_N, 1, scale)
-        self.check = CellCheck(names, np.full(4, RATED_N), doubt_N, scale, PERIOD_S)
+        std_N = balance_std_N(WEIGHT_N, 1, scale)
+        self.check = CellCheck(names, np.full(4, RATED_N), std_N, scale, PERIOD_S)
         self.read_N, self.valid = np.array(TENSION_N), np.ones(4, np.bool_)
         self.asked_N, self.added_N = np.array(TENSION_N), np.zeros(4)
         self.wrench = np.array(WEIGHT)

@@ -81,7 +81,9 @@ def test_where_it_turns_to_and_how_fast_it_swings(
     Q = np.array([[math.cos(angle), -math.sin(angle), 0.0], [math.sin(angle), math.cos(angle), 0.0],
                   [0.0, 0.0, 1.0]])  # fmt: skip
     pose = Pose(np.append(position_m, 0.0), Q)
-    kernel.turn_about_z(machine.model().kinematics.geometry, TENSION_N, pose.array, rotation)
+    kernel.rotational_stiffness(
+        machine.model().kinematics.geometry, TENSION_N, pose.array, rotation
+    )
     assert rotation[kernel.MOMENT] == pytest.approx(0.0, abs=1e-6)
     omega = math.sqrt(rotation[kernel.STIFFNESS] / rotation[kernel.SWINGING])
     found_Hz = other.frequency_Hz(angle, rotation[kernel.INERTIA])

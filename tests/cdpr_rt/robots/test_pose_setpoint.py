@@ -38,7 +38,9 @@ def drawn(
 
 def placed(q: FloatArray, directions: tuple[int, ...], home: Pose) -> Pose:
     pose = Pose(np.zeros(3))
-    pose_setpoint.place(q, np.array(directions), home.array, np.zeros((4, 3)), pose.array)
+    pose_setpoint.pose_of_coordinates(
+        q, np.array(directions), home.array, np.zeros((4, 3)), pose.array
+    )
     return pose
 
 
@@ -60,7 +62,7 @@ def test_a_set_point_is_found_again_in_its_pose(seed: int, chosen: tuple[int, ..
     _, home, q = drawn(seed, chosen)
     found = np.zeros(len(chosen))
     pose = placed(q, chosen, home).array
-    pose_setpoint.locate(pose, np.array(chosen), home.array, np.zeros((4, 3)), found)
+    pose_setpoint.coordinates_of_pose(pose, np.array(chosen), home.array, np.zeros((4, 3)), found)
     assert found == pytest.approx(q, abs=1e-9)
 
 
@@ -164,7 +166,7 @@ def test_motors_are_asked_for_the_lengths_and_rates_of_the_kinematics(make: obje
         here = model.pose(q).plus(np.concatenate([0.01 * rng.normal(size=3), np.zeros(3)]))
         wanted, moves = Pose(np.zeros(3)), np.zeros((3, 6))
         asked = np.zeros((3, n))
-        pose_setpoint.refer(
+        pose_setpoint.motor_references(
             shaped, chosen, model.home_pose.array, PERIOD_S, kinematics.geometry, motors,
             here.array, np.zeros((4, 3)), wanted.array, np.zeros((CABLE_ROWS, n)),
             moves[0], moves[1], moves[2], asked[0], asked[1], asked[2],

@@ -73,7 +73,7 @@ def test_what_can_be_held_is_what_the_controller_distributes(x: float, y: float)
     weight = np.array([0.0, -9.80665 * statics.platform.mass_kg])
     W, t = statics.model.kinematics.wrench_matrix(statics.model.pose(p)), np.zeros(3)
     outcome = statics.model.least_tensions(LOW, HIGH).solve(W, weight, t)
-    reserve = float(statics.reserve_N(p))
+    reserve = float(statics.margin_N(p))
     if abs(reserve) > 1e-6:
         assert (outcome is TensionOutcome.FEASIBLE) == (reserve > 0.0)
     if reserve > 1e-6:
@@ -84,7 +84,7 @@ def test_what_can_be_held_is_what_the_controller_distributes(x: float, y: float)
 def test_in_motion_the_worst_direction_counts_and_arrays_keep_their_shape() -> None:
     statics, points = shipped(), shipped().box.grid(4, 3)
     assert points.shape == (3, 4, 2)
-    moving = statics.reserve_N(points, 2.0)
+    moving = statics.margin_N(points, 2.0)
     worst = [
         min(
             by_linear_programming(statics, p, np.array([i, j]))
@@ -114,9 +114,9 @@ def test_the_largest_box_is_all_of_targets_and_no_wider_one_is() -> None:
     found = statics.largest_box(plane)
     assert found is not None
     spare_N = RESERVE * 130.0
-    assert statics.reserve_N(found.grid(41, 41), 2.0).min() > spare_N - 1.0
+    assert statics.margin_N(found.grid(41, 41), 2.0).min() > spare_N - 1.0
     wider = Box((found.low_m[0] - 0.15, found.low_m[1]), (found.high_m[0] + 0.15, found.high_m[1]))
-    assert statics.reserve_N(wider.grid(41, 41), 2.0).min() < spare_N
+    assert statics.margin_N(wider.grid(41, 41), 2.0).min() < spare_N
     heavy = dataclasses.replace(statics.platform, mass_kg=60.0)
     assert PlatformStatics(platform_model(heavy, LOW, HIGH)).largest_box(plane) is None
 
@@ -128,17 +128,17 @@ def test_targets_are_what_the_controller_takes(x: float, y: float) -> None:
     assert robot.platform is not None
     statics = shipped()
     control = CableControl(statics.model, list(robot.axes), np.full(3, 4.5), 1e-3)
-    moving_N = float(statics.reserve_N(p, statics.platform.acceleration_m_s2))
+    moving_N = float(statics.margin_N(p, statics.platform.acceleration_m_s2))
     # the controller counts no more than it must of the acceleration
     if abs(moving_N - statics.model.reserve_N) > 0.5:
-        assert (control.feasible(p) == "") == bool(statics.is_target(p))
+        assert (control.infeasibility(p) == "") == bool(statics.is_target(p))
 
 
 def test_a_platform_that_is_a_point_does_not_turn_and_may_sit_in_an_exit_point() -> None:
     platform = dataclasses.replace(shipped().platform, anchor_points_m=((0.0, 0.0),) * 3)
     statics = PlatformStatics(platform_model(platform, LOW, HIGH))
     assert statics.angle_rad(np.array([0.3, 1.5])) == 0.0
-    at_exits = statics.reserve_N(np.array(platform.exit_points_m))
+    at_exits = statics.margin_N(np.array(platform.exit_points_m))
     assert (at_exits == -np.inf).all()
 
 
@@ -159,7 +159,7 @@ def test_the_shipped_robot_is_held_with_a_reserve_in_its_whole_box() -> None:
     robot, statics = load_robot("planar-3"), shipped()
     assert findings(robot) == [] and refuse_impossible(robot) == []
     points = statics.box.grid(31, 31)
-    assert statics.reserve_N(points, statics.platform.acceleration_m_s2).min() > 18.0
+    assert statics.margin_N(points, statics.platform.acceleration_m_s2).min() > 18.0
     assert findings(load_robot("spatial-8")) == []
 
 
@@ -195,7 +195,7 @@ def test_every_shipped_robot_holds_its_box_at_all_orientations(name: str) -> Non
     assert (
         len(statics.orientations) == {3: 3, 6: 15}.get(statics.model.size, 1) or name == "point-4"
     )
-    moving = statics.reserve_N(
+    moving = statics.margin_N(
         statics.points(), statics.platform.acceleration_m_s2, statics.orientations
     )
     assert moving.min() > statics.model.reserve_N

@@ -77,7 +77,7 @@ def test_the_margin_is_what_linear_programming_finds(
     inside = np.minimum(t - workspace.low, workspace.high - t).min()
     assert inside == pytest.approx(margin, abs=1e-6)
     assert workspace.stands(pose) == (margin >= 0.0)
-    assert (workspace.feasible(pose) == "") == (margin >= 0.0)
+    assert (workspace.infeasibility(pose) == "") == (margin >= 0.0)
 
 
 def test_what_no_tension_holds_is_told() -> None:
@@ -86,11 +86,11 @@ def test_what_no_tension_holds_is_told() -> None:
     )
     weight, _ = wrenches_in_motion(2.0, 0.0, 1, (0, 1))
     workspace = CableWorkspace(flat, weight, np.zeros(3), np.full(3, 9.0), np.ones(2))
-    assert "cannot hold one direction" in workspace.feasible(Pose(np.zeros(3)))
-    assert "cannot hold one direction" in workspace.feasible(Pose(np.array([1.0, 0.0, 0.0])))
+    assert "cannot hold one direction" in workspace.infeasibility(Pose(np.zeros(3)))
+    assert "cannot hold one direction" in workspace.infeasibility(Pose(np.array([1.0, 0.0, 0.0])))
     margins, _ = workspace.margins(Pose(np.zeros(3)).array[None])
     assert margins[0] == -math.inf
-    assert "N outside" in workspace.feasible(Pose(np.array([0.5, -0.3, 0.0])))
+    assert "N outside" in workspace.infeasibility(Pose(np.array([0.5, -0.3, 0.0])))
 
 
 def test_margins_in_closed_form_are_those_of_every_corner_of_a_published_robot() -> None:

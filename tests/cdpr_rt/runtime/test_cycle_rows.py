@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, FIELDS, POSE_FIELDS, SCALAR_FIELDS, cycle_dtype
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.runtime.cycle_rows import CycleRows
+from cdpr_rt.runtime.cycle_rows import _CODES, CycleRows
 
 _N = 3
 
@@ -70,6 +71,12 @@ def test_an_array_of_another_layout_is_refused(array: Any) -> None:
     _put(engine, FIELDS["tension_N"].source, array)
     with pytest.raises(TypeError, match=r"estimate\.tension_N: .*allowed: .*contiguous"):
         rows.follow(engine)
+
+
+@pytest.mark.parametrize("kind", ["?", "<u1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f8"])
+def test_a_scalar_of_any_kind_is_packed_as_numpy_reads_it(kind: str) -> None:
+    """Also of kinds that no field is of yet."""
+    assert np.frombuffer(struct.pack(f"<{_CODES[kind]}", 1), kind).tolist() == [1]
 
 
 def test_every_field_says_what_it_means() -> None:

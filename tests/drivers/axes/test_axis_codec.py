@@ -49,7 +49,9 @@ class Group:
         rpdos, s = self.layout.rpdos, self.state
         raw = rpdos.bytes
         codec.end_answers(s.ints, s.floats, s.flags)
-        self.alarms = codec.encode(raw, self.layout.answer, CONTROLWORD_TABLE, s.ints, s.floats)
+        self.alarms = codec.encode(
+            raw, self.layout.command_offsets, CONTROLWORD_TABLE, s.ints, s.floats
+        )
         frames = [CAN_FRAME.unpack(row) for row in rpdos.rows]
         return [(i, data[:length]) for i, length, data in frames]
 

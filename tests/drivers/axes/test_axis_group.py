@@ -209,7 +209,7 @@ def test_what_the_drive_does_unasked_raises_the_alarm(
 
 
 def test_the_cause_is_told_before_what_follows_from_it(bus: str) -> None:
-    """While the only drive is waited for by the wall, it misses the master's heartbeat."""
+    """While the only drive is waited for by the wall clock, it misses the master's heartbeat."""
     with open_rig(bus, lead=False) as rig:
         rig.enable()
         rig.network.write(1, 0x1800, 1, 0x80000181)
@@ -317,7 +317,7 @@ def test_drives_stop_when_the_master_dies_or_hangs(hang: bool) -> None:
         with open_network(simulator.bus, [1]) as network:
             assert state_of(network.read_int(1, 0x6041)) == State.OPERATION_ENABLED
             master.send_signal(signal.SIGSTOP if hang else signal.SIGKILL)
-            # the consumer's 0.5 s run by the wall, since nobody leads the bus any more
+            # the consumer's 0.5 s run by the wall clock, since nobody leads the bus any more
             deadline = time.monotonic() + 60.0
             while state_of(network.read_int(1, 0x6041)) == State.OPERATION_ENABLED:
                 assert time.monotonic() < deadline

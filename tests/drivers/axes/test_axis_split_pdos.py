@@ -51,7 +51,7 @@ class Pair:
         s, rpdos = self.state, self.layout.rpdos
         codec.end_answers(s.ints, s.floats, s.flags)
         codec.encode(
-            rpdos.bytes, self.layout.answer, CONTROLWORD_TABLE,
+            rpdos.bytes, self.layout.command_offsets, CONTROLWORD_TABLE,
             s.ints, s.floats,
         )  # fmt: skip
         frames = [CAN_FRAME.unpack(row) for row in rpdos.rows]
@@ -59,7 +59,7 @@ class Pair:
 
     def next_cycle(self) -> None:
         self.state.feedback.valid.fill(False)
-        self.state.ints[codec.SEEN].fill(0)
+        self.state.ints[codec.TPDOS_RECEIVED].fill(0)
 
 
 @settings(max_examples=60)
@@ -149,7 +149,7 @@ def test_feedback_that_is_told_again_when_it_changes_is_not_waited_for() -> None
     plain = AxisConfig(1, SPLIT, 3.0, 8192, 0x2D, 2.0)
     for tpdos, bits in (((event, *SPLIT.tpdos), 0b110), ((*SPLIT.tpdos, event), 0b011)):
         axis = dataclasses.replace(plain, drive=SPLIT.model_copy(update={"tpdos": tpdos}))
-        assert axis.awaited_tpdos == bits
+        assert axis.expected_tpdos == bits
         fields = GroupLayout([axis]).fields[0]
         assert np.count_nonzero(fields[:, 3]) == 3
         assert tpdos.index(event) not in fields[fields[:, 3] > 0, 0]
@@ -184,7 +184,7 @@ def test_more_millinewtonmetres_than_16_bits_hold_are_cut_and_not_wrapped(torque
     state.command.torque_Nm[0] = torque_Nm
     for _ in range(3):
         codec.encode(
-            layout.rpdos.bytes, layout.answer, CONTROLWORD_TABLE,
+            layout.rpdos.bytes, layout.command_offsets, CONTROLWORD_TABLE,
             state.ints, state.floats,
         )  # fmt: skip
         (units,) = struct.unpack("<h", CAN_FRAME.unpack(layout.rpdos.rows[1])[2][:2])

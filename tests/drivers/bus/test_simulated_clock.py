@@ -1,4 +1,4 @@
-"""A master that leads simulated buses: bus time is what it waits for, whatever the wall does."""
+"""A master that leads simulated buses: bus time is what it waits for, whatever wall time does."""
 
 from __future__ import annotations
 

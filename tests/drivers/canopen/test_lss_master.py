@@ -67,7 +67,7 @@ def bus_with(*nodes: CanopenSlave) -> Iterator[str]:
 
 @contextmanager
 def master_on(name: str, timeout_s: float = TIMEOUT_S, *, lead: bool = True) -> Iterator[LssMaster]:
-    """An LSS master; who does not `lead` goes by the wall, as others who answer do."""
+    """An LSS master; who does not `lead` goes by the wall clock, as others who answer do."""
     url = BusUrl.parse(f"simbus:{name}")
     with (
         closing(open_clock([url]) if lead else PacedClock()) as clock,

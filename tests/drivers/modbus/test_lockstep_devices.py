@@ -2,7 +2,7 @@
 
 The bus here is the test's own, a mock of a simulated bus that this process leads: it moves the
 physics board in steps of 1 ms as the simulated drives do. The devices are real processes behind
-real lines; some of them are stopped (SIGSTOP) by the wall while they are asked.
+real lines; some of them are stopped (SIGSTOP) by the wall clock while they are asked.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def test_the_devices_own_watchdog_counts_bus_time(tmp_path: Path) -> None:
         io = SafetyIo(io_device.profile(), clock).open()
         io.energise()
         fed_s = io.state.at_s
-        time.sleep(1.5)  # by the wall: the device has 1 s
+        time.sleep(1.5)  # by the wall clock: the device has 1 s
         bus.go(fed_s + 0.9)  # nobody asks meanwhile
         assert bus.seen[-1][1]
         bus.go(fed_s + 1.1)

@@ -31,7 +31,7 @@ def test_bus_time_is_0_until_somebody_speaks(start_bus: StartBus, stub_node: typ
     assert member.status()["bus_time_s"] == 0.0
     assert node.advanced == []
     member.send(0x123)
-    # switched on, then the frame, then the wall
+    # switched on, then the frame, then the wall clock
     assert [member.recv(), member.recv()] == [beat(7), beat(7)]
     assert node.advanced[0] == 0.0
     assert node.seen[0][0] == pack_frame(0x123)
@@ -227,7 +227,7 @@ def test_a_leader_that_dies_during_its_go_is_noticed(start_bus: StartBus, stub_n
     while (status := other.status())["led"]:
         pass
     assert first < status["bus_time_s"] < 1e9
-    # its time is that of the wall now
+    # its time is that of the wall clock now
     before_s = time.monotonic()
     begin_s = other.status()["bus_time_s"]
     begun_s = time.monotonic()

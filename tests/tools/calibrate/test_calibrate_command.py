@@ -16,7 +16,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
-from cdpr_rt.robots.calibration_state import distrust, mark_not_calibrated
+from cdpr_rt.robots.calibration_state import mark_not_calibrated, not_calibrated_reason
 from cdpr_tools.calibrate.made_readings import HAND_EYE_m
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
@@ -82,7 +82,7 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     mark_not_calibrated("spatial-8", "rail 1 was moved")
     done = cdpr_here("calibrate", "fit", "spatial-8", "--data", data, "--points", points, "--json")
     assert done.returncode == 0, done.stderr
-    assert distrust("spatial-8") == ""
+    assert not_calibrated_reason("spatial-8") == ""
     told = result(done)
     assert told["good"] and told["frame"].startswith("the room")
     proof = told["verification"]
@@ -97,7 +97,7 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     assert "calibrated 20" in shown.stderr and "cdpr calibrate undo spatial-8" in shown.stderr
     undone = cdpr_here("calibrate", "undo", "spatial-8", "--json")
     assert undone.returncode == 0 and result(undone)["in_force"] is None
-    assert "1 was taken back; before it: " in distrust("spatial-8")
+    assert "1 was taken back; before it: " in not_calibrated_reason("spatial-8")
     assert calibrated(robot) is robot
     again = cdpr_here("calibrate", "undo", "spatial-8")
     assert again.returncode == 2 and "none to undo" in again.stderr

@@ -28,17 +28,17 @@ def test_every_shipped_robot_is_described(name: str) -> None:
 def test_a_daemon_takes_targets_with_the_calibration_in_force_only(tmp_path, monkeypatch) -> None:
     for folder in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(folder, str(tmp_path))
-    before, platform = load_calibrated("planar-4"), SimpleNamespace(distrust="")
+    before, platform = load_calibrated("planar-4"), SimpleNamespace(not_calibrated_reason="")
     take_over(before, calibration(before))
     mark_calibrated("planar-4", "calibration 1")
     look_at_calibration(before, platform)  # type: ignore[arg-type]
-    assert "start the daemon anew" in platform.distrust
+    assert "start the daemon anew" in platform.not_calibrated_reason
     now = load_calibrated("planar-4")
     look_at_calibration(now, platform)  # type: ignore[arg-type]
-    assert platform.distrust == ""
+    assert platform.not_calibrated_reason == ""
     undo(before)
     look_at_calibration(now, platform)  # type: ignore[arg-type]
-    assert "taken over or undone" in platform.distrust
+    assert "taken over or undone" in platform.not_calibrated_reason
 
 
 def test_what_a_simulated_robot_told_moves_no_real_one() -> None:

@@ -131,7 +131,7 @@ def harmonic_result() -> HarmonicResult:
         cogging_trend_1_s=-1e-5,
         excluded_fraction=0.01,
         residual_rms_Nm=1.5e-3,
-        held_back_error_Nm=np.array([0.04, 0.015, 0.0015, 0.0016]),
+        held_out_error_Nm=np.array([0.04, 0.015, 0.0015, 0.0016]),
     )
 
 

@@ -51,7 +51,7 @@ def test_the_planar_robot_is_told_sketched_and_drawn(tmp_path: Path) -> None:
     assert told["ok"] is True and told["findings"] == []
     assert told["held_share"] == 1.0 and told["reserve_in_motion_N"] > 18.0  # type: ignore[operator]
     lines = shown.stderr.splitlines()
-    assert any("hold it in 100 % of the box" in line for line in lines)
+    assert any("hold the platform in 100 % of the box" in line for line in lines)
     assert any("nothing to object to" in line for line in lines)
     # exit points where they are, the box of targets full, the stand under it
     first = next(i for i, line in enumerate(lines) if line.strip().startswith("1  "))
@@ -108,7 +108,7 @@ def test_a_robot_in_space_is_told_and_drawn(tmp_path: Path) -> None:
     loop = told["loop"]
     assert 0.45 <= loop["modulus_margin"] < 0.6  # type: ignore[index]
     assert 1.0 < loop["slowest_Hz"] < loop["fastest_Hz"] < 20.0  # type: ignore[index]
-    assert re.search(r"its gain may still be 1.8 times off, or its phase 26 deg", shown.stderr)
+    assert re.search(r"gain margin 1.8, phase margin 26 deg", shown.stderr)
     assert told["controlled"] == ["x", "y", "z", "rx", "ry", "rz"]
     assert "turns_at_most_rad" not in told
     swings = [axis["broken"]["swing_m"] for axis in told["axes"]]  # type: ignore[attr-defined]
@@ -260,7 +260,7 @@ def test_the_defaults_are_a_robot_that_works(tmp_path: Path) -> None:
     statics = statics_of(robot)
     spare = RESERVE * (statics.high_N - statics.low_N).min()
     points = statics.box.grid(21, 21)
-    assert statics.reserve_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
+    assert statics.margin_N(points, platform.acceleration_m_s2).min() > 0.85 * spare
     again = cdpr_here("robot", "new", path, "--yes")
     assert again.returncode == 2 and "not there yet" in again.stderr
     assert load_robot(path) == robot

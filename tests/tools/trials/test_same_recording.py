@@ -14,7 +14,7 @@ COMPARED = ("/cycle", "/description", "/events", "/status")
 
 
 def recorded(folder: Path, *, pause_s: float) -> dict[str, list[bytes]]:
-    """Tighten the cables a little, with pauses by the wall; return the messages by topic."""
+    """Tighten the cables a little, with pauses by the wall clock; return the messages by topic."""
     with LockstepRobot("planar-3", record=folder) as robot:
         robot.enable()
         for name in ("hold", "tighten") * 3:

@@ -15,11 +15,13 @@ app = typer.Typer()
 @app.command()
 def calibration(
     poses: Annotated[int, typer.Option(min=10, max=2000, help="Poses of the fit.")] = 100,
-    repeats: Annotated[int, typer.Option(min=2, max=1000, help="Fits, the fastest counts.")] = 10,
+    repeats: Annotated[
+        int, typer.Option(min=2, max=1000, help="Number of fits; the fastest counts.")
+    ] = 10,
     images: Annotated[
-        int, typer.Option(min=0, max=1000, help="Measure the fit with so many images, too.")
+        int, typer.Option(min=0, max=1000, help="Also measure the fit with this many images.")
     ] = 0,
-    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of these.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Random seed.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Measure the identification of spatial-8: poses measured, unknown, and by plain SciPy.

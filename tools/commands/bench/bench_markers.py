@@ -14,8 +14,10 @@ app = typer.Typer()
 
 @app.command()
 def markers(
-    images: Annotated[int, typer.Option(min=5, max=1000, help="Of 1.3 megapixels.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Of scene and poses.")] = 7,
+    images: Annotated[
+        int, typer.Option(min=5, max=1000, help="Number of images, of 1.3 megapixels.")
+    ] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 7,
     as_json: JsonOption = False,
 ) -> None:
     """Make a map of 42 markers from rendered images, beside one from OpenCV's own corners.

@@ -40,22 +40,20 @@ _BusOption = Annotated[
     str, typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
 ]
 _ProfileOption = Annotated[
-    str | None, typer.Option("--profile", help="Every node is this drive.", metavar="DRIVE")
+    str | None, typer.Option("--profile", help="Decode every node as this drive.", metavar="DRIVE")
 ]
 _WinchOption = Annotated[
-    str | None, typer.Option("--winch", help="The node of this winch, with its ratings.")
+    str | None, typer.Option("--winch", help="Decode the node of this winch, with its ratings.")
 ]
 _RobotOption = Annotated[
     str | None,
-    typer.Option("--robot", help="The nodes of this robot; ROBOT:BUS for one of its buses."),
+    typer.Option("--robot", help="Decode this robot's nodes; ROBOT:BUS for one of its buses."),
 ]
 _IdsOption = Annotated[
     str | None,
     typer.Option("--ids", help="Only these identifiers, hexadecimal: 181,700-77F", metavar="IDS"),
 ]
-_RawOption = Annotated[
-    bool, typer.Option("--raw", help="Lines of candump instead of what they mean.")
-]
+_RawOption = Annotated[bool, typer.Option("--raw", help="Print candump lines, undecoded.")]
 
 
 @app.command()
@@ -66,10 +64,10 @@ def monitor(
     robot: _RobotOption = None,
     ids: _IdsOption = None,
     log: Annotated[
-        Path | None, typer.Option("--log", help="Keep all in this file, as candump does.")
+        Path | None, typer.Option("--log", help="Log all frames to this file, in candump format.")
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.1, help="End by itself.")
+        float | None, typer.Option("--seconds", min=0.1, help="End after this many seconds.")
     ] = None,
     raw: _RawOption = False,
     as_json: JsonOption = False,
@@ -114,7 +112,7 @@ def replay(
         typer.Option(
             "--speed",
             min=0.001,
-            help="Times as fast as recorded; without it showing does not wait, sending takes 1.",
+            help="Speed factor of the replay; by default 1 with --to, else without waiting.",
         ),
     ] = None,
     to: Annotated[

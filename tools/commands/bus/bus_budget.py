@@ -9,7 +9,7 @@ import typer
 
 from cdpr_drivers.bus.budget import BusBudget, machine_budget
 from cdpr_drivers.robot.bus_fit import refusal
-from cdpr_profiles import load_machine
+from cdpr_profiles import load_winch_or_robot
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.errors import BAD_INPUT
 from cdpr_tools.output import Output
@@ -32,12 +32,12 @@ def budget(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell the worst-case time of the cycle on each bus, the highest rate, and what is left.
+    """Compute the worst-case time of the cycle on each bus, the highest rate, and what is left.
 
     Exit status 2 when the cycle does not fit.
     """
     out = Output(as_json)
-    profile = load_machine(machine)
+    profile = load_winch_or_robot(machine)
     period_s = None if rate is None else 1.0 / rate
     budgets = machine_budget(profile, period_s)
     out.say(*_report(profile.name, budgets))

@@ -35,11 +35,11 @@ def scan(
         Path | None, typer.Option("--profiles", help="Folder with drive profiles of your own.")
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Also while another master makes SDO transfers.")
+        bool, typer.Option("--force", help="Scan even while another master makes SDO transfers.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell who is on one or several buses: state, identity, modes, profile; reads only."""
+    """List the nodes on one or several buses: state, identity, modes, profile; reads only."""
     out = Output(as_json)
     urls = [running_bus(text) for text in bus]
     node_ids = parse_node_ids(nodes)

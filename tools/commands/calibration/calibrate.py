@@ -133,7 +133,7 @@ def run(
         Path | None,
         typer.Option(help="Sizes of the sheets, known places; else as ordered.", metavar="FILE"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the poses.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     identify: _Identify = None,
     known_mm: _KnownMm = None,
     out_dir: Annotated[
@@ -229,7 +229,7 @@ def check(
         bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
     ] = False,
     plant: _Plant = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the poses.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for the readings, check.json.")
     ] = None,
@@ -268,11 +268,11 @@ def undo(robot: _Robot, as_json: JsonOption = False) -> None:
     distrust_again(profile)
     before = take_back(profile)
     if before is None:
-        out.say(f"{profile.profile}: the geometry of {profile.path} counts from the next start on")
+        out.say(f"{profile.profile}: the geometry of {profile.path} takes effect at the next start")
     else:
         out.say(
             f"{profile.profile}: calibration {before.version} of {before.date:%Y-%m-%d %H:%M} "
-            f"({before.identity}) counts from the next start on"
+            f"({before.identity}) takes effect at the next start"
         )
     out.result({"ok": True, "in_force": None if before is None else before.summary()})
 
@@ -288,7 +288,7 @@ def study(
             min=2, max=100_000, help=f"Trials of each case; else {_DRAWS}, of --ablation {_FEW}."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of poses and noise.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     png: PngOption = None,
     ablation: Annotated[
         bool,

@@ -34,9 +34,9 @@ _CameraArgument = Annotated[
 def grab(
     camera: _CameraArgument,
     folder: Annotated[Path, typer.Option("--out", help="Folder for the images.")],
-    count: Annotated[int, typer.Option(min=1, max=10000, help="How many.")] = 1,
+    count: Annotated[int, typer.Option(min=1, max=10000, help="Number of images.")] = 1,
     interval_s: Annotated[
-        float, typer.Option("--interval-s", min=0.0, max=3600.0, help="From one to the next.")
+        float, typer.Option("--interval-s", min=0.0, max=3600.0, help="Interval between images.")
     ] = 1.0,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
@@ -73,10 +73,10 @@ def calibrate(
         str, typer.Argument(help="A folder of images, or a camera.", metavar="FOLDER|CAMERA")
     ],
     target: Annotated[Path, typer.Option("--out", help="File for the intrinsics.")],
-    columns: Annotated[int, typer.Option(min=3, max=40, help="Squares of the board.")] = 9,
-    rows: Annotated[int, typer.Option(min=3, max=40, help="Squares of the board.")] = 6,
-    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="As measured.")] = 28.0,
-    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="As measured.")] = 20.0,
+    columns: Annotated[int, typer.Option(min=3, max=40, help="Columns of squares.")] = 9,
+    rows: Annotated[int, typer.Option(min=3, max=40, help="Rows of squares.")] = 6,
+    square_mm: Annotated[float, typer.Option(min=2.0, max=1000.0, help="Square, measured.")] = 28.0,
+    marker_mm: Annotated[float, typer.Option(min=1.0, max=1000.0, help="Marker, measured.")] = 20.0,
     dictionary: Annotated[str, typer.Option(help="Set of the board's markers.")] = "5X5_100",
     count: Annotated[
         int, typer.Option(min=5, max=500, help="Images to take with a camera, one a second.")

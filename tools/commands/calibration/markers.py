@@ -34,7 +34,7 @@ app = typer.Typer(
 
 _SizeOption = Annotated[
     float | None,
-    typer.Option("--size-mm", min=1.0, max=10000.0, help="Of the black square, outer edges."),
+    typer.Option("--size-mm", min=1.0, max=10000.0, help="Width of the black square, outer edges."),
 ]
 _DictionaryOption = Annotated[str, typer.Option(help="Set of markers, as OpenCV calls it.")]
 _SheetsOption = Annotated[
@@ -48,7 +48,7 @@ _MIRROR_CHECKS = 12
 
 @app.command("print")
 def print_command(
-    ids: Annotated[str, typer.Argument(help="Such as 0-39 or 0,3,7.", metavar="IDS")],
+    ids: Annotated[str, typer.Argument(help="Marker numbers, as 0-39 or 0,3,7.", metavar="IDS")],
     size_mm: _SizeOption = None,
     dictionary: _DictionaryOption = "4X4_100",
     sheets: _SheetsOption = None,

@@ -41,7 +41,7 @@ def jog(
     axes: Annotated[
         list[str], typer.Argument(help="Speeds in deg/s at the motor.", metavar="AXIS=SPEED...")
     ],
-    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="How long.")] = 1.0,
+    seconds: Annotated[float, typer.Option(min=0.1, max=3600.0, help="Duration.")] = 1.0,
     cable: Annotated[
         bool, typer.Option("--cable", help="Speeds are mm/s of cable, positive pays out.")
     ] = False,
@@ -89,24 +89,23 @@ def move(
         ),
     ] = None,
     relative: Annotated[
-        bool, typer.Option("--relative", help="By so much from here, instead of to there.")
+        bool, typer.Option("--relative", help="Relative to the present position.")
     ] = False,
     frame: Annotated[
         Frame, typer.Option(help="With --relative: along and about whose axes the platform moves.")
     ] = Frame.ROOM,
     cable: Annotated[
-        bool, typer.Option("--cable", help="By mm of cable from here, positive pays out.")
+        bool, typer.Option("--cable", help="Relative, in mm of cable; positive pays out.")
     ] = False,
     speed: Annotated[
         float | None,
         typer.Option(
             min=0.01,
-            help="Not faster: deg/s at the motor; of a platform mm/s, its turning in the same "
-            "measure.",
+            help="Top speed: deg/s at the motor; mm/s of a platform, its rotation scaled alike.",
         ),
     ] = None,
 ) -> None:
-    """Take axes or the platform to positions and wait until there; Ctrl-C holds and fails."""
+    """Move axes or the platform to positions and wait; Ctrl-C holds and exits with 1."""
     if to is not None or rotate is not None:
         if axes or cable:
             raise BadInputError("--to, --rotate: not together with axes or --cable")
@@ -171,10 +170,13 @@ def controller(
     name: Annotated[str, typer.Argument(help="Program: hold, idle, sweep, pid, ...")],
     values: Annotated[
         list[str] | None,
-        typer.Argument(help="What it is to do, in JSON.", metavar="[KEY=VALUE]..."),
+        typer.Argument(help="Arguments of the program, in JSON.", metavar="[KEY=VALUE]..."),
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option(min=0.1, help="No longer than this; until its end otherwise.")
+        float | None,
+        typer.Option(
+            min=0.1, help="End after this many seconds; at the program's own end otherwise."
+        ),
     ] = None,
 ) -> None:
     """Change over to a program and stay with it until it is done; hold follows then.

@@ -42,9 +42,11 @@ app = typer.Typer()
 def status(
     daemon: Daemon,
     out: Output,
-    watch: Annotated[bool, typer.Option("--watch", help="Go on showing it until Ctrl-C.")] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Show it continuously until Ctrl-C.")
+    ] = False,
 ) -> None:
-    """Say how a daemon and its robot are; changes nothing."""
+    """Show the state of a daemon and its robot; changes nothing."""
     state = daemon.get("/status")
     if watch:
         state = _watch(daemon, out, state)
@@ -85,7 +87,9 @@ def check(daemon: Daemon, out: Output) -> None:
 def enable(
     daemon: Daemon,
     out: Output,
-    program: Annotated[str, typer.Option(help="What runs from the first moment on.")] = "hold",
+    program: Annotated[
+        str, typer.Option(help="Program that runs as soon as there is power.")
+    ] = "hold",
     yes: YesOption = False,
 ) -> None:
     """Give the drives power; they hold where they are.

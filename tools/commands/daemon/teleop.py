@@ -55,10 +55,10 @@ def _group() -> None:
     """Lead a robot by hand: `cdpr teleop ROBOT` means `cdpr teleop robot ROBOT`."""
 
 
-_Device = Annotated[Device, typer.Option("--device", help="What leads.")]
+_Device = Annotated[Device, typer.Option("--device", help="Input device.")]
 _Scale = Annotated[
     str,
-    typer.Option(metavar="ROBOT:HAND", help="How far the robot moves for the hand; or a number."),
+    typer.Option(metavar="ROBOT:HAND", help="Robot motion over hand motion; or a number."),
 ]
 _Script = Annotated[
     Path | None, typer.Option(help="For --device script: lines of seconds, x and y in mm, ...")
@@ -87,10 +87,10 @@ _TurnAxes = Annotated[
 _DeadMan = Annotated[str, typer.Option(help="Button that is held while the stick leads.")]
 _Confirm = Annotated[str, typer.Option(help="Button that confirms a target.")]
 _DeadZone = Annotated[
-    float, typer.Option(min=0.0, max=0.9, help="Part of the stick's way that does nothing.")
+    float, typer.Option(min=0.0, max=0.9, help="Dead zone of the stick, as a share of its travel.")
 ]
 _HandSpeed = Annotated[
-    float, typer.Option(min=0.1, max=1000.0, help="Of the hand at the stick's end, mm/s.")
+    float, typer.Option(min=0.1, max=1000.0, help="Hand speed at full deflection, mm/s.")
 ]
 
 

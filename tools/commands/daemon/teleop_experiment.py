@@ -42,27 +42,27 @@ def experiment(
     without_compensation: Annotated[
         bool, typer.Option("--without-compensation", help="Use nothing learnt of the motors.")
     ] = False,
-    places: Annotated[str, typer.Option(help="Of the pattern, with commas between.")] = "A,B,C",
-    scales: Annotated[str, typer.Option(help="Robot to hand.")] = "8:1,4:1,2:1",
-    round_trips: Annotated[str, typer.Option(help="Delays there and back, ms.")] = "0,350,730",
+    places: Annotated[str, typer.Option(help="Places of the pattern.")] = "A,B,C",
+    scales: Annotated[str, typer.Option(help="Scales, robot to hand.")] = "8:1,4:1,2:1",
+    round_trips: Annotated[str, typer.Option(help="Round-trip delays, ms.")] = "0,350,730",
     repeats: Annotated[int, typer.Option(min=1, max=100, help="Runs of each condition.")] = 2,
     without_clutch: Annotated[
-        bool, typer.Option("--without-clutch", help="As in the thesis: the hand always leads.")
+        bool, typer.Option("--without-clutch", help="As in the thesis: no clutch.")
     ] = False,
     unsteadied: Annotated[
-        bool, typer.Option("--unsteadied", help="As in the thesis: send the hand as it trembles.")
+        bool, typer.Option("--unsteadied", help="As in the thesis: send tremor unfiltered.")
     ] = False,
     operator: Annotated[
         list[str] | None,
-        typer.Option(help="Another number of the operator model; may be repeated.",
+        typer.Option(help="Set a parameter of the operator model; may be repeated.",
                      metavar="NAME=VALUE"),
     ] = None,
     perfect_robot: Annotated[
-        bool, typer.Option("--perfect-robot", help="Only what the operator does with such a one.")
+        bool, typer.Option("--perfect-robot", help="Simulate the operator with an ideal robot.")
     ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of all that is left to chance.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Sessions side by side; one for each core.")
+        int | None, typer.Option(min=1, help="Sessions in parallel; one for each core by default.")
     ] = None,
     out_dir: Annotated[
         Path | None,
@@ -70,7 +70,7 @@ def experiment(
                      "broken off.", metavar="DIR"),
     ] = None,
     again: Annotated[
-        bool, typer.Option("--again", help="Judge what --out holds once more; nothing moves.")
+        bool, typer.Option("--again", help="Evaluate the data in --out again; nothing moves.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:  # fmt: skip

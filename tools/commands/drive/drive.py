@@ -37,7 +37,7 @@ _JOG_SPEEDS, _JOG_LEAST_RAD_S = 4.0, 40.0
 @app.command()
 @with_winch
 def info(winch: WinchOnBus, out: Output) -> None:
-    """Say who the drive is and how it is; reads only."""
+    """Show the drive's identity and state; reads only."""
     profile = winch.profile
     node = profile.node_id
     with winch.network() as network:

@@ -88,7 +88,7 @@ def lss(
         str | None,
         typer.Option(help="Drive profile: finds devices of this type, with a node id or without."),
     ] = None,
-    serial: Annotated[int | None, typer.Option(min=0, help="The one with this serial.")] = None,
+    serial: Annotated[int | None, typer.Option(min=0, help="Its serial number.")] = None,
     alone: Annotated[
         bool, typer.Option("--alone", help="It is the only device on the bus: no search.")
     ] = False,

@@ -8,7 +8,7 @@ from cdpr_tools.command_group import group_of
 
 MODULES = {
     "drive.drive": {
-        "info": "Say who the drive is and how it is; reads only.",
+        "info": "Show the drive's identity and state; reads only.",
         "enable": "Enable the drive in torque mode without torque for a while, then switch it off.",
         "reset": "Acknowledge the drive's fault; nothing is enabled by it.",
         "home": "Find the encoder index by homing; the motor turns by up to a turn.",

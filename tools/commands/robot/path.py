@@ -45,7 +45,7 @@ def path(
         typer.Option(
             min=0.0,
             max=1000.0,
-            help="Within so many mm G-code's corners may be cut, where it has no G61 or G64 P.",
+            help="Tolerance, mm, for cutting G-code's corners where it has no G61 or G64 P.",
         ),
     ] = 1.0,
     ignore: Annotated[
@@ -72,7 +72,7 @@ def path(
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Look at a path before it is followed, follow it, take it up again.
+    """Preview a path, follow it on the running daemon, resume it.
 
     Ends with status 2 where the robot cannot follow it, with the first place named. With --run the
     running daemon plans and follows it.

@@ -38,7 +38,7 @@ def poses(
         str | None,
         typer.Option("--from", metavar="X Y [Z]", help="Where ways begin, in mm; else home."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same poses.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     by: Annotated[
         Choose,
         typer.Option(
@@ -59,7 +59,7 @@ def poses(
     share: Annotated[
         float,
         typer.Option(
-            min=0.01, max=1.0, help="Share that is gone of a way that ends before its target."
+            min=0.01, max=1.0, help="Share followed of a path that stops short of its target."
         ),
     ] = SHARE,
     out_file: Annotated[

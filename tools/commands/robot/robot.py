@@ -85,10 +85,10 @@ def new(
     path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
     answers: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="An answer beforehand; several times."),
+        typer.Option("--set", metavar="KEY=VALUE", help="Answer in advance; may be repeated."),
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Take the defaults for all that is not answered.")
+        bool, typer.Option("--yes", help="Use the defaults for all other questions.")
     ] = False,
     png: PngOption = None,
     as_json: JsonOption = False,

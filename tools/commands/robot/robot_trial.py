@@ -47,14 +47,14 @@ def trial(
     plant: Annotated[
         Path | None, typer.Option(help="Plant file: the truth about robot, cables and motors.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of all that is left to chance.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     minutes: Annotated[
         float | None,
-        typer.Option(min=0.05, max=600.0, help="How long, in the robot's time; not for line."),
+        typer.Option(min=0.05, max=600.0, help="Duration in the robot's time; not for line."),
     ] = None,
     speed_mm_s: Annotated[
         float | None,
-        typer.Option(min=0.1, help="Of lines, 10 where left out; of a path, what the robot has."),
+        typer.Option(min=0.1, help="Speed of lines, else 10; of a path, else the robot's."),
     ] = None,
     commissioned: Annotated[
         Path | None,
@@ -71,7 +71,7 @@ def trial(
         ),
     ] = None,
     again: Annotated[
-        bool, typer.Option("--again", help="Judge what --out holds once more; nothing moves.")
+        bool, typer.Option("--again", help="Evaluate the data in --out again; nothing moves.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -96,7 +96,7 @@ def workspace(
         bool, typer.Option("--static", help="At rest, without the accelerations of its file.")
     ] = False,
     margin: Annotated[
-        float, typer.Option(min=0.0, help="All tensions stay so many N from their bounds.")
+        float, typer.Option(min=0.0, help="Margin that all tensions keep from their bounds, N.")
     ] = 0.0,
     rotate: Annotated[
         str | None,

@@ -52,8 +52,8 @@ def camera(
 def photos(
     folder: Annotated[Path, typer.Argument(help="New folder for the images.", metavar="FOLDER")],
     plant: _PlantOption = None,
-    count: Annotated[int, typer.Option(min=1, max=2000, help="How many.")] = 40,
-    seed: Annotated[int, typer.Option(min=0, help="Of the poses.")] = 1,
+    count: Annotated[int, typer.Option(min=1, max=2000, help="Number of images.")] = 40,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     low: Annotated[
         str, typer.Option(help="Lowest position of the platform, m.", metavar='"X Y Z"')
     ] = "-0.5 -0.4 1.4",

@@ -10,7 +10,7 @@ import typer
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.errors import BusError, SdoError
 from cdpr_drivers.robot.robot_buses import robot_urls
-from cdpr_profiles import Robot, RobotAxis, Winch, load_machine
+from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_profiles.eds.dictionary import load_dictionary
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_rt.core.clock import PacedClock
@@ -75,7 +75,7 @@ def fault(
 
     It writes object 2F00h, which no real drive has, beside whoever runs the robot.
     """
-    profile = load_machine(machine)
+    profile = load_winch_or_robot(machine)
     robot = robot_of_winch(profile) if isinstance(profile, Winch) else profile
     chosen = _axis(robot, axis)
     how = _HOW[what]

@@ -14,7 +14,7 @@ import typer
 from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.errors import BusError
 from cdpr_drivers.robot.bus_fit import require_fit
-from cdpr_profiles import Robot, Winch, load_machine
+from cdpr_profiles import Robot, Winch, load_winch_or_robot
 from cdpr_sim_bus.bus.server import serve
 from cdpr_sim_bus.canopen.dictionary.store import StoreError
 from cdpr_sim_bus.canopen.lss import UNCONFIGURED
@@ -55,7 +55,7 @@ def up(
         ),
     ] = True,
     nodes: Annotated[
-        int, typer.Option(min=1, max=16, help="So many drives, node ids counted up.")
+        int, typer.Option(min=1, max=16, help="Number of drives, node ids counted up.")
     ] = 1,
     truth_log: Annotated[
         Path | None,
@@ -104,7 +104,7 @@ def up(
     exit_with_stdin: ExitWithStdinOption = False,
 ) -> None:
     """Run simulated drives until Ctrl-C; tells on standard output when they are up."""
-    profile = load_machine(machine)
+    profile = load_winch_or_robot(machine)
     tell_of_compiling("the simulated drives")
     mode = ClockMode.LOCKSTEP if lockstep else ClockMode.PACED
     if isinstance(profile, Robot):

@@ -38,7 +38,7 @@ def verify(
     ],
     runs: Annotated[int, typer.Option(min=2, max=1000, help="How often it is run.")] = 2,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Of the disturbances; any where left out.")
+        int | None, typer.Option(min=0, help="Random seed of the disturbances; any where left out.")
     ] = None,
     busy: Annotated[
         int | None,

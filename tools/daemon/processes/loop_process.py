@@ -37,9 +37,9 @@ from cdpr_rt.programs.registry import (
     platform_parts,
     warm_up_programs,
 )
-from cdpr_rt.robots.calibration_state import distrust
+from cdpr_rt.robots.calibration_state import not_calibrated_reason
 from cdpr_rt.robots.checks import refuse_impossible
-from cdpr_rt.robots.robot_arrays import described, limits_of, supervised, winches_of
+from cdpr_rt.robots.robot_arrays import described, limits_of, supervisor_limits, winches_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
 from cdpr_rt.runtime.machine import Machine
@@ -143,7 +143,7 @@ def loop_parts(
     names = [axis.name for axis in axes]
     parts = LoopParts(
         programs=programs,
-        supervisor=Supervisor(supervised(limits, robot), n, period_s, names),
+        supervisor=Supervisor(supervisor_limits(limits, robot), n, period_s, names),
         estimator=estimator,
         lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
         lowering=lowering,
@@ -165,9 +165,11 @@ def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
     try:
         known = in_force(robot) == robot.calibration
     except ProfileError as error:
-        platform.distrust = str(error)
+        platform.not_calibrated_reason = str(error)
         return
-    platform.distrust = distrust(robot.profile) if known else _OTHER_CALIBRATION
+    platform.not_calibrated_reason = (
+        not_calibrated_reason(robot.profile) if known else _OTHER_CALIBRATION
+    )
 
 
 def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:

@@ -179,9 +179,9 @@ class PathProgram(PlatformProgram):
         most, here = np.zeros((2, there.size))
         along_velocity(control.velocity, self._parts.acceleration, most)
         stopping_position(control.position, control.velocity, most, here)
-        missing = control.feasible(there) or control.feasible_path(there, here)
-        if missing:
-            raise ProgramError(f"path: on the way to where it begins: {missing}")
+        obstacle = control.infeasibility(there) or control.path_obstacle(there, here)
+        if obstacle:
+            raise ProgramError(f"path: on the way to where it begins: {obstacle}")
 
     def _take(self, command: _Command) -> None:
         self._feed = command.feed

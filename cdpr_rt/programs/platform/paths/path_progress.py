@@ -47,7 +47,7 @@ def write_progress(folder: Path, row: NDArray[Any]) -> None:
 async def keep_progress(folder: Path, live: NDArray[Any]) -> None:
     """Have the disk follow a `PATH` row that the loop writes, until cancelled.
 
-    A disk that is full keeps what it has until there is room: the path is followed all the same.
+    A disk that is full keeps what it has until space is free: the path is followed all the same.
     """
     kept = b""
     try:

@@ -108,10 +108,10 @@ def test_what_is_refused(rig, tmp_path):
     ):
         with pytest.raises(ProgramError, match=told):
             rig.check_command(**wanted)
-    rig.platform.parts.distrust = "rail 2 was moved"
+    rig.platform.parts.not_calibrated_reason = "rail 2 was moved"
     with pytest.raises(ProgramError, match="path: rail 2 was moved"):
         rig.check_command(plan=rig.name)
-    rig.platform.parts.distrust = ""
+    rig.platform.parts.not_calibrated_reason = ""
     file = rig.folder / f"{rig.name}.path"
     data = file.read_bytes()
     file.write_bytes(data.replace(b'"robot": "', b'"robot": "x', 1)[:4096] + data[4096:])
@@ -173,13 +173,13 @@ def test_a_plan_beyond_the_limits_does_not_move(rig, what):
 def test_a_robot_whose_geometry_is_not_believed_follows_nothing(rig: PathRig) -> None:
     parts = rig.platform.parts
     rig.begin()
-    parts.distrust = "rail 2 was moved"
+    parts.not_calibrated_reason = "rail 2 was moved"
     try:
         for wanted in ({"plan": rig.name}, {"resume": True}, {"back_m": 0.1}):
             with pytest.raises(ProgramError, match="path: rail 2 was moved"):
                 rig.program.check(wanted)
     finally:
-        parts.distrust = ""
+        parts.not_calibrated_reason = ""
 
 
 def test_the_way_back_to_the_beginning_is_looked_at(rig: PathRig) -> None:

@@ -242,7 +242,7 @@ def test_resume_goes_on_to_the_target_that_was_left(robot: LedPlatform) -> None:
     halted = robot.control.position.copy()
     assert np.abs(halted - [0.5, 2.2]).max() > 0.1
     robot.program.start(robot.feedback, robot.setpoint, robot.torque)
-    assert robot.program.progress()["left_m"] == [0.5, 2.2]
+    assert robot.program.progress()["interrupted_target_m"] == [0.5, 2.2]
     robot.program.command({"resume": True})
     robot.until_rest()
     assert robot.control.position == pytest.approx([0.5, 2.2])

@@ -237,4 +237,4 @@ def test_a_flat_platform_that_turns_is_proved_clear_in_a_few_looks() -> None:
     )
     way = np.array([[-0.5, 1.0, 0.1], [0.5, 1.4, -0.1]])
     assert model.interference.first_contact(way, 40) is None
-    assert model.interference.nears(way[0], way[0] + 0.05 * (way[1] - way[0])) < 0
+    assert model.interference.contact_ahead(way[0], way[0] + 0.05 * (way[1] - way[0])) < 0

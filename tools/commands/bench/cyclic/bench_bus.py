@@ -18,7 +18,7 @@ app = typer.Typer()
 @app.command()
 def bus(
     exchanges: Annotated[
-        int, typer.Option(min=1, help="So many times 8 frames out and 8 in, of each variant.")
+        int, typer.Option(min=1, help="Exchanges of 8 frames out and 8 in, for each variant.")
     ] = 500,
     as_json: JsonOption = False,
 ) -> None:

@@ -60,7 +60,9 @@ def _cycle_table(figures: dict[str, Any]) -> list[str]:
 
 @app.command()
 def profiles(
-    repeats: Annotated[int, typer.Option(min=1, help="The best of so many counts.")] = 5,
+    repeats: Annotated[
+        int, typer.Option(min=1, help="Number of repetitions; the best counts.")
+    ] = 5,
     as_json: JsonOption = False,
 ) -> None:
     """Measure loading and validating every shipped profile, against bare TOML parsing."""

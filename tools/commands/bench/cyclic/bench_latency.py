@@ -17,10 +17,10 @@ app = typer.Typer()
 @app.command()
 def latency(
     seconds: Annotated[
-        float, typer.Option(min=0.1, max=86_400.0, help="How long, for each of four curves.")
+        float, typer.Option(min=0.1, max=86_400.0, help="Duration of each of the four curves.")
     ] = 5.0,
     rate: Annotated[float, typer.Option(min=1.0, max=10_000.0, help="Cycles a second.")] = 1000.0,
-    picture: Annotated[Path, typer.Option("--out", help="Where the picture goes.")] = Path(
+    picture: Annotated[Path, typer.Option("--out", help="File for the picture.")] = Path(
         "out/latency.png"
     ),
     as_json: JsonOption = False,

@@ -22,9 +22,14 @@ app = typer.Typer()
 
 @app.command()
 def loop(
-    seconds: Annotated[float, typer.Option(min=3.0, max=3600.0, help="For each variant.")] = 30.0,
+    seconds: Annotated[
+        float, typer.Option(min=3.0, max=3600.0, help="Duration of each variant.")
+    ] = 30.0,
     robot: Annotated[
-        str, typer.Option(help="One with a platform is led by `pose`; bare axes where left out.")
+        str,
+        typer.Option(
+            help="Robot profile; with a platform it runs `pose`. Bare axes where left out."
+        ),
     ] = "",
     as_json: JsonOption = False,
 ) -> None:

@@ -20,7 +20,7 @@ app = typer.Typer()
 @app.command()
 def control(
     robot: Annotated[str, typer.Option(help="A robot with a platform.")] = "spatial-8",
-    cycles: Annotated[int, typer.Option(min=500, help="Updates of each way.")] = 5_000,
+    cycles: Annotated[int, typer.Option(min=500, help="Updates of each implementation.")] = 5_000,
     as_json: JsonOption = False,
 ) -> None:
     """Measure one update of a platform's control: pose, wrench, tensions, torques.

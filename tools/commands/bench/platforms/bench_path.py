@@ -14,8 +14,10 @@ app = typer.Typer()
 
 @app.command()
 def path(
-    lines: Annotated[int, typer.Option(min=100, max=100_000, help="Of the file.")] = 10_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the file.")] = 1,
+    lines: Annotated[
+        int, typer.Option(min=100, max=100_000, help="Lines of the G-code file.")
+    ] = 10_000,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Measure planning a G-code file as CAM writes it, for spatial-8: preview and picture too.
@@ -34,7 +36,7 @@ def path(
         f"nodes, {told['samples']} samples",
         f"planned in {told['plan_s']:.2f} s of processor time, drawn as well in "
         f"{told['with_picture_s']:.2f} s, wanted at most {told['target_s']:g} s: {verdict}; "
-        f"{told['wall_s']:.2f} s by the wall",
+        f"{told['wall_s']:.2f} s by the wall clock",
         f"the motion takes {told['duration_s']:.1f} s; at one speed and acceleration throughout "
         f"{told['constant_limit_s']:.1f} s, {told['gain']:.1f} times as long",
     )

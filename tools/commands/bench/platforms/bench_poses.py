@@ -14,7 +14,7 @@ app = typer.Typer()
 
 @app.command()
 def poses(
-    ways: Annotated[int, typer.Option(min=1, help="Ways that brute force looks at.")] = 10_000,
+    ways: Annotated[int, typer.Option(min=1, help="Paths checked by brute force.")] = 10_000,
     seed: Annotated[int, typer.Option(min=0)] = 1,
     as_json: JsonOption = False,
 ) -> None:

@@ -23,7 +23,9 @@ app = typer.Typer()
 @app.command()
 def workspace(
     poses: Annotated[int, typer.Option(min=1000, help="Poses checked.")] = 1_000_000,
-    compared: Annotated[int, typer.Option(min=10, help="Of these, by other methods too.")] = 300,
+    compared: Annotated[
+        int, typer.Option(min=10, help="How many of them other methods check too.")
+    ] = 300,
     as_json: JsonOption = False,
 ) -> None:
     """Measure whether the cables of spatial-8 hold poses, at full acceleration, on one core.

@@ -47,7 +47,7 @@ _STAGES = (("slack", TAKE_UP_SHARE), ("pull", 1.0), ("beyond", OVERSHOOT), ("len
 _SOURCES = ("home", "lengths", "last")
 
 
-class PretensionProgram(PlatformProgram):
+class TightenProgram(PlatformProgram):
     """Takes up slack until all cables are tight and still, pretensions them, then holds.
 
     The platform stays on its stand meanwhile: tensions grow together to those whose wrench presses
@@ -116,7 +116,7 @@ class PretensionProgram(PlatformProgram):
         self._start_rad[:] = self._still_rad[:] = feedback.position_rad
         self._winches.begin(feedback, parts.estimator.estimate.velocity_rad_s, torque_Nm)
         self._control.clear_compensation()
-        self._control.trust_cells()
+        self._control.clear_load_cell_fault()
         self._share = min(
             max(float(np.max(-torque_Nm / self._cable / self._pretension_N)), 0.0), 1.0
         )
@@ -329,7 +329,7 @@ class PretensionProgram(PlatformProgram):
         self._path = []
         if self._needs_index():
             self._path = index_path(
-                parts.model, self._cable, lambda there: not control.feasible(there)
+                parts.model, self._cable, lambda there: not control.infeasibility(there)
             )
         if self._path:
             self._target[:] = self._path[0]
