@@ -7,6 +7,8 @@ import os
 import socket
 import sys
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 from typing_extensions import override
 
@@ -91,3 +93,35 @@ def tell_of_compiling(what: str = "the numerics") -> None:
     _LOG.handlers[:] = [_Notice(what)]
     _LOG.propagate = False
     _LOG.setLevel(logging.INFO)
+
+
+class _NotWantedError(Exception):
+    """What is compiled is not wanted any more."""
+
+
+class _EndsIt(logging.Handler):
+    """Raises where the next kernel would be compiled, once that is not wanted any more."""
+
+    def __init__(self, ended: Callable[[], bool]) -> None:
+        super().__init__()
+        self._ended = ended
+
+    @override
+    def emit(self, record: logging.LogRecord) -> None:
+        if self._ended():
+            raise _NotWantedError
+
+
+@contextmanager
+def compiling_until(ended: Callable[[], bool]) -> Iterator[None]:
+    """Leave the block before the next kernel that it compiles once `ended` says so.
+
+    Only where `tell_of_compiling` is in force: nothing else tells of each kernel.
+    """
+    handler = _EndsIt(ended)
+    _LOG.addHandler(handler)
+    try:
+        with suppress(_NotWantedError):
+            yield
+    finally:
+        _LOG.removeHandler(handler)

@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 from typing import IO
 
-from cdpr_tools.compiling import NOTICE
+from cdpr_tools.compiling import NOTICE, compiling_until
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 # the first start on a machine compiles the physics, a slow one for minutes
@@ -32,7 +32,7 @@ class _OwnProcess:
         """Run it, and wait until it is ready; raises BadInputError and WorkFailedError as it does.
 
         It says that it is ready in one line of JSON: `ready`. What is to be done `meanwhile` is
-        done here while it starts.
+        done here while it starts; of that no more is compiled once the process has ended.
         """
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", "cdpr_tools.cli", *command, "--exit-with-stdin"],
@@ -43,7 +43,8 @@ class _OwnProcess:
         )
         try:
             if meanwhile is not None:
-                meanwhile()
+                with compiling_until(lambda: self.process.poll() is not None):
+                    meanwhile()
             self.ready = self._await_ready()
         except BaseException:
             self.stop()

@@ -19,7 +19,7 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.recordings.reasons import Reasons, is_fault
+from cdpr_tools.recordings.reasons import WHILE_ACTIVE, Reasons, is_fault, why_while_active
 from cdpr_tools.recordings.selection import ELAPSED, Selection
 from cdpr_tools.report.style import decimated, legend_above, legend_beside_title
 
@@ -43,6 +43,8 @@ _MOVED = 1e-6
 """A coordinate that differs by less over a recording is none of its robot's, m or rad."""
 _TIMES = {"answers in": "exchange_s", "computing": "compute_s", "late by": "lateness_s"}
 _POWERLESS, _REACTING, _FAULT = range(1, 4)
+_BEYOND, _ENDED = 0.02, "not recorded any more"
+"""The share of the time that is shown beyond the end of what ends while active, and its name."""
 _SHADES = {
     _POWERLESS: ("#e3e5e8", "without power"),
     _REACTING: ("#f6dfae", "reaction to a fault"),
@@ -97,10 +99,8 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
         _draw_path(grid.path, columns)
     _draw_times(grid.timed[-1], columns)
     _draw_what_happened(grid, selection, columns)
-    if dot is None:
-        grid.timed[-1].set_xlim(columns[ELAPSED][0], columns[ELAPSED][-1])
     if panels:
-        legend_above(grid.figure, grid.timed[0])
+        legend_above(grid.figure, grid.timed[0], columns=10 if beside else 4)
     grid.figure.align_ylabels()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -111,16 +111,26 @@ def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
 
 
 def _draw_what_happened(grid: _Grid, selection: Selection, columns: Columns) -> None:
-    """Name the programs, shade what was not active, and tell when and why faults came."""
+    """Name the programs, shade what was not active, and tell when and why faults came.
+
+    Where the recording ends while the robot is active, mark and tell that.
+    """
     for ax in (*grid.strips, *grid.timed):
         _shade(ax, columns)
     for strip in grid.strips:
         draw_programs(strip, columns, selection.readers[-1].description.get("programs", []))
-    happened = faults_of(selection.readers, columns)
-    for after_s, _ in happened:
+    happened, ended = faults_of(selection.readers, columns), end_while_active(selection, columns)
+    for after_s, _ in (*happened, *ended):
         for ax in (*grid.strips, *grid.timed):
             ax.axvline(after_s, color="#b3261e", lw=0.9)
-    told = [f"{after_s:.3f} s: {text}" for after_s, text in happened[:_MOST_TOLD]]
+    first_s, last_s = columns[ELAPSED][[0, -1]]
+    if last_s > first_s:
+        beyond_s = last_s + (_BEYOND * (last_s - first_s) if ended else 0.0)
+        grid.timed[-1].set_xlim(first_s, beyond_s)
+        for ax in (*grid.strips, *grid.timed) if ended else ():
+            ax.axvspan(last_s, beyond_s, fc="none", ec="#b3261e", hatch="////", lw=0, label=_ENDED)
+    shown = (*happened[:_MOST_TOLD], *ended)
+    told = [f"{after_s:.3f} s: {text}" for after_s, text in shown]
     if told:
         letters = int(_LETTERS_PER_in * grid.figure.get_figwidth())
         lines = [fill(text, letters, subsequent_indent="    ") for text in told]
@@ -201,13 +211,23 @@ def faults_of(readers: Sequence[RecordingReader], columns: Columns) -> list[tupl
     return found
 
 
+def end_while_active(selection: Selection, columns: Columns) -> list[tuple[float, str]]:
+    """Return when the recording ended, and why, where its robot was active; else nothing."""
+    last_s = float(columns[ELAPSED][-1])
+    why = why_while_active(selection.readers[-1], int(columns["state"][-1]))
+    if not why or last_s < selection.ends_s:
+        return []
+    return [(last_s, f"{WHILE_ACTIVE}: {why}")]
+
+
 def _draw_limits(ax: Axes, description: dict[str, Any], chosen: Sequence[int]) -> None:
-    limits = description.get("limits", {})
-    for key, label in (("tension_min_N", "limits"), ("tension_max_N", None)):
+    limits, lines = description.get("limits", {}), []
+    for key in ("tension_min_N", "tension_max_N"):
         known = [value for value in limits.get(key) or () if value is not None]
-        for number, value in enumerate(sorted({known[k] for k in chosen if k < len(known)})):
-            named = label if number == 0 else None
-            ax.axhline(value, color="#b3261e", lw=0.8, ls=":", label=named)
+        for value in {known[k] for k in chosen if k < len(known)}:
+            lines.append(ax.axhline(value, color="#b3261e", lw=0.8, ls=":", label="limits"))
+    if lines:
+        legend_beside_title(ax, handles=lines[:1])
 
 
 def _draw_path(ax: Axes, columns: Columns) -> None:

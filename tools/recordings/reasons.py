@@ -1,4 +1,4 @@
-"""Why motions ended, out of the events of a recording."""
+"""Why motions, and recordings, ended, out of what a recording tells."""
 
 from __future__ import annotations
 
@@ -6,10 +6,16 @@ from bisect import bisect_left
 from collections.abc import Iterable
 from typing import Any, Final
 
-from cdpr_rt.core.states import Reaction
+from cdpr_rt.core.states import LoopState, Reaction
+from cdpr_rt.service.recordings.recording_reader import CLOSED, RecordingReader
+from cdpr_tools.client.dead_loop import DEAD
 
 _EARLY_ns: Final = 50_000_000
 """A reason may be stamped so long before the row in which its reaction is seen."""
+
+WHILE_ACTIVE: Final = "the recording ends while the robot was active"
+LOOP_ENDED: Final = "the control loop ended without a stop"
+_WRITER_ENDED: Final = "its writer was ended, or still writes"
 
 
 class Reasons:
@@ -44,3 +50,18 @@ def is_fault(event: dict[str, Any]) -> bool:
     """Whether an event is a limit's reaction, or a state that became a fault."""
     of_row = "reaction" in event and "cycle" in event
     return of_row and (event["reaction"] > Reaction.CLAMP or "state fault" in event["text"])
+
+
+def why_while_active(reader: RecordingReader, last_state: int) -> str:
+    """Return why a recording, all of it read, ends in a row of state `last_state` that has power.
+
+    "" where that is none, or another file goes on from there.
+    """
+    if last_state != LoopState.ACTIVE:
+        return ""
+    if any(status.get("state") == DEAD for status in reader.status):
+        return LOOP_ENDED
+    next_name = f"{reader.metadata.get('session')}-{reader.part + 1:03d}.mcap"
+    if reader.ended == CLOSED or reader.path.with_name(next_name).exists():
+        return ""
+    return _WRITER_ENDED

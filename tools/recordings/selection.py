@@ -86,6 +86,8 @@ class Selection:
         self._robot: tuple[str | None, str | None] | None = None
         self.advance: Callable[[float], None] = lambda _seconds: None
         """Called with how far reading has come, out of `reading_s`."""
+        self.ends_s = 0.0
+        """When the last row was, be it selected or not; known once all have been read."""
         if until_s <= from_s:
             raise BadInputError(f"--until {until_s:g}: allowed: more than --from {from_s:g}")
 
@@ -108,6 +110,7 @@ class Selection:
                 done = sum(one.position for one in self.readers)
                 self.advance(done / _BYTES_PER_S)
                 elapsed = time(columns["time_s"], columns["stamp_ns"])
+                self.ends_s = float(elapsed[-1])
                 wanted = (elapsed >= self._from_s) & (elapsed <= self._until_s)
                 if wanted.any():
                     chosen = {name: columns[name][wanted] for name in self._fields or columns}

@@ -15,7 +15,13 @@ from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.output import Output
-from cdpr_tools.recordings.reasons import Reasons, is_fault, is_reason
+from cdpr_tools.recordings.reasons import (
+    WHILE_ACTIVE,
+    Reasons,
+    is_fault,
+    is_reason,
+    why_while_active,
+)
 from cdpr_tools.recordings.selection import ELAPSED, Selection
 
 _FIELDS = (
@@ -49,6 +55,7 @@ class _Count:
     states_s: dict[str, float] = field(default_factory=dict)
     began: dict[str, int] = field(default_factory=dict)
     last: dict[str, int] = field(default_factory=dict)
+    last_state: int = LoopState.UNCONFIGURED
     stamps_ns: list[FloatArray] = field(default_factory=list)
     elapsed_s: list[FloatArray] = field(default_factory=list)
     """When some of the rows were, by the wall clock and by the bus'."""
@@ -79,7 +86,7 @@ class _Count:
         for name in ("lateness_s", "exchange_s", "compute_s"):
             self.longest[name] = max(self.longest.get(name, 0.0), float(rows[name].max()))
         self.last = {name: int(rows[name][-1]) for name in ("cycle", "missed", "late_cycles")}
-        self.last_s = float(rows[ELAPSED][-1])
+        self.last_s, self.last_state = float(rows[ELAPSED][-1]), int(rows["state"][-1])
         self.rows += rows["cycle"].size
 
     def _add_runs(self, rows: Columns) -> None:
@@ -146,17 +153,21 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
     for event in reader.events:
         stamp_ns = event["log_time_ns"] - reader.offset_ns
         event["after_s"] = count.when_s(stamp_ns) if count.rows else None
+    runs, why = _named_runs(count.runs, reader), why_while_active(reader, count.last_state)
+    if why:
+        runs[-1].setdefault("cut_short_by", why)
     return {
         "file": str(path),
         "bytes": path.stat().st_size,
         "ended": reader.ended,
+        "ended_while_active": why or None,
         "robot": reader.metadata.get("robot"),
         "session": reader.metadata.get("session"),
         "part": reader.part,
         "axes": reader.axes,
         "period_s": reader.description.get("period_s"),
         **count.result(),
-        "runs": _named_runs(count.runs, reader),
+        "runs": runs,
         "events": sorted(reader.events, key=lambda event: int(event["log_time_ns"])),
     }
 
@@ -265,6 +276,8 @@ def summary_lines(figures: dict[str, Any], most_events: int) -> Sequence[str]:
             )
         ]
         lines.append(f"  at most: {', '.join(longest)}")
+    if figures["ended_while_active"]:
+        lines.append(f"  {WHILE_ACTIVE}: {figures['ended_while_active']}")
     runs = [run for run in figures["runs"] if run["program"] not in ("hold", "idle")]
     if len(runs) > most_events:
         lines.append(f"  ({len(runs) - most_events} earlier motions are in --json)")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Sequence
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -53,19 +55,34 @@ def canvas(
     return figure, [ax for row in axes for ax in row]
 
 
-def legend_above(figure: Figure, *axes: Axes) -> None:
+def legend_above(figure: Figure, *axes: Axes, columns: int = 4) -> None:
     """Name what is labelled in `axes` above the whole figure, where it hides nothing."""
     named = [pair for ax in axes for pair in zip(*ax.get_legend_handles_labels(), strict=True)]
     handles, labels = zip(*named, strict=True)
-    figure.legend(handles, labels, loc="outside upper left", ncols=4)
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns)
 
 
-def legend_beside_title(ax: Axes, columns: int = 3) -> None:
-    """Name what is labelled in `ax` at the right in its title's line, where it hides nothing."""
-    ax.legend(
+def legend_beside_title(
+    ax: Axes, columns: int = 3, handles: Sequence[Artist] | None = None
+) -> None:
+    """Name what is labelled in `ax` at the right in its title's line, where it hides nothing.
+
+    Or only some `handles`. A title, to be set before, that leaves too little room goes above it.
+    """
+    legend = ax.legend(
+        handles=handles or ax.get_legend_handles_labels()[0],
         loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, ncols=columns,
         handlelength=1.2, columnspacing=1.0, fontsize=8.0,
     )  # fmt: skip
+    if not (words := ax.get_title(loc="left")):
+        return
+    title = ax.set_title(words)
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()  # only then it is known how much room there is
+    named = legend.get_window_extent()
+    if title.get_window_extent().overlaps(named):
+        ax.set_title(words, pad=mpl.rcParams["axes.titlepad"] + 72.0 * named.height / figure.dpi)
 
 
 def data_uri(figure: Figure) -> str:

@@ -101,6 +101,9 @@ def test_a_stop_under_way_has_a_reason_also_where_the_loop_gives_none() -> None:
 def test_a_platform_of_unknown_pose_is_not_told_to_be_taken_home() -> None:
     assert stage_text("lower", {"stage": "home", "blind": False}).startswith("taking the platform")
     assert stage_text("lower", {"stage": "home", "blind": True}) == "letting the platform down"
+    for stage in ("home", "down"):  # it stands already, or nobody knows
+        slack = {"stage": stage, "blind": True, "was_slack": True}
+        assert stage_text("lower", slack).startswith("letting the cables out")
 
 
 def test_a_path_is_left_until_its_end() -> None:

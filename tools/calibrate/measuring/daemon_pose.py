@@ -19,7 +19,7 @@ from cdpr_rt.calibration.readings.camera_data import CameraSetup
 from cdpr_rt.calibration.readings.data import CalibrationData, load_data
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.procedures.calibration.measure_poses import PoseRefusedError, read_pose
-from cdpr_tools.calibrate.measuring.run import DATA
+from cdpr_tools.calibrate.measuring.run import COUNTED, DATA
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.client.pose_reader import DaemonReader
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -27,7 +27,6 @@ from cdpr_tools.errors import BadInputError, WorkFailedError
 if TYPE_CHECKING:
     from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
 
-COUNTED = "counted.json"
 _COUNTS_ANEW_m = 1e-5
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from pydantic import Field
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
+from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.reader import Profile, read_json_model
 from cdpr_rt.calibration.markers.coverage import coverage
 from cdpr_rt.calibration.outcome import Outcome
@@ -41,6 +43,8 @@ if TYPE_CHECKING:
     from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
 
 DATA, SETTINGS, OUTSIDE, IMAGES = "data.json", "run.json", "outside.json", "images"
+COUNTED = "counted.json"
+"""Of poses that `cdpr calibrate read` has read: it marks a folder of these."""
 _MOST_POSES = 100
 """Where nobody has said how many."""
 _FIRST_S, _HELD_OUT_S = 8.0, 3.0
@@ -84,7 +88,17 @@ class Kept:
 
     @classmethod
     def new(cls, folder: Path, robot: Robot, camera: CameraSetup | None) -> Kept:
-        """Return what has read nothing yet."""
+        """Return what has read nothing yet; what the folder held of earlier poses is removed.
+
+        Raises ProfileError.
+        """
+        try:
+            for name in (DATA, OUTSIDE, COUNTED):
+                (folder / name).unlink(missing_ok=True)
+            if (folder / IMAGES).exists():
+                shutil.rmtree(folder / IMAGES)
+        except OSError as error:
+            raise ProfileError(folder, "", f"cannot be emptied: {error.strerror}") from error
         data = CalibrationData(
             robot=robot.profile,
             geometry_sha256=geometry_sha256(robot),

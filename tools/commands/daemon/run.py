@@ -9,6 +9,7 @@ import socket
 import sys
 import time
 from contextlib import ExitStack
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
@@ -151,8 +152,6 @@ def run(
         raise ModuleNotFoundError(name="uvicorn")
     profile = load_calibrated(robot)
     refuse_simulated_calibration(profile, bus or ())
-    for doubt in refuse_impossible(profile):
-        out.note(doubt)
     settings = settings_for(
         profile,
         bus=bus,
@@ -176,6 +175,8 @@ def run(
         raise BadInputError("--camera: only for a simulator that the command starts (simbus:)")
     _require_free(settings.socket)
     _require_no_master(profile, settings)
+    if not settings.own_simulator:
+        _judge(profile, out)
     _ask(profile, settings, yes)
     settings = settings.with_key_loaded().with_ports_bound()
     manager = ServiceManager()  # before any child is started: none of them speaks for the daemon
@@ -184,12 +185,21 @@ def run(
         if text := uncommissioned_text(with_commissioned(profile, commissioned)):
             out.note(text)
         simulator = None
-        if asks_for_own_simulator(bus or ()):
+        if settings.own_simulator:
             out.note(f"starting simulated drives: {len(profile.axes)} ...")
             bus_url = settings.buses[0]
-            simulator = OwnSimulator(profile.reference, bus_url, plant, camera=camera)
+            judge = partial(_judge, profile, out)  # which compiles, where nothing is kept yet
+            simulator = OwnSimulator(
+                profile.reference, bus_url, plant, camera=camera, meanwhile=judge
+            )
             stack.callback(simulator.stop)
         _launch(profile, settings, out, manager, simulator)
+
+
+def _judge(robot: Robot, out: Output) -> None:
+    """Say what is doubtful about the robot; raises ProfileError for one that cannot work."""
+    for doubt in refuse_impossible(robot):
+        out.note(doubt)
 
 
 def settings_for(

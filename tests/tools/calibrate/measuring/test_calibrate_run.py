@@ -13,6 +13,7 @@ import pytest
 from cdpr_drivers.camera.camera import CameraError
 from cdpr_profiles import load_robot
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
+from cdpr_profiles.errors import ProfileError
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.estimation.residuals import lengths_told
 from cdpr_rt.calibration.markers.sighting import Sighting
@@ -283,6 +284,20 @@ def test_a_camera_that_sees_no_marker_at_home_ends_it_before_anything_moves_far(
     with pytest.raises(WorkFailedError, match="at home the camera sees no marker"):
         begin(tmp_path, settings())
     assert not made[0].gone
+
+
+def test_a_new_run_leaves_nothing_of_the_poses_before(
+    tmp_path: Path, rigs: Callable[..., list[Rig]]
+) -> None:
+    rigs()
+    begin(tmp_path, settings())
+    (tmp_path / run.IMAGES).mkdir()
+    for name in (f"{run.IMAGES}/pose-15.png", run.COUNTED):
+        (tmp_path / name).write_text("of before")
+    run.Kept.new(tmp_path, ROBOT, SETUP)
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(ProfileError, match=run.DATA):
+        go_on(tmp_path, settings())
 
 
 def test_data_of_another_state_of_the_robot_are_not_gone_on_with(

@@ -14,7 +14,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.data import CalibrationData, load_data
-from cdpr_tools.calibrate.measuring import daemon_pose
+from cdpr_tools.calibrate.measuring import daemon_pose, run
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 
 pytestmark = pytest.mark.long
@@ -104,8 +104,10 @@ def of_the_simulator(told: Told, folder: Path) -> None:
 
 
 def of_a_run(told: Told, folder: Path) -> None:
+    """It was begun with --overwrite where poses had been read by hand."""
+    told.description["simulated"] = True  # as all runs are
     read(told, folder)
-    (folder / daemon_pose.COUNTED).unlink()
+    run.Kept.new(folder, ROBOT, None).data.save(folder / run.DATA)
 
 
 @pytest.mark.parametrize(

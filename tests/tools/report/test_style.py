@@ -1,0 +1,27 @@
+"""Legends hide nothing of a picture."""
+
+from __future__ import annotations
+
+import pytest
+from matplotlib.text import Text
+
+from cdpr_tools.report.style import canvas, legend_beside_title
+
+
+@pytest.mark.parametrize(
+    ("words", "same_line"), [("way", True), ("way of the platform, and its target", False)]
+)
+def test_a_title_without_room_for_the_legend_goes_above_it(words: str, same_line: bool) -> None:
+    figure, (ax, _) = canvas(1, 2)
+    for name in ("upper left", "lower"):
+        ax.plot([0.0, 1.0], label=name)
+    ax.set_title(words)
+    legend_beside_title(ax)
+    figure.draw_without_rendering()
+    (title,) = ax.findobj(lambda one: isinstance(one, Text) and one.get_text() == words)
+    legend = ax.get_legend()
+    assert legend is not None
+    written, box = title.get_window_extent(), legend.get_window_extent()
+    assert not written.overlaps(box)
+    assert bool(written.y0 < box.y1) is same_line
+    assert written.y1 < figure.bbox.y1
