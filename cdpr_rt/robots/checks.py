@@ -293,8 +293,8 @@ def _swinging(platform: Platform) -> Iterator[Finding]:
     left = [name for name in angles if name not in platform.controlled]
     if not platform.is_planar and left and not is_point(platform):
         text = (
-            f"{', '.join(left)} left out: the platform swings about these axes, and is reckoned "
-            "with as it is at home"
+            f"{', '.join(left)} left out: the platform swings about these axes, and is taken "
+            "to be turned as it is at home"
         )
         yield Finding("platform.controlled", text, impossible=False)
 

@@ -1,4 +1,4 @@
-"""What one unit of a drive's objects is, against the numbers a person would reckon."""
+"""What one unit of a drive's objects is, against the numbers a person would compute."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ class _Traffic:
 
 @dataclass
 class Summary:
-    """Counts what it is given; `bitrate_bit_s` is what the load is reckoned against."""
+    """Counts what it is given; `bitrate_bit_s` is what the load is relative to."""
 
     bitrate_bit_s: int
     frames: int = 0

@@ -112,14 +112,14 @@ def platform_text(status: dict[str, Any]) -> str:
 
 
 def learnt_text(status: dict[str, Any]) -> str:
-    """Return what is reckoned of motors that were not commissioned, an empty text for nothing."""
+    """Return what is estimated of motors that were not commissioned, an empty text for nothing."""
     progress = status.get("program_progress") or {}
     parts = []
     for what in ("friction", "cogging"):
         learnt = progress.get(f"learnt_{what}_Nm") or [0.0]
         if max(learnt) > 0.0:
             parts.append(f"{what} {min(learnt):.3f} to {max(learnt):.3f} Nm")
-    return f"reckoned of the motors: {', '.join(parts)}" if parts else ""
+    return f"estimated from the motors: {', '.join(parts)}" if parts else ""
 
 
 def left_text(path: dict[str, Any]) -> str:

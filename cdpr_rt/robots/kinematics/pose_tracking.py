@@ -131,7 +131,7 @@ def _turn_to_equilibrium(
 ) -> None:
     """Turn the platform about z by one Newton step to where tensions have no moment about it.
 
-    The true one swings about there, since it does not follow at once: its `swing` is reckoned from
+    The true one swings about there, since it does not follow at once: its `swing` is computed from
     its inertia, and is told; where it is at an instant is not known well enough to be used.
     """
     free.rotational_stiffness(geometry, motors[TENSION], pose, rotation)

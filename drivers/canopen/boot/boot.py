@@ -85,7 +85,7 @@ def boot_all(
     heartbeat awaited. They are started together once no mandatory one has failed; one that is not
     mandatory and fails stays in pre-operational and stands in `missing`. With
     `store_configuration` a drive whose stored configuration is another one is commanded to keep it
-    (1010h). `bitrate_bit_s` is that of the bus, by which its load is reckoned.
+    (1010h). `bitrate_bit_s` is that of the bus, by which its load is computed.
 
     Raises the BootError of the lowest node id that failed, with the others' as notes (and who
     floods the bus, should that be why), once all have come to an end, and BusError.

@@ -1,4 +1,4 @@
-"""A rotation that no cable controls: reckoned and told."""
+"""A rotation that no cable controls: computed and told."""
 
 from __future__ import annotations
 

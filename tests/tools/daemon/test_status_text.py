@@ -55,7 +55,7 @@ def test_the_status_tells_which_motors_are_compensated() -> None:
 def test_what_was_learnt_of_the_motors_is_told_once_it_is_something() -> None:
     progress = {"learnt_friction_Nm": [0.08, 0.11], "learnt_cogging_Nm": [0.0, 0.0]}
     told = learnt_text({"program_progress": progress})
-    assert told == "reckoned of the motors: friction 0.080 to 0.110 Nm"
+    assert told == "estimated from the motors: friction 0.080 to 0.110 Nm"
     assert learnt_text({"program_progress": {"learnt_friction_Nm": [0.0, 0.0]}}) == ""
     assert learnt_text({"program_progress": {}}) == ""
 

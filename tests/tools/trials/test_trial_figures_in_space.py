@@ -208,6 +208,18 @@ def test_overshoot_in_space_counts_in_each_direction_and_angle():
     pictures.of_limits(made, ROBOT)
 
 
+@pytest.mark.parametrize("most_rad", [0.05, 0.26, 1.5])
+def test_an_angle_is_off_by_no_more_than_its_quaternion_s_rounding_makes_of_it(most_rad):
+    chance = np.random.default_rng(3)
+    turns = chance.standard_normal((200_000, 3))
+    turns *= most_rad / np.linalg.norm(turns, axis=1, keepdims=True)
+    unit = 2.0 * streaming.ROUNDING
+    rounded = unit * np.round(Rotation.from_rotvec(turns).as_quat() / unit)
+    off = np.abs(Rotation.from_quat(rounded).as_rotvec() - turns).max()
+    most = streaming.ROUNDING * streaming.angle_rounding(most_rad)
+    assert 0.6 * most < off <= most
+
+
 @pytest.mark.parametrize(("direction", "key"), [(2, "step_mm_s"), (5, "step_deg_s")])
 @pytest.mark.parametrize(("times", "reached"), [(0.99, True), (1.05, False)])
 def test_a_step_of_the_commanded_velocity_is_found_in_any_direction(direction, key, times, reached):

@@ -44,7 +44,7 @@ def show(robot: _Robot, png: PngOption = None, as_json: JsonOption = False) -> N
             f"{profile.path}: platform: this robot has none, its winches have nothing in common; "
             f"`cdpr profiles show` tells what else there is"
         )
-    with out.stage(f"{profile.profile}: reckoning tensions, control and what cannot work"):
+    with out.stage(f"{profile.profile}: computing tensions, control and what cannot work"):
         figures = summary.figures(profile, platform)
         found = checks.findings(profile)
     out.say(*summary.lines(profile, platform, figures))

@@ -19,7 +19,7 @@ from cdpr_tools.trials.streams.channel import Channel, Network
 RATE_Hz: Final = 50.0
 SCALE: Final = 4.0
 ROUNDING: Final = 0.5e-9
-"""Of a recorded position in m, or an entry of a quaternion, which is half as much of an angle."""
+"""Of a recorded position in m, or an entry of a quaternion."""
 _SENDER_AHEAD_s: Final = 1234.5
 """The hand's clock is its own."""
 _PHASE_S: Final = (2.0, 6.0)
@@ -109,6 +109,17 @@ def velocity_steps(recorded: Recorded) -> FloatArray:
     return np.asarray(np.diff(velocity, axis=0))
 
 
+def angle_rounding(most_rad: float) -> float:
+    """Return what an entry of a rotation vector is off at most, over what a quaternion's are off.
+
+    The vector is θ n = 2 atan2(s, w) n with s n = v, its length at most `most_rad`. Derivatives by
+    the entries of v are (θ/s) (δ_ij - n_i n_j) + 2 w n_i n_j, together at most 1.5 θ/s - w; by w,
+    at most 2 s.
+    """
+    half = max(0.5 * most_rad, 1e-9)
+    return 3.0 * half / math.sin(half) - math.cos(half) + 2.0 * math.sin(half)
+
+
 def judge(recorded: Recorded) -> list[Figure]:
     """Return the network's figures and the greatest step of the commanded velocity."""
     directions, k = recorded.directions, recorded.directions.k
@@ -116,7 +127,8 @@ def judge(recorded: Recorded) -> list[Figure]:
     steps = np.abs(velocity_steps(recorded)).max(axis=0)
     velocity = np.abs(np.diff(recorded.setpoint_m, axis=0)) / recorded.period_s
     # a step is made of three positions, the middle one counted twice
-    rounding = 4.0 * ROUNDING / recorded.period_s
+    rounding = 4.0 / recorded.period_s * np.full(directions.d, ROUNDING)
+    rounding[k:] *= angle_rounding(directions.angle_rad)
     allowed = directions.acceleration * recorded.period_s + rounding
     way = float(np.linalg.norm(np.diff(recorded.setpoint_m, axis=0), axis=1).sum())
     off = np.linalg.norm(recorded.true_m - recorded.setpoint_m, axis=1)
@@ -141,7 +153,7 @@ def judge(recorded: Recorded) -> list[Figure]:
     if directions.angle_rad > 0.0:
         angle = np.degrees(np.linalg.norm(recorded.turned_off_rad, axis=1))
         text, step = "greatest step of angular velocity in a cycle", float(steps[k:].max())
-        limit = float(np.degrees(allowed[k:].min() + rounding))
+        limit = float(np.degrees(allowed[k:].min()))
         figures += [
             Figure("step_deg_s", text, math.degrees(step), "deg/s", limit),
             Figure("turned_off_rms_deg", "RMS angle from the set-point", _rms(angle), "deg"),
