@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -24,6 +24,10 @@ _MOST_FAILURES = 5
 
 class PoseRefusedError(Exception):
     """The robot does not go to a pose; the message says why. It stands where it was."""
+
+
+class NotThePoseError(TripError):
+    """The motion was ended by what no pose has a part in, such as an emergency stop."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +123,12 @@ class Measured:
         self.refused.append(f"{_listed(place)}: {why}")
         self.tried.append(tuple(place.tolist()))
 
+    def interrupted(self, place: FloatArray, error: TripError) -> None:
+        """Give up a place (d,) at which the motion was ended, unless that was not its fault."""
+        if not isinstance(error, NotThePoseError):
+            # nobody knows whether it would not happen there again
+            self.leave_out(place, str(error))
+
 
 def measure_poses(
     operator: PlatformOperator,
@@ -129,8 +139,9 @@ def measure_poses(
 ) -> None:
     """Go to places (d,) and read each; by way of `between` where it does not go straight.
 
-    One that is not reached is read where the platform stands. Raises TripError where the motion is
-    ended, or where five places in turn are not reached or do not come to rest.
+    One that is not reached is read where the platform stands, on the way by `between` as well.
+    Raises TripError where the motion is ended, or where five places in turn are not reached or do
+    not come to rest.
     """
     for place in places:
         what = f"pose {len(measured.readings) + 1}, at {_listed(place)}"
@@ -140,8 +151,8 @@ def measure_poses(
             measured.leave_out(place, str(error))
             notifier.note(f"{what}, is left out: {error}")
             continue
-        except TripError as error:  # nobody knows whether it would not happen there again
-            measured.leave_out(place, str(error))
+        except TripError as error:
+            measured.interrupted(place, error)
             raise
         failure = _read(operator, place, held, measured)
         measured.failures = measured.failures + 1 if failure else 0
@@ -155,8 +166,10 @@ def _go(operator: PlatformOperator, place: FloatArray, between: FloatArray) -> H
     try:
         return operator.go(place)
     except PoseRefusedError:
-        operator.go(between)
-        return operator.go(place)
+        held = operator.go(between)
+        if held is None:
+            return operator.go(place)
+        return replace(held, why=f"on its way by {_listed(between)} {held.why}")
 
 
 def _read(
@@ -165,12 +178,13 @@ def _read(
     """Read a pose where the platform has come to; return what was wrong, empty for nothing."""
     try:
         reading = read_pose(operator, place if held is None else held.place)
-    except (PoseRefusedError, TripError) as error:
+    except PoseRefusedError as error:
         why = str(error) if held is None else f"{held.why}; {error}"
         measured.leave_out(place, why)
-        if isinstance(error, TripError):
-            raise
         return f"is left out: {why}"
+    except TripError as error:
+        measured.interrupted(place, error)
+        raise
     if held is not None:
         measured.tried.append(tuple(place.tolist()))
     measured.add(reading)

@@ -12,6 +12,7 @@ from cdpr_rt.procedures.calibration.measure_poses import (
     Held,
     Look,
     Measured,
+    NotThePoseError,
     PoseRefusedError,
     measure_poses,
 )
@@ -26,18 +27,26 @@ class Operator:
         refused: float = -1.0,
         behind: float = -1.0,
         beyond: float = np.inf,
+        held_on_way_to: float = -1.0,
     ) -> None:
+        self.held_on_way_to, self.ended = held_on_way_to, dict[float, TripError]()
         self.shaky, self.refused, self.behind, self.beyond = shaky, refused, behind, beyond
         self.here = np.zeros(2)
         self.looks = 0
         self.marker: int | None = None
+        self.trip: TripError | None = None
         self.gone: list[float] = []
 
     def go(self, place: FloatArray) -> Held | None:
         straight = self.here[0] == BETWEEN[0] or place[0] == BETWEEN[0]
         if place[0] == self.refused or (place[0] == self.behind and not straight):
             raise PoseRefusedError("cable 2 would need 200 N")
+        if float(place[0]) in self.ended:
+            raise self.ended[float(place[0])]
         self.gone.append(float(place[0]))
+        if place[0] == self.held_on_way_to:
+            self.here = 0.5 * (self.here + place)
+            return Held(self.here, "700 mm off after 12 s: no way on")
         self.here = np.minimum(place, self.beyond)
         if place[0] <= self.beyond:
             return None
@@ -53,6 +62,8 @@ class Operator:
 
     def look(self, seconds: float) -> Look:
         self.looks += 1
+        if self.trip is not None:
+            raise self.trip
         lengths = np.tile(np.append(self.here, 1.0), (50, 1))
         if self.here[0] == self.shaky:
             lengths[25:] += 0.01
@@ -111,6 +122,43 @@ def test_where_the_straight_way_is_refused_it_goes_by_the_place_between() -> Non
     measure_poses(operator, PLACES[:4], BETWEEN, measured, Notes())
     assert len(measured.readings) == 4 and not measured.refused
     assert operator.gone == [1.0, 2.0, 0.5, 3.0, 4.0]
+
+
+def test_one_that_is_held_on_the_way_round_is_read_there_and_goes_no_further() -> None:
+    operator, notes = Operator(behind=3.0, held_on_way_to=0.5), Notes()
+    measured, _ = collected()
+    measure_poses(operator, PLACES[:4], BETWEEN, measured, notes)
+    assert operator.gone == [1.0, 2.0, 0.5, 4.0]
+    assert [reading.target[0] for reading in measured.readings] == [1, 2, 1.25, 4]
+    assert measured.tried == [(3.0, 2.0)] and not measured.refused
+    assert notes.lines == [
+        "pose 3, at 3.000, 2.000, is read where the platform stands: on its way by 0.500, 2.000 "
+        "700 mm off after 12 s: no way on"
+    ]
+    shaky = Operator(behind=3.0, held_on_way_to=0.5, shaky=1.25)
+    measured, _ = collected()
+    measure_poses(shaky, PLACES[:4], BETWEEN, measured, notes)
+    assert shaky.gone == [1.0, 2.0, 0.5, 4.0] and len(measured.readings) == 3
+    assert "on its way by 0.500" in measured.refused[0] and "10.00 mm" in measured.refused[0]
+
+
+@pytest.mark.parametrize("ended_on_the_way", [True, False])
+def test_a_place_is_given_up_where_the_motion_was_ended_unless_that_was_not_its_fault(
+    ended_on_the_way: bool,
+) -> None:
+    for error, tried in (
+        (TripError("tension 140 N"), [(1.0, 2.0)]),
+        (NotThePoseError("emergency stop"), []),
+    ):
+        operator, (measured, _) = Operator(), collected()
+        if ended_on_the_way:
+            operator.ended[1.0] = error
+        else:
+            operator.trip = error
+        with pytest.raises(type(error)):
+            measure_poses(operator, PLACES[:4], BETWEEN, measured, Notes())
+        assert measured.tried == tried and len(measured.refused) == len(tried)
+        assert not measured.readings
 
 
 def test_it_gives_up_where_nothing_comes_to_rest_and_keeps_what_it_has() -> None:

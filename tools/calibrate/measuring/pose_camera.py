@@ -16,7 +16,7 @@ from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
 from cdpr_rt.calibration.markers.images.detection import MarkerDetector
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.errors import TripError
+from cdpr_rt.procedures.calibration.measure_poses import NotThePoseError
 from cdpr_tools.errors import BadInputError
 
 _TRIES, _AGAIN_S = 3, 2.0
@@ -50,7 +50,7 @@ class PoseCamera:
     def see(self, number: int, wait: Callable[[float], None]) -> Sighting:
         """Return what is seen at a pose, counted from 1: no markers in an image that is bad.
 
-        Raises CameraError where no image comes, TripError after five bad ones in turn,
+        Raises CameraError where no image comes, NotThePoseError after five bad ones in turn,
         BadInputError for an image of another size than the intrinsics are of.
         """
         for left in reversed(range(_TRIES)):
@@ -69,7 +69,7 @@ class PoseCamera:
         self._bad += 1
         self._note(f"pose {number}: its image is not used: {seen.problem}")
         if self._bad >= _MOST_BAD:
-            raise TripError(
+            raise NotThePoseError(
                 f"{self._bad} images in turn are of no use, the last: {seen.problem}; look at the "
                 "camera's light, lens and exposure"
             )

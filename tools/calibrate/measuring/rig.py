@@ -16,14 +16,23 @@ from cdpr_profiles.reading.bounded_input import parse_json
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.core.limits import Limit
+from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import TripError
-from cdpr_rt.procedures.calibration.measure_poses import Held, Look, PoseRefusedError
+from cdpr_rt.procedures.calibration.measure_poses import (
+    Held,
+    Look,
+    NotThePoseError,
+    PoseRefusedError,
+)
+from cdpr_rt.runtime.control_loop.stop_requests import EMERGENCY_STOP
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.directions import Directions, platform_of
 from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
 
 if TYPE_CHECKING:
+    from cdpr_rt.programs.base import Program
     from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
 
 _TIGHTEN_S, _BRAKE_S = 180.0, 5.0
@@ -32,6 +41,14 @@ _SLOWED, _LATE_S = 1.5, 10.0
 _HEADER_BYTES = 1024
 _SPEED_SHARE = 0.5
 """Of the speed of the robot's file: a robot that is not calibrated yet is not hurried."""
+_NO_POSE_MAKES = frozenset(
+    limit.key
+    for limit in (
+        Limit.SAFETY_STOP, Limit.SAFETY_ALARM, Limit.STALE, Limit.MISSED, Limit.MISSED_IN_WINDOW,
+        Limit.LATE,
+    )
+)  # fmt: skip
+"""Limits that are exceeded wherever the platform is."""
 
 
 class ScannerTail:
@@ -99,6 +116,8 @@ class RigOperator:
         try:
             rig.program("pose", **self.directions.arguments(place, speed))
         except CommandRefusedError as error:
+            if rig.loop.busy or rig.state is not LoopState.ACTIVE:  # it is being ended, or was
+                raise self._trip(str(error)) from None
             raise PoseRefusedError(str(error)) from None
         within_s = _SLOWED * self._planned_s(place, speed) + _LATE_S
         try:
@@ -108,7 +127,7 @@ class RigOperator:
             rig.program("hold")
             self._ended(_BRAKE_S)
         except WorkFailedError as error:
-            raise TripError(str(error)) from None
+            raise self._trip(str(error)) from None
         here = self._here()
         kept = told["trouble"] or told["held_back"] or told["missing"] or "still on its way"
         return Held(here, f"{self._apart(here, place)} off after {within_s:.0f} s: {kept}")
@@ -141,6 +160,14 @@ class RigOperator:
         if self._stop():
             raise StoppedError
 
+    def _trip(self, text: str) -> TripError:
+        """Return that the motion was ended, and whether a pose can have had a part in it."""
+        life = self.rig.loop.life
+        limit = (life.details or {}).get("limit")
+        if limit in _NO_POSE_MAKES or EMERGENCY_STOP in life.reason:
+            return NotThePoseError(text)
+        return TripError(text)
+
     def _here(self) -> FloatArray:
         """Return the place (d,) at which the controller has the platform."""
         told = self.rig.progress
@@ -172,12 +199,21 @@ class RigOperator:
             self._standing = self._scanner.count()
         rig.turn(half)
         self._heed()
-        if rig.loop.engine.program is not before:
-            raise TripError(f"the motion was ended: {rig.state_text()}")
+        self._require(before)
+
+    def _require(self, program: Program) -> None:
+        """Raise TripError where the motion was ended since `program` ran."""
+        if self.rig.loop.engine.program is not program:
+            raise self._trip(f"the motion was ended: {self.rig.state_text()}")
 
     def look(self, seconds: float) -> Look:
-        """Let bus time pass and return lengths, tensions, and what the scanner has measured."""
+        """Let bus time pass and return lengths, tensions, and what the scanner has measured.
+
+        Raises TripError where the motion is ended meanwhile.
+        """
+        before = self.rig.loop.engine.program
         rows = self.rig.run(seconds)
+        self._require(before)
         lengths, tensions = np.array(rows["cable_length_m"]), np.array(rows["tension_N"])
         seen = self._scanned() if self._given else None
         return Look(lengths, tensions) if seen is None else Look(lengths, tensions, *seen)

@@ -26,6 +26,7 @@ from cdpr_rt.procedures.calibration.measure_poses import (
     SETTLE_S,
     Held,
     Look,
+    NotThePoseError,
     PoseRefusedError,
 )
 from cdpr_tools.calibrate.measuring import run
@@ -56,6 +57,7 @@ class Rig:
         Rig.started += 1
         self.here = self.geometry.model.home.copy()
         self.gone: list[FloatArray] = []
+        self.failed_at: FloatArray | None = None
         self.stays: list[float] = []
         self.trip: TripError | None = None
         self.sees: dict[int, FloatArray] = {0: np.zeros((4, 2)), 1: np.ones((4, 2))}
@@ -68,6 +70,7 @@ class Rig:
     def go(self, place: FloatArray) -> Held | None:
         self._left -= 1
         if self._failure is not None and self._left < 0:
+            self.failed_at = place
             raise self._failure
         if len(self.gone) == 2:
             self.gone.append(place)
@@ -274,6 +277,19 @@ def test_a_place_at_which_the_motion_was_ended_is_not_gone_to_again(
     data = go_on(tmp_path, settings())
     assert len(data.poses) == 15
     assert left.tried[-1] not in {reading.target for reading in data.poses}
+
+
+def test_a_place_that_an_emergency_stop_has_interrupted_is_gone_to_again(
+    tmp_path: Path, rigs: Callable[..., list[Rig]]
+) -> None:
+    made = rigs((7, NotThePoseError("the motion was ended: emergency stop")))
+    with pytest.raises(TripError):
+        begin(tmp_path, settings())
+    failed_at = made[0].failed_at
+    assert failed_at is not None
+    data = go_on(tmp_path, settings())
+    assert tuple(failed_at.tolist()) in {reading.target for reading in data.poses}
+    assert not any("emergency" in text for text in data.left_out)
 
 
 def test_a_camera_that_sees_no_marker_at_home_ends_it_before_anything_moves_far(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cdpr_drivers.camera.camera import Camera, CameraError, Image
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
 from cdpr_rt.core.clock import LockstepClock
-from cdpr_rt.errors import TripError
+from cdpr_rt.procedures.calibration.measure_poses import NotThePoseError
 from cdpr_tools.calibrate.measuring import pose_camera
 from cdpr_tools.calibrate.measuring.pose_camera import PoseCamera
 from cdpr_tools.errors import BadInputError
@@ -102,7 +102,7 @@ def test_one_bad_pose_is_survived_and_told_five_in_turn_are_not(
     assert camera.see(3, lambda _: None).corners_px
     for number in range(4, 8):
         camera.see(number, lambda _: None)
-    with pytest.raises(TripError, match=r"5 images in turn are of no use.*light, lens"):
+    with pytest.raises(NotThePoseError, match=r"5 images in turn are of no use.*light, lens"):
         camera.see(8, lambda _: None)
 
 

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_rt.procedures.calibration.measure_poses import Measured, measure_poses, read_pose
+from cdpr_rt.errors import TripError
+from cdpr_rt.procedures.calibration.measure_poses import (
+    Measured,
+    NotThePoseError,
+    measure_poses,
+    read_pose,
+)
 from cdpr_tools.calibrate.measuring import rig
 from cdpr_tools.calibrate.measuring.outside import OutsidePose
 from cdpr_tools.calibrate.measuring.places import chosen_places
@@ -88,3 +95,48 @@ def test_a_pose_that_is_not_reached_in_time_is_read_where_the_platform_is_held(
     assert other.target == tuple(second.tolist())
     assert len(said) == 1 and said[0].startswith("pose 1, at ")
     assert "is read where the platform stands" in said[0] and "mm off after" in said[0]
+
+
+@pytest.mark.parametrize("when", ["on its way", "before it is read", "while it is read"])
+def test_an_emergency_stop_is_no_fault_of_the_pose(
+    when: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places = chosen_places(load_robot("planar-3"), 3, 3)
+    with simulated_rig("planar-3", plant=None, scanner=False) as operator:
+        operator.tighten()
+        rig = operator.rig
+        measured, pressed_s = Measured(lambda: None), list[float]()
+        name = {"on its way": "go", "before it is read": "stay", "while it is read": "look"}[when]
+        told = getattr(operator, name)
+
+        def pressing(what: Any) -> Any:
+            begun_s, turn = rig.now_s, rig.loop.turn
+
+            def press() -> None:
+                turn()
+                if rig.now_s > begun_s + 0.3 and not pressed_s:
+                    pressed_s.append(rig.now_s)
+                    rig.loop.request_power_off()
+
+            monkeypatch.setattr(rig.loop, "turn", press)
+            return told(what)
+
+        monkeypatch.setattr(operator, name, pressing)
+        with pytest.raises(NotThePoseError, match="emergency stop"):
+            measure_poses(operator, places.chosen[:2], places.middle, measured, Notes())
+        assert pressed_s and not measured.tried and not measured.readings
+        monkeypatch.undo()
+        with pytest.raises(NotThePoseError):  # in the fault, no pose is to blame for it either
+            operator.go(places.middle)
+
+
+def test_a_drive_that_fails_on_the_way_is_held_against_the_pose() -> None:
+    places = chosen_places(load_robot("planar-3"), 3, 3)
+    with simulated_rig("planar-3", plant=None, scanner=False) as operator:
+        operator.tighten()
+        measured = Measured(lambda: None)
+        operator.rig.inject_fault(1, 1, 0x2310)
+        with pytest.raises(TripError) as caught:
+            measure_poses(operator, places.chosen[:1], places.middle, measured, Notes())
+    assert not isinstance(caught.value, NotThePoseError)
+    assert measured.tried == [tuple(places.chosen[0].tolist())]
