@@ -14,7 +14,7 @@ def power_text(status: dict[str, Any]) -> str:
         return "it only listened, and commanded no drive"
     if not status.get("driving") and not status.get("busy"):  # busy with giving or taking it
         return "its drives had been told to have no power"
-    return "drives that had power stop once its heartbeat is missing: check that they have stopped"
+    return "drives that had power stop by themselves without its heartbeat: check that they have"
 
 
 def death_text(status: dict[str, Any]) -> str:

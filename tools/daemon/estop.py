@@ -177,7 +177,7 @@ def _attach(found: LoopFile) -> SharedBlock:
 def _own_stop_notice(found: LoopFile) -> str:
     return (
         "drives that had power from it stop by themselves, without its heartbeat, within "
-        f"{found.drives_stop_s:g} s: look whether they have"
+        f"{found.drives_stop_s:g} s: check that they have"
     )
 
 

@@ -29,7 +29,7 @@ SIGMAS = 4.0
 """From how many σ_a on a cell is named."""
 _OWN_SHARE = 0.5
 """Of a, what a cell has to differ from its own motor by."""
-_CALM_S, _SETTLING_S = 1.5, 4.0
+_LOWPASS_S, _SETTLING_S = 1.5, 4.0
 
 
 def balance_std_N(weight_N: float, up: int, scale: FloatArray) -> FloatArray:
@@ -65,7 +65,7 @@ def compare(
     and `balance` (d,) are z - τ and W z + w, low-passed.
     """
     d, n = W.shape
-    share, square, whole = period_s / (_CALM_S + period_s), 0.0, True
+    share, square, whole = period_s / (_LOWPASS_S + period_s), 0.0, True
     for i in range(n):
         if measured[i]:
             off = measured_N[i] - asked[i] - correction[i]

@@ -216,8 +216,8 @@ class LoopModel:
     def _factors(self, gains: LoopGains) -> tuple[ComplexArray, ComplexArray]:
         """Return by what damping and stiffness count in C(s), latency included, (frequencies,)."""
         s = self._s
-        calm = 1.0 / (1.0 + s / gains.smoother_rad_s) ** 2
-        of_speed = self._late * s * (1.0 - gains.smooth + gains.smooth * calm)
+        lowpassed = 1.0 / (1.0 + s / gains.smoother_rad_s) ** 2
+        of_speed = self._late * s * (1.0 - gains.smooth + gains.smooth * lowpassed)
         return of_speed, self._late * (1.0 + gains.integral_1_s / s)
 
     def _keeps(self, gains: LoopGains) -> bool:

@@ -24,7 +24,7 @@ from cdpr_rt.robots.platform.body_kernel import write_mass_matrix, write_wrench
 _STRETCH_SHARE = 0.2
 PLAUSIBLE_m_s = 0.15
 """By how much the cables' rates may contradict each other in motion."""
-_CALMING_S = 0.02
+_LOWPASS_S = 0.02
 PERIOD, BANDWIDTH, DAMPING, RATIO, INTEGRAL, NULL_DAMPING, ROTOR = range(7)
 REGULATOR_N, MOST_N, STICTION_GAIN, STICTION_SPEED, DEADBAND, SETTINGS = range(7, 13)
 """Period, s; the loop's bandwidth, rad/s, and damping, N s/m of a cable; damping ratio; rate of the
@@ -213,12 +213,12 @@ def _write_errors(
     """
     d = e.size
     size, speed, wanted_speed = 0.0, 0.0, 0.0
-    calming = settings[PERIOD] / (settings[PERIOD] + _CALMING_S)
+    lowpass = settings[PERIOD] / (settings[PERIOD] + _LOWPASS_S)
     for k in range(d):
         i = directions[k]
         e[k], v[k] = moves[POSE_ERROR, i], moves[WANTED_TWIST, i] - moves[TWIST, i]
         size += (scale[k] * e[k]) ** 2
-        state[d + 1 + k] += calming * (moves[TWIST, i] - state[d + 1 + k])
+        state[d + 1 + k] += lowpass * (moves[TWIST, i] - state[d + 1 + k])
         speed += (scale[k] * state[d + 1 + k]) ** 2
         wanted_speed += abs(moves[WANTED_TWIST, i])
     return math.sqrt(size), speed, wanted_speed > 0.0
