@@ -11,11 +11,15 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typing_extensions import override
 
+from cdpr_tools.loading import told_on_a_terminal
+
 
 @cache
 def load(module: str, name: str) -> Any:
     """Return the group or command `name` of a module of cdpr_tools.commands: its `app`."""
-    group = typer.main.get_group(importlib.import_module(f"cdpr_tools.commands.{module}").app)
+    with told_on_a_terminal():
+        app = importlib.import_module(f"cdpr_tools.commands.{module}").app
+    group = typer.main.get_group(app)
     return group if group.name == name else group.commands[name]
 
 

@@ -85,9 +85,12 @@ class Output:
             yield advance
 
     @contextmanager
-    def stage(self, what: str) -> Iterator[None]:
-        """Say at once what is being done, and that it still is while the block runs."""
-        if not self.notes.is_interactive:
+    def stage(self, what: str, quick: bool = False) -> Iterator[None]:
+        """Say at once what is being done, and that it still is while the block runs.
+
+        What is `quick` on most machines is told at once on a terminal only, where it leaves none.
+        """
+        if not quick and not self.notes.is_interactive:
             self.note(f"{what} ...")
         columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
         with self._shown(columns, Advance(what, None), True):

@@ -10,7 +10,6 @@ import typer
 from cdpr_tools.commands.options import JsonOption, written_as
 from cdpr_tools.output import Output
 from cdpr_tools.recordings.export import check_target, export
-from cdpr_tools.recordings.picture import FIELDS, draw
 from cdpr_tools.recordings.selection import Selection, fields_of, files_of
 from cdpr_tools.recordings.summary import summarise, summary_lines
 
@@ -84,8 +83,13 @@ def plot(
     """Draw motion, torques, tensions and the timing of the cycles into a picture."""
     out = Output(as_json)
     path = target or files_of(files)[0].with_suffix(".png")
+    with out.stage("loading what draws", quick=True):
+        from cdpr_tools.recordings.picture import FIELDS, draw  # noqa: PLC0415  # slow to load
+
     selection = Selection(files, FIELDS, from_s, until_s)
     with out.progress(path.name, selection.reading_s) as selection.advance:
-        rows = draw(selection, axis, path)
+        columns = selection.columns()
+    with out.stage(f"{path.name}: drawing", quick=True):
+        rows = draw(selection, columns, axis, path)
     out.say(f"{path}: {rows} cycles")
     out.result({"ok": True, "out": path, "rows": rows})

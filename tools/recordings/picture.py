@@ -60,12 +60,11 @@ def axes_of(names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
     return [names.index(name) for name in wanted or names]
 
 
-def draw(selection: Selection, axes: Sequence[str] | None, path: Path) -> int:
-    """Draw the rows into a PNG file; return their number.
+def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, path: Path) -> int:
+    """Draw the columns of a selection into a PNG file; return the number of their rows.
 
     Raises BadInputError for what there is not, WorkFailedError where it cannot be written.
     """
-    columns = selection.columns()
     count = columns["position_rad"].shape[1]
     names = selection.readers[-1].axes[:count]
     names += [str(k) for k in range(len(names), count)]

@@ -18,7 +18,7 @@ from cdpr_tools.errors import BadInputError
 ELAPSED = "elapsed_s"
 """The column that is added: seconds since the first row, over all files."""
 
-_BYTES_PER_S = 1e7
+_BYTES_PER_S = 3e6
 
 
 def files_of(paths: Sequence[Path]) -> list[Path]:

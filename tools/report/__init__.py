@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cdpr_profiles import Winch
-from cdpr_rt.procedures.commissioning.commission_files import Paths
-from cdpr_rt.procedures.commissioning.identified import Identified
+if TYPE_CHECKING:  # those who want the pictures' style alone load neither
+    from cdpr_profiles import Winch
+    from cdpr_rt.procedures.commissioning.commission_files import Paths
+    from cdpr_rt.procedures.commissioning.identified import Identified
 
 
 def build(paths: Paths, winch: Winch, results: dict[str, Any], found: Identified) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 app = typer.Typer()
@@ -29,7 +30,8 @@ def calibration(
     SciPy solves the same with poses as unknowns and a numeric Jacobian, once. With --images, also
     the fit of cables, camera and 42 markers, from images that are rendered to the verdict.
     """
-    from cdpr_tools.bench import calibration as bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench import calibration as bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     told = bench.measure(poses, repeats, out)
@@ -54,7 +56,8 @@ def calibration(
 
 
 def _joint(out: Output, images: int, seed: int) -> dict[str, Any]:
-    from cdpr_tools.bench import joint_calibration as bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench import joint_calibration as bench  # noqa: PLC0415  # slow to load
 
     told = bench.measure(images, seed, out)
     verdict = "reached" if told["reached"] else "MISSED"

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 app = typer.Typer()
@@ -25,7 +26,8 @@ def markers(
     Errors are against the truth of the simulator; along and across the reference marker's plane as
     in figure 3.21 of the thesis, and in the frame in which the map fits the truth best.
     """
-    from cdpr_tools.bench import markers as bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench import markers as bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     figures = bench.measure(images, seed, out)

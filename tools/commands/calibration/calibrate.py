@@ -12,6 +12,7 @@ from cdpr_profiles.calibration.in_force import undo as take_back
 from cdpr_tools.commands.calibration.calibrate_read import read
 from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption
 from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 if TYPE_CHECKING:
@@ -303,7 +304,8 @@ def study(
     Table 3.1 and figures 3.7 and 3.8 of the thesis for a robot of ours, on all cores. With
     --ablation: what made the thesis' 31 mm, and what each improvement takes off.
     """
-    from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     if ablation:
@@ -323,7 +325,8 @@ def study(
 
 def _ablation(out: Output, robot: str, draws: int, seed: int, png: Path | None) -> None:
     try:
-        from cdpr_tools.calibrate import ablation as ablations  # noqa: PLC0415  # slow to load
+        with told_on_a_terminal():
+            from cdpr_tools.calibrate import ablation as ablations  # noqa: PLC0415  # slow to load
     except ModuleNotFoundError as error:
         raise BadInputError(
             f"--ablation needs {error.name}, which comes with: pip install 'cdpr-rt[camera]'"

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 _ORDER = ("simbus", "socketcan", "socketcand", "slcan")
@@ -27,7 +28,8 @@ def bus(
     On simbus, on SocketCAN (vcan0, where there is one), through socketcand and through a serial
     adapter, each with a node in a process of its own that answers every frame.
     """
-    from cdpr_tools.bench.cyclic import bus as bus_bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench.cyclic import bus as bus_bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     figures = bus_bench.measure(exchanges, out)

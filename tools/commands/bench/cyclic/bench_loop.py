@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 _VARIANTS = {
@@ -38,7 +39,8 @@ def loop(
     The motors turn, or lead their platform; the simulator runs in a process of its own. In the same
     run the same loop is measured as one writes it first, on the canopen package's PDOs and NumPy.
     """
-    from cdpr_tools.bench.daemon import loop as loop_bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench.daemon import loop as loop_bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     figures = loop_bench.measure(seconds, out, robot)

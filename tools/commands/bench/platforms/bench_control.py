@@ -9,6 +9,7 @@ import typer
 from cdpr_rt.errors import GeometryError
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 _VARIANTS = {"ours": "ours, compiled", "obvious": "the same in NumPy and SciPy"}
@@ -28,7 +29,8 @@ def control(
     The same update as one writes it first, in NumPy and SciPy, is measured in the same run, in
     turns, from the same angles; both have to come to the same torques.
     """
-    from cdpr_tools.bench import control as bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench import control as bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     try:

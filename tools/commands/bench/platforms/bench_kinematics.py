@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 _SEARCHES = {"ours": "ours", "plain": "plain LM, compiled", "scipy": "plain LM, SciPy"}
@@ -29,7 +30,8 @@ def kinematics(
     Along a path on spatial-8, from the last pose. On CoGiRo from starts that are up to 1 m and 2
     to 40 degrees off, beside Levenberg-Marquardt, compiled of the same parts, and SciPy's.
     """
-    from cdpr_tools.bench import kinematics as bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench import kinematics as bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     figures = bench.measure(poses, out)

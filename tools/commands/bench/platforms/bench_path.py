@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 app = typer.Typer()
@@ -25,7 +26,8 @@ def path(
     The planned motion is compared with one at a single speed and acceleration that every place of
     the path bears, the cost with the package toppra, which knows neither jerk nor tensions.
     """
-    from cdpr_tools.bench.paths import measure as bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench.paths import measure as bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     told = bench.measure(lines, seed, out)

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 app = typer.Typer()
@@ -23,7 +24,8 @@ def poses(
     Each pose is held and clear of contact all the way from home. The ways that are looked at again,
     at every millimetre, lead far out of the box of targets, so that most of them end early.
     """
-    from cdpr_tools.bench.poses import measure  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench.poses import measure  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     figures = measure.measure(ways, seed, out)

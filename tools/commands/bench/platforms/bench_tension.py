@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 _OTHERS = {
@@ -30,7 +31,8 @@ def tension(
     Every method is asked for the same poses as the general solvers DAQP, PIQP and OSQP, in turns,
     and follows paths with as many points, on which its tensions may change by steps.
     """
-    from cdpr_tools.bench.tension import measure as tension_bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench.tension import measure as tension_bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     figures = tension_bench.measure(poses, out.say)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
 _METHODS = {
@@ -32,7 +33,8 @@ def workspace(
 
     Beside OSQP and pycapacity; and the workspace's volume by a grid, by rays and by drawn places.
     """
-    from cdpr_tools.bench import workspace as bench  # noqa: PLC0415  # slow to load
+    with told_on_a_terminal():
+        from cdpr_tools.bench import workspace as bench  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
     figures = bench.measure(poses, compared, out)
