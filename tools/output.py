@@ -23,6 +23,8 @@ from rich.progress import (
 )
 
 _SLOW_S = 2.0
+_TOLD_FROM = 0.005
+"""Share of the work from which on it is told how long the rest may take."""
 _TELL_S = (2.0, 5.0)
 """Where nothing can be drawn over again: when work is first told of to go on, then how often."""
 
@@ -147,7 +149,7 @@ class Advance:
         if not self.total:
             return f"{self.what}: for {elapsed_s:.0f} s now"
         share = self.done / self.total
-        if share <= 0.0:
+        if share < _TOLD_FROM:
             return f"{self.what}: 0 %"
         left_s = elapsed_s * (1.0 / min(share, 1.0) - 1.0)
         left = f"{left_s:.0f} s" if left_s < 100.0 else f"{left_s / 60.0:.0f} min"

@@ -43,7 +43,11 @@ def test_what_takes_longer_is_told_in_a_pipe_too(monkeypatch: pytest.MonkeyPatch
             until("turns: 0 %")
             advance(5.0)
             until("turns: 50 %, about 0 s left")
+        with out.progress("turning", 1e9) as advance:
+            advance(1e-3)
+            until("turning: 0 %")
     told = errors.getvalue()
+    assert told.count("left") == told.count("50 %, about 0 s left")
     time.sleep(0.05)
     assert errors.getvalue() == told
 

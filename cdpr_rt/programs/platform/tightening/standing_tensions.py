@@ -14,17 +14,17 @@ OVERSHOOT = 1.5
 that its effect on the angles cancels out."""
 _STANDING = 0.85
 _HIGHEST = 0.9
-_PLANNED, _PRESSING, _MODEST = (1.0, 0.5, 0.25), (0.5, 0.25, 0.0), 0.4
-"""Shares of the weight with which cables press, of planned tensions and of others, and how hard
-these others pull at most, over the highest tension."""
+_PRESSING, _MODEST = (0.5, 0.25, 0.0), 0.4
+_FLOORS = (1.0, 0.75, 0.5, 0.25)
+"""Shares of what is planned with on top of the least tension, the most that can be had first."""
 
 
 class StandingTensions:
     """Tensions (n,) under which a platform stays where it stands.
 
-    Their wrench is along the weight: it presses the platform down where the cables can, with none
-    below the least that is planned with, so that friction leaves no cable to sag, or else without
-    pulling hard with none below the least tension; else it carries 0.57 of the weight, too little
+    Their wrench is along the weight: it presses the platform down where the cables can without
+    pulling hard, with none below the least tension, and as far above it as they can up to what is
+    planned with: friction leaves cables to sag. Else it carries 0.57 of the weight, too little
     to lift the platform even at the overshoot, with each at 0.57 of what would carry it all, which
     may be below the least tension. Friction makes the tensions differ from what is asked
     for by some newtons, which a platform whose weight is all but carried does not stand still for.
@@ -37,10 +37,11 @@ class StandingTensions:
         least_N = model.low_N
         most = np.maximum(_HIGHEST * model.high_N / OVERSHOOT, 1.1 * least_N)
         modest = np.minimum(most, np.maximum(_MODEST * model.high_N, 1.1 * least_N))
-        planned = model.least_tensions(np.minimum(low_N, 0.9 * most), most)
+        planned_N = np.minimum(low_N, 0.9 * most)
+        floors_N = [least_N + share * (planned_N - least_N) for share in _FLOORS]
         self._least = model.least_tensions(least_N, most)
         pressing = model.least_tensions(least_N, modest)
-        self._pressed = [(planned, share) for share in _PLANNED]
+        self._pressed = [(model.least_tensions(floor_N, most), 1.0) for floor_N in floors_N]
         self._pressed += [(self._least, 1.0)] + [(pressing, share) for share in _PRESSING]
         self._carrying = model.least_tensions(np.zeros(least_N.size), model.high_N)
         self._W, self._t = np.zeros((model.size, least_N.size)), np.zeros(least_N.size)

@@ -9,11 +9,14 @@ from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, St
 from tests.cdpr_rt.robots.platform_physics import heavier, spatial
 
 
-@pytest.mark.parametrize(("mass_kg", "share"), [(6.0, 1.0), (14.0, 0.5), (25.0, 0.25)])
-def test_no_cable_is_pulled_by_less_than_is_planned_with_to_press_harder(
+@pytest.mark.parametrize(("mass_kg", "share"), [(6.0, 1.0), (12.0, 0.75), (14.0, 0.25)])
+def test_no_cable_is_pulled_less_than_the_others_bounds_make_it(
     mass_kg: float, share: float
 ) -> None:
-    """Below that, friction leaves cables to sag, whose lengths then tell another pose."""
+    """Friction leaves cables that hardly pull to sag, and their lengths tell another pose.
+
+    The heavier a platform that is pressed down with its weight, the less is left for that.
+    """
     machine = heavier(spatial(), mass_kg)
     model, low_N = machine.model(), machine.control().low_N
     standing = StandingTensions(model, low_N, np.full(machine.n, machine.torque_Nm / 0.026))
@@ -21,6 +24,7 @@ def test_no_cable_is_pulled_by_less_than_is_planned_with_to_press_harder(
     W = np.zeros((model.size, machine.n))
     model.kinematics.wrench_matrix(model.home_pose, W)
     assert stays
-    assert (tension_N > low_N - 1e-6).all()
+    floor_N = machine.low_N + share * (low_N - machine.low_N)
+    assert tension_N.min() == pytest.approx(floor_N.min(), abs=1e-6)
     assert (OVERSHOOT * tension_N < machine.high_N).all()
-    np.testing.assert_allclose(W @ tension_N, share * model.weight(), atol=1e-6)
+    np.testing.assert_allclose(W @ tension_N, model.weight(), atol=1e-6)
