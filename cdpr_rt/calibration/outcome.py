@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
 
@@ -17,7 +17,8 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.calibration.camera.camera_faults import UNDECIDED, map_faults, told_right
 from cdpr_rt.calibration.camera.camera_start import camera_start
 from cdpr_rt.calibration.estimation.faults import Fault, fit_without_faults, parameter_faults
-from cdpr_rt.calibration.estimation.fit import Fit, fit
+from cdpr_rt.calibration.estimation.fit import Fit
+from cdpr_rt.calibration.estimation.noise import fit_with_noise_seen
 from cdpr_rt.calibration.estimation.parameters import DRUM, CableGeometry
 from cdpr_rt.calibration.markers.map_fit import MapFit
 from cdpr_rt.calibration.readings.camera_data import Images
@@ -47,7 +48,6 @@ _LESS_CONTRADICTION = 0.5
 _MISFIT = 9.0
 _SLACK_SHARE = 0.5
 _LEAST_POINTS = 3
-_LEAST_FACTOR = 0.05
 _MOST_LEFT_OUT = 0.1
 
 
@@ -66,12 +66,15 @@ class Outcome:
     verified_left_out: int
     """Readings at those poses of cables that hung slack, or next to a slip, which are left out."""
     predicted_3_sigma_mm: float
-    """Of a position in the workspace; without measured points, of its shape."""
+    """Of a position in the workspace; without measured points, of its shape. Errors at poses not
+    used that are larger than predicted have made it larger by as much."""
     with_more_3_sigma_mm: float
     """The same with ten more poses that tell as much as those so far."""
     known_room: bool
     """Whether anything was measured in the room: points, or places of markers."""
     unused: Unused
+    birge_ratio: float
+    """How many times as large errors at measured points not used are as predicted; nan without."""
 
     @property
     def good(self) -> bool:
@@ -229,6 +232,7 @@ class Outcome:
                 "mean_orientation_error_before_deg": _number(self.before.mean_deg),
                 "reference": self.verified.kind,
                 "by": self.verified.reference,
+                "birge_ratio": _number(self.birge_ratio),
                 "length_residual_mm": 1e3 * self.verified.residual_m,
                 "length_residual_before_mm": 1e3 * self.before.residual_m,
             },
@@ -262,11 +266,11 @@ def calibrate(
     slack = _SLACK_SHARE * np.asarray(limits_of(robot).slack_N, float)
     known_room = bool(seen.measured.sum() >= _LEAST_POINTS)
     first_map: MapFit | None = None
-    weighed = geometry
     if images is None:
         base = seen
         require_enough(geometry, base.some(~held))
         found, faults = fit_without_faults(geometry, base, slack)
+        found, weighed = fit_with_noise_seen(found, geometry)
     else:
         start = camera_start(geometry, seen, images.setup, images.sightings)
         base = start.seen
@@ -274,11 +278,7 @@ def calibrate(
         found, faults = fit_without_faults(geometry, base, slack, start.camera)
         known_room = known_room or start.known_room
         found, wrong = told_right(geometry, found, start.map)
-        weighed = _with_noise_seen(found)
-        found = fit(
-            weighed, replace(found.seen, start=found.poses), start=found.geometry,
-            camera=found.camera,
-        )  # fmt: skip
+        found, weighed = fit_with_noise_seen(found, geometry)
         readings = [one for one in faults if one.kind not in ("drum", "elongation")]
         of_map = map_faults(start.map, images.sightings)
         told = {(one.kind, one.cable) for one in wrong}
@@ -287,13 +287,15 @@ def calibrate(
         first_map = start.map
     unused = hold_out(geometry, weighed, base, slack, found, first_map, images)
     verified, before = unused.verified(), unused.before(geometry)
+    birge = unused.birge_ratio()
+    larger = max(birge, 1.0) if known_room and math.isfinite(birge) else 1.0
     sigma_mm, with_more_mm = (
-        _three_sigma_mm(one, known_room) for one in (found, with_more_poses(found))
+        larger * _three_sigma_mm(one, known_room) for one in (found, with_more_poses(found))
     )
     left_out = int((~unused.seen.used).sum())
     return Outcome(
         robot, found, method, faults, open_directions(found), verified, before, left_out,
-        sigma_mm, with_more_mm, known_room, unused,
+        sigma_mm, with_more_mm, known_room, unused, birge,
     )  # fmt: skip
 
 
@@ -302,19 +304,6 @@ def _three_sigma_mm(found: Fit, known_room: bool) -> float:
     geometry = found.geometry
     predicted = predicted_std(found, _grid(geometry), relative=not known_room)
     return 3e3 * float(np.sqrt((predicted[:, : geometry.coordinates] ** 2).mean(axis=0).max()))
-
-
-def _with_noise_seen(found: Fit) -> CableGeometry:
-    """Return the robot's file with readings as good as the camera has found them to be.
-
-    What encoders and torques were taken to be uncertain by is a guess for all robots; poses by
-    the camera leave enough over to know it, and weigh lengths against corners rightly.
-    """
-    share = math.sqrt(min(max(found.variance_factor, _LEAST_FACTOR), 1.0))
-    known = found.geometry.knowledge
-    known = replace(known, length_m=share * known.length_m, tension_N=share * known.tension_N)
-    nothing = np.zeros_like(found.geometry.cable)
-    return replace(found.geometry, knowledge=known, cable=nothing, elongation=0.0)
 
 
 def frame_of(outcome: Outcome) -> str:

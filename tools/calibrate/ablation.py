@@ -7,6 +7,7 @@ seen from the frame of the markers.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -19,8 +20,15 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles import Robot, load_robot
 from cdpr_rt.calibration.camera.camera_start import camera_start
 from cdpr_rt.calibration.error_model import solve_thesis
-from cdpr_rt.calibration.estimation.fit import fit, locate
-from cdpr_rt.calibration.estimation.parameters import EXIT, OFFSET, CableGeometry, Knowledge
+from cdpr_rt.calibration.estimation.fit import Fit, fit, locate
+from cdpr_rt.calibration.estimation.noise import fit_with_noise_seen
+from cdpr_rt.calibration.estimation.parameters import (
+    DRUM,
+    EXIT,
+    OFFSET,
+    CableGeometry,
+    Knowledge,
+)
 from cdpr_rt.calibration.markers.map_fit import fit_map
 from cdpr_rt.calibration.markers.marker_map import best_fit
 from cdpr_rt.calibration.pose_choice import informative
@@ -101,6 +109,8 @@ class Accuracy:
     marker_mm: float
     """Seen from the frame of the markers."""
     marker_deg: float
+    chi_square: float = math.nan
+    """Of the errors of exit points and drums by their predicted covariance, over their number."""
 
 
 def ablation(
@@ -131,10 +141,13 @@ def count(draws: int) -> int:
 
 
 def _row(case: Case, found: list[Accuracy]) -> dict[str, Any]:
-    means = {
+    means: dict[str, float | None] = {
         one.name: float(np.mean([getattr(each, one.name) for each in found]))
         for one in fields(Accuracy)
+        if one.name != "chi_square"
     }
+    square = float(np.mean([each.chi_square for each in found]))
+    means["over_predicted"] = None if math.isnan(square) else math.sqrt(square)
     return {"name": case.name, "poses": case.poses, **means}
 
 
@@ -224,6 +237,7 @@ def _by_joint_fit(robot: Robot, geometry: CableGeometry, made: Made) -> Accuracy
     seen = made.data.observations(robot, geometry.model)
     start = camera_start(geometry, seen, setup, made.data.sightings())
     found = fit(geometry, start.seen, start=start.geometry, camera=start.camera)
+    found, _ = fit_with_noise_seen(found, geometry)
     camera, count = found.camera, len(made.data.poses)
     assert camera is not None
     poses = _located(found.geometry, made, made.poses[count:], found.seen.reference_m)
@@ -231,7 +245,23 @@ def _by_joint_fit(robot: Robot, geometry: CableGeometry, made: Made) -> Accuracy
     ids = list(camera.ids)
     _, turn, shift = best_fit(made.markers_m[ids], camera.marker_position_m)
     frame, true = np.vstack([shift, turn]), np.vstack([np.zeros(3), np.eye(3)])
-    return _accuracy(poses, made.poses[count:], frame, true)
+    accuracy = _accuracy(poses, made.poses[count:], frame, true)
+    return replace(accuracy, chi_square=_chi_square(robot, found, made))
+
+
+def _chi_square(robot: Robot, found: Fit, made: Made) -> float:
+    """Return the square of errors by the predicted covariance, over how many there are."""
+    assert robot.platform is not None
+    geometry = found.geometry
+    rows = [row for row in (0, 1, 2, DRUM) if row in geometry.rows]
+    true = np.zeros_like(geometry.cable)
+    true[:, EXIT] = made.exits_m - np.array(robot.platform.exit_points_m)
+    true[:, DRUM] = made.drums
+    off = (geometry.cable - true)[:, rows].ravel()
+    places = [geometry.rows.index(row) for row in rows]
+    index = np.add.outer(np.arange(geometry.n) * len(geometry.rows), places).ravel()
+    covariance = found.uncertainty[np.ix_(index, index)]
+    return float(off @ np.linalg.solve(covariance, off)) / off.size
 
 
 def _located(
@@ -268,11 +298,21 @@ def lines(tables: dict[str, list[dict[str, Any]]]) -> list[str]:
     }
     told = []
     for key, title in titles.items():
-        told += [title, f"{'':36}{'poses':>6}{'to the first pose':>22}{'to the markers':>22}"]
+        told += [
+            title,
+            f"{'':36}{'poses':>6}{'to the first pose':>22}{'to the markers':>22}"
+            f"{'errors/predicted':>20}",
+        ]
         told += [
             f"{row['name']:36}{row['poses']:6d}{row['position_mm']:11.2f} mm{row['turn_deg']:6.2f} "
-            f"°{row['marker_mm']:12.2f} mm{row['marker_deg']:6.2f} °"
+            f"°{row['marker_mm']:12.2f} mm{row['marker_deg']:6.2f} °{_ratio(row):>18}"
             for row in tables[key]
         ]
         told.append("")
     return told[:-1]
+
+
+def _ratio(row: dict[str, Any]) -> str:
+    """Return errors over those predicted, empty where none are."""
+    ratio = row["over_predicted"]
+    return "" if ratio is None else f"{ratio:.2f}"

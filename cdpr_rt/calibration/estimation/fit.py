@@ -17,7 +17,7 @@ from cdpr_rt.calibration.camera.corner_terms import (
 )
 from cdpr_rt.calibration.estimation.normal import NormalEquations
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.estimation.residuals import Linearised, linearise
+from cdpr_rt.calibration.estimation.residuals import Linearised, linearise, noise_in_slope
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
@@ -31,6 +31,8 @@ _HUBER = 2.5
 _NORMAL_MEDIAN = 1.1774
 """Median of the length of a vector of two normal numbers of deviation 1."""
 _JUMP_STD_m = 1.0
+_MOST_SHARE = 0.9
+"""Of a slope's square that is taken for noise."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,11 @@ class Fit:
     """(N, 4, 3)"""
     seen: Observations
     covariance: FloatArray
-    """Of the geometry's parameters, jumps and the camera's, (P, P), with what was known before."""
+    """Of the geometry's parameters, jumps and the camera's, (P, P), with what was known before: by
+    noise alone."""
+    attenuation: FloatArray
+    """By how much parameters may be off since the tensions err, (P,), a standard deviation: all of
+    them together, and no further poses take it away."""
     at: Linearised
     """Residuals and derivatives of geometry and jumps at the result, without the robust loss."""
     weights: FloatArray
@@ -70,15 +76,20 @@ class Fit:
         return max(self.variance_factor, self.corner_factor, 1.0)
 
     @property
+    def uncertainty(self) -> FloatArray:
+        """Covariance by noise and by attenuation, (P, P)."""
+        return np.asarray(self.covariance + np.outer(self.attenuation, self.attenuation))
+
+    @property
     def std(self) -> FloatArray:
         """Standard deviations of the geometry's parameters, (P,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)[: self.geometry.size]))
+        return np.asarray(np.sqrt(np.diag(self.uncertainty)[: self.geometry.size]))
 
     @property
     def camera_std(self) -> FloatArray:
         """Standard deviations of the camera's parameters, see `CameraModel`."""
         first = self.geometry.size + self.jumps_m.size
-        return np.asarray(np.sqrt(np.diag(self.covariance)[first:]))
+        return np.asarray(np.sqrt(np.diag(self.uncertainty)[first:]))
 
     @property
     def length_residual_m(self) -> FloatArray:
@@ -246,11 +257,32 @@ class _Search:
         factor = float((weighted.residual**2).sum()) / max(rows - taken, 1.0)
         return Fit(
             here.geometry, here.jumps, here.poses, self._seen,
-            covariance * max(factor, corner_factor, 1.0), here.at, self._weights(), normal.across,
+            covariance * max(factor, corner_factor, 1.0),
+            self._attenuation(covariance, max(rows - taken, 0.0) / max(rows, 1)),
+            here.at, self._weights(), normal.across,
             normal.pose_covariance(), factor, corner_factor, here.cost, steps,
             self.done and self._damping < _MOST_DAMPING,
             here.camera if self._markers is not None else None,
         )  # fmt: skip
+
+    def _attenuation(self, covariance: FloatArray, spare: float) -> FloatArray:
+        """Return what noise of tensions may have put parameters off, (P,).
+
+        Where told tensions err about true ones, 1 + κ comes out as (1 + κ) (1 - γ), with γ the
+        share of its slope's square that is noise (Fuller, Measurement Error Models, 1.1); where
+        true ones err about told ones, as a controller sets these, it comes out right (Berkson).
+        Which it is, nobody knows: it is 0 or the whole, of which the root mean square is taken.
+        `spare` is the share of rows that no unknown takes.
+        """
+        geometry, off = self._here.geometry, np.zeros(len(covariance))
+        if not geometry.shared:
+            return off
+        k = geometry.size - 1
+        variance = float(covariance[k, k])
+        share = min(spare * noise_in_slope(geometry, self._seen) * variance, _MOST_SHARE)
+        largest = (1.0 + geometry.elongation) * share / (1.0 - share)
+        size = min(abs(largest) / np.sqrt(2.0), float(self._known[k]))
+        return np.asarray(covariance[:, k] * (size / variance))
 
 
 def moved(poses: FloatArray, moves: FloatArray, free: tuple[int, ...]) -> FloatArray:

@@ -90,6 +90,14 @@ def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
     return np.asarray(np.hypot(known.length_m, yielding))
 
 
+def noise_in_slope(geometry: CableGeometry, seen: Observations) -> float:
+    """Return how much of Σ (∂f/∂κ / σ)² noise of the tensions makes, Σ (l c σ_t / σ)²."""
+    if not geometry.shared:
+        return 0.0
+    soft = seen.length_m * geometry.compliance_1_N * geometry.knowledge.tension_N
+    return float((seen.used * (soft / length_std_m(geometry, seen)) ** 2).sum())
+
+
 def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray) -> FloatArray:
     """Return what encoders would say at poses (N, 4, 3) but for drum errors, (N, n)."""
     cables = np.empty((len(poses), KERNEL_ROWS, geometry.n))

@@ -18,6 +18,7 @@ from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.markers.map_fit import MapFit
 from cdpr_rt.calibration.readings.camera_data import CameraSetup, Images
 from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.calibration.verification.verdict import predicted_std
 from cdpr_rt.calibration.verification.verification import Verification, verify
 from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
 
@@ -71,6 +72,26 @@ class Unused:
         """Return how the robot's file does, with what jumped as it has that."""
         return self._compared(file, locate(file, self.part.seen).jumps_m)
 
+    def birge_ratio(self) -> float:
+        """Return how many times as large errors are as predicted, against measured points.
+
+        The root mean square of errors by lengths over their standard deviations: by the fit's
+        uncertainty, by lengths of one pose, and by the measurement (Birge, Phys. Rev. 40, 1932).
+        nan where no positions were measured.
+        """
+        part, seen = self.part, self.seen
+        there = locate(part.geometry, seen.without_jumps(self.jumps_m))
+        k = part.geometry.coordinates
+        known = np.isfinite(seen.position_std_m[:, :k])
+        if not known.any():
+            return float("nan")
+        p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
+        own = np.diagonal(there.pose_covariance, axis1=1, axis2=2) * max(part.variance_factor, 1.0)
+        variance = predicted_std(part, there.poses)[:, :k] ** 2 + own[:, :k]
+        variance += np.where(known, seen.position_std_m[:, :k], 0.0) ** 2
+        squares = (p - seen.position_m)[:, :k] ** 2 / variance
+        return float(np.sqrt(squares[known].mean()))
+
     def _compared(self, geometry: CableGeometry, jumps_m: FloatArray) -> Verification:
         """Return how lengths alone do by a geometry.
 
@@ -107,9 +128,8 @@ def hold_out(
     part, _ = fit_without_faults(geometry, seen.some(~held), slack_N, whole.camera)
     if first_map is not None:
         part, _ = told_right(geometry, part, first_map)
-    if weighed is not geometry:
-        again = replace(part.seen, start=part.poses)
-        part = fit(weighed, again, start=part.geometry, camera=part.camera)
+    again = replace(part.seen, start=part.poses)
+    part = fit(weighed, again, start=part.geometry, camera=part.camera)
     kept, index = np.flatnonzero(~held), np.flatnonzero(held)
     slipped = part.seen.jumps[len(seen.jumps) :]  # what the other poses have found
     some, _ = without_slack(seen.some(index), slack_N)

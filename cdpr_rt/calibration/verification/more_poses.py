@@ -26,4 +26,4 @@ def with_more_poses(found: Fit, more: int = MORE) -> Fit:
     shares, vectors = np.linalg.eigh(0.5 * (C + C.T))
     told = np.maximum(1.0 / np.maximum(shares, 1e-12) - 1.0, 0.0) * (poses + more) / poses
     C = (vectors / (1.0 + told)) @ vectors.T * np.outer(known, known) * factor
-    return replace(found, covariance=C)
+    return replace(found, covariance=C, attenuation=found.attenuation[:size])

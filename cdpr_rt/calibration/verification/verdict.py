@@ -151,7 +151,7 @@ def _of_single_cables(
 def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> FloatArray:
     """Return standard deviations of poses (M, 4, 3) that lengths tell with this geometry, (M, d).
 
-    By the parameters' covariance alone. `relative`: of what is left when all of the room is moved
+    By the parameters' uncertainty alone. `relative`: of what is left when all of the room is moved
     as one to where it fits best, since without measured points nobody knows better where it is.
     """
     geometry, d = found.geometry, len(found.geometry.free)
@@ -163,7 +163,7 @@ def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> Floa
     A = np.asarray(-np.linalg.solve(across @ x, across @ p))
     if relative:
         A = _less_rigid_motion(A, poses, geometry.free)
-    covariance = found.covariance[:size, :size]
+    covariance = found.uncertainty[:size, :size]
     variance = np.einsum("jdp,pq,jdq->jd", A, covariance, A)
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)).reshape(count, d))
 

@@ -169,7 +169,7 @@ def _known_to(found: Fit, camera: CameraModel) -> tuple[IntArray, FloatArray]:
     """
     first = found.geometry.size + found.jumps_m.size + camera.first_marker
     own = first + 6 * np.arange(len(camera.ids))[:, None] + np.arange(3)
-    placed = np.flatnonzero(np.sqrt(np.diag(found.covariance)[own].max(axis=1)) < _PLACED_m)
+    placed = np.flatnonzero(np.sqrt(np.diag(found.uncertainty)[own].max(axis=1)) < _PLACED_m)
     at, index = camera.marker_position_m[placed], own[placed].ravel()
     motions = np.zeros((len(placed), 3, 6))
     motions[:, :, :3] = np.eye(3)
@@ -177,5 +177,5 @@ def _known_to(found: Fit, camera: CameraModel) -> tuple[IntArray, FloatArray]:
         motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], at - at.mean(axis=0))
     R = motions.reshape(-1, 6)
     free = np.eye(len(R)) - R @ np.linalg.pinv(R)
-    variance = np.diag(free @ found.covariance[np.ix_(index, index)] @ free).reshape(-1, 3)
+    variance = np.diag(free @ found.uncertainty[np.ix_(index, index)] @ free).reshape(-1, 3)
     return placed, np.sqrt(np.maximum(variance, 0.0)).max(axis=1)

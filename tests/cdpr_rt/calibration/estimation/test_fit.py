@@ -109,7 +109,9 @@ def test_errors_are_as_large_as_predicted(seed: int, robot: str) -> None:
     what = made_up(robot, 40, seed, noise_m=3e-4, elongation=-0.3)
     found = fit(replace(what.file, knowledge=known), measured(what, 1e-3, 2e-3, seed + 1))
     off = found.geometry.values() - what.true.values()
-    whitened = np.linalg.solve(np.linalg.cholesky(found.covariance + 1e-18 * np.eye(off.size)), off)
+    whitened = np.linalg.solve(
+        np.linalg.cholesky(found.uncertainty + 1e-18 * np.eye(off.size)), off
+    )
     # chi squared of 17 to 41 unknowns, far within one in 10^6
     assert 0.15 < float((whitened**2).mean()) < 3.5
 

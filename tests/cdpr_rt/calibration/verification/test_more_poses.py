@@ -17,9 +17,10 @@ def test_it_is_what_a_fit_comes_to_that_has_every_pose_twice() -> None:
     seen = measured(what, 1e-3, 1e-3, 3)
     found, twice = fit(what.file, seen), fit(what.file, seen.some(np.tile(np.arange(30), 2)))
     told = np.sqrt(np.diag(with_more_poses(found, 30).covariance))
-    truly = twice.std * np.sqrt(found.variance_factor / max(twice.variance_factor, 1.0))
+    by_noise = np.sqrt(np.diag(twice.covariance))
+    truly = by_noise * np.sqrt(found.variance_factor / max(twice.variance_factor, 1.0))
     if found.variance_factor < 1.0:
-        truly = twice.std / np.sqrt(max(twice.variance_factor, 1.0))
+        truly = by_noise / np.sqrt(max(twice.variance_factor, 1.0))
     np.testing.assert_allclose(told, truly, rtol=0.02)
     assert (told < found.std).all()
 
