@@ -158,8 +158,8 @@ def _place(progress: dict[str, Any], of: str = "") -> str:
 def stage_text(program: str, progress: dict[str, Any]) -> str:
     """Return what a program that goes by stages is doing, an empty text for others."""
     stage = str(progress.get("stage") or "")
-    if progress.get("was_slack") and stage in ("home", "down"):  # it may well stand already
-        return "letting the cables out until none carries anything"
+    if progress.get("was_tight") is False and stage in ("home", "down"):  # it may well stand
+        return "letting the cables out; a platform that hangs on them comes down"
     if stage == "home" and progress.get("blind"):  # nobody knows the way there
         stage = "down"
     return _STAGES.get((program, stage), stage)

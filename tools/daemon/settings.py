@@ -85,6 +85,8 @@ class RunSettings(BaseModel):
     """The robot's short name, in the names of its socket and its recordings."""
     buses: tuple[str, ...] = ()
     """What was given with --bus; never `simbus:` alone, its simulator has a name already."""
+    simulated: bool = False
+    """Whether all buses are simulated; what such a robot leaves for later is kept by itself."""
     own_simulator: bool = False
     """Whether the drives are a simulator's that begins and ends with this daemon."""
     read_only: bool = False

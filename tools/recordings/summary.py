@@ -16,6 +16,7 @@ from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.output import Output
 from cdpr_tools.recordings.reasons import (
+    LOOP_ENDED,
     WHILE_ACTIVE,
     Reasons,
     is_fault,
@@ -154,7 +155,7 @@ def summarise(path: Path, out: Output) -> dict[str, Any]:
         stamp_ns = event["log_time_ns"] - reader.offset_ns
         event["after_s"] = count.when_s(stamp_ns) if count.rows else None
     runs, why = _named_runs(count.runs, reader), why_while_active(reader, count.last_state)
-    if why:
+    if why == LOOP_ENDED:  # one that is still written may be well
         runs[-1].setdefault("cut_short_by", why)
     return {
         "file": str(path),

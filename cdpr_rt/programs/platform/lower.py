@@ -104,13 +104,14 @@ class LowerProgram(PlatformProgram):
         self._here = np.zeros(cable_m.size)
         self._stage = ""
         self._cycles = self._still = 0
-        self._without_pose = self._slack = False
+        self._without_pose = self._was_tight = False
         self._velocity = parts.estimator.estimate.velocity_rad_s
 
     def start(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Go on from the present set-point and torque, (n,) each."""
         self._cycles = self._still = 0
-        self._without_pose = self._slack = not self._parts.tight
+        self._was_tight = self._parts.tight
+        self._without_pose = not self._was_tight
         # slack cables are left as loose as they are
         self._drum_tension_N[:] = 0.0 if self._without_pose else _DRUM_TENSION_SHARE * self._least
         self._stage = "home"
@@ -146,11 +147,11 @@ class LowerProgram(PlatformProgram):
         """Go on: lowering is the quickest stop; it is at rest when the platform stands."""
 
     def progress(self) -> dict[str, Any]:
-        """Return the stage, the cables' tensions, whether they were slack, whether it has ended."""
+        """Return the stage, the cables' tensions, whether they held it, whether it has ended."""
         state = {
             "stage": self._stage,
             "blind": self._without_pose,
-            "was_slack": self._slack,
+            "was_tight": self._was_tight,
             "done": float(self._at_rest),
         }
         if self._stage == "home":

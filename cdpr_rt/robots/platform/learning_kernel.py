@@ -9,8 +9,7 @@ loop's force F and the motors' corrections u (n,), all low-passed by L(s) = ω/(
 and a Kalman filter finds w (n, 3), Nm, from one of these d equations a cycle. u is all that was
 added, whoever asked for it. c (d,) is a wrench that stays for seconds: a payload, errors of mass
 and torque constants, a hand that pulls. It is far more uncertain than w, so that what does not
-change its sign with the motion is taken for c, not for friction. w is bounded; friction that many
-reversals have confirmed, by more: what is known of it puts no tension off. The filter's states
+change its sign with the motion is taken for c, not for friction. w is bounded. The filter's states
 x (m,), m = 3 n + d, are w, row by row, and c; beyond what motion tells they return to 0: ẋ = -x/T +
 noise, of which without a measurement a standard deviation σ would come.
 
@@ -49,8 +48,9 @@ def write_learnt(
 ) -> None:
     """Write φ into `terms` (n, 3), and the torques (n,) that make up for what was learnt.
 
-    `reference` (n,) is the wanted speed of the motors, `most` (n,) what cogging is at most. A
-    little of the friction is left: with too much of it made up for, the platform would run ahead.
+    `reference` (n,) is the wanted speed of the motors, `most` (n,) what friction and cogging are
+    at most, each. A little of the friction is left: with too much of it made up for, the platform
+    would run ahead.
     """
     for i in range(torque.size):
         angle = pole_pairs[i] * (theta[i] + settings[LATENCY] * omega[i])
@@ -86,10 +86,9 @@ def learn(
 ) -> int:
     """Take in one cycle: `x` (m,) and their covariance `P` (m, m); return the next direction.
 
-    `most` (n,) bounds w; friction, by as much again less three of its standard deviations. Of M
-    (d, d) the lower half counts. `usable` is whether the force was exerted. Where it was not, no
-    motor has to turn, or neither friction nor cogging can be what is seen, nothing is learnt.
-    `scratch` (2, m) is overwritten.
+    `most` (n,) bounds w. Of M (d, d) the lower half counts. `usable` is whether the force was
+    exerted. Where it was not, no motor has to turn, or neither friction nor cogging can be what is
+    seen, nothing is learnt. `scratch` (2, m) is overwritten.
     """
     n, d = J.shape
     w = TERMS * n
@@ -112,8 +111,7 @@ def learn(
     noise = settings[NOISE_N] * scale[direction]
     if _take_in(measured, noise * noise, h, Ph, x, P):
         for i in range(n):
-            sure = max(most[i] - _SIGMAS * math.sqrt(max(P[TERMS * i, TERMS * i], 0.0)), 0.0)
-            x[TERMS * i] = min(max(x[TERMS * i], 0.0), most[i] + sure)
+            x[TERMS * i] = min(max(x[TERMS * i], 0.0), most[i])
             for j in range(1, TERMS):
                 x[TERMS * i + j] = min(max(x[TERMS * i + j], -most[i]), most[i])
     following: int = (direction + 1) % d

@@ -18,8 +18,7 @@ FRICTION_SHARE, COGGING_SHARE = 0.04, 0.03
 """What friction and cogging usually are (standard deviation), over the motor's rated torque."""
 MOST_SHARE, MOST_RESERVE_SHARE = 0.08, 1.0 / 3.0
 """What they are at most, each: the less of a share of the rated torque, and of what puts a cable's
-tension off by a share of the reserve that tensions are planned with; friction that is certain, up
-to twice that. All of it together stays within the reserve."""
+tension off by a share of the reserve that tensions are planned with."""
 WRENCH_SHARE, NOISE_SHARE = 0.25, 0.09
 """What the platform's wrench is off, and one cycle's equation, over the cables' rated tension."""
 REVERSAL_rad_s = 0.1
@@ -63,7 +62,7 @@ class MotorLearning:
         self.most_Nm = np.minimum(
             MOST_SHARE * rated_Nm, MOST_RESERVE_SHARE * reserve_N * np.abs(cable)
         )
-        """What friction that is uncertain, and cogging, of each motor are at most, each, (n,)."""
+        """What friction and cogging of each motor are at most, each, (n,)."""
         self._x, self._P = np.zeros(m), np.zeros((m, m))
         self._terms, self._filters = np.zeros((n, kernel.TERMS)), np.zeros(4 * n + 2 * d)
         self._direction = 0

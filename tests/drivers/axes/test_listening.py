@@ -247,7 +247,7 @@ def test_a_backlog_is_taken_in_cycle_by_cycle(two: list[Stage]) -> None:
         assert ears.feedback.cycle == 199
 
 
-@pytest.mark.alone  # which bus is ahead is told by when its SYNC comes, by the wall's clock
+@pytest.mark.alone  # which bus is ahead is told by when its SYNC comes, by the wall clock
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("behind", [0, 1])
 def test_a_bus_that_has_lost_cycles_is_caught_up_with(

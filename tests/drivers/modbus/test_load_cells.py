@@ -19,7 +19,7 @@ from cdpr_rt.core.clock import PacedClock
 from cdpr_rt.core.tension import TensionFault
 from tests.drivers.modbus.load_cell_rig import LoadCellRig
 
-# amplifiers answer within 0.05 s of the wall's clock, from a process of their own
+# amplifiers answer within 0.05 s of wall time, from a process of their own
 pytestmark = pytest.mark.alone
 CLOCK = PacedClock()
 N = 3

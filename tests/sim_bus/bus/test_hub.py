@@ -55,7 +55,9 @@ def test_what_a_client_sends_last_arrives_though_it_left_frames_unread(start_bus
     hasty.send(0x124)
     hasty.sock.close()
     assert [other.recv_id(), other.recv_id()] == [0x123, 0x124]
+    end_s = time.monotonic() + 10.0
     while len(bus.hub._clients) > 1:
+        assert time.monotonic() < end_s
         time.sleep(0.01)
 
 

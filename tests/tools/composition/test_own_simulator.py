@@ -60,6 +60,7 @@ def _command_lines() -> Iterator[str]:
 
 
 @pytest.mark.long
+@pytest.mark.alone  # how far one process has compiled when the other ends
 @pytest.mark.parametrize("command", ["commission winch-mpp0923d", "run planar-3"])
 def test_a_bad_plant_is_told_before_all_is_compiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str

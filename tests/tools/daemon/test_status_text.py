@@ -102,7 +102,7 @@ def test_a_platform_of_unknown_pose_is_not_told_to_be_taken_home() -> None:
     assert stage_text("lower", {"stage": "home", "blind": False}).startswith("taking the platform")
     assert stage_text("lower", {"stage": "home", "blind": True}) == "letting the platform down"
     for stage in ("home", "down"):  # it stands already, or nobody knows
-        slack = {"stage": stage, "blind": True, "was_slack": True}
+        slack = {"stage": stage, "blind": True, "was_tight": False}
         assert stage_text("lower", slack).startswith("letting the cables out")
 
 

@@ -127,6 +127,7 @@ class BenchDaemon:
             robot=self.robot.reference,
             name="bench",
             buses=(self._bus,),
+            simulated=True,
             own_simulator=True,
             socket=self._folder / "bench.sock",
             record=self._folder / "recordings" if serving else None,

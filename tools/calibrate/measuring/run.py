@@ -90,8 +90,12 @@ class Kept:
     def new(cls, folder: Path, robot: Robot, camera: CameraSetup | None) -> Kept:
         """Return what has read nothing yet; what the folder held of earlier poses is removed.
 
-        Raises ProfileError.
+        Raises ProfileError, and BadInputError where that was read of a real robot.
         """
+        if _is_of_real_robot(folder / DATA):
+            raise BadInputError(
+                f"{folder / DATA}: was read of a real robot; allowed: another --out, or remove it"
+            )
         try:
             for name in (DATA, OUTSIDE, COUNTED):
                 (folder / name).unlink(missing_ok=True)
@@ -191,6 +195,13 @@ def measure(
         error.add_note(_going_on(robot, kept))
         raise
     return kept.data
+
+
+def _is_of_real_robot(path: Path) -> bool:
+    try:
+        return path.exists() and not load_data(path).simulated
+    except ProfileError:
+        return False  # nothing that can be used
 
 
 def _told_only(enough: Enough) -> Enough:

@@ -193,8 +193,8 @@ def run(
             from cdpr_tools.calibrate.measuring.camera_setup import camera_setup  # noqa: PLC0415
 
             setup = camera_setup(out, plant, intrinsics, markers)
-        settings.save(folder)
         kept = runs.Kept.new(folder, profile, setup)
+        settings.save(folder)
     if source == "points" and points is None:
         raise BadInputError("--points: the run that goes on was begun with it; allowed: the file")
     data = runs.measure(out, profile, settings, kept, enough(out, profile, points, geometry))

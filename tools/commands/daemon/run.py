@@ -241,6 +241,8 @@ def settings_for(
         robot=robot.reference,
         name=robot.profile,
         buses=(f"simbus:own-{os.getpid()}",) if own else tuple(bus or ()),
+        simulated=own
+        or all(url.is_simulated for url in robot_urls(robot, tuple(bus or ())).values()),
         own_simulator=own,
         read_only=read_only,
         safety_io=safety_io,

@@ -81,11 +81,11 @@ def main() -> int:
     simulated = any(url.is_simulated for url in robot_urls(robot, settings.buses).values())
     block.write_description({**description(robot, limits, parts), "simulated": simulated})
     if parts.last is not None and robot.platform is not None:
-        parts.last.path = _lengths_file(robot, settings, simulated=simulated)
+        parts.last.path = _lengths_file(robot, settings)
         parts.last.geometry = robot.geometry_identity
         parts.last.load(len(robot.axes), robot.platform.longest_cable_m)
     if parts.paths is not None:
-        _open_paths(parts.paths, robot, block)
+        _open_paths(parts.paths, robot, settings, block)
     loop = ControlLoop(block, machine, parts)
     loop.engine.notices += freeze_memory()
     _obey_signals(loop)
@@ -105,20 +105,24 @@ def main() -> int:
     return DONE
 
 
-def _lengths_file(robot: Robot, settings: RunSettings, *, simulated: bool) -> Path | None:
+def _lengths_file(robot: Robot, settings: RunSettings) -> Path | None:
     """Return where the lengths of the last stop are kept, a simulation's apart from a robot's.
 
     A simulator that begins with the daemon begins at home, whatever became of the one before.
     """
     if settings.own_simulator:
         return None
-    return state_path("lengths", f"{robot.profile}.simulated" if simulated else robot.profile)
+    return state_path(
+        "lengths", f"{robot.profile}.simulated" if settings.simulated else robot.profile
+    )
 
 
-def _open_paths(paths: PathStore, robot: Robot, block: SharedBlock) -> None:
+def _open_paths(paths: PathStore, robot: Robot, settings: RunSettings, block: SharedBlock) -> None:
     """Have planned paths from their folder; a robot without one runs all the same."""
     try:
-        paths.open(paths_folder(robot.profile), block.counters["path"])
+        paths.open(
+            paths_folder(robot.profile), block.counters["path"], simulated=settings.simulated
+        )
     except ControlError as error:
         print(f"cdpr: paths cannot be followed: {error}", file=sys.stderr)
 

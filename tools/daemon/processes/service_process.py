@@ -56,7 +56,9 @@ def main() -> int:
     service.background.append(bounded.watch)
     service.end_daemon = partial(os.kill, settings.launcher_pid or os.getpid(), signal.SIGTERM)
     folder = paths_folder(settings.name)
-    service.background.append(partial(keep_progress, folder, block.counters["path"]))
+    service.background.append(
+        partial(keep_progress, folder, block.counters["path"], simulated=settings.simulated)
+    )
     service.planner.work = partial(plan_in_process, settings.robot)
     try:
         asyncio.run(_serve(settings, service))

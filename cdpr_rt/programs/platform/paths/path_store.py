@@ -108,14 +108,18 @@ def write_plan(
         with os.fdopen(fd, "wb") as file:
             file.write(data)
         fresh.replace(path)
-        left = bytes(read_progress(folder)["name"][0]).decode("ascii", "replace")
+        left = [_left_on(folder, simulated=simulated) for simulated in (False, True)]
         plans = sorted(folder.glob("*.path"), key=lambda one: one.stat().st_mtime)
         for old in plans[:-_KEPT]:
-            if old.stem != left:
+            if old.stem not in left:
                 old.unlink(missing_ok=True)
     except OSError as error:
         raise ProgramError(f"{path}: cannot be written: {error.strerror}") from error
     return name
+
+
+def _left_on(folder: Path, *, simulated: bool) -> str:
+    return bytes(read_progress(folder, simulated=simulated)["name"][0]).decode("ascii", "replace")
 
 
 def _parsed_plan(name: str, data: bytes, d: int) -> tuple[StoredPlan, Any]:
@@ -159,7 +163,9 @@ class PathStore:
         self._progress = np.zeros(1, PATH)
         self._time = self._progress["time_s"]
 
-    def open(self, folder: Path, progress: NDArray[Any] | None = None) -> None:
+    def open(
+        self, folder: Path, progress: NDArray[Any] | None = None, *, simulated: bool = False
+    ) -> None:
         """Take plans from a folder, and write how far they have come to `progress`, a `PATH` row.
 
         One that holds nothing yet is filled from the folder. Raises ProgramError where plans cannot
@@ -173,7 +179,7 @@ class PathStore:
         if progress is not None:
             self._progress, self._time = progress, progress["time_s"]
         if not self._progress["name"][0]:
-            self._progress[:] = read_progress(folder)
+            self._progress[:] = read_progress(folder, simulated=simulated)
 
     def load(self, name: str) -> None:
         """Read a plan and hold it against the robot's limits; for another thread than the loop's.

@@ -32,7 +32,7 @@ def test_what_is_begun_at_this_moment_is_looked_at_anew(
 ) -> None:
     written: list[bytes] = []
 
-    def write(_folder: Path, row: np.ndarray) -> None:
+    def write(_folder: Path, row: np.ndarray, **_: bool) -> None:
         written.append(bytes(row["name"][0]))
 
     async def follow() -> None:
@@ -57,7 +57,7 @@ def test_what_a_full_disk_refused_is_written_once_there_is_room(
 ) -> None:
     tried: list[str] = []
 
-    def write(_folder: Path, _row: np.ndarray) -> None:
+    def write(_folder: Path, _row: np.ndarray, **_: bool) -> None:
         tried.append("")
         if len(tried) < 3:
             raise OSError("no space left on device")

@@ -316,6 +316,14 @@ def test_a_new_run_leaves_nothing_of_the_poses_before(
         go_on(tmp_path, settings())
 
 
+def test_what_was_read_of_a_real_robot_is_not_overwritten_by_a_simulation(tmp_path: Path) -> None:
+    kept = run.Kept.new(tmp_path, ROBOT, None)
+    kept.data.model_copy(update={"simulated": False}).save(tmp_path / run.DATA)
+    with pytest.raises(BadInputError, match="was read of a real robot"):
+        run.Kept.new(tmp_path, ROBOT, None)
+    assert (tmp_path / run.DATA).exists()
+
+
 def test_data_of_another_state_of_the_robot_are_not_gone_on_with(
     tmp_path: Path, rigs: Callable[..., list[Rig]]
 ) -> None:
