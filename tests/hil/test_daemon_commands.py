@@ -125,7 +125,6 @@ def test_a_controller_runs_to_its_end_and_hold_follows(
         (("controller", "sweep", "legs"), 2, "legs: allowed: KEY=VALUE"),
         (("controller", "sweep", "legs=NaN"), 2, "legs: value NaN; allowed: a finite number"),
         (("controller", "sweep", "legs=[1"), 2, "legs: is not valid JSON"),
-        (("ack",), 1, "acknowledge: not in state active; allowed in fault"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(
@@ -143,6 +142,12 @@ def test_status_is_for_people_and_for_programs(active: RealDaemon, terminal: Ter
     for axis in ("left", "right"):
         assert f"\n{axis} " in shown
     assert terminal.told("status", *active.at)["axes"][1]["name"] == "right"
+
+
+def test_where_there_is_no_fault_acknowledging_is_no_error(
+    active: RealDaemon, terminal: Terminal
+) -> None:
+    assert terminal.told("ack", *active.at)["state"] == "active"
 
 
 def test_disable_and_enable(active: RealDaemon, terminal: Terminal) -> None:

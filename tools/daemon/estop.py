@@ -87,7 +87,9 @@ class EmergencyStop:
         try:
             block = self._block = _attach(self._found)
         except (OSError, SharedBlockError) as error:
-            return self._failed(f"what its drives say cannot be seen: {error}")
+            ended = "its loop has ended; " + _own_stop_notice(self._found)
+            unseen = f"what its drives say cannot be seen: {error}"
+            return self._failed(ended if isinstance(error, FileNotFoundError) else unseen)
         while not (off := self._power_is_off()):
             if self._ended(_LOOK_S):
                 return self._failed("its loop has ended; " + _own_stop_notice(self._found))

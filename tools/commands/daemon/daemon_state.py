@@ -146,6 +146,11 @@ def hold(daemon: Daemon, out: Output) -> None:
 @with_daemon
 def ack(daemon: Daemon, out: Output) -> None:
     """Acknowledge a fault whose cause is gone; nothing gets power by it."""
+    state = daemon.get("/status")["state"]
+    if state in ("ready", "active"):
+        out.say("no fault to acknowledge")
+        out.result({"ok": True, "state": state, "text": ""})
+        return
     _show(out, daemon.post("/acknowledge"))
 
 
