@@ -17,7 +17,13 @@ from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.reading.bounded_input import parse_json
 from cdpr_profiles.reading.places import reference
 from cdpr_tools.client.dead_loop import DEAD, death_text
-from cdpr_tools.daemon.paths import find_sockets, is_trusted, unsearched_folders
+from cdpr_tools.daemon.launcher_file import launcher_runs
+from cdpr_tools.daemon.paths import (
+    find_launcher_files,
+    find_sockets,
+    is_trusted,
+    unsearched_folders,
+)
 from cdpr_tools.daemon.settings import read_key
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
 
@@ -239,6 +245,8 @@ def _only_socket(robot: str | None) -> Path:
         return found[0]
     if not found:
         whose = "" if robot is None else f" for {robot}"
+        if any(map(launcher_runs, find_launcher_files(robot))):
+            raise NoDaemonError(f"the daemon{whose} is starting, or ending: it does not answer")
         hint = f"; {where}" if (where := unsearched_folders()) else ""
         raise NoDaemonError(
             f"no daemon runs{whose}; `cdpr run {robot or 'ROBOT'}` starts one{hint}"

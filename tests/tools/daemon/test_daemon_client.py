@@ -24,6 +24,7 @@ from cdpr_tools.client.client import (
     open_daemon,
 )
 from cdpr_tools.commands.robot.path import robot_called
+from cdpr_tools.daemon.launcher_file import named_launcher
 from cdpr_tools.errors import BadInputError
 
 
@@ -63,6 +64,9 @@ def test_what_a_killed_daemon_left_behind_is_none(listening: list[Path], folder:
         dead.bind(str(folder / "dead.sock"))
     assert where(None) == str(listening[1])
     with pytest.raises(NoDaemonError, match="no daemon runs for dead"):
+        where("dead")
+    starting = pytest.raises(NoDaemonError, match="the daemon for dead is starting, or ending")
+    with named_launcher(folder / "dead.sock"), starting:
         where("dead")
 
 
