@@ -6,6 +6,12 @@ from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import GeometryCalibration
 
 
+def geometry_note(robot: Robot) -> str:
+    """Return by which calibration a robot runs, "" where its file counts."""
+    known = robot.calibration
+    return "" if known is None else f"geometry {calibration_lines(known, robot)[0]}"
+
+
 def calibration_lines(known: GeometryCalibration, robot: Robot) -> list[str]:
     """Return which calibration is in force and how good it is."""
     lines = [

@@ -12,6 +12,7 @@ from cdpr_profiles.calibration.in_force import load_calibrated, take_over, undo
 from cdpr_profiles.catalogue import list_profiles
 from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_rt.robots.robot_arrays import limits_of
+from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.daemon.processes.loop_process import description, look_at_calibration
 from tests.profiles.test_geometry_calibration import calibration
 
@@ -31,6 +32,8 @@ def test_a_daemon_takes_targets_with_the_calibration_in_force_only(tmp_path, mon
     before, platform = load_calibrated("planar-4"), SimpleNamespace(not_calibrated_reason="")
     take_over(before, calibration(before))
     mark_calibrated("planar-4", "calibration 1")
+    assert geometry_note(before) == ""
+    assert geometry_note(load_calibrated("planar-4")).startswith("geometry calibrated 20")
     look_at_calibration(before, platform)  # type: ignore[arg-type]
     assert "start the daemon anew" in platform.not_calibrated_reason
     now = load_calibrated("planar-4")

@@ -30,6 +30,7 @@ from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_rt.service.recordings.retention import BYTES_PER_AXIS, Retention, size_text
+from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
@@ -183,6 +184,8 @@ def run(
     with ExitStack() as stack:
         stack.enter_context(named_launcher(settings.socket))
         if text := uncommissioned_text(with_commissioned(profile, commissioned)):
+            out.note(text)
+        if text := geometry_note(profile):
             out.note(text)
         simulator = None
         if settings.own_simulator:
