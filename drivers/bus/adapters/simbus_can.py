@@ -60,16 +60,6 @@ class SimBus(PacketBus):
                 return
         raise can.CanOperationError(f"{self.channel_info}: the bus takes no frames (buffer full)")
 
-    @property
-    def state(self) -> can.BusState:
-        """Error-active always: nothing disturbs the wire of a simulated bus."""
-        return can.BusState.ACTIVE
-
-    @state.setter
-    def state(self, new_state: can.BusState) -> None:
-        # what python-can lays down for a bus without such a switch
-        raise NotImplementedError(f"{self.channel_info}: the state cannot be set")
-
     @staticmethod
     def _detect_available_configs() -> list[can.typechecking.AutoDetectedConfig]:
         """Return the simulated buses that run on this machine."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
@@ -144,7 +145,28 @@ class IdealControl:
         return "" if found is None else found[1]
 
 
-class IdealPlatform:
+class SteppedPlatform(ABC):
+    """A platform under a program, cycle by cycle."""
+
+    program: PlatformProgram
+
+    @abstractmethod
+    def cycle(self) -> None:
+        """Run one cycle."""
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / PERIOD_S)):
+            self.cycle()
+
+    def until_rest(self) -> None:
+        for _ in range(20_000):
+            self.cycle()
+            if self.program.at_rest:
+                return
+        raise AssertionError("does not come to rest")
+
+
+class IdealPlatform(SteppedPlatform):
     """One of these platforms under a program; keeps what its set-point did."""
 
     def __init__(self, platform: Platform, low_N: float, high_N: float) -> None:
@@ -154,7 +176,7 @@ class IdealPlatform:
         self.parts = PlatformParts(self.model, self.control, Estimator(n, PERIOD_S), PERIOD_S)
         self.block = SharedBlock.create(n, 1.0, 1000.0)
         self.pose = PoseProgram(self.parts, np.full(n, 10.0), PoseStream(self.block, PERIOD_S))
-        self.program: PlatformProgram = self.pose
+        self.program = self.pose
         self.feedback, self.setpoint, self.torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
         self.feedback.valid[:] = True
         self.sample = np.zeros((), SAMPLE)
@@ -194,17 +216,6 @@ class IdealPlatform:
         self.program.update(self.feedback, self.setpoint, self.torque)
         self.path.append(self.control.position.copy())
         self.paces.append(self.control.velocity.copy())
-
-    def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / PERIOD_S)):
-            self.cycle()
-
-    def until_rest(self) -> None:
-        for _ in range(20_000):
-            self.cycle()
-            if self.program.at_rest:
-                return
-        raise AssertionError("does not come to rest")
 
     def hand(
         self,

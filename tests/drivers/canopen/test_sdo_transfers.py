@@ -1,4 +1,4 @@
-"""SDO from the master's side: long data, cancelling, duplicates, retries, devices that vanish."""
+"""SDO from the master: long data, cancelling, duplicates, repeats, devices that vanish."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ def test_over_range_and_broken_wire_are_told_apart(rig: LoadCellRig, cells: Load
 
 
 def test_a_disturbed_answer_is_asked_for_again(rig: LoadCellRig) -> None:
-    profile = three().model_copy(update={"retries": 5, "answer_timeout_s": 0.1})
+    profile = three().model_copy(update={"retries": 5})
     cells = LoadCells(profile, rig.port, CLOCK)
     cells.read(0)
     assert cells.line.repeated == 0

@@ -15,13 +15,14 @@ from cdpr_rt.programs.platform.pose import PoseProgram
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.robot_arrays import winches_of
+from tests.cdpr_rt.programs.ideal_platform import SteppedPlatform
 
 PERIOD_S = 1e-3
 ROBOT = load_robot("planar-3")
 SPEED_m_s, ACCELERATION_m_s2 = 0.5, 2.0
 
 
-class LedPlatform:
+class LedPlatform(SteppedPlatform):
     """A platform that is where its set-point is, and a hand whose packets come at once."""
 
     def __init__(self, platform: Platform | None = None) -> None:
@@ -70,17 +71,6 @@ class LedPlatform:
         self.path.append(self.control.position.copy())
         self.paces.append(self.control.velocity.copy())
         self.shaped.append(self.control.shaped.copy())
-
-    def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / PERIOD_S)):
-            self.cycle()
-
-    def until_rest(self) -> None:
-        for _ in range(20_000):
-            self.cycle()
-            if self.program.at_rest:
-                return
-        raise AssertionError("does not come to rest")
 
     def post(self, x: float, y: float, scale: float = 1.0, buttons: int = 0) -> None:
         """Post where the hand is now."""
