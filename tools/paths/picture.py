@@ -28,6 +28,8 @@ _WIDE_in: Final = 7.4
 _MOST_POINTS: Final = 5000
 _SMALL: Final = 0.5
 """A path smaller than this share of the box of targets is drawn enlarged as well."""
+_FLATTEST: Final = 0.4
+"""Least height of a view over its width, and width over its height."""
 
 
 @dataclass(frozen=True)
@@ -107,10 +109,12 @@ def _draw_view(ax: Axes, shown: Preview, view: _View) -> None:
         ax.plot(*shown.obstacle.position[[i, j]], "x", ms=11, mew=2.5, color=_WRONG,
                 label=f"line {shown.obstacle.line}: cannot be there")  # fmt: skip
     every = place if view.enlarged else np.vstack([place, [low[[i, j]]], [high[[i, j]]]])
-    margin = 0.05 * float(np.ptp(every, axis=0).max())
+    span = np.ptp(every, axis=0)
+    # a path that is flat gets room for the numbers at its side
+    margin = np.maximum(0.05 * span.max(), 0.5 * (_FLATTEST * span.max() - span))
+    (left, bottom), (right, top) = every.min(axis=0) - margin, every.max(axis=0) + margin
     ax.set(
-        xlim=(every[:, 0].min() - margin, every[:, 0].max() + margin),
-        ylim=(every[:, 1].min() - margin, every[:, 1].max() + margin),
+        xlim=(left, right), ylim=(bottom, top),
         xlabel=f"{_NAMES[i]} (m)", ylabel=f"{_NAMES[j]} (m)", aspect="equal",
     )  # fmt: skip
     ax.xaxis.set_major_locator(MaxNLocator(5))
