@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from cdpr_profiles.cable import Cable, CableSeries
-from cdpr_profiles.devices.rail import load_rail
+from cdpr_profiles.devices.rail import Cia402Rail, load_rail
 from cdpr_profiles.devices.safety_io import load_safety_io
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_profiles.drive import DriveProfile
@@ -36,7 +36,7 @@ from cdpr_profiles.robot import (
     with_heartbeat_timeout,
 )
 from cdpr_profiles.winch import Winch, WinchFile
-from cdpr_profiles.winch_calibration import WinchCalibration, load_winch_calibration
+from cdpr_profiles.winch_calibration import WinchCalibration
 
 _T = TypeVar("_T")
 
@@ -79,6 +79,11 @@ def load_drive(name: str | Path, beside: Path | None = None) -> DriveProfile:
     if not is_file(eds):
         raise ProfileError(path, "eds", f"value {str(drive.eds)!r}; allowed: a file beside this")
     return drive.model_copy(update={"eds": resolved(eds)})
+
+
+def load_rail_drive(name: str | Path, rail: Cia402Rail) -> DriveProfile:
+    """Return the drive that a rail's file names, looked for beside it first; ProfileError."""
+    return load_drive(rail.drive, require("rails", name).parent)
 
 
 def load_cable(name: str | Path, beside: Path | None = None) -> Cable:
@@ -199,7 +204,7 @@ def _calibration(robot: Path, axis: int, name: str | None, winch: Winch) -> Winc
     if name is None:
         return None
     path = path_of(robot.parent, name)
-    found = load_winch_calibration(path)
+    found = WinchCalibration.load_file(path)
     for key, problem in found.faults(winch):
         raise ProfileError(path, key, f"{problem} (axes[{axis}] of {robot.name})")
     return found
@@ -211,7 +216,7 @@ def _limit_faults(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[
         ("torque_Nm", [a.winch.motor.peak_torque_Nm for a in axes], "the motor's peak torque"),
         (
             "speed_rad_s",
-            [_speed_rad_s(a) for a in axes],
+            [MOST_SPEED_RATIO * a.winch.motor.rated_speed_rad_s for a in axes],
             f"{MOST_SPEED_RATIO:g} times the motor's rated speed",
         ),
         ("tension_max_N", [a.winch.cable.breaking_force_N for a in axes], "the breaking force"),
@@ -225,10 +230,6 @@ def _limit_faults(file: RobotFile, axes: Sequence[RobotAxis]) -> Iterator[tuple[
     if clearance_m and clearance_m < _thickest_m(axes):
         allowed = f"allowed: the cables' diameter ({_thickest_m(axes):g}) and more"
         yield "platform.clearance_m", f"value {clearance_m:g}; {allowed}"
-
-
-def _speed_rad_s(axis: RobotAxis) -> float:
-    return MOST_SPEED_RATIO * axis.winch.motor.rated_speed_rad_s
 
 
 def _device(robot: Path, key: str, load: Callable[[str], object], name: str | None) -> str | None:

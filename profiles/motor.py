@@ -189,28 +189,18 @@ class MotorSeries(Profile):
         inertia = sheet.mpp_inertia_kg_m2 if name.startswith("MPP") else sheet.mpj_inertia_kg_m2
         if inertia is None:
             return None
-        common = self.common
+        common, names = self.common, set(Motor.model_fields)
+        alike = common.model_dump(include=names) | sheet.model_dump(include=names)
         is_230_VAC = row in self.ratings.models_230_VAC
         return Motor(
             model=name,
             manufacturer=self.manufacturer,
             source=self.source,
             notes=self.notes,
-            poles=common.poles,
-            torque_constant_Nm_per_Arms=sheet.torque_constant_Nm_per_Arms,
-            rated_torque_Nm=sheet.rated_torque_Nm,
-            stall_torque_Nm=sheet.stall_torque_Nm,
-            peak_torque_Nm=sheet.peak_torque_Nm,
-            rated_current_Arms=sheet.rated_current_Arms,
-            stall_current_Arms=sheet.stall_current_Arms,
-            peak_current_Arms=sheet.peak_current_Arms,
-            rated_speed_rpm=sheet.rated_speed_rpm,
-            resistance_ohm=sheet.resistance_ohm,
             inductance_H=sheet.inductance_mH * 1e-3,
             rotor_inertia_kg_m2=inertia,
             max_dc_bus_voltage_V=common.max_dc_bus_voltage_of_230_VAC_models_V
             if is_230_VAC
             else common.max_dc_bus_voltage_of_460_VAC_models_V,
-            max_winding_temperature_degC=common.max_winding_temperature_degC,
-            mass_kg=sheet.mass_kg,
+            **alike,
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
@@ -11,7 +10,7 @@ from pydantic import Field
 
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.limits.motor_bounds import Faults, MotorBounds, within
-from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.reading.reader import Profile
 from cdpr_profiles.winch import Winch
 
 
@@ -71,14 +70,8 @@ class WinchCalibration(Profile):
         return self.friction_Nm + self.friction_per_N_m * tension_N
 
     def to_toml(self) -> str:
-        """Return the text of the file that `load_winch_calibration` reads."""
-        lines = ["# Tension-to-torque gain and friction of one winch, as measured."]
-        for key, value in self.model_dump().items():
-            # JSON writes strings, numbers and lists of them as TOML does
-            is_date = isinstance(value, datetime)
-            text = value.isoformat() if is_date else json.dumps(value, ensure_ascii=False)
-            lines.append(f"{key} = {text}")
-        return "\n".join(lines) + "\n"
+        """Return the text of the file."""
+        return self.toml_text("Tension-to-torque gain and friction of one winch, as measured.")
 
     def save(self, path: Path) -> None:
         """Write the file; raises ProfileError naming it."""
@@ -88,8 +81,3 @@ class WinchCalibration(Profile):
             part.replace(path)
         except OSError as error:
             raise ProfileError(path, "", f"cannot be written: {error.strerror}") from None
-
-
-def load_winch_calibration(path: Path) -> WinchCalibration:
-    """Return the calibration in a file; raises ProfileError."""
-    return read_toml_model(path, WinchCalibration)

@@ -9,11 +9,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from cdpr_sim_bus.bus.hub import Hub
-from cdpr_sim_bus.bus.node_protocol import LocalNode
 from cdpr_sim_bus.bus.server import open_hub, run_until_stopped, with_frame_log
+from cdpr_sim_bus.bus.switch import LocalNode
 from cdpr_sim_bus.bus.watcher import FINE_WAIT_S
 from cdpr_sim_bus.clock import ClockMode
-from cdpr_sim_bus.frame_log import FrameLog
+from cdpr_sim_bus.frame import FrameLog
 
 
 @dataclass(frozen=True)

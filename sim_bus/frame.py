@@ -1,8 +1,14 @@
-"""CAN frames as the bus carries them: packing, order of arbitration, time on the wire."""
+"""CAN frames as the bus carries them: packing, arbitration, time on the wire; and a log of all."""
 
 from __future__ import annotations
 
+import errno
+import fcntl
+import heapq
+import math
 import struct
+import sys
+from pathlib import Path
 
 FRAME_BYTES = 16
 EFF_FLAG = 0x80000000
@@ -65,3 +71,114 @@ def arbitration_key(can_id: int) -> int:
 def base_id(can_id: int) -> int:
     """Return the 11 leading bits of an identifier, standard or extended."""
     return (can_id & EFF_MASK) >> 18 if can_id & EFF_FLAG else can_id & SFF_MASK
+
+
+_WRITTEN_AT = 4096
+_MOST_WAITING = 1 << 18
+
+
+class FrameLog:
+    """Writes the frames of its listeners by bus time, at one instant in the order of the buses.
+
+    So the order does not depend on which of several buses the simulator looked at first. A file
+    that cannot be written on ends, and says so; the buses go on.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Create the file; raises OSError, also where another simulator writes it."""
+        self._file = path.open("ab", buffering=0)
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if path.is_file():
+                self._file.truncate(0)
+        except BlockingIOError:
+            self._file.close()
+            raise OSError(errno.EBUSY, "another simulator writes it") from None
+        self._listeners: list[FrameListener] = []
+        self._waiting = 0
+
+    def listener(self, channel: str) -> FrameListener:
+        """Return a listener for one more bus, called `channel` in the log."""
+        listener = FrameListener(self, channel)
+        self._listeners.append(listener)
+        return listener
+
+    def count(self) -> None:
+        """Count one more frame that waits to be written."""
+        self._waiting += 1
+        if self._waiting % _WRITTEN_AT == 0:
+            # a bus that stands behind the others for ever does not fill the memory
+            over = self._waiting >= _MOST_WAITING
+            self._write(math.inf if over else min(listener.now_s for listener in self._listeners))
+
+    def close(self) -> None:
+        """Write what waits and close the file; safe to repeat."""
+        self._write(math.inf)
+        self._file.close()
+
+    def _write(self, before_s: float) -> None:
+        """Write the frames of the time before `before_s`, when no bus can add to them any more."""
+        parts = [listener.take(before_s) for listener in self._listeners]
+        self._waiting -= sum(map(len, parts))
+        lines = heapq.merge(*parts, key=lambda entry: entry[0])
+        data = memoryview(b"".join(_line(*entry) for entry in lines))
+        try:
+            while data and not self._file.closed:
+                data = data[self._file.write(data) :]
+        except OSError as error:
+            print(f"frame log {self._file.name}: {error.strerror}; it ends here", file=sys.stderr)
+            self._file.close()
+
+
+class FrameListener:
+    """A node without an id that receives every frame of its bus and sends nothing."""
+
+    node_id = 0
+    sync_period_s = 0.0
+    accepts = None
+
+    def __init__(self, log: FrameLog, channel: str) -> None:
+        self.outbox: list[bytes] = []
+        self.now_s = 0.0
+        """Bus time that the bus has come to."""
+        self._log = log
+        self._channel = channel.encode()
+        self._frames: list[tuple[float, bytes, bytes]] = []
+
+    def receive(self, frame: bytes, now: float) -> None:
+        """Keep a frame for the log."""
+        self.now_s = now
+        self._frames.append((now, self._channel, frame))
+        self._log.count()
+
+    def advance(self, now: float) -> None:
+        """Note how far the bus is."""
+        self.now_s = now
+
+    def next_event(self) -> float:
+        """Return that nothing is due, ever."""
+        return math.inf
+
+    def close(self) -> None:
+        """Complete the log, as no frames follow."""
+        self._log.close()
+
+    def take(self, before_s: float) -> list[tuple[float, bytes, bytes]]:
+        """Remove and return time, channel and frame of what came before `before_s`."""
+        frames = self._frames
+        count = len(frames)
+        while count and frames[count - 1][0] >= before_s:
+            count -= 1
+        self._frames = frames[count:]
+        return frames[:count]
+
+
+def _line(time_s: float, channel: bytes, frame: bytes) -> bytes:
+    can_id, length, data = FRAME.unpack(frame)
+    wide = can_id & EFF_FLAG
+    identifier = b"%08X" % (can_id & EFF_MASK) if wide else b"%03X" % (can_id & SFF_MASK)
+    if can_id & RTR_FLAG:
+        content = b"R%d" % length if length else b"R"
+    else:
+        content = data[:length].hex().upper().encode()
+    return b"(%017.6f) %s %s#%s\n" % (time_s, channel, identifier, content)

@@ -73,6 +73,6 @@ def test_the_simulators_kernels_have_a_cache_for_each_state_of_them(tmp_path: Pa
     shutil.copytree(Path(cdpr_sim_bus.__file__).resolve().parent, package)
     before = told(tmp_path, "-c", KERNEL_CACHE)
     assert told(tmp_path, "-c", KERNEL_CACHE) == before
-    kernel = package / "robot" / "rotor.py"
+    kernel = package / "robot" / "motor_physics.py"
     kernel.write_text(kernel.read_text() + "# changed\n")
     assert told(tmp_path, "-c", KERNEL_CACHE) != before

@@ -44,8 +44,6 @@ MODULES = {
         "move": "Move axes or the platform to positions and wait; Ctrl-C holds and exits with 1.",
         "controller": "Change over to a program and stay with it until it is done; hold follows "
         "then.",
-    },
-    "daemon.daemon_platform": {
         "tighten": "Take up the slack of a platform's cables and learn where it is; it is held "
         "then.",
         "lower": "Let the platform down onto its stand; the power stays on, the cables are loose.",
@@ -61,10 +59,10 @@ MODULES = {
         "ack": "Acknowledge a fault whose cause is gone; nothing gets power by it.",
         "stop": "End the daemon: the motion stops under control, the power goes off.",
     },
-    "bench.bench": {
+    "bench": {
         "bench": "Measure this project's own cost on this machine.",
     },
-    "bus.bus": {
+    "bus": {
         "bus": "Look at a CAN bus.",
     },
     "calibration.calibrate": {

@@ -46,3 +46,14 @@ def group_of(modules: Mapping[str, Mapping[str, str]]) -> type[TyperGroup]:
             return super().resolve_command(ctx, args)
 
     return _Group
+
+
+def lazy_group(name: str, line: str, modules: Mapping[str, Mapping[str, str]]) -> typer.Typer:
+    """Return the group `name` of such commands; `line` is what its help says of it."""
+    app = typer.Typer(name=name, cls=group_of(modules), help=line, no_args_is_help=True)
+
+    @app.callback()
+    def group() -> None:
+        """Have typer make a group where it knows of no command."""
+
+    return app

@@ -7,7 +7,7 @@ import typer
 from cdpr_tools.errors import BadInputError
 
 
-def require_consent(question: str, yes: bool) -> None:
+def require_consent(question: str, yes: bool, undone: str = "nothing was energised") -> None:
     """Ask on standard error, unless `yes`; raises BadInputError when nobody agrees."""
     if yes:
         return
@@ -16,4 +16,4 @@ def require_consent(question: str, yes: bool) -> None:
     except typer.Abort:  # nobody there to answer
         agreed = False
     if not agreed:
-        raise BadInputError("not confirmed (--yes does it beforehand); nothing was energised")
+        raise BadInputError(f"not confirmed (--yes does it beforehand); {undone}")

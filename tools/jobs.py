@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from multiprocessing.pool import Pool
 from typing import Any, Protocol
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _ANSWER_S = 5.0

@@ -154,3 +154,12 @@ class Advance:
         left_s = elapsed_s * (1.0 / min(share, 1.0) - 1.0)
         left = f"{left_s:.0f} s" if left_s < 100.0 else f"{left_s / 60.0:.0f} min"
         return f"{self.what}: {100.0 * share:.0f} %, about {left} left"
+
+
+def time_text(seconds: float) -> str:
+    """Return a duration: 12.34 s, 3 min 20 s, 2 h 5 min."""
+    if seconds < 60.0:
+        return f"{seconds:.2f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"

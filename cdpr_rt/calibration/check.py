@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.estimation.fit import fit
 from cdpr_rt.calibration.estimation.parameters import DRUM, EXIT, OFFSET, CableGeometry
 from cdpr_rt.calibration.estimation.residuals import Linearised, length_std_m, linearise
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
 from cdpr_rt.robots.kinematics.cable_kernel import run_poses
 
@@ -65,12 +65,12 @@ class Change:
         others = ", ".join(str(other + 1) for other in self.alike)
         who = f"cable {self.cable + 1}" + (f" (or {others})" if others else "")
         many = ", ".join(f"{1e3 * x:+.1f}" for x in self.size)
-        sure = f"± {1e3 * float(self.std.max()):.1f} mm"
+        sure = f"± {1e3 * float(self.std.max()):.1f} mm (1 sigma)"
         what = {
             "exit": f"the exit point of {who} has moved by ({many}) {sure}",
             "length": f"{who} is {many} {sure} longer than it is taken for",
             "drum": f"a turn of the motor of {who} pays out {100 * float(self.size[0]):+.2f} ± "
-            f"{100 * float(self.std[0]):.2f} % of what it did",
+            f"{100 * float(self.std[0]):.2f} % (1 sigma) of what it did",
         }[self.kind]
         effect = f"positions are off by up to {1e3 * self.effect_m:.1f} mm"
         return f"{what}; {effect}: {_ADVICE[self.kind]}"

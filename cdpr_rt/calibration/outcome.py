@@ -1,4 +1,4 @@
-"""From observations to a calibration that has verified itself, with a verdict in words."""
+"""A calibration that has verified itself: its verdict in words, in JSON and as a file."""
 
 from __future__ import annotations
 
@@ -14,40 +14,29 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import GeometryCalibration, geometry_sha256
 from cdpr_profiles.platform import Platform
-from cdpr_rt.calibration.camera.camera_faults import UNDECIDED, map_faults, told_right
-from cdpr_rt.calibration.camera.camera_start import camera_start
-from cdpr_rt.calibration.estimation.faults import Fault, fit_without_faults, parameter_faults
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.camera.camera_faults import UNDECIDED
+from cdpr_rt.calibration.estimation.faults import Fault
 from cdpr_rt.calibration.estimation.fit import Fit
-from cdpr_rt.calibration.estimation.noise import fit_with_noise_seen
-from cdpr_rt.calibration.estimation.parameters import DRUM, CableGeometry
-from cdpr_rt.calibration.markers.map_fit import MapFit
-from cdpr_rt.calibration.readings.camera_data import Images
-from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.calibration.verification.held_out import LEAST_POSES, Unused, held_out, hold_out
-from cdpr_rt.calibration.verification.more_poses import MORE, with_more_poses
+from cdpr_rt.calibration.estimation.parameters import DRUM
+from cdpr_rt.calibration.verification.held_out import Unused
+from cdpr_rt.calibration.verification.more_poses import MORE
 from cdpr_rt.calibration.verification.verdict import (
+    Change,
     OpenDirection,
     camera_table,
-    open_directions,
     parameter_table,
-    predicted_std,
-    require_enough,
 )
 from cdpr_rt.calibration.verification.verification import Verification
-from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.errors import InvalidRequestError
-from cdpr_rt.robots.robot_arrays import limits_of
 
 Method = Literal["points", "redundancy", "camera"]
-_GRID = 4
 _WANTED_mm_PER_m = 0.3
 """1.5 mm for 5 m of frame, 3 sigma."""
 _MOST_OVER_WANTED = 3.0
 """What is known worse than so many times what is wanted is not taken over."""
-_LESS_CONTRADICTION = 0.5
 _MISFIT = 9.0
-_SLACK_SHARE = 0.5
-_LEAST_POINTS = 3
+LEAST_POINTS = 3
+"""Poses that have to be measured to tell where the robot is in its room."""
 _MOST_LEFT_OUT = 0.1
 
 
@@ -73,6 +62,8 @@ class Outcome:
     known_room: bool
     """Whether anything was measured in the room: points, or places of markers."""
     unused: Unused
+    change: Change
+    """By how much it changes the robot's file."""
     birge_ratio: float
     """How many times as large errors at measured points not used are as predicted; nan without."""
 
@@ -111,7 +102,7 @@ class Outcome:
         worse = self.verified.residual_m > self.before.residual_m
         if self.verified.errors_m.size:
             worse = self.verified.mean_mm > self.before.mean_mm
-        if worse:
+        if worse and self.change.significant:
             told.append(
                 "poses that the fit had not seen are told no better than by the robot's file: take "
                 "more poses, further apart"
@@ -121,24 +112,19 @@ class Outcome:
                 "no three of the poses not used show two markers of the map, so nothing verifies "
                 "it: take more poses, or lay more sheets"
             )
-        if self._is_insignificant():
-            told.append(
-                f"the file's geometry is off by {self.before.mean_mm:.2f} mm here, less than the "
-                f"{self.predicted_3_sigma_mm:.2f} mm that this calibration is uncertain by, and "
-                "lengths contradict each other hardly less than by the file, which may be right "
-                "already: take more poses, or larger markers"
-            )
         return told + self._impossible()
 
-    def _is_insignificant(self) -> bool:
-        """Return whether the camera tells too little to know better than the robot's file.
-
-        What lengths contradict each other by does not depend on how good the camera's map is.
-        """
-        verified, before = self.verified, self.before
-        contradicts_less = verified.residual_m < _LESS_CONTRADICTION * before.residual_m
-        within = before.mean_mm < self.predicted_3_sigma_mm
-        return verified.by_camera and within and not contradicts_less
+    def insignificance(self) -> str | None:
+        """Return why nothing is to be changed though nothing is wrong; None where it is."""
+        change = self.change
+        if change.significant:
+            return None
+        return (
+            f"not significant: noise alone changes parameters as much as this in "
+            f"{100.0 * change.chance:.0f} % of cases; positions would move by "
+            f"{1e3 * change.moved_m:.2f} mm (root mean square), and the robot's file may be right "
+            "already"
+        )
 
     def _impossible(self) -> list[str]:
         """Return which values cannot be of this robot."""
@@ -166,6 +152,8 @@ class Outcome:
         against = self.objections()
         lines = [fault.text for fault in self.faults if fault.text not in against]
         lines += [f"NOT GOOD: {text}" for text in against]
+        if (little := self.insignificance()) and not against:
+            lines.append(little)
         wanted = wanted_mm(self.robot)
         if not against:
             enough = self.predicted_3_sigma_mm <= wanted
@@ -209,6 +197,13 @@ class Outcome:
             "good": self.good,
             "verdict": self.verdict(),
             "objections": self.objections(),
+            "change": {
+                "significant": self.change.significant,
+                "chance": self.change.chance,
+                "chi_squared": self.change.chi_squared,
+                "parameters_told": self.change.told,
+                "positions_move_by_mm": 1e3 * self.change.moved_m,
+            },
             "poses": self.found.seen.poses,
             "converged": self.found.converged,
             "variance_factor": self.found.variance_factor,
@@ -244,71 +239,9 @@ def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def calibrate(
-    robot: Robot,
-    geometry: CableGeometry,
-    seen: Observations,
-    method: Method,
-    images: Images | None = None,
-) -> Outcome:
-    """Return the calibration that observations support; raises InvalidRequestError for too few.
-
-    With images it is fitted together with camera and markers. It is fitted to all poses, with what
-    is at fault left out, and anew without one pose in five, which verify it: these count for
-    nothing there, not even to find what is at fault.
-    """
-    if seen.poses < LEAST_POSES:
-        raise InvalidRequestError(
-            f"{seen.poses} poses; allowed: {LEAST_POSES} and more, some of which verify what the "
-            "others tell"
-        )
-    held = held_out(seen.poses)
-    slack = _SLACK_SHARE * np.asarray(limits_of(robot).slack_N, float)
-    known_room = bool(seen.measured.sum() >= _LEAST_POINTS)
-    first_map: MapFit | None = None
-    if images is None:
-        base = seen
-        require_enough(geometry, base.some(~held))
-        found, faults = fit_without_faults(geometry, base, slack)
-        found, weighed = fit_with_noise_seen(found, geometry)
-    else:
-        start = camera_start(geometry, seen, images.setup, images.sightings)
-        base = start.seen
-        require_enough(geometry, base.some(~held))
-        found, faults = fit_without_faults(geometry, base, slack, start.camera)
-        known_room = known_room or start.known_room
-        found, wrong = told_right(geometry, found, start.map)
-        found, weighed = fit_with_noise_seen(found, geometry)
-        readings = [one for one in faults if one.kind not in ("drum", "elongation")]
-        of_map = map_faults(start.map, images.sightings)
-        told = {(one.kind, one.cable) for one in wrong}
-        others = [one for one in parameter_faults(found) if (one.kind, one.cable) not in told]
-        faults = [*of_map, *readings, *wrong, *others]
-        first_map = start.map
-    unused = hold_out(geometry, weighed, base, slack, found, first_map, images)
-    verified, before = unused.verified(), unused.before(geometry)
-    birge = unused.birge_ratio()
-    larger = max(birge, 1.0) if known_room and math.isfinite(birge) else 1.0
-    sigma_mm, with_more_mm = (
-        larger * _three_sigma_mm(one, known_room) for one in (found, with_more_poses(found))
-    )
-    left_out = int((~unused.seen.used).sum())
-    return Outcome(
-        robot, found, method, faults, open_directions(found), verified, before, left_out,
-        sigma_mm, with_more_mm, known_room, unused, birge,
-    )  # fmt: skip
-
-
-def _three_sigma_mm(found: Fit, known_room: bool) -> float:
-    """Return what positions in the workspace are known to, the worst coordinate's rms."""
-    geometry = found.geometry
-    predicted = predicted_std(found, _grid(geometry), relative=not known_room)
-    return 3e3 * float(np.sqrt((predicted[:, : geometry.coordinates] ** 2).mean(axis=0).max()))
-
-
 def frame_of(outcome: Outcome) -> str:
     """Return in words what the identified coordinates are relative to."""
-    if outcome.found.seen.measured.sum() >= _LEAST_POINTS:
+    if outcome.found.seen.measured.sum() >= LEAST_POINTS:
         return "the room in which the platform was measured"
     if outcome.known_room:
         return "the room in which places of markers are known"
@@ -369,17 +302,6 @@ def _home(platform: Platform, pose: FloatArray) -> tuple[tuple[float, ...], tupl
         return position, platform.home_rotation_rad
     vector = Rotation.from_matrix(pose[1:]).as_rotvec()
     return position, tuple(vector[3 - turns :].tolist())
-
-
-def _grid(geometry: CableGeometry) -> FloatArray:
-    """Return poses spread over the workspace, at home's orientation."""
-    platform = geometry.model.platform
-    axes = [
-        np.linspace(low, high, _GRID)
-        for low, high in zip(platform.workspace_min_m, platform.workspace_max_m, strict=True)
-    ]
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
-    return geometry.model.poses(places)
 
 
 def wanted_mm(robot: Robot) -> float:

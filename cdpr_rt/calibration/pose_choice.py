@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.estimation.parameters import CABLE_ROWS, CableGeometry, Kind, Knowledge
 from cdpr_rt.calibration.estimation.residuals import lengths_told, linearise
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.robots.platform_model import PlatformModel
 
 EXIT_m = OFFSET_m = 0.1

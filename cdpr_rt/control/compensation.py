@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
 
 TWO_PI = 2.0 * math.pi
@@ -80,6 +81,19 @@ def _observe(
 
 
 @jit
+def _interpolated(tables: FloatArray, i: int, angle: float) -> tuple[float, float]:
+    """Return the torques of an axis' table at an angle from the index, for either direction."""
+    size = tables.shape[2]
+    place = (angle / TWO_PI - math.floor(angle / TWO_PI)) * size
+    low = int(place)
+    part = place - low
+    low %= size
+    high = (low + 1) % size
+    forward = (1.0 - part) * tables[i, 0, low] + part * tables[i, 0, high]
+    return forward, (1.0 - part) * tables[i, 1, low] + part * tables[i, 1, high]
+
+
+@jit
 def _torque(
     tables: FloatArray,
     means: FloatArray,
@@ -95,7 +109,6 @@ def _torque(
     out: FloatArray,
     cogging: FloatArray,
 ) -> None:
-    size = tables.shape[2]
     for i in range(out.size):
         if parameters[i, _AVAILABLE] == 0.0 or not index_known[i]:
             state[i, _FADE] = state[i, _STARTED] = 0.0
@@ -109,13 +122,7 @@ def _torque(
         moving = velocity + drift
         angle = reference[i] + deviation + moving * parameters[i, _LOOK_AHEAD] - index[i]
         moving = max(moving, 0.0) if velocity >= 0.0 else min(moving, 0.0)
-        place = (angle / TWO_PI - math.floor(angle / TWO_PI)) * size
-        low = int(place)
-        part = place - low
-        low %= size
-        high = (low + 1) % size
-        forward = (1.0 - part) * tables[i, 0, low] + part * tables[i, 0, high]
-        backward = (1.0 - part) * tables[i, 1, low] + part * tables[i, 1, high]
+        forward, backward = _interpolated(tables, i, angle)
         side = min(max(velocity / parameters[i, _BLEND], -1.0), 1.0)
         periodic = 0.5 * (1.0 + side) * (forward - means[i, 0])
         periodic += 0.5 * (1.0 - side) * (backward - means[i, 1])

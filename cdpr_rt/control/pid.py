@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.control.compensation import Compensation
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
 
 # the last state of an axis: whether its controller runs, or what its integral begins with
@@ -32,19 +33,6 @@ class PidGains:
     derivative_filter_s: float
     following_Nm_rad_s: float = 0.0
     """Added to the integral gain by the share of the set-point's motion that the axis follows."""
-
-
-class Compensation(Protocol):
-    """A feed-forward torque: cogging and friction of each motor."""
-
-    cogging_Nm: FloatArray
-    """The part of the torque last written that averages to nothing over a turn, (n,)."""
-
-    def reset(self) -> None:
-        """Forget the past."""
-
-    def torque(self, feedback: AxisFeedback, setpoint: Setpoint, out: FloatArray) -> None:
-        """Write the torque to add, (n,), Nm."""
 
 
 @jit

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.pid import PidGains
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import ControlError
 
 ComplexArray = NDArray[np.complex128]
@@ -137,7 +137,7 @@ def stiffest_pid(
     return design_pid(inertia_kg_m2, latency_s, bandwidths_Hz[-1], period_s)
 
 
-def stand_firm(design: PidDesign, period_s: float) -> PidDesign:
+def standstill_gains(design: PidDesign, period_s: float) -> PidDesign:
     """Return a design with as much gain at standstill as `MAX_SENSITIVITY` leaves.
 
     A rotor stands where the loop is stiffer than its cogging is steep. Phase margin is given away

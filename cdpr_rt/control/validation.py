@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.pid import PidGains
 from cdpr_rt.control.tuning import loop_response
-from cdpr_rt.core.exchange import BoolArray, FloatArray
 from cdpr_rt.errors import ControlError
 
 VELOCITY_LOW_PASS_Hz = 50.0

@@ -73,10 +73,6 @@ class Cycle:
         """Send the command as it stands, and close the cycle."""
         self.device.transmit()
 
-    def device_alarm(self) -> str:
-        """Return why the drives must not go on being driven, or an empty text."""
-        return self.device.alarm()
-
     def watch_alarm(self) -> str:
         """Return for what cause beside the axes the torque must go at once, or an empty text."""
         for watch in self.watches:

@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray
-from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.core.exchange import AxisFeedback
+from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.jit import bound, jit
 
 FILTER_S = 0.01
 """Speed and torque are judged over this: one encoder step a cycle is hundreds a second."""
 _FRICTION_FULL_rad_s = 0.1
+_M_PER_RAD, _GAIN, _BIAS, _FRICTION, _FRICTION_PER_N, _INERTIA = range(6)
+"""The rows of `WinchArrays.table`."""
 
 _PAST = np.dtype(
     [
@@ -52,7 +55,7 @@ class WinchArrays:
         return cls(*(np.zeros(n) for _ in range(6)))
 
     def table(self) -> FloatArray:
-        """Return all of it as (6, n)."""
+        """Return all of it as (6, n), a row for each attribute in their order."""
         return np.array(
             [
                 self.cable_m_per_rad,
@@ -106,7 +109,7 @@ def _update(
         if not valid[i]:
             continue
         # a measured friction of the winch has the motor's in it, but not its cogging
-        outer = torque[i] - (loss[i] if winch[3, i] == 0.0 else cogging[i])
+        outer = torque[i] - (loss[i] if winch[_FRICTION, i] == 0.0 else cogging[i])
         if own["started"] == 0.0:
             own["position"], own["torque"] = position[i], outer
             own["started"], velocity[i] = 1.0, 0.0
@@ -116,21 +119,21 @@ def _update(
         velocity[i] += gain
         own["torque"] += weight * (outer - own["torque"])
         own["position"], own["elapsed"] = position[i], 0.0
-        length[i] = own["length_at_zero"] + winch[0, i] * position[i]
+        length[i] = own["length_at_zero"] + winch[_M_PER_RAD, i] * position[i]
         tension[i] = np.nan
-        if winch[1, i] > 0.0:
+        if winch[_GAIN, i] > 0.0:
             # what the torque does not spend on accelerating the motor is on the cable
-            loaded = own["torque"] - winch[5, i] * gain / since
+            loaded = own["torque"] - winch[_INERTIA, i] * gain / since
             tension[i] = _tension(winch[:, i], loaded, velocity[i])
 
 
 @jit
 def _tension(winch: FloatArray, torque: float, velocity: float) -> float:
-    sign = 1.0 if winch[0] >= 0.0 else -1.0
+    sign = 1.0 if winch[_M_PER_RAD] >= 0.0 else -1.0
     winding = -sign * velocity / _FRICTION_FULL_rad_s
-    way = min(max(winding, -1.0), 1.0)
-    balanced = -sign * torque - winch[2] - way * winch[3]
-    return max(0.0, float(balanced / (winch[1] + way * winch[4])))
+    direction = min(max(winding, -1.0), 1.0)
+    balanced = -sign * torque - winch[_BIAS] - direction * winch[_FRICTION]
+    return max(0.0, float(balanced / (winch[_GAIN] + direction * winch[_FRICTION_PER_N])))
 
 
 @jit
@@ -170,7 +173,7 @@ class Estimator:
         """How often lengths were forgotten: whether angles still count from the same origins."""
         self._period_s = period_s
         self._winch = (winches or WinchArrays.bare(n)).table()
-        self.estimate.cable_m_per_rad[:] = self._winch[0]
+        self.estimate.cable_m_per_rad[:] = self._winch[_M_PER_RAD]
         self._past = np.zeros(n, _PAST)
         self._past["length_at_zero"] = np.nan
         sensors = range(n) if sensor_of_axis is None else sensor_of_axis
@@ -197,8 +200,10 @@ class Estimator:
     def set_lengths(self, position_rad: FloatArray, length_m: FloatArray) -> None:
         """Take the cables to have `length_m` (n,) at the motor angles; nan leaves one as it is."""
         for i, length in enumerate(length_m):
-            if math.isfinite(length) and self._winch[0, i] != 0.0:
-                self._past["length_at_zero"][i] = length - self._winch[0, i] * position_rad[i]
+            if math.isfinite(length) and self._winch[_M_PER_RAD, i] != 0.0:
+                self._past["length_at_zero"][i] = (
+                    length - self._winch[_M_PER_RAD, i] * position_rad[i]
+                )
                 self.estimate.cable_length_m[i] = length
         np.isfinite(self._past["length_at_zero"], out=self.estimate.length_known)
 

@@ -5,14 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cdpr_rt.arrays import BoolArray, FloatArray, WordArray
 from cdpr_rt.core.clock import Clock
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
-WordArray = NDArray[np.uint16]
 
 
 class AxisFeedback:

@@ -9,7 +9,7 @@ from typing import Final
 
 from cdpr_profiles.limits.limit_kinds import Limit
 from cdpr_profiles.limits.robot_limits import Reactions
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import Reaction
 
 __all__ = [

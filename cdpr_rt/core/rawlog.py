@@ -15,8 +15,8 @@ import numpy as np
 
 from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.reading.bounded_input import parse_json, read_bytes
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import Row
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import RawLogError
 
 _FORMAT = "cdpr-rt raw log"

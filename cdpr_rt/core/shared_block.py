@@ -286,7 +286,10 @@ class RowReader:
         block = self._block
         capacity = block.capacity
         head = int(block.counters["rows"][0])
-        self._skip(head - capacity)
+        oldest = head - capacity
+        if oldest > self.next:
+            self.lost += oldest - self.next
+            self.next = oldest
         last = min(head, self.next + most)
         numbers = np.arange(self.next, last, dtype=np.int64) % capacity
         rows = block.rows[numbers]
@@ -296,11 +299,6 @@ class RowReader:
         self.lost += stale
         self.next = last
         return rows[stale:]
-
-    def _skip(self, oldest: int) -> None:
-        if oldest > self.next:
-            self.lost += oldest - self.next
-            self.next = oldest
 
 
 class RowWriter:

@@ -8,8 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.estimate import AxisEstimate
-from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limit, Limits
 from cdpr_rt.core.states import Reaction
 from cdpr_rt.jit import bound, jit

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from cdpr_profiles.limits.motor_bounds import MOST_GAIN_ERROR
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import ControlError
 from cdpr_rt.identification.confidence import ConfidenceInterval
 

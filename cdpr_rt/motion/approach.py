@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 
 _EXACT = 1e-11

@@ -13,9 +13,9 @@ from enum import IntEnum
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import SAMPLES, SharedBlock
-from cdpr_rt.motion import pose_playback as playback
+from cdpr_rt.motion import jitter_buffer as playback
 
 
 class StreamState(IntEnum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 
 _SMALL_rad = 1e-9

@@ -6,7 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import Setpoint
 from cdpr_rt.jit import jit
 
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.base import Controller
-from cdpr_rt.core.exchange import BoolArray, FloatArray
 from cdpr_rt.core.rawlog import RawLog, RawLogWriter, column_names
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.identification import SweepData

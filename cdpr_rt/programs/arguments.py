@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.programs.base import ProgramError
 
 _SHOWN = 60

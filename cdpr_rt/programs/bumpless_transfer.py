@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
 
 _FADE_S = 0.2

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Idle
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.model import AxesModel

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdpr_profiles import RobotAxis
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import AxisCompensation
 from cdpr_rt.control.pid import PidGains
-from cdpr_rt.control.tuning import PidDesign, stand_firm, stiffest_pid, sweep_gain
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.control.tuning import PidDesign, standstill_gains, stiffest_pid, sweep_gain
 from cdpr_rt.core.limits import Limits
 
 BANDWIDTHS_Hz = (30.0, 25.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
@@ -57,7 +57,7 @@ def position_loop(inertia_kg_m2: float, latency_s: float, period_s: float) -> Pi
     quicker by `FOLLOWING_SHARE`.
     """
     design = stiffest_pid(inertia_kg_m2, latency_s, BANDWIDTHS_Hz, period_s)
-    firm = stand_firm(design, period_s)
+    firm = standstill_gains(design, period_s)
     gains = firm.gains
     following = FOLLOWING_SHARE * gains.proportional_Nm_rad**2 / gains.derivative_Nms_rad
     return replace(firm, gains=replace(gains, following_Nm_rad_s=following))

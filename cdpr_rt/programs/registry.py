@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_profiles import Robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.motion.pose_stream import PoseStream
+from cdpr_rt.programs.axes.axis_program import AxisProgram
 from cdpr_rt.programs.axes.follow import FollowProgram
-from cdpr_rt.programs.axes.hold import HoldProgram
 from cdpr_rt.programs.axes.jog import JogProgram
 from cdpr_rt.programs.axes.pid import PidProgram
 from cdpr_rt.programs.axes.position_loop import PositionLoop
@@ -67,7 +68,7 @@ def build_programs(
         return {program.name: program for program in _of_platform(model, loop, stream, parts)}
     programs: tuple[Program, ...] = (
         IdleProgram(model),
-        HoldProgram(model, loop),
+        AxisProgram(model, loop),  # which brakes and holds
         JogProgram(model, loop),
         SweepProgram(model),
         PidProgram(model, loop),

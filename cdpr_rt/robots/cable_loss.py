@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import NonlinearConstraint, minimize
 
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.rigid_body import free_directions, home_rotation, in_space, rotation
 
 _FURTHEST_RAD = 0.9 * np.pi

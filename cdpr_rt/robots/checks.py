@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.platform_model import platform_model

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics import free_rotation_kernel as kernel
 from cdpr_rt.robots.platform_model import PlatformModel

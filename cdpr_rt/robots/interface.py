@@ -2,64 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.base import Controller
-from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray
-from cdpr_rt.robots.kinematics.pose import Pose
-
-
-@dataclass
-class PoseSolution:
-    """A pose from cable lengths; it belongs to the kinematics and is overwritten by its next."""
-
-    pose: Pose
-    converged: bool = False
-    """False too where the lengths leave a direction free."""
-    steps: int = 0
-    residual_m: float = np.inf
-    """Root mean square over the cables of what their lengths are off."""
-
-
-class Kinematics(Protocol):
-    """Geometry of n cables and a platform of d controlled directions.
-
-    A twist is (velocity of the origin, angular velocity) along the axes of the room, and d of its
-    six components are controlled; `out`, where given, is written and returned.
-    """
-
-    n: int
-    directions: tuple[int, ...]
-    """Which of the twist's components are controlled, in order."""
-
-    def lengths(
-        self, pose: Pose, tension_N: FloatArray | None = None, out: FloatArray | None = None
-    ) -> FloatArray:
-        """Return the lengths (n,) that the winches have to pay out, under tensions (n,)."""
-
-    def jacobian(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
-        """Return J (n, d), the derivative of the lengths by the controlled twist."""
-
-    def wrench_matrix(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
-        """Return W = -J^T (d, n): tensions t give the platform the wrench W t, W t + w_e = 0."""
-
-    def wrench_matrices(self, poses: FloatArray, out: FloatArray) -> None:
-        """Write W (m, d, n) at the arrays of m poses (m, 4, 3); nan where a cable has no length."""
-
-    def pose_from_lengths(
-        self,
-        lengths_m: FloatArray,
-        start: Pose,
-        tension_N: FloatArray | None = None,
-        restarts: int = 0,
-    ) -> PoseSolution:
-        """Return the pose whose lengths are next to `lengths_m` (n,), searched from `start`."""
-
-    def covariance(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
-        """Return the covariance (6, 6) of a pose that was found from lengths, in m and rad."""
+from cdpr_rt.core.exchange import AxisFeedback
 
 
 class PlatformControl(Controller, Protocol):
@@ -136,8 +83,8 @@ class PlatformControl(Controller, Protocol):
     def clear_compensation(self) -> None:
         """Have it said that nothing is added, while a program drives the winches itself."""
 
-    def stand_still(self) -> None:
-        """Have the set-point stand where the platform is."""
+    def stand_still(self, *, on_stand: bool = False) -> None:
+        """Have the set-point stand where the platform is, which may rest `on_stand`."""
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:
         """Return the lengths without tension of cables that hold `tension_N` at home."""
@@ -148,7 +95,7 @@ class PlatformControl(Controller, Protocol):
     def tension_infeasibility(self) -> str:
         """Return why the last cycle's tensions are not feasible, an empty text where they are."""
 
-    def stands(self, position: FloatArray) -> bool:
+    def is_feasible(self, position: FloatArray) -> bool:
         """Return whether the platform can be held, and accelerated, at a position."""
 
     def contact_ahead(self, position: FloatArray) -> int:
@@ -167,5 +114,5 @@ class PlatformControl(Controller, Protocol):
     def infeasibility(self, position: FloatArray) -> str:
         """Return why the platform cannot stand at a position, an empty text where it can."""
 
-    def path_obstacle(self, position: FloatArray, start: FloatArray | None = None) -> str:
+    def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
         """Return what is in the straight way to a position, from where it is or from `start`."""

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles.platform import FURTHEST_m
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import AxisEstimate
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.state_file import StateFileError, read_state, write_state
 
 _FIELDS = ("cable_length_m", "cable_at_index_m")
@@ -151,6 +152,24 @@ def off_index_m(
     turn = math.tau * np.abs(cable_m)
     off = np.remainder(at_index - last.cable_at_index_m + 0.5 * turn, turn) - 0.5 * turn
     return np.where(feedback.index_known, off, math.nan)
+
+
+def index_disagreement(
+    last: StoppedLengths,
+    length_m: FloatArray,
+    feedback: AxisFeedback,
+    cable_m: FloatArray,
+    allowed_m: float,
+) -> str:
+    """Return which index is by more than `allowed_m` off, see `off_index_m`; "" for none."""
+    off_m = np.nan_to_num(np.abs(off_index_m(last, length_m, feedback, cable_m)))
+    worst = int(off_m.argmax())
+    if off_m[worst] <= allowed_m:
+        return ""
+    return (
+        f"cable {worst + 1}: its motor's index is {1e3 * off_m[worst]:.0f} mm from where the last "
+        f"stop has it, {1e3 * allowed_m:.0f} mm allowed: lower, and tighten from home"
+    )
 
 
 def _length_m(value: Any, most_m: float) -> float:

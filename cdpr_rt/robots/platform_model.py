@@ -10,10 +10,10 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.interference.interference import Interference
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
-from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
+from cdpr_rt.robots.kinematics.kinematics import PLANAR, SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.kinematics.pose_setpoint import poses_of_coordinates
 from cdpr_rt.robots.rigid_body import home_rotation, in_space, inertia_kg_m2
@@ -242,7 +242,7 @@ def _left_by_torque(robot: Robot, high_N: FloatArray) -> FloatArray:
 def directions_of(platform: Platform) -> tuple[int, ...]:
     """Return which components of the twist the cables control."""
     names = DIRECTIONS[len(platform.home_m)]
-    places = SPATIAL if len(names) == len(SPATIAL) else (0, 1, 5)
+    places = SPATIAL if len(names) == len(SPATIAL) else PLANAR
     return tuple(i for name, i in zip(names, places, strict=True) if name in platform.controlled)
 
 

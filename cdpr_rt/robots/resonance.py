@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.rigid_body import free_directions, home_rotation, in_space, inertia_kg_m2
 
 _NEAREST_m = 1e-3

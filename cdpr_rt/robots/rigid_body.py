@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from cdpr_profiles.platform import DIRECTIONS, Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics.pose import exponential
 
 LEAST_ARM_m = 0.01

@@ -12,8 +12,8 @@ import numpy as np
 from cdpr_profiles import Robot, RobotAxis
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_profiles.platform import Platform
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import WinchArrays
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.limits import DEFAULT_REACTIONS, Limits, reactions_of
 
 RATED_SPEED_SHARE: Final = 0.2

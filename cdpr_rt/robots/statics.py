@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics.kinematics import PLANAR_POINT
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.rigid_body import (

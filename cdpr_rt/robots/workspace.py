@@ -9,13 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import bound
-from cdpr_rt.robots.interface import Kinematics
+from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.tension.circuit_margin import MOST_NULL_DIRECTIONS, write_circuit_margins
 from cdpr_rt.robots.tension.null_space import null_spaces
-from cdpr_rt.robots.tension.tension_projection import write_margins
+from cdpr_rt.robots.tension.tension_qp import write_margins
 
 G_m_s2 = 9.80665
 SHARES = np.linspace(0.0, 1.0, 33)
@@ -31,7 +31,7 @@ class CableWorkspace:
 
     def __init__(
         self,
-        kinematics: Kinematics,
+        kinematics: CableKinematics,
         wrenches: FloatArray,
         low_N: FloatArray,
         high_N: FloatArray,
@@ -71,11 +71,11 @@ class CableWorkspace:
 
     @cached_property
     def _one(self) -> _Pass:
-        return self._pass(1, 0.0)
+        return _Pass(self, 1, 0.0)
 
     @cached_property
     def _way(self) -> _Pass:
-        return self._pass(len(SHARES), 0.0)
+        return _Pass(self, len(SHARES), 0.0)
 
     def margins(self, poses: FloatArray, most_N: float = math.inf) -> tuple[FloatArray, FloatArray]:
         """Return margins (m,), at most `most_N`, and the worst wrenches' tensions (m, n).
@@ -83,7 +83,7 @@ class CableWorkspace:
         `poses` (m, 4, 3) are `Pose.array` of each. Tensions are nan, and a margin -inf, where the
         cables cannot hold some direction.
         """
-        tried = self._pass(len(poses), most_N)
+        tried = _Pass(self, len(poses), most_N)
         tried.poses[:] = poses
         tried.run()
         return tried.margins, tried.tensions
@@ -119,7 +119,7 @@ class CableWorkspace:
         """The `centre` (3,), wrenches (k, d), how many of them are generators, scale, bounds."""
         return self._centre, self._sets, self._generators, self._scale, self._bounds
 
-    def stands(self, pose: Pose) -> bool:
+    def is_feasible(self, pose: Pose) -> bool:
         """Return whether the platform is held at a pose; once `prepared` allocates no arrays."""
         self._one.poses[0] = pose.array
         self._one.run_margins()
@@ -127,12 +127,14 @@ class CableWorkspace:
 
     def infeasibility(self, pose: Pose) -> str:
         """Return why the platform is not held at a pose, an empty text where it is."""
-        if self.stands(pose):
+        if self.is_feasible(pose):
             return ""
         self._one.run()
-        return self._infeasibility_at_one()
+        margin_N = float(self._one.margins[0])
+        why = infeasibility_text(margin_N, self._one.tensions[0], self.low, self.high)
+        return f"{why} (with a reserve of {self.reserve_N:.1f} N)" if self.reserve_N else why
 
-    def first_obstacle(self, poses: FloatArray) -> tuple[Pose, str] | None:
+    def first_infeasible(self, poses: FloatArray) -> tuple[Pose, str] | None:
         """Return the first of the poses (33, 4, 3) of a way that is not held, and why; or None.
 
         A start that is not held is left first. The pose is overwritten by the next call.
@@ -146,14 +148,6 @@ class CableWorkspace:
         k = first + int(held[first:].argmin())
         self._there.array[:] = poses[k]
         return self._there, self.infeasibility(self._there)
-
-    def _pass(self, m: int, most_N: float) -> _Pass:
-        return _Pass(self, m, most_N)
-
-    def _infeasibility_at_one(self) -> str:
-        margin_N = float(self._one.margins[0])
-        why = infeasibility_text(margin_N, self._one.tensions[0], self.low, self.high)
-        return f"{why} (with a reserve of {self.reserve_N:.1f} N)" if self.reserve_N else why
 
 
 class _Pass:

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, POSE_FIELDS, SCALAR_FIELDS, Field
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.shared_block import RowWriter, SharedBlock
 from cdpr_rt.jit import bound, copy_bytes, jit
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle import Watch
 from cdpr_rt.core.exchange import AxisDevice
-from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.errors import ControlError
 
 

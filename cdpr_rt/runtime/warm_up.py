@@ -12,7 +12,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.supervisor import Supervisor
-from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 
 

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_drivers.axes.answer_wait import AnswerWait
 from cdpr_drivers.axes.axis_group import AxisGroup
 from cdpr_drivers.axes.axis_layout import AxisConfig
 from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.canopen.network import CanNetwork
 from cdpr_drivers.cia402 import POWER_OFF, State
 from cdpr_drivers.errors import BusError, DriverError, ModeRefusedError
-from cdpr_rt.core.exchange import AxisCommand, AxisFeedback, BoolArray
+from cdpr_rt.arrays import BoolArray
+from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
 
 _STOP_TIMEOUT_S = 1.0
+_SHORTEST_SLEEP_S = 5e-5
+"""Shorter waits are left to the sockets."""
+_RISE, _FALL = 0.1, 0.995
 
 
 @dataclass(frozen=True)
@@ -66,8 +69,8 @@ class AxisBuses:
                 group.close()
             raise
         self._names = {group: bus.name for group, bus in zip(self.groups, buses, strict=True)}
-        self.axes = tuple(group.axes[i] for group, i in self._in_order())
-        self.feedback, self.command = arrays.feedback(), arrays.command()
+        self.axes: tuple[AxisConfig, ...] = tuple(self._by_axis(lambda group: group.axes))
+        self.feedback, self.command = arrays.feedback, arrays.command
         self._reordering = AxisReordering(order, self.feedback, self.command)
         if self._reordering.needed:
             self.feedback, self.command = self._reordering.feedback, self._reordering.command
@@ -223,13 +226,11 @@ class AxisBuses:
 
     def states(self) -> list[State]:
         """Return the state each axis reported last."""
-        by_group = {id(group): group.states() for group in self.groups}
-        return [by_group[id(group)][i] for group, i in self._in_order()]
+        return self._by_axis(AxisGroup.states)
 
     def faulted(self) -> BoolArray:
         """Return which axes have been in fault since the last acknowledgement, (n,)."""
-        by_group = {id(group): group.faulted() for group in self.groups}
-        return np.array([by_group[id(group)][i] for group, i in self._in_order()])
+        return np.array(self._by_axis(AxisGroup.faulted))
 
     def acknowledge_fault(self) -> None:
         """Forget latched alarms and reset drives in fault; see `AxisGroup.acknowledge_fault`."""
@@ -239,8 +240,7 @@ class AxisBuses:
     @property
     def torque_modes(self) -> list[int]:
         """Return the mode in which each drive obeys a torque, by its profile."""
-        by_group = {id(group): group.torque_modes for group in self.groups}
-        return [by_group[id(group)][i] for group, i in self._in_order()]
+        return [axis.drive.mode_torque for axis in self.axes]
 
     def ask_mode(self, modes: int | Sequence[int]) -> None:
         """Ask for a mode of operation, one for all or one each; see `AxisGroup.ask_mode`."""
@@ -261,8 +261,10 @@ class AxisBuses:
         """Return the group that an axis belongs to, and its number there."""
         return self._location[axis]
 
-    def _in_order(self) -> list[tuple[AxisGroup, int]]:
-        return [self._location[number] for number in range(self.n)]
+    def _by_axis(self, ask: Callable[[AxisGroup], Any]) -> list[Any]:
+        """Return the answers of all groups, in the order of the axes."""
+        answers = {group: ask(group) for group in self.groups}
+        return [answers[group][i] for group, i in map(self.group_of, range(self.n))]
 
     # -- the end
 
@@ -344,3 +346,29 @@ class AxisReordering:
         """Copy the torques that were sent."""
         sent, in_axis_order = self._bus_command.sent_torque_Nm, self.command.sent_torque_Nm
         np.take(sent, self._columns, out=in_axis_order, mode="clip")
+
+
+class AnswerWait:
+    """Sleeps until the answers have usually come, and adapts that time from cycle to cycle.
+
+    Waking up costs the host more than reading the frames of a whole cycle. `most_s` bounds the
+    sleep, from SYNC on.
+    """
+
+    def __init__(self, most_s: float) -> None:
+        self._most_s = most_s
+        self._expected_s = 0.0
+
+    def sleep(self, since_s: float) -> None:
+        """Sleep until the answers to the SYNC of `since_s` (monotonic) have usually come."""
+        left = since_s + self._expected_s - time.monotonic()
+        if left > _SHORTEST_SLEEP_S:
+            time.sleep(left)
+
+    def learn(self, took_s: float, too_early: bool) -> None:
+        """Adapt to how long all answers took and whether some were missing after the sleep."""
+        if too_early:
+            took_s = min(took_s, self._most_s)
+            self._expected_s += _RISE * (took_s - self._expected_s)
+        else:  # they may have come earlier, which only an earlier look can show
+            self._expected_s *= _FALL

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray, WordArray
+from cdpr_rt.arrays import BoolArray, FloatArray, WordArray
 from cdpr_rt.jit import jit
 
 Frames = NDArray[np.uint8]

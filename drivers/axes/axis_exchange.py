@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_drivers.axes import axis_codec as codec
 from cdpr_drivers.axes.axis_alarms import alarm_text
 from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
-from cdpr_drivers.axes.axis_state import GroupState, StateArrays
+from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.bus.frames import FRAME
 from cdpr_drivers.bus.simulated_bus import SimulatedBus
 from cdpr_drivers.canopen.network import CanNetwork
@@ -62,7 +62,8 @@ class AxisExchange:
         self.waits = 0
         """How often a frame was waited for, in paced cycles."""
         self._alarms = 0
-        state = GroupState(self.axes, period_s, self.lockstep, arrays)
+        state = arrays or StateArrays(self.n)
+        state.begin(self.axes, period_s, self.lockstep)
         self._ints, self._floats = state.ints, state.floats
         self._words, self._flags = state.words, state.flags
         self.feedback, self.command = state.feedback, state.command

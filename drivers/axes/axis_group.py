@@ -10,11 +10,10 @@ import numpy as np
 from cdpr_drivers.axes import axis_codec as codec
 from cdpr_drivers.axes.axis_exchange import AxisExchange, has_deadline
 from cdpr_drivers.axes.axis_layout import AxisConfig
-from cdpr_drivers.axes.axis_shutdown import switch_off_by_sdo
 from cdpr_drivers.axes.axis_state import NO_MODE
 from cdpr_drivers.cia402 import HALT, POWER_OFF, TARGETS, State, mode_name, supports
 from cdpr_drivers.errors import BusError, DriveFaultError, ModeRefusedError, SdoError
-from cdpr_rt.core.exchange import BoolArray
+from cdpr_rt.arrays import BoolArray
 
 __all__ = ["AxisConfig", "AxisGroup"]
 
@@ -226,11 +225,7 @@ class AxisGroup(AxisExchange):
         try:
             if self._switch_off_by_cycles():
                 return ""
-            left = [
-                axis.node_id
-                for axis in self.axes
-                if not switch_off_by_sdo(self.network, axis.node_id)
-            ]
+            left = [a.node_id for a in self.axes if not self.network.switch_off(a.node_id)]
         except BusError as error:
             nodes = ", ".join(str(axis.node_id) for axis in self.axes)
             return f"node {nodes}: not known to be without power: {error}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from cdpr_drivers.axes.axis_codec import Ints
 from cdpr_drivers.axes.axis_layout import AxisConfig
 from cdpr_drivers.cia402 import State
 from cdpr_drivers.drive_units import whole_units
-from cdpr_rt.core.exchange import AxisCommand, AxisFeedback, BoolArray, FloatArray, WordArray
+from cdpr_rt.arrays import BoolArray, FloatArray, WordArray
+from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
 
 NO_MODE = -1000
 """Requested mode of an axis that was not asked for any."""
@@ -40,8 +42,9 @@ class StateArrays:
         view.flags, view.words = self.flags[:, first:last], self.words[:, first:last]
         return view
 
+    @cached_property
     def feedback(self) -> AxisFeedback:
-        """Return the feedback whose arrays are rows of these."""
+        """The feedback whose arrays are rows of these."""
         feedback = AxisFeedback(self.ints.shape[1])
         feedback.position_rad = self.floats[codec.POSITION_RAD]
         feedback.torque_Nm = self.floats[codec.TORQUE_NM]
@@ -53,32 +56,17 @@ class StateArrays:
         feedback.statusword = self.words[0]
         return feedback
 
+    @cached_property
     def command(self) -> AxisCommand:
-        """Return the command whose arrays are rows of these."""
+        """The command whose arrays are rows of these."""
         command = AxisCommand(self.ints.shape[1])
         command.torque_Nm = self.floats[codec.COMMAND_NM]
         command.sent_torque_Nm = self.floats[codec.SENT_NM]
         return command
 
-
-class GroupState:
-    """Initial state of n axes; `feedback` and `command` are views into the arrays of the kernels.
-
-    `arrays` are part of a larger device's, where given.
-    """
-
-    def __init__(
-        self,
-        axes: Sequence[AxisConfig],
-        period_s: float,
-        lockstep: bool,
-        arrays: StateArrays | None = None,
-    ) -> None:
-        arrays = arrays or StateArrays(len(axes))
-        self.ints = ints = arrays.ints
-        self.floats = floats = arrays.floats
-        self.words, self.flags = arrays.words, arrays.flags
-        self.feedback, self.command = arrays.feedback(), arrays.command()
+    def begin(self, axes: Sequence[AxisConfig], period_s: float, lockstep: bool) -> None:
+        """Write the initial state of the axes, and what their drives are made for."""
+        ints, floats = self.ints, self.floats
         ints[codec.TARGET] = State.SWITCH_ON_DISABLED
         ints[codec.STATE] = State.UNKNOWN
         ints[codec.MODE_REQUESTED] = NO_MODE

@@ -15,12 +15,13 @@ from cdpr_drivers.axes import axis_codec as codec
 from cdpr_drivers.axes.axis_alarms import alarm_text
 from cdpr_drivers.axes.axis_buses import AxisReordering
 from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
-from cdpr_drivers.axes.axis_state import GroupState, StateArrays
+from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.bus import BusHealth, BusUrl, FrameBuffer, open_port
 from cdpr_drivers.cia402 import STATE_TABLE, State
 from cdpr_profiles import Winch
+from cdpr_rt.arrays import BoolArray
 from cdpr_rt.core.clock import PacedClock
-from cdpr_rt.core.exchange import AxisCommand, AxisFeedback, BoolArray
+from cdpr_rt.core.exchange import AxisCommand, AxisFeedback
 
 _SYNC_ID = 0x080
 _SYNC_HEAD = bytes([_SYNC_ID, 0, 0, 0])
@@ -87,8 +88,8 @@ class ListeningDevice:
         except BaseException:
             self.close()
             raise
-        self.feedback: AxisFeedback = arrays.feedback()
-        self.command: AxisCommand = arrays.command()
+        self.feedback: AxisFeedback = arrays.feedback
+        self.command: AxisCommand = arrays.command
         self._reordering = AxisReordering(order, self.feedback, self.command)
         if self._reordering.needed:
             self.feedback, self.command = self._reordering.feedback, self._reordering.command
@@ -215,12 +216,11 @@ class _BusMonitor:
         self.health = BusHealth()
         self.alarms = 0
         self._layout = layout = GroupLayout(self.axes)
-        state = GroupState(self.axes, period_s, False, arrays)
-        self.ints, self._floats, self._words, self._flags = (
-            state.ints, state.floats, state.words, state.flags,
-        )  # fmt: skip
-        self.valid = state.feedback.valid
-        self._seen = state.ints[codec.TPDOS_RECEIVED]
+        arrays.begin(self.axes, period_s, lockstep=False)
+        self.ints, self._floats = arrays.ints, arrays.floats
+        self._words, self._flags = arrays.words, arrays.flags
+        self.valid = arrays.feedback.valid
+        self._seen = arrays.ints[codec.TPDOS_RECEIVED]
         self._rx = FrameBuffer(_FRAMES_PER_AXIS * len(self.axes) + _SPARE_FRAMES)
         self._others = np.zeros(len(self._rx.rows) + 1, np.int64)
         self._missing = 0

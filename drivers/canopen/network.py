@@ -15,10 +15,10 @@ from cdpr_drivers.canopen import emergency as emcy
 from cdpr_drivers.canopen import error_control as nmt
 from cdpr_drivers.canopen.emergency import Emergency, EmergencyLog
 from cdpr_drivers.canopen.error_control import ErrorControl
-from cdpr_drivers.canopen.objects import ObjectAccess
+from cdpr_drivers.canopen.sdo_access import ObjectAccess
 from cdpr_drivers.canopen.sdo_frames import ANSWER
-from cdpr_drivers.cia402 import POWER_OFF, state_of
-from cdpr_drivers.errors import BusError, DriverError
+from cdpr_drivers.cia402 import DISABLE_VOLTAGE, POWER_OFF, state_of
+from cdpr_drivers.errors import BusError, DriverError, SdoError
 from cdpr_rt.core.clock import Clock
 
 _SYNC, _EMCY, _HEARTBEAT = 0x080, 0x080, 0x700
@@ -96,7 +96,7 @@ class CanNetwork(BusMember, ObjectAccess):
         if self.cycling:
             return math.inf
         if now_s >= self._heartbeat_at_s:
-            self._send_heartbeat()
+            self.start_heartbeat()
         # only when no frame waits: the heartbeat may be among those
         if now_s >= self._look_at_s and not self.poll():
             self._look_at_s = now_s + _LOOK_S
@@ -223,6 +223,21 @@ class CanNetwork(BusMember, ObjectAccess):
         self._errors.expect_reset(node_id)
         self._command(_RESET_NODE, node_id)
 
+    def switch_off(self, node_id: int) -> bool:
+        """Take the power from one drive by SDO and return whether it says that it has none.
+
+        For when no cycles run or it does not follow them. One that does not say so is reset, as the
+        last resort. Raises BusError.
+        """
+        try:
+            self.write(node_id, 0x6040, 0, DISABLE_VOLTAGE)
+            if state_of(self.read_int(node_id, 0x6041)) in POWER_OFF:
+                return True
+        except SdoError:
+            pass  # it does not listen to SDO either
+        self.reset(node_id)
+        return False
+
     def release(self, node_id: int) -> None:
         """Leave a node alone: without power it need not watch the master's heartbeat any more.
 
@@ -265,13 +280,10 @@ class CanNetwork(BusMember, ObjectAccess):
         self._errors.restart_watch()
         if self.cycling:
             self.cycling = False
-            self._send_heartbeat()  # the cycle's last one may be a whole period ago
+            self.start_heartbeat()  # the cycle's last one may be a whole period ago
 
     def start_heartbeat(self) -> None:
         """Begin to produce the master's heartbeat; the drives watch it from the first one on."""
-        self._send_heartbeat()
-
-    def _send_heartbeat(self) -> None:
         # twice as often as configured: a master that computes for a while does not wait
         self._heartbeat_at_s = self.clock.now_s + 0.5 * self.heartbeat_s
         try:

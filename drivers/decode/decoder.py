@@ -129,11 +129,10 @@ class Decoder:
         return Record(frame, "EMCY", node_id, text, problem=problem)
 
     def _heartbeat(self, frame: Frame, node_id: int) -> Record:
-        text = messages.heartbeat(frame.data)
+        text, problem = messages.heartbeat(frame.data)
         if frame.data[:1] == b"\0":
             self._node(node_id).mode = None
-        malformed = len(frame.data) != 1 or frame.data[0] & 0x7F not in messages.NMT_STATES
-        return Record(frame, "heartbeat", node_id, text, problem=malformed)
+        return Record(frame, "heartbeat", node_id, text, problem=problem)
 
     def _pdo(self, frame: Frame, pdo: PdoView) -> Record:
         fields, note = pdo.read(frame.data)
@@ -146,9 +145,8 @@ class Decoder:
         return Record(frame, kind, pdo.node.node_id, "; ".join(texts), tuple(fields), problem)
 
     def _request(self, frame: Frame, node_id: int) -> Record:
-        return self._sdo_record(
-            frame, node_id, "->", self._sdo_decoder(node_id).request(frame.data)
-        )
+        event = self._sdo_decoder(node_id).request(frame.data)
+        return self._sdo_record(frame, node_id, "->", event)
 
     def _response(self, frame: Frame, node_id: int) -> Record:
         event = self._sdo_decoder(node_id).response(frame.data)
@@ -215,36 +213,12 @@ def _bytes(frame: Frame) -> str:
     return frame.data.hex(" ").upper() or "no data"
 
 
-_Read = Callable[[bytes], tuple[str, bool]]
-
-
-def _nmt(data: bytes) -> tuple[str, bool]:
-    return messages.nmt_command(data), len(data) != 2
-
-
-def _sync(data: bytes) -> tuple[str, bool]:
-    return messages.sync(data), len(data) > 1
-
-
-def _time(data: bytes) -> tuple[str, bool]:
-    return messages.time_stamp(data), len(data) != 6
-
-
-def _lss(data: bytes) -> tuple[str, bool]:
-    return f"-> {messages.lss_request(data)}", len(data) != 8
-
-
-def _lss_answer(data: bytes) -> tuple[str, bool]:
-    text, problem = messages.lss_answer(data)
-    return f"<- {text}", problem
-
-
-_FIXED: dict[int, tuple[str, _Read]] = {
-    0x000: ("NMT", _nmt),
-    0x080: ("SYNC", _sync),
-    0x100: ("TIME", _time),
-    0x7E4: ("LSS", _lss_answer),
-    0x7E5: ("LSS", _lss),
+_FIXED: dict[int, tuple[str, Callable[[bytes], messages.Reading]]] = {
+    0x000: ("NMT", messages.nmt_command),
+    0x080: ("SYNC", messages.sync),
+    0x100: ("TIME", messages.time_stamp),
+    0x7E4: ("LSS", messages.lss_answer),
+    0x7E5: ("LSS", messages.lss_request),
 }
 _SERVICES: dict[int, Callable[[Decoder, Frame, int], Record]] = {
     0x080: Decoder._emergency,

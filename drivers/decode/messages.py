@@ -9,6 +9,9 @@ from collections.abc import Callable
 from cdpr_drivers.canopen.emergency import register_text
 from cdpr_drivers.cia402 import fault_text
 
+Reading = tuple[str, bool]
+"""A message in words, and whether it is a problem."""
+
 NMT_STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
 _NMT_COMMANDS = {
     1: "start",
@@ -22,30 +25,27 @@ _TIME = struct.Struct("<IH")
 _CIA_EPOCH = datetime.datetime(1984, 1, 1)
 
 
-def nmt_state(value: int) -> str:
-    """Return the NMT state of a heartbeat in words."""
-    return NMT_STATES.get(value & 0x7F, f"NMT state {value & 0x7F}, which there is not")
-
-
-def nmt_command(data: bytes) -> str:
-    """Return an NMT command in words."""
+def nmt_command(data: bytes) -> Reading:
+    """Read an NMT command."""
     if len(data) != 2:
         return _wrong_length("NMT command", data, 2)
     nodes = f"node {data[1]}" if data[1] else "all nodes"
-    return f"{_NMT_COMMANDS.get(data[0], f'command {data[0]}, which there is not')}: {nodes}"
+    command = _NMT_COMMANDS.get(data[0], f"command {data[0]}, which there is not")
+    return f"{command}: {nodes}", False
 
 
-def heartbeat(data: bytes) -> str:
-    """Return a heartbeat or boot-up message in words."""
+def heartbeat(data: bytes) -> Reading:
+    """Read a heartbeat or boot-up message."""
     if len(data) != 1:
         return _wrong_length("heartbeat", data, 1)
-    return nmt_state(data[0])
+    state = data[0] & 0x7F
+    return NMT_STATES.get(state, f"NMT state {state}, which there is not"), state not in NMT_STATES
 
 
-def emergency(data: bytes) -> tuple[str, bool]:
-    """Return an EMCY message in words, and whether it reports an error (or its end)."""
+def emergency(data: bytes) -> Reading:
+    """Read an EMCY message: a problem where it reports an error, and not its end."""
     if len(data) != 8:
-        return _wrong_length("EMCY", data, 8), True
+        return _wrong_length("EMCY", data, 8)
     code, register, vendor = _EMCY.unpack(data)
     text = f"{fault_text(code)}; error register {register:02X}h ({register_text(register)})"
     if any(vendor):
@@ -53,20 +53,20 @@ def emergency(data: bytes) -> tuple[str, bool]:
     return text, bool(code >> 8)
 
 
-def sync(data: bytes) -> str:
-    """Return a SYNC in words: its counter, where it has one."""
-    if not data:
-        return ""
-    return f"counter {data[0]}" if len(data) == 1 else _wrong_length("SYNC", data, 1)
+def sync(data: bytes) -> Reading:
+    """Read a SYNC: its counter, where it has one."""
+    if len(data) > 1:
+        return _wrong_length("SYNC", data, 1)
+    return f"counter {data[0]}" if data else "", False
 
 
-def time_stamp(data: bytes) -> str:
-    """Return a TIME message as date and time."""
+def time_stamp(data: bytes) -> Reading:
+    """Read a TIME message: date and time."""
     if len(data) != 6:
         return _wrong_length("TIME", data, 6)
     milliseconds, days = _TIME.unpack(data)
     moment = _CIA_EPOCH + datetime.timedelta(days=days, milliseconds=milliseconds & 0x0FFFFFFF)
-    return moment.isoformat(sep=" ", timespec="milliseconds")
+    return moment.isoformat(sep=" ", timespec="milliseconds"), False
 
 
 _LSS_TABLE_kbit_s = {0: 1000, 1: 800, 2: 500, 3: 250, 4: 125, 6: 50, 7: 20, 8: 10, 9: 0}
@@ -90,34 +90,36 @@ _LSS_ANSWERS = {
 _LSS_CONFIGURED = {0x11: "node id", 0x13: "bit rate", 0x17: "storing"}
 
 
-def lss_request(data: bytes) -> str:
-    """Return what an LSS master asks (CiA 305), in words."""
+def lss_request(data: bytes) -> Reading:
+    """Read what an LSS master asks (CiA 305)."""
     if len(data) != 8:
-        return _wrong_length("LSS request", data, 8)
+        return _wrong_length("LSS request", data, 8, "-> ")
     command, number = data[0], int.from_bytes(data[1:5], "little")
+    text = f"command {command:02X}h, which there is not"
     if command in _LSS_SELECT:
-        return f"{_LSS_SELECT[command]} {number:08X}h"
-    if command in _LSS_IDENTIFY:
-        return f"{_LSS_IDENTIFY[command]} {number:08X}h?"
-    if command in _LSS_INQUIRE:
-        return f"tell your {_LSS_INQUIRE[command]}"
-    describe = _LSS_COMMANDS.get(command)
-    return describe(data) if describe else f"command {command:02X}h, which there is not"
+        text = f"{_LSS_SELECT[command]} {number:08X}h"
+    elif command in _LSS_IDENTIFY:
+        text = f"{_LSS_IDENTIFY[command]} {number:08X}h?"
+    elif command in _LSS_INQUIRE:
+        text = f"tell your {_LSS_INQUIRE[command]}"
+    elif command in _LSS_COMMANDS:
+        text = _LSS_COMMANDS[command](data)
+    return f"-> {text}", False
 
 
-def lss_answer(data: bytes) -> tuple[str, bool]:
-    """Return what an LSS slave answers in words, and whether it is an error."""
+def lss_answer(data: bytes) -> Reading:
+    """Read what an LSS slave answers."""
     if len(data) != 8:
-        return _wrong_length("LSS answer", data, 8), True
+        return _wrong_length("LSS answer", data, 8, "<- ")
     command, number = data[0], int.from_bytes(data[1:5], "little")
     if command in _LSS_CONFIGURED:
         done = f"refused (error {data[1]}, {data[2]})" if data[1] else "done"
-        return f"{_LSS_CONFIGURED[command]}: {done}", bool(data[1])
+        return f"<- {_LSS_CONFIGURED[command]}: {done}", bool(data[1])
     if command in _LSS_INQUIRE:
         value = str(data[1]) if command == 0x5E else f"{number:08X}h"
-        return f"{_LSS_INQUIRE[command]} is {value}", False
-    text = _LSS_ANSWERS.get(command)
-    return text or f"command {command:02X}h, which there is not", text is None
+        return f"<- {_LSS_INQUIRE[command]} is {value}", False
+    text = _LSS_ANSWERS.get(command, f"command {command:02X}h, which there is not")
+    return f"<- {text}", command not in _LSS_ANSWERS
 
 
 def _switch_all(data: bytes) -> str:
@@ -154,5 +156,5 @@ _LSS_COMMANDS: dict[int, Callable[[bytes], str]] = {
 }
 
 
-def _wrong_length(what: str, data: bytes, wanted: int) -> str:
-    return f"{what} of {len(data)} bytes, not {wanted}: {data.hex(' ').upper()}"
+def _wrong_length(what: str, data: bytes, wanted: int, arrow: str = "") -> Reading:
+    return f"{arrow}{what} of {len(data)} bytes, not {wanted}: {data.hex(' ').upper()}", True

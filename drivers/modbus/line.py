@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import os
-import struct
 import termios
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import serial  # type: ignore[import-untyped]
-from pymodbus.exceptions import ModbusException
 from pymodbus.framer.rtu import FramerRTU
 from pymodbus.pdu import (
     DecodePDU,
@@ -20,7 +18,7 @@ from pymodbus.pdu import (
 from pymodbus.pdu.register_message import ReadInputRegistersRequest, WriteSingleRegisterRequest
 
 from cdpr_drivers.modbus.byte_channel import ByteChannel
-from cdpr_drivers.modbus.tcp import ModbusError, exception_text
+from cdpr_drivers.modbus.tcp import ModbusError, answer_in, refusal
 from cdpr_rt.core.clock import Clock
 
 _READS: Final[dict[str, type[ModbusPDU]]] = {
@@ -79,11 +77,8 @@ class ModbusLine:
         self._port: Any = None
         self._channel: ByteChannel | None = None
 
-    def open(self) -> None:
-        """Open the port; raises LineError. Done by the first request where it was not before."""
-        self._opened()
-
-    def _opened(self) -> ByteChannel:
+    def open(self) -> ByteChannel:
+        """Open the port, where it is not; the first request does too. Raises LineError."""
         if self._channel is not None:
             return self._channel
         try:
@@ -137,7 +132,7 @@ class ModbusLine:
         raise AssertionError  # not reached: the last attempt returns or raises
 
     def _ask_once(self, unit: int, what: str, request: ModbusPDU) -> ModbusPDU:
-        channel, code, clock = self._opened(), request.function_code, self._clock
+        channel, code, clock = self.open(), request.function_code, self._clock
         question, asked_s = self._framer.buildFrame(request), clock.now_s
         data = channel.ask(question, lambda data: len(data) >= _size(data, code), self._timeout_s)
         if channel.lost:
@@ -146,17 +141,11 @@ class ModbusLine:
         if clock.lockstep:
             taken_s = (len(question) + len(data)) * self._byte_s + _TURNAROUND_S
             clock.wait(None, asked_s + taken_s)
-        try:
-            _, answer = self._framer.handleFrame(data, unit, 0)
-        except (ModbusException, ValueError, IndexError, struct.error):
-            answer = None
+        answer = answer_in(data, self._framer, unit)
         if answer is None or answer.function_code & 0x7F != code:
             raise self._wrong(unit, what, self._missing_answer_reason(data, unit, code))
         if isinstance(answer, ExceptionResponse):
-            number = answer.exception_code
-            raise self._wrong(
-                unit, what, f"refused with exception {number} ({exception_text(number)})"
-            )
+            raise self._wrong(unit, what, refusal(answer))
         return answer
 
     def _missing_answer_reason(self, data: bytes, unit: int, code: int) -> str:

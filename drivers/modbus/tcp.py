@@ -8,6 +8,7 @@ import struct
 from typing import Final
 
 from pymodbus.exceptions import ModbusException
+from pymodbus.framer import FramerBase
 from pymodbus.framer.socket import FramerSocket
 from pymodbus.pdu import (
     DecodePDU,
@@ -45,9 +46,18 @@ class ModbusError(DriverError):
     """A Modbus device cannot be reached, or did not do what was asked."""
 
 
-def exception_text(code: int) -> str:
-    """Return what an exception code of Modbus means."""
-    return _EXCEPTIONS.get(code, "unknown exception")
+def refusal(answer: ExceptionResponse) -> str:
+    """Return in words that, and why, a device refuses."""
+    code = answer.exception_code
+    return f"refused with exception {code} ({_EXCEPTIONS.get(code, 'unknown exception')})"
+
+
+def answer_in(data: bytes, framer: FramerBase, unit: int, number: int = 0) -> ModbusPDU | None:
+    """Return the answer that `data` hold to the request with this number; None for no such."""
+    try:
+        return framer.handleFrame(data, unit, number)[1]
+    except (ModbusException, ValueError, IndexError, struct.error):
+        return None
 
 
 class ModbusTcp:
@@ -118,16 +128,11 @@ class ModbusTcp:
         self._count = self._count % 0xFFFF + 1
         request.dev_id, request.transaction_id = self._unit, self._count
         data = channel.ask(self._framer.buildFrame(request), _is_whole, self._timeout_s)
-        try:
-            _, answer = self._framer.handleFrame(data, self._unit, self._count)
-        except (ModbusException, ValueError, IndexError, struct.error):
-            answer = None
+        answer = answer_in(data, self._framer, self._unit, self._count)
         if answer is None:
             raise self._wrong(what, self._missing_answer_reason(data, channel.lost))
         if isinstance(answer, ExceptionResponse):
-            number = answer.exception_code
-            reason = exception_text(number)
-            raise ModbusError(f"{self.name}: {what}: refused with exception {number} ({reason})")
+            raise ModbusError(f"{self.name}: {what}: {refusal(answer)}")
         if answer.function_code != request.function_code:
             code, asked = answer.function_code, request.function_code
             raise self._wrong(what, f"function {code} was answered, {asked} was asked")

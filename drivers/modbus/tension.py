@@ -19,7 +19,7 @@ from cdpr_profiles.devices.tension_sensor import (
 )
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.task import Task
-from cdpr_rt.core.tension import TensionExchange, TensionFault
+from cdpr_rt.core.tension_feedback import TensionExchange, TensionFault
 
 _FORMATS: Final[dict[DataType, str]] = {
     "int16": ">h",

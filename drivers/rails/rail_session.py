@@ -18,8 +18,8 @@ from cdpr_drivers.rails.rail_cia402 import Cia402RailAxis
 from cdpr_drivers.rails.rail_modbus import ModbusRailAxis
 from cdpr_drivers.robot.safety import CLOSED, connect
 from cdpr_profiles import DriveProfile
+from cdpr_profiles.catalogue import load_rail_drive
 from cdpr_profiles.devices.rail import Cia402Rail, RailProfile
-from cdpr_profiles.devices.rail_drive import load_rail_drive
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_profiles.eds.dictionary import load_dictionary
 from cdpr_rt.core.clock import Clock, PacedClock

@@ -12,7 +12,7 @@ from cdpr_drivers.robot.robot_buses import robot_urls
 from cdpr_profiles import Robot
 from cdpr_rt.core.clock import PacedClock
 from cdpr_rt.core.cycle import Watch
-from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.runtime.machine import MachineError
 
 _MASTER_S: Final = 1.0
@@ -37,13 +37,9 @@ class ListeningMachine:
         self.clock = PacedClock()
         self._robot = robot
         self._urls = robot_urls(robot, buses)
-        self._device: ListeningDevice | None = None
-        self._patient_until_s = 0.0
-
-    @property
-    def device(self) -> ListeningDevice | None:
+        self.device: ListeningDevice | None = None
         """The axes that are heard, None until `open` and after `close`."""
-        return self._device
+        self._patient_until_s = 0.0
 
     # -- slow
 
@@ -58,7 +54,7 @@ class ListeningMachine:
             ]
             buses.append(MonitoredBus(name, url, axes, axis_numbers))
         try:
-            self._device = ListeningDevice(buses, robot.sync_period_s, self.clock)
+            self.device = ListeningDevice(buses, robot.sync_period_s, self.clock)
         except DriverError as error:
             raise MachineError(str(error)) from error
 
@@ -82,7 +78,7 @@ class ListeningMachine:
 
     def close(self) -> str:
         """Leave the buses; return an empty text, as nothing is uncertain."""
-        device, self._device = self._device, None
+        device, self.device = self.device, None
         return "" if device is None else device.close()
 
     # -- in a cycle
@@ -93,12 +89,12 @@ class ListeningMachine:
 
     def bus_state(self) -> dict[str, Any]:
         """Return where each bus is found, and whether a master is heard."""
-        state = "closed" if self._device is None else "listening" if self._led else "no master"
+        state = "closed" if self.device is None else "listening" if self._led else "no master"
         return {name: {"url": str(url), "state": state} for name, url in self._urls.items()}
 
     @property
     def _led(self) -> bool:
-        return self._device is not None and self._device.silent_s < _MASTER_S
+        return self.device is not None and self.device.silent_s < _MASTER_S
 
     def prepared(self) -> bool:
         """Whether a master runs the axes; raises MachineError after a while without."""
@@ -129,21 +125,21 @@ class ListeningMachine:
 
     def unpowered(self) -> bool:
         """Whether no drive that can be heard has power."""
-        return self._device is None or all(state in POWER_OFF for state in self._device.states())
+        return self.device is None or all(state in POWER_OFF for state in self.device.states())
 
     def reset_faults(self) -> None:
         """Clear the alarms received so far; the drives keep their faults."""
-        if self._device is not None:
-            self._device.forget_alarms()
+        if self.device is not None:
+            self.device.forget_alarms()
 
     def intact(self) -> bool:
         """Whether the buses are there."""
-        return self._device is not None
+        return self.device is not None
 
     def faultless(self) -> bool:
         """Whether no drive is in fault."""
         faults = (State.FAULT, State.FAULT_REACTION)
-        return self._device is not None and not any(s in faults for s in self._device.states())
+        return self.device is not None and not any(s in faults for s in self.device.states())
 
     def set_brakes(self, released: bool) -> None:
         """Do nothing, as `power_off`."""
@@ -154,9 +150,9 @@ class ListeningMachine:
 
     def states(self) -> list[str]:
         """Return what each drive says of itself, in the standard's words."""
-        if self._device is None:
+        if self.device is None:
             return []
         return [
             f"{axis.name} is {state.label}"
-            for axis, state in zip(self._robot.axes, self._device.states(), strict=True)
+            for axis, state in zip(self._robot.axes, self.device.states(), strict=True)
         ]

@@ -13,7 +13,6 @@ import numpy as np
 
 from cdpr_drivers.axes import touch_probe
 from cdpr_drivers.axes.axis_buses import AxisBuses
-from cdpr_drivers.axes.axis_shutdown import switch_off_by_sdo
 from cdpr_drivers.bus.simulated_bus import open_clock
 from cdpr_drivers.canopen.boot.boot import BootReport
 from cdpr_drivers.canopen.network import CanNetwork
@@ -33,7 +32,7 @@ from cdpr_drivers.robot.tensions import RobotTensions
 from cdpr_profiles import Robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.core.cycle import Watch
-from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.errors import ControlError
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.runtime.machine import MachineError
@@ -90,7 +89,8 @@ class RobotMachine:
         real = not all(url.is_simulated for url in self._urls.values())
         self._tensions = RobotTensions(robot, tension_port)
         self._reference = safety_io or (robot.safety_io if real else None)
-        self._device: AxisBuses | None = None
+        self.device: AxisBuses | None = None
+        """The booted axes, None until `open` and after `close`."""
         self.watches: Sequence[Watch] = ()
         self.notices: Sequence[str] = ()
         self.networks: dict[str, CanNetwork] = {}
@@ -133,7 +133,7 @@ class RobotMachine:
         notices += [self._tensions.missing(self.robot), *unsought, self._idle_brakes()]
         self.notices = [notice for notice in notices if notice]
         self.watches = () if self._safety is None else (self._safety.io,)
-        self._device = device
+        self.device = device
 
     def _leave_out(self, absent: Mapping[int, str]) -> None:
         """Go on as a robot without the axes that have not booted; raises MachineError."""
@@ -209,7 +209,7 @@ class RobotMachine:
             if state in POWER_OFF:
                 continue
             try:
-                off = switch_off_by_sdo(self.networks[axis.bus], axis.node_id)
+                off = self.networks[axis.bus].switch_off(axis.node_id)
             except BusError as error:
                 unconfirmed.append(f"{axis.name}: not known to be without power: {error}")
                 continue
@@ -231,7 +231,7 @@ class RobotMachine:
     @_as_machine_error
     def close(self) -> str:
         """Take the power from the drives and leave the buses; return what stayed uncertain."""
-        device, self._device = self._device, None
+        device, self.device = self.device, None
         self.watches = ()
         unconfirmed = ""
         try:
@@ -248,11 +248,6 @@ class RobotMachine:
         if self.device is None:
             raise MachineError("the drives have not booted")
         return self.device
-
-    @property
-    def device(self) -> AxisBuses | None:
-        """The booted axes, None until `open` and after `close`."""
-        return self._device
 
     # -- in a cycle
 

@@ -10,7 +10,7 @@ from cdpr_drivers.modbus.tension import TensionSampler
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.core.cycle import Watch
-from cdpr_rt.core.tension import TensionWatch
+from cdpr_rt.core.tension_feedback import TensionWatch
 
 _FIRST_READINGS_S = 2.0
 

@@ -9,7 +9,7 @@ from cdpr_drivers.modbus.tension import TensionSampler
 from cdpr_profiles import Robot
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.core.tension_feedback import TensionFeedback
 
 _FIRST_READINGS_S = 3.0
 

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.platform import Platform, Point
-from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.reading.reader import Profile
 from cdpr_profiles.robot import Robot, RobotAxis
 
 _HASH_CHARS = 12
@@ -140,14 +140,9 @@ class GeometryCalibration(Profile):
 
     def to_toml(self) -> str:
         """Return the text of the file."""
-        lines = ["# Geometry of a robot as calibrated; `cdpr calibrate undo` takes it away."]
-        for key, value in self.model_dump().items():
-            if value is None:
-                continue
-            is_date = isinstance(value, datetime)
-            text = value.isoformat() if is_date else json.dumps(value, ensure_ascii=False)
-            lines.append(f"{key} = {text}")
-        return "\n".join(lines) + "\n"
+        return self.toml_text(
+            "Geometry of a robot as calibrated; `cdpr calibrate undo` takes it away."
+        )
 
     def summary(self) -> dict[str, Any]:
         """Return what descriptions and recordings tell of it."""
@@ -162,11 +157,6 @@ class GeometryCalibration(Profile):
             "verified_mean_mm": self.verified_mean_mm,
             "verified_worst_mm": self.verified_worst_mm,
         }
-
-
-def load_geometry_calibration(path: Path) -> GeometryCalibration:
-    """Return the calibration in a file; raises ProfileError."""
-    return read_toml_model(path, GeometryCalibration)
 
 
 def geometry_sha256(robot: Robot) -> str:

@@ -14,7 +14,6 @@ from pathlib import Path
 from cdpr_profiles.calibration.geometry import (
     GeometryCalibration,
     geometry_sha256,
-    load_geometry_calibration,
     write_text,
 )
 from cdpr_profiles.catalogue import load_robot
@@ -59,7 +58,7 @@ def in_force(robot: Robot) -> GeometryCalibration | None:
     path = calibration_file(robot)
     if robot.platform is None or robot.is_winch or not is_file(path):
         return None
-    return load_geometry_calibration(path)
+    return GeometryCalibration.load_file(path)
 
 
 def next_version(robot: Robot) -> int:
@@ -74,7 +73,7 @@ def take_over(robot: Robot, found: GeometryCalibration) -> Path:
     path = calibration_file(robot)
     _require_of(robot, found, path)
     if is_file(path):
-        before = load_geometry_calibration(path)
+        before = GeometryCalibration.load_file(path)
         write_text(_numbered(path, before.version), before.to_toml())
     write_text(path, found.to_toml())
     return path
@@ -91,7 +90,7 @@ def undo(robot: Robot) -> GeometryCalibration | None:
         raise ProfileError(path, "", "there is no calibration in force, so none to undo")
     older, before = _last_before(robot, path)
     try:
-        version = load_geometry_calibration(path).version
+        version = GeometryCalibration.load_file(path).version
     except ProfileError:  # a damaged one is taken back as well
         version = _newest(path) + 1
     undone = path.with_name(f"{path.name}.undone.{version}")
@@ -124,7 +123,7 @@ def _require_of(robot: Robot, found: GeometryCalibration, path: Path) -> None:
 def _last_before(robot: Robot, path: Path) -> tuple[Path | None, GeometryCalibration | None]:
     for _, older in sorted(_versions(path, _BEFORE), reverse=True):
         try:
-            found = load_geometry_calibration(older)
+            found = GeometryCalibration.load_file(older)
             _require_of(robot, found, older)
         except ProfileError:
             continue

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cdpr_profiles.reading.reader import Profile, closest, read_toml_model, require_unique
+from cdpr_profiles.reading.reader import Profile, closest, require_unique
 
 _Pixels = Annotated[int, Field(ge=16, le=20000)]
 _Focal = Annotated[float, Field(gt=1.0, le=1e6)]
@@ -56,22 +55,6 @@ class CameraIntrinsics(Profile):
         """fx, fy, cx, cy, k1, k2, p1, p2, k3."""
         return (*self.focal_px, *self.centre_px, *self.distortion)
 
-    @classmethod
-    def load_file(cls, path: str | Path) -> Self:
-        """Read such a file; raises ProfileError."""
-        return read_toml_model(Path(path), cls)
-
-    def to_toml(self) -> str:
-        """Return the file's text."""
-        lines = [f"{name} = {_toml(value)}" for name, value in self if value is not None]
-        return "\n".join(lines) + "\n"
-
-
-def _toml(value: float | tuple[float, ...]) -> str:
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return repr(value)
-
 
 class KnownMarker(Profile):
     """Where a marker was measured to be: its middle, x along its upper edge, z out of the sheet."""
@@ -116,11 +99,6 @@ class MarkerSheets(Profile):
     def size_of(self, marker: int) -> float:
         """Return the size of a marker, m."""
         return next((one.size_m for one in self.sizes if marker in one.ids), self.size_m)
-
-    @classmethod
-    def load_file(cls, path: str | Path) -> Self:
-        """Read such a file; raises ProfileError."""
-        return read_toml_model(Path(path), cls)
 
 
 def rotation_vector_rad(rotation_deg: tuple[float, ...]) -> tuple[float, ...]:

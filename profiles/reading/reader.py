@@ -1,11 +1,13 @@
 """Read a TOML or JSON file into a validated, frozen model."""
 
 import difflib
+import json
 from collections.abc import Iterable, Mapping
+from datetime import datetime
 from itertools import islice
 from pathlib import Path
 from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Any, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
@@ -26,6 +28,22 @@ class Profile(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True
     )
+
+    @classmethod
+    def load_file(cls, path: str | Path) -> Self:
+        """Read a TOML file; raises ProfileError naming file, key, value and what is allowed."""
+        return read_toml_model(Path(path), cls)
+
+    def toml_text(self, *comments: str) -> str:
+        """Return the text of a file from which `load_file` reads this; None is left out."""
+        lines = [f"# {comment}" for comment in comments]
+        for key, value in self.model_dump().items():
+            if value is not None:
+                # JSON writes strings, numbers and lists of them as TOML does
+                is_date = isinstance(value, datetime)
+                text = value.isoformat() if is_date else json.dumps(value, ensure_ascii=False)
+                lines.append(f"{key} = {text}")
+        return "\n".join(lines) + "\n"
 
 
 def require_unique(what: str, values: list[Any]) -> None:

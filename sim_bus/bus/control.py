@@ -1,16 +1,117 @@
-"""Control messages of the bus: JSON packets beside the frames."""
+"""Control messages of the bus, JSON packets beside the frames; and the client that leads it."""
 
 from __future__ import annotations
 
 import json
+import math
+import struct
+import time
 from collections.abc import Callable
 from typing import Any
 
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import parse_json
 from cdpr_sim_bus.bus.client import PACKET_BYTES, Client
-from cdpr_sim_bus.bus.lead import Lead, is_go
+from cdpr_sim_bus.bus.switch import Switch
+from cdpr_sim_bus.clock import BusClock, ClockMode
 from cdpr_sim_bus.frame import FRAME_BYTES
+
+_PACKET = struct.Struct("<8sdd")
+_GO, _TIME = b"bus-go\0\0", b"bus-time"
+_STEPS_A_TURN = 16
+
+
+def is_go(packet: bytes) -> bool:
+    """Return whether a packet is a time grant ("bus-go")."""
+    return len(packet) == _PACKET.size and packet.startswith(_GO)
+
+
+class Lead:
+    """The leading client of a bus, and the grant that is being carried out."""
+
+    def __init__(self, switch: Switch, clock: BusClock) -> None:
+        self._switch = switch
+        self._clock = clock
+        self.leader: Client | None = None
+        self.until_s: float | None = None
+        """Bus time up to which a grant runs, None without one."""
+        self.time_pending = False
+        """Whether a time packet waits for room in the leader's socket."""
+
+    def take(self, client: Client) -> dict[str, Any]:
+        """Make `client` the leader; return the answer to it."""
+        clock = self._clock
+        if clock.mode is ClockMode.PACED:
+            return {"error": "lead: this bus is paced, its time is the clock's"}
+        if self.leader not in (None, client):
+            return {"error": "lead: another client leads this bus"}
+        clock.stop(time.monotonic())
+        now_s = clock.now(0.0)
+        self._switch.advance(now_s)
+        self._switch.settle()
+        self.leader = client
+        client.delivered = False
+        next_s = self._switch.next_event_s()
+        return {"lead": {"now_s": now_s, "next_s": None if next_s == math.inf else next_s}}
+
+    def release(self, client: Client) -> None:
+        """End the lead of `client`; bus time stands until a client sends or leads."""
+        if client is self.leader:
+            self._end()
+
+    def lose(self, client: Client) -> None:
+        """Let bus time run with wall time where the disconnected `client` was the leader."""
+        if client is self.leader:
+            self._end()
+            self._clock.run(time.monotonic())
+
+    def _end(self) -> None:
+        self.leader = self.until_s = None
+        self.time_pending = False
+
+    def go(self, packet: bytes) -> None:
+        """Take a grant of the leader; `go_on` carries it out. One without a finite time only
+        asks for a time packet."""
+        until_s = _PACKET.unpack(packet)[1]
+        self.until_s = until_s if math.isfinite(until_s) else -math.inf
+
+    def go_on(self) -> None:
+        """Advance bus time from event to event up to the grant, some events in each call.
+
+        Sends the time packet that is pending first.
+        """
+        leader, until_s, switch, clock = self.leader, self.until_s, self._switch, self._clock
+        if self.time_pending:
+            self.send_time()
+        if leader is None or until_s is None:
+            return
+        for _ in range(_STEPS_A_TURN):
+            now_s = clock.now(0.0)
+            if leader.delivered or until_s <= now_s:
+                self.until_s = None
+                self.send_time()
+                return
+            step_s = max(now_s, min(switch.next_event_s(), until_s))
+            clock.move(step_s)
+            switch.advance(step_s)
+            switch.settle()
+
+    def send_time(self) -> None:
+        """Send the leader a time packet, now or as soon as its socket has room."""
+        leader = self.leader
+        if leader is None:
+            return
+        packet = _PACKET.pack(_TIME, self._clock.now(0.0), self._switch.next_event_s())
+        self.time_pending = False
+        try:
+            leader.sock.send(packet)
+            leader.delivered = False
+        except BlockingIOError:
+            self.time_pending = True
+        except OSError:
+            # it has disconnected, which reading from it shows
+            return
+
 
 _KEYS = "filters, lead, more_filters, status"
 

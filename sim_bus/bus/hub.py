@@ -10,14 +10,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cdpr_sim_bus.bus.client import PACKET_BYTES, Client
-from cdpr_sim_bus.bus.contention import Contention
-from cdpr_sim_bus.bus.control import handle
-from cdpr_sim_bus.bus.lead import Lead, is_go
-from cdpr_sim_bus.bus.listener import Listener
-from cdpr_sim_bus.bus.node_protocol import LocalNode
-from cdpr_sim_bus.bus.route import Route
-from cdpr_sim_bus.bus.switch import Switch
+from cdpr_sim_bus.bus.client import PACKET_BYTES, Client, Listener
+from cdpr_sim_bus.bus.control import Lead, handle, is_go
+from cdpr_sim_bus.bus.switch import Contention, LocalNode, Route, Switch
 from cdpr_sim_bus.bus.watcher import Watcher
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
 from cdpr_sim_bus.errors import SimulatorError

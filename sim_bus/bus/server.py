@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import signal
 import sys
@@ -14,11 +15,10 @@ from typing import Any, Protocol
 from cdpr_sim_bus.bus.adapters.gateway import Gateway
 from cdpr_sim_bus.bus.client import raw_can_socket
 from cdpr_sim_bus.bus.hub import Hub
-from cdpr_sim_bus.bus.node_protocol import LocalNode
+from cdpr_sim_bus.bus.switch import LocalNode
 from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.errors import BusSetupError
-from cdpr_sim_bus.frame_log import FrameLog
-from cdpr_sim_bus.ready import print_ready
+from cdpr_sim_bus.frame import FrameLog
 
 _PRIORITY = 40
 _CHANNEL = "can0"
@@ -194,3 +194,27 @@ def _stop_with_stdin(loop: Loop) -> None:
         loop.watch(descriptor, read)
     except PermissionError:
         raise BusSetupError("standard input must be a pipe to be watched for its end") from None
+
+
+_SHOWN_KEYS = ("robot", "bus", "mode", "nodes", "slcan", "socketcand", "truth_log")
+
+
+def print_ready(ready: dict[str, Any]) -> None:
+    """Print {"ready": ...} as one line of JSON, or a readable text on a terminal."""
+    if not sys.stdout.isatty():
+        print(json.dumps({"ready": ready}), flush=True)
+        return
+    for line in _lines(ready):
+        print(line)
+    print("up; Ctrl-C ends it", flush=True)
+
+
+def _lines(ready: dict[str, Any]) -> Iterator[str]:
+    for key in _SHOWN_KEYS:
+        value = ready.get(key)
+        if value is not None:
+            shown = ", ".join(map(str, value)) if isinstance(value, list) else value
+            yield f"{key.replace('_', ' '):12}{shown}"
+    buses = ready.get("buses")
+    for bus in buses.values() if isinstance(buses, dict) else ():
+        yield from _lines(bus)

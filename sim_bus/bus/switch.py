@@ -1,4 +1,4 @@
-"""Delivery of frames: routes, order of arbitration, bus load."""
+"""Delivery of frames between clients and nodes: routes, order of arbitration, bus load."""
 
 from __future__ import annotations
 
@@ -6,12 +6,185 @@ import errno
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+from typing import Protocol
 
-from cdpr_sim_bus.bus.bus_load import BusLoad
 from cdpr_sim_bus.bus.client import Client
-from cdpr_sim_bus.bus.node_protocol import LocalNode
-from cdpr_sim_bus.bus.route import Route
-from cdpr_sim_bus.frame import HEADER, RTR_FLAG
+from cdpr_sim_bus.frame import (
+    ERR_FLAG,
+    HEADER,
+    LONGEST_FRAME_BITS,
+    RTR_FLAG,
+    SYNC_ID,
+    arbitration_key,
+    base_id,
+    bits_by_length,
+)
+
+
+class LocalNode(Protocol):
+    """A CAN node driven by one thread; frames are 16 bytes, laid out as `struct can_frame`.
+
+    All times are bus time in seconds. After every call the bus sends what stands in `outbox`, in
+    the order of arbitration, and clears the list (the list object itself stays the same).
+    """
+
+    outbox: list[bytes]
+
+    @property
+    def node_id(self) -> int:
+        """Node id in use, 0 for a node that only listens."""
+
+    @property
+    def sync_period_s(self) -> float:
+        """Communication cycle period (1006h), 0 while it is not set."""
+
+    @property
+    def accepts(self) -> AbstractSet[int] | None:
+        """Identifiers (11 bits, or 29 bits with the EFF flag) the node wants, None for all.
+
+        A node that changes them shows a new set; the bus looks at the attribute again after
+        every frame outside the cyclic exchange (anything but SYNC and PDOs) and after `advance`
+        while bus time runs by itself.
+        """
+
+    def receive(self, frame: bytes, now: float) -> None:
+        """Take a frame seen on the bus, SYNC included; never one of the node's own."""
+
+    def advance(self, now: float) -> None:
+        """Bring timers and physics to `now`; called before a frame when time has moved."""
+
+    def next_event(self) -> float:
+        """Return the bus time of the next timer, `math.inf` when none runs."""
+
+    def close(self) -> None:
+        """Flush and close what the node holds open."""
+
+
+def is_acyclic(can_id: int) -> bool:
+    """Return whether the identifier is of acyclic traffic, which waits for gaps between the PDOs.
+
+    SDO, heartbeat and LSS of the predefined connection set (CiA 301): they lose arbitration
+    against SYNC and PDOs, so they never make a cycle too long by more than one frame.
+    """
+    base = base_id(can_id)
+    return 0x580 <= base <= 0x67F or 0x700 <= base <= 0x77F or base in (0x7E4, 0x7E5)
+
+
+class BusLoad:
+    """Worst-case bits of all frames compared with bus time.
+
+    In lockstep bus time stands still while a cycle's frames go, so their sum is compared with
+    the bus time from SYNC to SYNC. In paced mode the wire is followed frame by frame: a cycle
+    overruns when at its end the wire would still be busy for longer than one frame takes.
+    """
+
+    def __init__(self, bitrate: int, *, lockstep: bool) -> None:
+        self.bitrate = bitrate
+        self.frames = 0
+        self.overruns = 0
+        self.peak_cycle_load = 0.0
+        self.cycle_bits = 0
+        """Bits of cyclic traffic since the last SYNC; the hub adds to it frame by frame."""
+        self.acyclic_bits = 0
+        self._lockstep = lockstep
+        self._bit_s = 1.0 / bitrate
+        self._longest_s = LONGEST_FRAME_BITS * self._bit_s
+        self._past_bits = 0
+        self._last_sync_s = -1.0
+        self._busy_until_s = 0.0
+
+    def occupy(self, now_s: float, bits: int) -> None:
+        """Put a cyclic frame of `bits` on the wire at `now_s` (paced mode only)."""
+        self._busy_until_s = max(self._busy_until_s, now_s) + bits * self._bit_s
+
+    def sync(self, now_s: float) -> None:
+        """Close the cycle that ends with the SYNC at `now_s`."""
+        window_s = now_s - self._last_sync_s
+        if self._last_sync_s >= 0.0 and window_s > 0.0:
+            load = self.cycle_bits * self._bit_s / window_s
+            self.peak_cycle_load = max(self.peak_cycle_load, load)
+            # a bit of slack for the rounding of bus time
+            late = self._busy_until_s - now_s - self._longest_s > 0.0
+            if load > 1.0 + 1e-9 if self._lockstep else late:
+                self.overruns += 1
+        self._past_bits += self.cycle_bits
+        self.cycle_bits = 0
+        self._last_sync_s = now_s
+
+    def load(self, now_s: float) -> float:
+        """Return the share of bus time since the start during which the wire was in use."""
+        bits = self._past_bits + self.cycle_bits + self.acyclic_bits
+        return bits * self._bit_s / now_s if now_s > 0.0 else 0.0
+
+
+_LSS_ANSWER = 0x7E4
+
+
+class Route:
+    """Receivers and lengths in bits of the frames with one identifier."""
+
+    __slots__ = (
+        *("acyclic", "bits", "clients", "configures"),
+        *("key", "longest", "merges", "nodes", "sync"),
+    )
+
+    def __init__(self, can_id: int, clients: list[Client], nodes: list[LocalNode]) -> None:
+        self.key = arbitration_key(can_id)
+        self.bits = bits_by_length(can_id)
+        # error frames are no traffic: they have no length
+        self.longest = -1 if can_id & ERR_FLAG else 8
+        self.acyclic = is_acyclic(can_id)
+        self.configures = self.acyclic or base_id(can_id) == 0
+        self.sync = can_id == SYNC_ID
+        # identical LSS answers at the same time are one frame on a wire
+        self.merges = can_id == _LSS_ANSWER
+        self.clients = tuple(clients)
+        self.nodes = tuple(nodes)
+
+
+class Contention:
+    """The head of each client's queue; the clients' own order is kept.
+
+    In lockstep the smallest identifier wins. In paced mode frames have times: one that was sent
+    while the wire could still have been busy with an earlier one contends with it, a later one
+    waits, however long the simulator itself was held up and whatever has come together meanwhile.
+    """
+
+    def __init__(self, *, paced: bool, bitrate: int) -> None:
+        self._paced = paced
+        self._window_s = LONGEST_FRAME_BITS / bitrate
+        self._heads: dict[Client, tuple[int, bytes]] = {}
+
+    def __bool__(self) -> bool:
+        """Return whether a frame waits."""
+        return bool(self._heads)
+
+    def __contains__(self, client: Client) -> bool:
+        """Return whether a frame of `client` waits."""
+        return client in self._heads
+
+    def add(self, client: Client, frame: bytes) -> None:
+        """Queue the frame that `client` sent last."""
+        self._heads[client] = (arbitration_key(HEADER.unpack_from(frame)[0]), frame)
+
+    def discard(self, client: Client) -> None:
+        """Discard the frame of a client that has disconnected."""
+        self._heads.pop(client, None)
+
+    def pop(self) -> tuple[Client, bytes]:
+        """Return the frame that wins arbitration, with its sender; there must be one."""
+        heads = self._heads
+        if len(heads) == 1:
+            client, (_, frame) = heads.popitem()
+            return client, frame
+        contending = list(heads)
+        if self._paced:
+            end_s = min(client.sent_s for client in contending) + self._window_s
+            contending = [client for client in contending if client.sent_s <= end_s]
+        winner = min(contending, key=lambda client: heads[client][0])
+        return winner, heads.pop(winner)[1]
+
 
 _MOST_ROUTES = 4096
 _MOST_ANSWERS = 64

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
+from typing_extensions import override
 
 from cdpr_profiles.reading.bounded_input import read_toml
 from cdpr_profiles.reading.reader import Profile, validated
+from cdpr_sim_bus.plant_file import PlantFile
 
 _Length_m = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 _Angle_deg = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -148,7 +150,7 @@ class CameraFaultPlant(Profile):
         return self.from_image <= image < self.from_image + self.images
 
 
-class CameraPlant(Profile):
+class CameraPlant(PlantFile):
     """The truth about a simulated camera and what it sees, which no controller may read."""
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
@@ -167,8 +169,11 @@ class CameraPlant(Profile):
     faults: Annotated[tuple[CameraFaultPlant, ...], Field(max_length=64)] = ()
 
     @classmethod
-    def load_file(cls, path: str | Path) -> CameraPlant:
-        """Read such a file, or [camera] of a robot's plant file; raises ProfileError."""
+    @override
+    def load_file(cls, path: str | Path | None) -> Self:
+        """Return what such a file, or [camera] of a robot's plant file, says; see `PlantFile`."""
+        if path is None:
+            return cls()
         table = read_toml(Path(path))
         own = table.get("camera", table)
         return validated(Path(path), own if isinstance(own, dict) else table, cls)

@@ -8,9 +8,8 @@ from collections.abc import Callable
 
 from cdpr_sim_bus.canopen import cob_ids
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.application import NmtState
 from cdpr_sim_bus.canopen.dictionary.datatypes import Value
-from cdpr_sim_bus.canopen.slave import Slave
+from cdpr_sim_bus.canopen.slave import NmtState, Slave
 from cdpr_sim_bus.frame import pack_frame
 
 SYNC_LENGTH = 0x8240

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from cdpr_sim_bus.canopen import cob_ids, emcy
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.application import NmtState
 from cdpr_sim_bus.canopen.dictionary.datatypes import Value
-from cdpr_sim_bus.canopen.slave import Slave
+from cdpr_sim_bus.canopen.slave import NmtState, Slave
 from cdpr_sim_bus.frame import pack_frame
 
 

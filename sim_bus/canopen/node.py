@@ -5,17 +5,19 @@ from __future__ import annotations
 import struct
 
 from cdpr_sim_bus.canopen import cob_ids, emcy
-from cdpr_sim_bus.canopen.application import NmtState, SlaveApplication
 from cdpr_sim_bus.canopen.dictionary.od import APPLICATION, COMMUNICATION, ObjectDictionary
-from cdpr_sim_bus.canopen.dictionary.store import ParameterStore, add_store_objects
-from cdpr_sim_bus.canopen.dictionary.verify import ConfigurationStamp
+from cdpr_sim_bus.canopen.dictionary.store import (
+    ConfigurationStamp,
+    ParameterStore,
+    add_store_objects,
+)
 from cdpr_sim_bus.canopen.emcy import EmergencyProducer
 from cdpr_sim_bus.canopen.heartbeat import HeartbeatConsumers, HeartbeatProducer
 from cdpr_sim_bus.canopen.lss import UNCONFIGURED, LssSlave
 from cdpr_sim_bus.canopen.pdos.pdo import PdoService
-from cdpr_sim_bus.canopen.sdo.sdo_server import SdoServer
+from cdpr_sim_bus.canopen.sdo import SdoServer
+from cdpr_sim_bus.canopen.slave import NmtState, SlaveApplication, Timers
 from cdpr_sim_bus.canopen.sync import SyncConsumer
-from cdpr_sim_bus.canopen.timers import Timers
 from cdpr_sim_bus.frame import RTR_FLAG
 
 _IDENTIFIER = struct.Struct("<I").unpack_from

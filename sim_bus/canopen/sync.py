@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from cdpr_sim_bus.canopen import cob_ids, emcy
 from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
-from cdpr_sim_bus.canopen.application import NmtState
 from cdpr_sim_bus.canopen.dictionary.datatypes import Value
-from cdpr_sim_bus.canopen.slave import Slave
+from cdpr_sim_bus.canopen.slave import NmtState, Slave
 
 _PRODUCER = 0x40000000
 _MAX_COUNTER = 240
@@ -25,8 +24,8 @@ class SyncConsumer:
         od = slave.od
         for index, hook in (
             (0x1005, self._write_cob_id),
-            (0x1006, self._write_period),
-            (0x1007, self._write_window),
+            (0x1006, lambda value: self._store(0x1006, int(value))),
+            (0x1007, lambda value: self._store(0x1007, int(value))),
             (0x1019, self._write_overflow),
         ):
             if (index, 0) in od:
@@ -48,7 +47,8 @@ class SyncConsumer:
     def receive(self, frame: bytes, now: float) -> None:
         """Take a SYNC frame."""
         if frame[4] != self.counted:
-            self._report_length()
+            self._length_error = True
+            self._slave.communication_error(emcy.SYNC_LENGTH)
             return
         if self._length_error:
             self._length_error = False
@@ -58,22 +58,12 @@ class SyncConsumer:
         if self._operational:
             slave.pdo.at_sync(now, frame[8])
 
-    def _report_length(self) -> None:
-        self._length_error = True
-        self._slave.communication_error(emcy.SYNC_LENGTH)
-
     def _write_cob_id(self, value: Value) -> None:
         new = int(value)
         if new & _PRODUCER or cob_ids.is_restricted(new & 0x1FFFFFFF) or new & 0x20000000:
             raise SdoAbort(Abort.INVALID_VALUE)
         self._store(0x1005, new)
         self._slave.rebuild_handlers()
-
-    def _write_period(self, value: Value) -> None:
-        self._store(0x1006, int(value))
-
-    def _write_window(self, value: Value) -> None:
-        self._store(0x1007, int(value))
 
     def _write_overflow(self, value: Value) -> None:
         new = int(value)

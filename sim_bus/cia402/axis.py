@@ -11,6 +11,7 @@ from cdpr_sim_bus.jit import bound
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import MotorSample, RobotMember
 from cdpr_sim_bus.robot.motor import run
+from cdpr_sim_bus.robot.motor_physics import restart_counter
 from cdpr_sim_bus.robot.motor_state import (
     MotorRatings,
     Transmission,
@@ -19,7 +20,6 @@ from cdpr_sim_bus.robot.motor_state import (
     remove_cable,
 )
 from cdpr_sim_bus.robot.plant import Plant
-from cdpr_sim_bus.robot.rotor import restart_counter
 
 _WINDOW_OFF = 0xFFFFFFFF
 

@@ -22,7 +22,6 @@ from cdpr_sim_bus.canopen import (
 )
 from cdpr_sim_bus.canopen.dictionary.datatypes import Value
 from cdpr_sim_bus.cia402.axis import Axis
-from cdpr_sim_bus.cia402.board_link import BoardLink
 from cdpr_sim_bus.cia402.drive_quirks import (
     IN_ACCELERATION_UNITS,
     IN_VELOCITY_UNITS,
@@ -36,10 +35,9 @@ from cdpr_sim_bus.cia402.state_machine import StateMachine
 from cdpr_sim_bus.cia402.touch_probe import TouchProbes
 from cdpr_sim_bus.cia402.words import ErrorCode
 from cdpr_sim_bus.physics_board import BoardAxis
-from cdpr_sim_bus.record_file import NO_SYNC
 from cdpr_sim_bus.robot import servo
 from cdpr_sim_bus.robot.cable_robot import RobotMember
-from cdpr_sim_bus.robot.logs.truth_log import TruthLog
+from cdpr_sim_bus.robot.logs.truth_log import NO_SYNC, TruthLog
 from cdpr_sim_bus.robot.motor_state import MotorRatings, Transmission
 from cdpr_sim_bus.robot.plant import Plant
 
@@ -327,3 +325,50 @@ def _adapt(od: ObjectDictionary, quirks: DriveQuirks, plant: Plant, ratings: Mot
 
 def _default(entry: Entry, value: int) -> None:
     entry.base_default = entry.default = entry.value = value
+
+
+class BoardLink:
+    """Publishes one drive's true state on the board and applies what other devices write there."""
+
+    def __init__(self, axis: Axis, state_machine: StateMachine, board: BoardAxis) -> None:
+        self._axis = axis
+        self._state_machine = state_machine
+        self._board = board
+        self._tension = axis.motor["tension"]
+        self._brake_Nm = axis.plant.motor.brake_torque_Nm
+        self._released, self._power_on = True, False
+        self._applied_s = axis.time
+        self._mass_kg = axis.read("mass")
+        board.hung_mass_kg = self._mass_kg
+        self.publish()
+
+    def apply_inputs(self, now_s: float) -> None:
+        """Take power, brake and mass as the board has them at bus time `now_s`."""
+        board = self._board
+        self._applied_s = now_s
+        power, released = board.allows_power(now_s), board.releases_brake(now_s)
+        if power != self._state_machine.power_allowed:
+            self._state_machine.allow_power(power)
+        if released != self._released:
+            self._released = released
+            self._axis.motor["brake"] = 0.0 if self._released else self._brake_Nm
+        if board.hung_mass_kg != self._mass_kg:
+            self._mass_kg = board.hung_mass_kg
+            self._axis.motor["mass"] = self._mass_kg
+
+    def next_change_s(self) -> float:
+        """Return the next bus time at which power or brake change."""
+        return self._board.next_change_s(self._applied_s)
+
+    def publish(self) -> None:
+        """Write tension and motion as they are now."""
+        axis = self._axis
+        angle, speed = axis.sample[4], axis.sample[5]
+        self._power_on = axis.kind != servo.OFF
+        shown_N = float(self._tension[0]) + axis.cell_off_N
+        self._board.publish(axis.time, shown_N, angle, speed, self._power_on)
+
+    def publish_power(self) -> None:
+        """Publish where power has changed, as bus time may stand still for long afterwards."""
+        if self._power_on != (self._axis.kind != servo.OFF):
+            self.publish()

@@ -52,7 +52,7 @@ class FaultInjection:
             _MUTE_HEARTBEAT: self._mute,
             _FALL_SILENT: self._silence_after_the_answer,
             _BABBLE: self._set_babble,
-            _JUMP: self._jump,
+            _JUMP: lambda counts: self._axis.jump(int(counts)),
             _CUT_CABLE: self._cut_cable,
             _SLIP: self._slip,
             _CELL_OFF: self._set_cell_off,
@@ -148,9 +148,6 @@ class FaultInjection:
     def _raise_fault(self, code: Value) -> None:
         if code:
             self._state_machine.trip(int(code))
-
-    def _jump(self, counts: Value) -> None:
-        self._axis.jump(int(counts))
 
     def _cut_cable(self, cut: Value) -> None:
         if cut and not self._axis.cut_cable():

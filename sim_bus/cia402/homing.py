@@ -14,7 +14,7 @@ from typing_extensions import override
 from cdpr_sim_bus.cia402.axis import Axis
 from cdpr_sim_bus.cia402.modes import Mode
 from cdpr_sim_bus.cia402.words import BIT_4, BIT_12, BIT_13, TARGET_REACHED, ModeNumber
-from cdpr_sim_bus.robot import rotor, servo
+from cdpr_sim_bus.robot import motor_physics, servo
 
 _TURNS_WITHOUT_INDEX = 2
 
@@ -192,7 +192,7 @@ class Homing(Mode):
 
     def _find_index(self, flags: int) -> None:
         axis = self.axis
-        if flags & rotor.INDEX_ROSE:
+        if flags & motor_physics.INDEX_ROSE:
             self._set_home(int(axis.motor["rise_count"][0]))
             return
         travelled = abs(axis.sample[1] - self._sought_from)

@@ -99,11 +99,20 @@ class ProfileTorque(Mode):
         return TARGET_REACHED if self.axis.flags & servo.ON_TARGET else 0
 
 
-class CyclicTorque(Mode):
+class _Cyclic(Mode):
+    """A mode that follows a new target at every SYNC."""
+
+    watch = servo.LIMITED
+
+    @override
+    def status(self) -> int:
+        return 0 if self.axis.flags & (servo.LIMITED | servo.FOLLOWING_ERROR) else BIT_12
+
+
+class CyclicTorque(_Cyclic):
     """CST: target torque plus torque offset, at once."""
 
     number = ModeNumber.CYCLIC_TORQUE
-    watch = servo.LIMITED
 
     @override
     def start(self) -> None:
@@ -113,10 +122,6 @@ class CyclicTorque(Mode):
         target: Any = axis.od.entry(0x6071)
         offset: Any = axis.od.entry(0x60B2)
         axis.setpoint = lambda: float(target.value + offset.value)
-
-    @override
-    def status(self) -> int:
-        return _follows(self.axis)
 
 
 class ProfileVelocity(Mode):
@@ -150,12 +155,11 @@ class ProfileVelocity(Mode):
         )
 
 
-class CyclicVelocity(Mode):
+class CyclicVelocity(_Cyclic):
     """CSV: target velocity plus velocity offset, at once; torque offset fed forward."""
 
     number = ModeNumber.CYCLIC_VELOCITY
     torque_mode = False
-    watch = servo.LIMITED
     cyclic = True
 
     @override
@@ -172,12 +176,8 @@ class CyclicVelocity(Mode):
     def sync(self) -> None:
         _feed_torque_offset(self.axis)
 
-    @override
-    def status(self) -> int:
-        return _follows(self.axis)
 
-
-class CyclicPosition(Mode):
+class CyclicPosition(_Cyclic):
     """CSP: target position, interpolated over 60C2h; torque offset fed forward."""
 
     number = ModeNumber.CYCLIC_POSITION
@@ -208,7 +208,7 @@ class CyclicPosition(Mode):
     @override
     def status(self) -> int:
         late = self.axis.flags & servo.FOLLOWING_ERROR
-        return _follows(self.axis) | (BIT_13 if late else 0)
+        return super().status() | (BIT_13 if late else 0)
 
 
 class ProfilePosition(Mode):
@@ -282,10 +282,6 @@ class ProfilePosition(Mode):
             | (BIT_12 if acknowledged else 0)
             | (BIT_13 if flags & servo.FOLLOWING_ERROR else 0)
         )
-
-
-def _follows(axis: Axis) -> int:
-    return 0 if axis.flags & (servo.LIMITED | servo.FOLLOWING_ERROR) else BIT_12
 
 
 def _feed_torque_offset(axis: Axis) -> None:

@@ -9,18 +9,21 @@ from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
 from cdpr_sim_bus.canopen.dictionary.datatypes import Value
 from cdpr_sim_bus.cia402 import modes
 from cdpr_sim_bus.cia402.axis import Axis
-from cdpr_sim_bus.cia402.faults import ALWAYS_WATCHED, FAULTS, LASTING, ErrorReporter
 from cdpr_sim_bus.cia402.homing import Homing
 from cdpr_sim_bus.cia402.modes import Mode
 from cdpr_sim_bus.cia402.words import (
+    ALWAYS_WATCHED,
     FAULT_RESET,
+    FAULTS,
     HALT,
     INTERNAL_LIMIT,
+    LASTING,
     REMOTE,
     TARGET_REACHED,
     VOLTAGE_ENABLED,
     WARNING,
     ErrorCode,
+    ErrorReporter,
     ModeNumber,
     State,
     error_register_bits,
@@ -337,7 +340,9 @@ class StateMachine:
         if now >= self._enable_due:
             self._enable()
         if self.axis.kind != servo.OFF:
-            self._watch_faults(flags)
+            for flag, code, severe in FAULTS:
+                if flags & flag:
+                    self.trip(code, severe=severe)
         if self._stop_to is not None and (self._at_rest() or now >= self._reaction_due):
             self._enter(self._stop_to)
         elif self._running:
@@ -349,11 +354,6 @@ class StateMachine:
         self.axis.configure()
         if self._running:
             self.mode.reconfigure()
-
-    def _watch_faults(self, flags: int) -> None:
-        for flag, code, severe in FAULTS:
-            if flags & flag:
-                self.trip(code, severe=severe)
 
     def _at_rest(self) -> bool:
         flags = self.axis.flags

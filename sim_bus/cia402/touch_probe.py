@@ -8,7 +8,7 @@ from cdpr_sim_bus.canopen.abort import Abort, SdoAbort
 from cdpr_sim_bus.canopen.dictionary.datatypes import Value
 from cdpr_sim_bus.canopen.dictionary.od import Entry
 from cdpr_sim_bus.cia402.axis import Axis, to_int32
-from cdpr_sim_bus.robot import rotor
+from cdpr_sim_bus.robot import motor_physics
 
 _ENABLE = 0x01
 _CONTINUOUS = 0x02
@@ -18,7 +18,10 @@ _SOURCE_OBJECT = 0x08
 _EDGES = 0x30
 _ZERO_PULSE_IN_60D0 = {5, 6}
 _TOGGLES = 0xC0
-_PULSE_EDGES = ((rotor.INDEX_ROSE, 0, "rise_count"), (rotor.INDEX_FELL, 1, "fall_count"))
+_PULSE_EDGES = (
+    (motor_physics.INDEX_ROSE, 0, "rise_count"),
+    (motor_physics.INDEX_FELL, 1, "fall_count"),
+)
 
 
 class TouchProbes:
@@ -101,8 +104,8 @@ class TouchProbes:
 
     @staticmethod
     def _edges(setting: int) -> int:
-        return (rotor.INDEX_ROSE if setting & 0x10 else 0) | (
-            rotor.INDEX_FELL if setting & 0x20 else 0
+        return (motor_physics.INDEX_ROSE if setting & 0x10 else 0) | (
+            motor_physics.INDEX_FELL if setting & 0x20 else 0
         )
 
     def _source_writer(self, sub: int) -> Callable[[Value], None]:

@@ -6,7 +6,6 @@ import math
 import random
 import struct
 from enum import Enum
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
@@ -14,15 +13,15 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from cdpr_profiles.devices.tension_sensor import REGISTERS, Sensor, TensionSensors, ValueMap
-from cdpr_profiles.reading.reader import Profile, read_toml_model
 from cdpr_sim_bus.physics_board import BoardAxis
+from cdpr_sim_bus.plant_file import PlantFile
 
 _HOLDING_CODES = (3, 6, 16, 22, 23)
 _BEYOND = 1.02
 """A converter's range is a little more than the specified one."""
 
 
-class AmplifierPlant(Profile):
+class AmplifierPlant(PlantFile):
     """The truth about the simulated amplifiers, which no controller may read."""
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
@@ -36,11 +35,6 @@ class AmplifierPlant(Profile):
     """Relative, of every load cell."""
     zero_spread_N: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.5
     """Standard deviation of the zeros of the load cells."""
-
-    @classmethod
-    def load_file(cls, path: str | Path) -> AmplifierPlant:
-        """Read such a file; raises ProfileError."""
-        return read_toml_model(Path(path), cls)
 
 
 class TensionFault(Enum):

@@ -11,7 +11,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from cdpr_profiles.devices.rail import ModbusRail, RailProfile
-from cdpr_sim_bus.devices.modbus_tcp_server import AnswerFaults, Panel
+from cdpr_sim_bus.devices.modbus_servers import AnswerFaults, Panel
 
 _STEP_S = 1e-3
 _BRAKE_S = 0.05

@@ -1,8 +1,4 @@
-"""A simulated safety I/O: the remote I/O itself and the contactor, brakes and switches behind it.
-
-Wired as docs/safety-io.md asks for: the emergency-stop chain takes the contactor's coil and the
-drives' safe torque off by itself, whatever the outputs say.
-"""
+"""The plant file of a simulated safety I/O: the truth about contactor, brakes and switches."""
 
 from __future__ import annotations
 
@@ -10,14 +6,39 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from enum import IntFlag
+from typing import Annotated
 
+from pydantic import Field
 from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from cdpr_profiles.devices.safety_io import Input, SafetyIoProfile
-from cdpr_sim_bus.devices.modbus_tcp_server import AnswerFaults, Panel
-from cdpr_sim_bus.devices.safety_plant import SafetyAxisPlant, SafetyPlant
+from cdpr_profiles.reading.reader import Profile
+from cdpr_sim_bus.devices.modbus_servers import AnswerFaults, Panel
 from cdpr_sim_bus.physics_board import BoardAxis, Window
+from cdpr_sim_bus.plant_file import PlantFile
+
+Delay = Annotated[float, Field(ge=0.0, le=10.0)]
+
+
+class SafetyAxisPlant(Profile):
+    """Where the limit switches of one axis stand, on the motor's true angle over all turns."""
+
+    limit_negative_deg: float | None = None
+    """Reached below."""
+    limit_positive_deg: float | None = None
+    """Reached above."""
+
+
+class SafetyPlant(PlantFile):
+    """Delays of the devices wired to the I/O, and its axes in the order of its profile."""
+
+    contactor_close_s: Delay = 0.03
+    contactor_open_s: Delay = 0.015
+    brake_release_s: Delay = 0.05
+    brake_apply_s: Delay = 0.03
+    axes: tuple[SafetyAxisPlant, ...] = ()
+
 
 _ALWAYS, _NEVER = (-math.inf, math.inf), (-math.inf, -math.inf)
 _READ_COILS, _READ_INPUTS, _WRITE_COIL, _WRITE_COILS = 1, 2, 5, 15

@@ -48,7 +48,7 @@ class CableRobot:
         self.platform = build_platform(shape, plant, n, self._rng)
         # have it compiled now, before the clock runs
         run_together(self.motors, self.platform, 0.0, self.kinds, self.targets, self._flags)
-        self.commands: list[MotorCommand] = [_switched_off] * n
+        self.commands: list[MotorCommand] = [lambda: (servo.OFF, 0.0)] * n
         """Returns the present command of each power stage."""
 
     def adopt(self, i: int, motor: MotorArray, command: MotorCommand) -> MotorArray:
@@ -155,7 +155,3 @@ class RobotMember:
     def slip(self, metres: float) -> None:
         """See `CableRobot.slip`."""
         self.robot.slip(self.number, metres)
-
-
-def _switched_off() -> tuple[int, float]:
-    return servo.OFF, 0.0

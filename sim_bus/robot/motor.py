@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from cdpr_sim_bus.jit import jit
-from cdpr_sim_bus.robot import rotor, servo
+from cdpr_sim_bus.robot import motor_physics, servo
 from cdpr_sim_bus.robot.motor_state import (
     CONTROL_STEP_S,
     MotorArray,
@@ -46,7 +46,7 @@ def sample_of(
     m = motor[0]
     return (
         flags | servo.switches(m),
-        rotor.read_counter(m, rotor.delayed_angle(m)),
+        motor_physics.read_counter(m, motor_physics.delayed_angle(m)),
         math.floor(m.sensed / m.torque_unit + 0.5),
         math.floor(m.displayed_velocity + 0.5),
         m.angle,
@@ -71,15 +71,15 @@ def run(
         n = max(1, math.ceil(dt / CONTROL_STEP_S - 1e-6))
         h = dt / n
         start = m.time
-        rotor.warm_up(m, dt, energised)
+        motor_physics.warm_up(m, dt, energised)
         for i in range(n):
             flags |= servo.control(m, kind, target, h)
             for _ in range(m.steps_per_control):
-                rotor.step_rotor(m, h / m.steps_per_control, m.torque_demand, energised)
-                flags |= rotor.step_disc(m)
+                motor_physics.step_rotor(m, h / m.steps_per_control, m.torque_demand, energised)
+                flags |= motor_physics.step_disc(m)
             m.time = start + (i + 1) * h
-            rotor.remember_angle(m)
-            servo.observe(m, rotor.read_counter(m, m.angle), h)
+            motor_physics.remember_angle(m)
+            servo.observe(m, motor_physics.read_counter(m, m.angle), h)
         m.time = until
         flags |= servo.watch(m, kind, target, dt)
     return sample_of(motor, flags)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.reading.reader import Profile
 from cdpr_profiles.winch import Winch
+from cdpr_sim_bus.plant_file import PlantFile
 
 MAX_COGGING_TERMS = 32
 _RATED_Nm, _PEAK_Arms = 3.00, 22.8
@@ -204,7 +204,7 @@ def _filled(section: _Section, values: dict[str, float]) -> _Section:
     return section.model_copy(update=left_out)
 
 
-class Plant(Profile):
+class Plant(PlantFile):
     """All sections of a plant file; every key has a default."""
 
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 7
@@ -219,14 +219,6 @@ class Plant(Profile):
     thermal: ThermalPlant = ThermalPlant()
     load: LoadPlant = LoadPlant()
     limits: LimitsPlant = LimitsPlant()
-
-    @classmethod
-    def load_file(cls, path: str | Path) -> Plant:
-        """Read a plant file.
-
-        Raises cdpr_profiles.errors.ProfileError naming file, key, value and what is allowed.
-        """
-        return read_toml_model(Path(path), cls)
 
     def of(self, winch: Winch) -> Plant:
         """Return this plant with what was left out as a winch's motor and encoder have it.

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cdpr_sim_bus.jit import jit
-from cdpr_sim_bus.robot import rotor, servo
+from cdpr_sim_bus.robot import motor_physics, servo
 from cdpr_sim_bus.robot.motor_state import CONTROL_STEP_S
 from cdpr_sim_bus.robot.platform import step_platform, update_cable_ends
 
@@ -32,7 +32,7 @@ def stable_steps(motors: Any, p: Any, h: float) -> int:
     if p.standing:
         stiffness, damping = p.feet * p.floor_stiffness, p.feet * p.floor_damping
     for m in motors:
-        length, gain = rotor.paid_out(m)
+        length, gain = motor_physics.paid_out(m)
         k = m.rigidity / length
         stiffness += k
         damping += k * m.damping_time
@@ -55,7 +55,7 @@ def run_together(
     h = dt / n
     start = motors[0].time
     for i in range(p.cables):
-        rotor.warm_up(motors[i], dt, kinds[i] != servo.OFF)
+        motor_physics.warm_up(motors[i], dt, kinds[i] != servo.OFF)
     for k in range(n):
         for i in range(p.cables):
             flags[i] |= servo.control(motors[i], kinds[i], targets[i], h)
@@ -64,14 +64,14 @@ def run_together(
             update_cable_ends(p, motors)
             for i in range(p.cables):
                 m = motors[i]
-                rotor.step_rotor(m, h / parts, m.torque_demand, kinds[i] != servo.OFF)
-                flags[i] |= rotor.step_disc(m)
+                motor_physics.step_rotor(m, h / parts, m.torque_demand, kinds[i] != servo.OFF)
+                flags[i] |= motor_physics.step_disc(m)
             step_platform(p, motors, h / parts)
         for i in range(p.cables):
             m = motors[i]
             m.time = start + (k + 1) * h
-            rotor.remember_angle(m)
-            servo.observe(m, rotor.read_counter(m, m.angle), h)
+            motor_physics.remember_angle(m)
+            servo.observe(m, motor_physics.read_counter(m, m.angle), h)
     for i in range(p.cables):
         motors[i].time = until
         flags[i] |= servo.watch(motors[i], kinds[i], targets[i], dt)

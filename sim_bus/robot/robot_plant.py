@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
-from cdpr_profiles.reading.reader import Profile, read_toml_model
+from cdpr_profiles.reading.reader import Profile
 from cdpr_profiles.winch import Winch
 from cdpr_sim_bus.camera.camera_plant import CameraPlant
+from cdpr_sim_bus.plant_file import PlantFile
 from cdpr_sim_bus.robot.plant import CoggingTerm, LoadPlant, Plant
 
 Vector = tuple[Annotated[float, Field(ge=-1000.0, le=1000.0)], ...]
@@ -138,7 +138,7 @@ class ScannerPlant(Profile):
     rate_Hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 10.0
 
 
-class RobotPlant(Profile):
+class RobotPlant(PlantFile):
     """All sections of a robot's plant file; every key has a default.
 
     `motor` is the plant of one motor as for a single winch, `motors`, where given, one each.
@@ -157,14 +157,6 @@ class RobotPlant(Profile):
     """What the platform carries, where the robot is simulated with a camera."""
     motor: Plant = Plant()
     motors: tuple[Plant, ...] = ()
-
-    @classmethod
-    def load_file(cls, path: str | Path) -> RobotPlant:
-        """Read a robot's plant file.
-
-        Raises cdpr_profiles.errors.ProfileError naming file, key, value and what is allowed.
-        """
-        return read_toml_model(Path(path), cls)
 
     def require_fit(self, n: int, size: int) -> None:
         """Raise ValueError where the plant does not fit a robot of n axes and 2 or 3 directions."""

@@ -235,7 +235,7 @@ def test_touch_probe_finds_the_index_in_motion(booted: BootedDrive) -> None:
     booted.power()
     session.expect_index()
     assert not device.feedback.index_known[0]
-    booted.motion.push(0.6, 12)
+    booted.motion.push(0.6, 20)  # by more than a turn, wherever the rotor stands
     session.idle(0.3)
     assert device.feedback.index_known[0]
     _index_is_right(booted)

@@ -61,7 +61,8 @@ def test_one_that_has_turned_over_is_not_pulled_at() -> None:
 
 
 def test_one_that_still_stands_upright_is_tightened_where_it_is() -> None:
-    with fallen([0.15, 0.5, 1.7], [0.2, 0.0, 0.0]) as robot:
+    # 15 cm above the stand: from higher up it is chance whether it tips over
+    with fallen([0.15, 0.5, 1.45], [0.2, 0.0, 0.0]) as robot:
         assert turned_deg(robot) < 20.0  # the platform may be turned by 15 in use
         with pytest.raises(CommandRefusedError, match="say from: lengths"):
             robot.program("tighten")

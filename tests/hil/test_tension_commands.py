@@ -20,7 +20,7 @@ import pytest
 
 from cdpr_profiles import load_winch
 from cdpr_profiles.reading.places import SHIPPED
-from cdpr_profiles.winch_calibration import load_winch_calibration
+from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_tools.cli import main
 
@@ -152,7 +152,7 @@ def test_masses_give_gain_and_friction(
     true = 0.026 * (1.0 + radius_error) / (1.0 + constant_error)
     gain(result, true)
     assert result["friction_per_N_m"] == pytest.approx(share * true, rel=0.1)
-    stored = load_winch_calibration(Path(result["calibration"]))
+    stored = WinchCalibration.load_file(Path(result["calibration"]))
     assert stored.gain_m == result["gain_m"]
     assert all((out / name).is_file() for name in stored.raw_data)
 

@@ -12,8 +12,7 @@ from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.decode import Frame
 from cdpr_profiles import load_winch
 from cdpr_tools.busview.replay import Sender
-from cdpr_tools.busview.roster import entry, responding
-from cdpr_tools.busview.scan import Scan
+from cdpr_tools.busview.scan import Scan, entry, responding
 from cdpr_tools.busview.source import PythonCanSource, open_source
 
 pytestmark = pytest.mark.vcan

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_tools.host.can_interfaces import list_interfaces
-from cdpr_tools.host.host_checks import look_around
+from cdpr_tools.host.host_checks import list_interfaces, look_around
 
 pytestmark = pytest.mark.vcan
 

@@ -13,7 +13,6 @@ from cdpr_profiles import ProfileError, Robot, load_robot
 from cdpr_profiles.calibration.geometry import (
     GeometryCalibration,
     geometry_sha256,
-    load_geometry_calibration,
 )
 from cdpr_profiles.calibration.in_force import (
     calibrated,
@@ -81,7 +80,7 @@ def test_one_in_force_takes_the_place_of_the_file(robot: Robot) -> None:
 
 def test_the_file_reads_back_as_it_was_written(robot: Robot) -> None:
     given = calibration(robot)
-    held = load_geometry_calibration(take_over(robot, given))
+    held = GeometryCalibration.load_file(take_over(robot, given))
     assert held == given
     assert held.identity == given.identity
     assert calibration(robot, move_m=0.011).identity != given.identity

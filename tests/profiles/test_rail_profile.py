@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from cdpr_profiles import ProfileError
+from cdpr_profiles.catalogue import load_rail_drive
 from cdpr_profiles.devices.rail import load_rail
-from cdpr_profiles.devices.rail_drive import load_rail_drive
 from cdpr_profiles.reading.places import SHIPPED
 
 CIA402 = (SHIPPED / "rails" / "rail-cia402.toml").read_text()

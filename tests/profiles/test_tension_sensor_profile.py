@@ -10,7 +10,7 @@ import pytest
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.places import SHIPPED
-from cdpr_profiles.winch_calibration import WinchCalibration, load_winch_calibration
+from cdpr_profiles.winch_calibration import WinchCalibration
 
 TEXT = (SHIPPED / "tension_sensors" / "rtu-load-cell-1.toml").read_text(encoding="utf-8")
 
@@ -71,11 +71,11 @@ def test_a_calibration_is_read_as_it_was_written(tmp_path: Path) -> None:
     )
     path = tmp_path / "winch-calibration.toml"
     made.save(path)
-    assert load_winch_calibration(path) == made
+    assert WinchCalibration.load_file(path) == made
     assert made.torque_Nm(100.0) == pytest.approx(2.496)
     assert made.friction_at_Nm(100.0) == pytest.approx(0.205)
     path.write_text(path.read_text().replace("gain_m = 0.025", "gain_m = -0.025"))
     with pytest.raises(ProfileError, match=r"gain_m: value -0\.025"):
-        load_winch_calibration(path)
+        WinchCalibration.load_file(path)
     with pytest.raises(ProfileError, match="cannot be written"):
         made.save(tmp_path / "none" / "file.toml")

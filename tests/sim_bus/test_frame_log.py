@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 from cdpr_drivers.decode.candump import LogEntry, read_log
-from cdpr_sim_bus.frame import EFF_FLAG, RTR_FLAG, pack_frame
-from cdpr_sim_bus.frame_log import FrameListener, FrameLog
+from cdpr_sim_bus.frame import EFF_FLAG, RTR_FLAG, FrameListener, FrameLog, pack_frame
 
 StartBus = Callable[..., Any]
 SYNC = pack_frame(0x080)
@@ -88,7 +87,7 @@ def test_which_bus_was_looked_at_first_makes_no_difference(tmp_path: Path) -> No
 def test_a_bus_that_stands_for_ever_fills_no_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cdpr_sim_bus.frame_log._MOST_WAITING", 8192)
+    monkeypatch.setattr("cdpr_sim_bus.frame._MOST_WAITING", 8192)
     log = FrameLog(tmp_path / "frames.log")
     speaks, stands = log.listener("left"), log.listener("right")
     for k in range(20_000):

@@ -8,7 +8,7 @@ import os
 import pty
 from contextlib import redirect_stdout, suppress
 
-from cdpr_sim_bus.ready import print_ready
+from cdpr_sim_bus.bus.server import print_ready
 
 READY = {"bus": "simbus:lab", "pid": 7, "mode": "lockstep", "nodes": [1, 2], "slcan": "/dev/pts/3"}
 

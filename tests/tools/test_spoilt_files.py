@@ -31,7 +31,7 @@ from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_profiles.motor import Motor
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_profiles.reading.reader import dotted
-from cdpr_profiles.winch_calibration import load_winch_calibration
+from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.control.tuning import design_pid
 from cdpr_rt.core.rawlog import RawLogWriter, column_names, read_raw_log
 from cdpr_rt.errors import ControlError, InvalidRequestError
@@ -42,8 +42,8 @@ from cdpr_rt.robots.last_lengths import LastLengths
 from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
 from cdpr_sim_bus.canopen.dictionary.od import ObjectDictionary
 from cdpr_sim_bus.cia402.drive import SimDrive
-from cdpr_sim_bus.devices.safety_plant import SafetyPlant
 from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant
+from cdpr_sim_bus.devices.sim_safety_io import SafetyPlant
 from cdpr_sim_bus.errors import SimulatorError
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
@@ -79,22 +79,22 @@ class Kind:
     use: Callable[[], object]
 
 
-def spoil(data: bytes, chance: random.Random) -> bytes:
+def spoil(data: bytes, rng: random.Random) -> bytes:
     """Return a file with one to three things changed in it."""
-    for _ in range(chance.choice((1, 1, 1, 2, 3))):
-        token = chance.choice(HOSTILE).encode("utf-8")
+    for _ in range(rng.choice((1, 1, 1, 2, 3))):
+        token = rng.choice(HOSTILE).encode("utf-8")
         spans = [m.span() for m in NUMBER.finditer(data)]
         lines = [m.span() for m in LINE.finditer(data)]
-        what = chance.randrange(8)
-        at = chance.randrange(len(data) + 1)
+        what = rng.randrange(8)
+        at = rng.randrange(len(data) + 1)
         if what <= 2 and spans:
-            low, high = chance.choice(spans)
+            low, high = rng.choice(spans)
         elif what == 3 and lines:
-            low, high = chance.choice(lines)
-            token = data[low:high] * chance.choice((0, 2, 300))
+            low, high = rng.choice(lines)
+            token = data[low:high] * rng.choice((0, 2, 300))
         elif what == 4:
-            low, high = at, min(len(data), at + chance.choice((1, 10, 1000)))
-            token = chance.randbytes(high - low)
+            low, high = at, min(len(data), at + rng.choice((1, 10, 1000)))
+            token = rng.randbytes(high - low)
         elif what == 5:
             low, high, token = at, len(data), b""
         else:
@@ -165,7 +165,7 @@ def profiles(folder: Path) -> dict[str, Kind]:
     }  # fmt: skip
     return {
         **{name: Kind(path, lambda: use_robot(robot)) for name, path in of_robot.items()},
-        "calibration alone": Kind(known, lambda: load_winch_calibration(known)),
+        "calibration alone": Kind(known, lambda: WinchCalibration.load_file(known)),
         "tension sensors": Kind(folder / sensors, lambda: load_tension_sensors(folder / sensors)),
         "safety I/O": Kind(folder / io, lambda: load_safety_io(folder / io)),
         "rail": Kind(folder / rail, lambda: load_rail(folder / rail)),

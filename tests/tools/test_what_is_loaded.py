@@ -9,7 +9,6 @@ import pytest
 
 from cdpr_tools import cli
 from cdpr_tools.command_group import load
-from cdpr_tools.commands.bench import bench
 from cdpr_tools.commands.drive import group as drive
 from cdpr_tools.commands.robot import group as robot
 from cdpr_tools.commands.sim import sim
@@ -28,8 +27,8 @@ def _loaded(code: str) -> set[str]:
 
 @pytest.mark.parametrize(
     "modules",
-    [cli.MODULES, sim.MODULES, bench.MODULES, drive.MODULES, robot.MODULES],
-    ids=["cdpr", "sim", "bench", "drive", "robot"],
+    [cli.MODULES, sim.MODULES, drive.MODULES, robot.MODULES],
+    ids=["cdpr", "sim", "drive", "robot"],
 )
 def test_the_lines_of_help_are_those_of_the_commands(modules: dict[str, dict[str, str]]) -> None:
     for module, lines in modules.items():

@@ -11,20 +11,24 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.estimation.fit import fit
 from cdpr_rt.calibration.estimation.parameters import EXIT, OFFSET, CableGeometry
 from cdpr_rt.calibration.estimation.residuals import lengths_told
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
-from cdpr_tools.bench.timing import timed
+from cdpr_tools.bench.timing import timed, verdict
+from cdpr_tools.output import Output
 
 ROBOT: Final = "spatial-8"
 TARGET_ms: Final = 50.0
 _EXIT_m, _NOISE_m, _SIGMA_m, _SIGMA_rad = 0.01, 3e-4, 1e-3, 2e-3
 
 
-def measure(poses: int, repeats: int, out: Any) -> dict[str, Any]:
-    """Measure the fit of exit points and offsets with poses measured, and without."""
+def measure(poses: int, repeats: int, images: int, seed: int, out: Output) -> dict[str, Any]:
+    """Measure the fit of exit points and offsets with poses measured, and without.
+
+    With so many images, also one with a camera.
+    """
     file, true, seen = _made_up(poses)
     blind = seen.unmeasured()
     figures: dict[str, Any] = {"poses": poses, "target_ms": TARGET_ms}
@@ -42,7 +46,40 @@ def measure(poses: int, repeats: int, out: Any) -> dict[str, Any]:
     figures["reached"] = (
         max(figures[name]["ms"] for name in ("measured", "redundancy")) <= TARGET_ms
     )
+    if images:
+        from cdpr_tools.bench import joint_calibration  # noqa: PLC0415  # needs an extra
+
+        figures["joint"] = joint_calibration.measure(images, seed, out)
     return figures
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as lines."""
+    lines = [
+        f"{figures['poses']} poses x 8 cables, exit points and offsets, processor time:",
+        *(
+            f"  {text:34}{figures[name]['ms']:10.1f} ms, exit points "
+            f"{figures[name]['off_mm']:.2f} mm off"
+            for name, text in (
+                ("measured", "poses measured"),
+                ("redundancy", "poses unknown"),
+                ("scipy", "SciPy, poses measured"),
+            )
+        ),
+        f"  {'with drums and elongation too':34}{figures['usual']:10.1f} ms",
+        f"  SciPy takes {figures['ratio']:.0f} times as long; wanted at most "
+        f"{figures['target_ms']:g} ms: {verdict(figures['reached'])}",
+    ]
+    if told := figures.get("joint"):
+        lines += [
+            f"{told['images']} images of {told['markers']} markers, {told['corners']} corners, "
+            "processor time:",
+            f"  {'detection':34}{told['detection_s']:10.2f} s",
+            f"  {'map, joint fit, faults, verdict':34}{told['fit_s']:10.2f} s, poses by lengths "
+            f"{told['position_mm']:.2f} mm and {told['turn_deg']:.3f} deg off",
+            f"  wanted at most {told['target_s']:g} s: {verdict(told['reached'])}",
+        ]
+    return lines
 
 
 def _made_up(poses: int) -> tuple[CableGeometry, CableGeometry, Observations]:

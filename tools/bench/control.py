@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import Robot, load_robot
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.bench.control_baseline import BaselineCableControl
+from cdpr_tools.bench.timing import verdict
+from cdpr_tools.output import Output
 
 TARGET_RATIO, TARGET_us = 20.0, 100.0
 """Least ratio of the baseline's median cost to ours, and most of ours at p99."""
@@ -24,7 +27,7 @@ _ROUND_S = 4.0
 _NOISE_rad = 3e-4
 
 
-def measure(name: str, cycles: int) -> dict[str, Any]:
+def measure(name: str, cycles: int, out: Output) -> dict[str, Any]:  # noqa: ARG001  # as all have it
     """Run both for `cycles` cycles in blocks that take turns and return the figures.
 
     Both are given the same set-points and the same angles of the motors, with the encoders' noise;
@@ -62,6 +65,26 @@ def measure(name: str, cycles: int) -> dict[str, Any]:
         },
         "difference_Nm": difference,
     }
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, a line for each implementation."""
+    lines = [
+        f"{figures['robot']}: {figures['cables']} cables, {figures['directions']} directions, "
+        f"{figures['cycles']} updates of each",
+        f"{'update of one cycle, us':32}{'p50':>10}{'p99':>10}{'worst':>10}",
+    ]
+    for name, text in (("ours", "ours, compiled"), ("obvious", "the same in NumPy and SciPy")):
+        us = figures["update_us"][name]
+        lines.append(f"{text:32}{us['p50']:10.1f}{us['p99']:10.1f}{us['worst']:10.1f}")
+    targets, reached = figures["targets"], figures["reached"]
+    return [
+        *lines,
+        f"NumPy / ours at p50: {figures['obvious_over_ours']:.1f}, wanted at least "
+        f"{targets['ratio']:g}: {verdict(reached['ratio'])}",
+        f"ours at p99, wanted at most {targets['p99_us']:g} us: {verdict(reached['p99_us'])}",
+        f"torques differ by at most {figures['difference_Nm']:.1e} Nm",
+    ]
 
 
 def controls(robot: Robot) -> tuple[CableControl, BaselineCableControl]:

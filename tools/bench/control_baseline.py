@@ -11,7 +11,8 @@ from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import RobotAxis
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.loop_design import LoopGains, latency_s
 from cdpr_rt.robots.platform_model import PlatformModel

@@ -6,9 +6,9 @@ import time
 from typing import Any, Final
 
 from cdpr_profiles import load_robot
+from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry, Knowledge
 from cdpr_rt.calibration.markers.images.detection import MarkerDetector
-from cdpr_rt.calibration.outcome import calibrate
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_sim_bus.camera.camera_plant import CameraPlant
 from cdpr_sim_bus.camera.sim_camera import SimCamera

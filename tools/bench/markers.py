@@ -18,6 +18,7 @@ from cdpr_sim_bus.camera.camera_plant import CameraPlant
 from cdpr_sim_bus.camera.random_poses import Box, random_poses
 from cdpr_sim_bus.camera.scene import Sheet
 from cdpr_sim_bus.camera.sim_camera import SimCamera
+from cdpr_tools.bench.timing import verdict
 from cdpr_tools.output import Output
 
 TARGET_S = 20.0
@@ -35,13 +36,7 @@ def measure(count: int, seed: int, out: Output) -> dict[str, Any]:
         for state in random_poses(_BOX, count, seed):
             images.append(camera.grab(state))
             advance(float(len(images)))
-    intrinsics = CameraIntrinsics(
-        width_px=lens.width_px,
-        height_px=lens.height_px,
-        focal_px=lens.focal_px,
-        centre_px=lens.centre_px,
-        distortion=lens.distortion,
-    )
+    intrinsics = CameraIntrinsics.model_validate(lens, from_attributes=True)
     sheets = MarkerSheets(size_m=_SIZE_m)
     results: dict[str, Any] = {"images": count, "seed": seed}
     reference: int | None = None  # the same for both, as errors are told in its frame
@@ -63,6 +58,26 @@ def measure(count: int, seed: int, out: Output) -> dict[str, Any]:
     ours = results["ours"]
     results["reached"] = {"time": ours["detection_s"] + ours["fit_s"] <= TARGET_S}
     return results
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, beside those of OpenCV's corners."""
+    ours, theirs = figures["ours"], figures["opencv"]
+    lines = [f"{figures['images']} images{'ours':>30}{'OpenCV corners':>20}{'ratio':>9}"]
+    for text, key, unit, digits in (
+        ("detection, processor time", "detection_s", "s", 2),
+        ("map, processor time", "fit_s", "s", 2),
+        ("corners fit to", "corner_sigma_px", "px", 3),
+        ("largest error along the plane", "xy_max_mm", "mm", 2),
+        ("largest error across it", "z_max_mm", "mm", 2),
+        ("error where it fits best, rms", "shape_rms_mm", "mm", 2),
+        ("what the map says of that", "told_mm", "mm", 2),
+    ):
+        a, b = ours[key], theirs[key]
+        ratio = f"{b / a:9.1f}" if a else ""
+        lines.append(f"{text:32}{a:8.{digits}f} {unit:3}{b:13.{digits}f} {unit:3}{ratio}")
+    told = verdict(figures["reached"]["time"])
+    return [*lines, f"detection and map wanted within {TARGET_S:g} s: {told}"]
 
 
 def _ours(images: _Images) -> list[Sighting]:
@@ -116,7 +131,7 @@ def _errors(fit: MapFit, camera: SimCamera) -> dict[str, float]:
     off = difference(map_, truth)
     along = np.abs(off.corner_error_m)
     points = map_.position_m[map_.placed]
-    _, turn, shift = best_fit(points, truth.position_m)
+    turn, shift = best_fit(points, truth.position_m)
     left = points @ turn.T + shift - truth.position_m
     return {
         "markers": len(there),

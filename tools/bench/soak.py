@@ -249,4 +249,40 @@ def measure(
         "drives": len(robot.axes),
         "boot_s": round(session.boot_s, 3),
     }
-    return head | figures
+    return head | figures | ({} if figures["ok"] else {"error": _failure(figures)})
+
+
+def _failure(figures: dict[str, Any]) -> str:
+    texts = [f"{figures['lost_frames']} frames were lost"] if figures["lost_frames"] else []
+    texts += [
+        f"the {name} gained {figures['memory_growth_KiB'][name]} KiB and "
+        f"{figures['open_files_growth'][name]} open files"
+        for name in figures["leaks"]
+    ]
+    return "; ".join(texts)
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as lines, one for each bus and process."""
+    lines = [
+        f"{figures['drives']} drives were up in {figures['boot_s']:.2f} s of bus time",
+        f"{figures['robot']} at {figures['rate_Hz']:g} Hz: {figures['bus_hours']:.3f} h of bus "
+        f"time, {figures['cycles']} cycles, in {figures['wall_s']:.0f} s "
+        f"({figures['us_per_cycle']:.0f} us each)",
+        f"{figures['bus_hours_in_10_minutes']:.2f} h fit into 10 minutes; 24 h take "
+        f"{figures['wall_hours_for_24_bus_hours']:.1f} h",
+    ]
+    for name, verdict in figures["buses"].items():
+        lines.append(
+            f"bus {name}: {verdict['frames_counted']} frames on the bus, "
+            f"{verdict['frames_expected']} expected by the master (heartbeats to within "
+            f"{verdict['tolerance']}); SYNCs lost {verdict['syncs_lost']}, answers missed "
+            f"{verdict['answers_missed']}, dropped {verdict['dropped']}, cycles that did not fit "
+            f"{verdict['overruns']}"
+        )
+    for name, gained in figures["memory_growth_KiB"].items():
+        lines.append(
+            f"{name}: {figures['memory_KiB'][name] / 1024:.0f} MiB, grown by {gained} KiB; "
+            f"open files grown by {figures['open_files_growth'][name]}"
+        )
+    return lines

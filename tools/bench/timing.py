@@ -1,4 +1,4 @@
-"""Process and wall time of repeated calls, and their percentiles."""
+"""Process and wall time of repeated calls, their percentiles, and what is said of a target."""
 
 from __future__ import annotations
 
@@ -34,3 +34,8 @@ def percentiles(
     """Return percentiles rounded to so many digits, by names such as p50 and p99.9."""
     found = np.percentile(values, percents)
     return {f"p{p:g}": round(float(v), digits) for p, v in zip(percents, found, strict=True)}
+
+
+def verdict(reached: bool) -> str:
+    """Return in a word whether a target is reached."""
+    return "reached" if reached else "MISSED"

@@ -14,11 +14,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from cdpr_profiles import load_robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.statics import view_of
 from cdpr_rt.robots.workspace import CableWorkspace
 from cdpr_rt.robots.workspace_analysis.criterion import criterion_of
+from cdpr_tools.bench.timing import verdict
 from cdpr_tools.robots.workspace.search import Search, search
 
 TARGET_s, TARGET_SHARE = 30.0, 0.02
@@ -29,6 +30,12 @@ _SEED = 14
 _BLOCK = 50_000
 _NEAR_N = 0.5
 """Margins nearer to 0 than this are left out where yes and no are compared: tolerances differ."""
+_METHODS = {
+    "margins": "ours: margins in closed form",
+    "active set": "ours, before: active set, every corner",
+    "osqp": "OSQP, every corner until one is not held",
+    "pycapacity": "pycapacity: half-spaces, then every corner",
+}
 
 Held = NDArray[np.bool_]
 Method = Callable[[FloatArray], Held]
@@ -63,6 +70,33 @@ def measure(poses: int, compared: int, out: Any) -> dict[str, Any]:
         "agreement": abs(figures["volume"]["rays_against_grid"]) <= TARGET_SHARE,
     }
     return figures
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, a line for each method."""
+    volume = figures["volume"]
+    lines = [
+        f"{figures['poses']} poses of {figures['robot']}, {100.0 * figures['held_share']:.0f} % of "
+        f"them held: {figures['spent_s']:.1f} s of one core",
+        f"a million takes {figures['million_s']:.1f} s, wanted at most {figures['target_s']:g}: "
+        f"{verdict(figures['reached']['cost'])}",
+        "",
+        f"{figures['compared']:<46d}{'us a pose':>12}{'times ours':>12}{'otherwise':>11}",
+    ]
+    for name, told in figures["others"].items():
+        lines.append(
+            f"{_METHODS[name]:46}{told['us']:12.1f}{told['times']:12.1f}{told['otherwise']:11d}"
+        )
+    lines += [f"{_METHODS[name]}: not installed" for name in figures["not_installed"]]
+    return [
+        *lines,
+        "",
+        f"volume at home's orientation: grid {volume['grid_m3']:.3f} m3, rays "
+        f"{volume['rays_m3']:.3f} m3, drawn places {volume['drawn_m3']:.3f} m3 (+- "
+        f"{volume['drawn_std_m3']:.3f})",
+        f"rays against grid: {100.0 * volume['rays_against_grid']:+.1f} %, wanted within 2 %: "
+        f"{verdict(figures['reached']['agreement'])}",
+    ]
 
 
 def _poses(model: PlatformModel, count: int) -> FloatArray:

@@ -13,21 +13,29 @@ _LAST_NODE = 127
 
 def parse_identifiers(text: str) -> frozenset[int]:
     """Return the 11-bit identifiers in a list as `181,700-77F`, hexadecimal; BadInputError."""
+    allowed = "no identifier; write them hexadecimal up to 7FF, as in 181,700-77F"
+    return frozenset(_numbers("--ids", text, 16, range(_LAST + 1), allowed))
+
+
+def parse_node_ids(text: str) -> list[int]:
+    """Return the node ids in a list as `1,5,20-23`, decimal, in their order; BadInputError."""
+    allowed = "no node id; allowed: 1 to 127, as in 1,5,20-23"
+    return sorted(_numbers("--nodes", text, 10, range(1, _LAST_NODE + 1), allowed))
+
+
+def _numbers(option: str, text: str, base: int, known: range, allowed: str) -> set[int]:
     found: set[int] = set()
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
+    for part in map(str.strip, text.split(",")):
+        first, dash, last = part.partition("-")
         try:
-            low = int(first, 16)
-            high = int(last, 16) if dash else low
+            low = int(first, base)
+            high = int(last, base) if dash else low
         except ValueError:
             low, high = 1, 0
-        if not 0 <= low <= high <= _LAST:
-            raise BadInputError(
-                f"--ids {text}: {part.strip()!r} is no identifier; write them hexadecimal up to "
-                "7FF, as in 181,700-77F"
-            )
+        if not (low in known and high in known and low <= high):
+            raise BadInputError(f"{option} {text}: {part!r} is {allowed}")
         found |= set(range(low, high + 1))
-    return frozenset(found)
+    return found
 
 
 def filters(identifiers: frozenset[int]) -> list[tuple[int, int]]:
@@ -43,19 +51,3 @@ def _blocks(wanted: frozenset[int], start: int, size: int) -> Iterator[tuple[int
     elif inside:
         yield from _blocks(wanted, start, size // 2)
         yield from _blocks(wanted, start + size // 2, size // 2)
-
-
-def parse_node_ids(text: str) -> list[int]:
-    """Return the node ids in a list as `1,5,20-23`, decimal, in their order; BadInputError."""
-    found: set[int] = set()
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        low = int(first) if first.isdecimal() else 0
-        high = (int(last) if last.isdecimal() else 0) if dash else low
-        if not 1 <= low <= high <= _LAST_NODE:
-            raise BadInputError(
-                f"--nodes {text}: {part.strip()!r} is no node id; allowed: 1 to 127, as in "
-                "1,5,20-23"
-            )
-        found |= set(range(low, high + 1))
-    return sorted(found)

@@ -18,7 +18,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import open_regular
 from cdpr_tools.busview.monitor import Viewer
 from cdpr_tools.busview.source import frame_of
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 
 _LOOK_S = 0.1
 BLOCK = 200
@@ -127,10 +127,8 @@ class Sender:
         self.complete = False
         """Whether the recording was sent to its end."""
         self._commanded: set[int] = set()
-        try:
+        with raised_as(BadInputError, BusError):
             self._port: FramePort = open_port(url, [])
-        except BusError as error:
-            raise BadInputError(str(error)) from error
 
     def send(self, frame: Frame) -> None:
         """Send a frame as it was; raises WorkFailedError when the bus does not take it."""

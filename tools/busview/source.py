@@ -5,14 +5,13 @@ from __future__ import annotations
 import select
 import time
 from collections import deque
-from typing import Protocol
 
 import can
 
 from cdpr_drivers.bus import BusUrl, Filters, bus_gone, open_port, open_python_can, query_status
 from cdpr_drivers.decode import Frame
 from cdpr_drivers.errors import BusError
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError, raised_as
 
 _MOST_WAITING = 1 << 20
 """Frames kept for decoding; what comes on top stays in the bus' own buffer."""
@@ -21,27 +20,6 @@ _FRAME_BYTES = 16
 _CONTROL_BYTES = 64
 _LATEST_RELATIVE_s = 1e9
 """A time stamp below this does not count from the epoch."""
-
-
-class Source(Protocol):
-    """A bus to listen to."""
-
-    name: str
-    """How log files name it."""
-    lost: BusError | None
-    """Why nothing comes any more."""
-
-    def receive(self, timeout_s: float) -> None:
-        """Keep some of what has arrived, waiting up to `timeout_s` for the first.
-
-        At the end of the bus `lost` is set.
-        """
-
-    def next_frames(self, most: int) -> list[Frame]:
-        """Return frames that were received, the oldest first."""
-
-    def close(self) -> None:
-        """Leave the bus."""
 
 
 class SimbusSource:
@@ -61,7 +39,7 @@ class SimbusSource:
         self._seen = 0
 
     def receive(self, timeout_s: float) -> None:
-        """Keep what has arrived; see Source."""
+        """Keep what has arrived, waiting up to `timeout_s`; at the end of the bus `lost` is set."""
         if self.lost or len(self._waiting) >= _MOST_WAITING:
             return
         if not self._readable.poll(timeout_s * 1e3):
@@ -117,7 +95,7 @@ class PythonCanSource:
         self._waiting: deque[can.Message] = deque()
 
     def receive(self, timeout_s: float) -> None:
-        """Keep what has arrived; see Source."""
+        """Keep what has arrived, waiting up to `timeout_s`; at the end of the bus `lost` is set."""
         try:
             for i in range(_AT_ONCE):
                 if len(self._waiting) >= _MOST_WAITING:
@@ -155,31 +133,26 @@ def frame_of(message: can.Message) -> Frame:
     )
 
 
-def open_source(url: BusUrl, filters: Filters | None = None) -> SimbusSource | PythonCanSource:
+Source = SimbusSource | PythonCanSource
+"""A bus to listen to: its `name` in log files, and why it is `lost` once nothing comes any more."""
+
+
+def open_source(url: BusUrl, filters: Filters | None = None) -> Source:
     """Open a bus to listen to; raises BadInputError where that is not possible."""
-    try:
+    with raised_as(BadInputError, BusError):
         if url.interface == "simbus":
             return SimbusSource(url, filters)
         return PythonCanSource(url, filters)
-    except BusError as error:
-        raise BadInputError(str(error)) from error
 
 
 def running_bus(text: str) -> BusUrl:
     """Return the bus that `text` names, which has to exist; raises BadInputError."""
-    try:
+    with raised_as(BadInputError, BusError):
         url = BusUrl.parse(text)
-    except BusError as error:
-        raise BadInputError(str(error)) from error
     if url.starts_own_simulator:
-        running = ", ".join(_running_simbuses()) or "none"
+        found = can.detect_available_configs(interfaces=["simbus"])
+        running = ", ".join(f"simbus:{config['channel']}" for config in found) or "none"
         raise BadInputError(
             f"--bus {text}: the name is missing; running on this machine: {running}"
         )
     return url
-
-
-def _running_simbuses() -> list[str]:
-    """Return the simulated buses that run on this machine, as URLs."""
-    found = can.detect_available_configs(interfaces=["simbus"])
-    return [f"simbus:{config['channel']}" for config in found]

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import Robot, load_robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.camera_start import camera_start
 from cdpr_rt.calibration.error_model import solve_thesis
 from cdpr_rt.calibration.estimation.fit import Fit, fit, locate
@@ -34,7 +35,6 @@ from cdpr_rt.calibration.markers.marker_map import best_fit
 from cdpr_rt.calibration.pose_choice import informative
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.calibration.verification.verification import relative_errors
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_tools.calibrate.made_readings import (
     Errors,
@@ -214,7 +214,7 @@ def _by_thesis(geometry: CableGeometry, made: Made) -> Accuracy:
     rigid = replace(geometry, compliance_1_N=np.zeros(geometry.n))
     a, b = geometry.kernel_geometry()[:3].T, geometry.kernel_geometry()[3:6].T
     # where the file has the robot, in the frame of the map
-    _, R, t = best_fit(geometry.model.poses(made.targets[there])[:, 0], p)
+    R, t = best_fit(geometry.model.poses(made.targets[there])[:, 0], p)
     points = p[:, None] + np.einsum("jab,ib->jia", Q, b)
     first = made.length_m[0]
     exits, start = solve_thesis(points, made.length_m[there] - first, a @ R.T + t, first)
@@ -241,9 +241,12 @@ def _by_joint_fit(robot: Robot, geometry: CableGeometry, made: Made) -> Accuracy
     camera, count = found.camera, len(made.data.poses)
     assert camera is not None
     poses = _located(found.geometry, made, made.poses[count:], found.seen.reference_m)
-    # the frame in which all markers together are where they truly are
-    ids = list(camera.ids)
-    _, turn, shift = best_fit(made.markers_m[ids], camera.marker_position_m)
+    # the frame in which all markers together are where they truly are; one that no image has left
+    # a place has none
+    assert found.seen.markers is not None
+    there = np.unique(found.seen.markers.marker)
+    ids = np.array(camera.ids)[there]
+    turn, shift = best_fit(made.markers_m[ids], camera.marker_position_m[there])
     frame, true = np.vstack([shift, turn]), np.vstack([np.zeros(3), np.eye(3)])
     accuracy = _accuracy(poses, made.poses[count:], frame, true)
     return replace(accuracy, chi_square=_chi_square(robot, found, made))

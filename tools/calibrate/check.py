@@ -144,6 +144,11 @@ def _read(
         raise WorkFailedError("stopped; nothing is said of the robot") from None
     except PoseRefusedError as error:
         raise WorkFailedError(f"{robot.profile}: at home: {error}") from error
+    return _kept(robot, measured, known, folder)
+
+
+def _kept(robot: Robot, measured: Measured, known: Before | None, folder: Path) -> CalibrationData:
+    """Return what was read, which is in the folder then."""
     data = CalibrationData(
         robot=robot.profile,
         geometry_sha256=geometry_sha256(robot),

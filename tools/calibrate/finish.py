@@ -12,8 +12,9 @@ from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import GeometryCalibration
 from cdpr_profiles.calibration.in_force import in_force, next_version, take_over
 from cdpr_profiles.errors import ProfileError
+from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.outcome import Method, Outcome, calibrate, calibration_of
+from cdpr_rt.calibration.outcome import Method, Outcome, calibration_of
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.data import CalibrationData, load_points, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
@@ -87,9 +88,12 @@ def finish(
     source: Path,
     folder: Path,
     dry_run: bool,
+    adopt: bool,
     judge: Judge | None = None,
 ) -> None:
     """Identify, tell, report, and take over what is good; `source` is the file of the data.
+
+    What changes nothing significantly is taken over only to `adopt`.
 
     Raises typer.Exit with status 1 where nothing was taken over because it is not good.
     """
@@ -102,25 +106,34 @@ def finish(
         told["verification"] = {**told["verification"], **known.verification()}
         told["truth"] = known.true_errors()
         out.say(*known.lines())
-    taken, more = (
-        _taken(outcome, str(source.resolve()), data.simulated) if not dry_run else (None, [])
-    )
+    why_not = _why_not(outcome, dry_run, adopt)
+    taken: dict[str, Any] | None = None
+    more = [f"nothing was taken over: {why_not}"]
+    if why_not is None:
+        taken, more = _taken(outcome, str(source.resolve()), data.simulated)
     more.append(f"fit it again: cdpr calibrate fit {robot.reference} --data {source.parent}")
     with out.stage("drawing the report"):
         told |= _reported(outcome, data, known, more, folder, source.parent / _IMAGES)
     out.say(*more, f"report: {told['report']}")
-    out.result({"ok": outcome.good, **told, "in_force": taken})
+    out.result({"ok": outcome.good, **told, "in_force": taken, "not_taken_over": why_not})
     if not outcome.good:
         raise typer.Exit(WorkFailedError.exit_status)
 
 
-def _taken(
-    outcome: Outcome, raw_data: str, simulated: bool
-) -> tuple[dict[str, Any] | None, list[str]]:
+def _why_not(outcome: Outcome, dry_run: bool, adopt: bool) -> str | None:
+    """Return why a calibration is not taken over, None where it is."""
+    if dry_run:
+        return "--dry-run"
+    if not outcome.good:
+        return "it is not good"
+    if adopt or outcome.change.significant:
+        return None
+    return "its changes are not significant (--adopt takes it over all the same)"
+
+
+def _taken(outcome: Outcome, raw_data: str, simulated: bool) -> tuple[dict[str, Any], list[str]]:
     """Take a good calibration over; return it for JSON, and what there is to say and do."""
     robot = outcome.robot
-    if not outcome.good:
-        return None, ["nothing was taken over"]
     found, path = _take_over(outcome, raw_data, simulated)
     lines = [
         f"calibration {found.version} ({found.identity}) takes effect at the next start: {path}",
@@ -192,6 +205,7 @@ def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:
     lines = [f"{outcome.robot.name}: {told['poses']} poses, in the frame of {told['frame']}"]
     if data.left_out:
         lines.append(f"{len(data.left_out)} poses were refused, the last: {data.left_out[-1]}")
+    lines.append("changes to the robot's file, ± 1 sigma (predicted):")
     lines += [
         f"  {row['name']:26}{row['change']:+9.2f} ± {row['std']:.2f} {row['unit']}"
         for row in told["parameters"]

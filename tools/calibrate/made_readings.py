@@ -18,10 +18,10 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.devices.camera import CameraIntrinsics, KnownMarker, MarkerSheets
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.camera_data import CameraSetup, HandEye, ImageReading
 from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.workspace import G_m_s2
 
 WIDTH_px, HEIGHT_px = 1280, 1024
@@ -137,26 +137,8 @@ def made_readings(
     assert platform is not None
     n = len(robot.axes)
     exits = np.array(platform.exit_points_m) + rng.normal(0.0, errors.exit_m, (n, 3))
-    anchors = np.array(platform.anchor_points_m)
     drums = rng.normal(0.0, errors.drum, n)
-    soft = np.array([1.0 / axis.winch.cable.stiffness_N for axis in robot.axes])
-    arm = np.einsum("jab,ib->jia", poses[:, 1:], anchors)
-    away = exits - poses[:, None, 0] - arm
-    straight = np.linalg.norm(away, axis=2)
-    tension = _tensions(
-        away / straight[..., None],
-        arm,
-        platform.mass_kg,
-        np.abs(rng.normal(0.0, 1.0, (len(poses), n))) * errors.spread_N,
-    )
-    free = straight / (1.0 + soft * (1.0 + errors.elongation) * tension)
-    # the encoders begin to count at what the file says of home
-    corners = wanted[0, 0] + anchors @ wanted[0, 1:].T
-    start = np.linalg.norm(np.array(platform.exit_points_m) - corners, axis=1)
-    start = start / (1.0 + soft * tension[0])
-    told = start + (free - free[0]) / (1.0 + drums)
-    told += rng.normal(0.0, 1.0, told.shape) * errors.encoder_m
-    felt = np.maximum(tension + rng.normal(0.0, errors.tension_N, tension.shape), _SLACK_N / 5.0)
+    told, felt = _read_cables(robot, poses, wanted[0], exits, drums, errors, rng)
     position, rotation = _sheets(layout, rng)
     setup, place, turn = _setup(errors, layout, position, rotation, rng, hand_eye_known)
     images = _images(poses[:of_data], place, turn, position, rotation, layout, errors, rng)
@@ -178,6 +160,40 @@ def made_readings(
         poses=readings,
     )
     return Made(targets, poses, exits, drums, position, rotation, data, told, felt)
+
+
+def _read_cables(
+    robot: Robot,
+    poses: FloatArray,
+    home: FloatArray,
+    exits: FloatArray,
+    drums: FloatArray,
+    errors: Errors,
+    rng: np.random.Generator,
+) -> tuple[FloatArray, FloatArray]:
+    """Return lengths and tensions as they are told, (N, n); `home` is where the file has it."""
+    platform = robot.platform
+    assert platform is not None
+    anchors = np.array(platform.anchor_points_m)
+    soft = np.array([1.0 / axis.winch.cable.stiffness_N for axis in robot.axes])
+    arm = np.einsum("jab,ib->jia", poses[:, 1:], anchors)
+    away = exits - poses[:, None, 0] - arm
+    straight = np.linalg.norm(away, axis=2)
+    tension = _tensions(
+        away / straight[..., None],
+        arm,
+        platform.mass_kg,
+        np.abs(rng.normal(0.0, 1.0, straight.shape)) * errors.spread_N,
+    )
+    free = straight / (1.0 + soft * (1.0 + errors.elongation) * tension)
+    # the encoders begin to count at what the file says of home
+    corners = home[0] + anchors @ home[1:].T
+    start = np.linalg.norm(np.array(platform.exit_points_m) - corners, axis=1)
+    start = start / (1.0 + soft * tension[0])
+    told = start + (free - free[0]) / (1.0 + drums)
+    told += rng.normal(0.0, 1.0, told.shape) * errors.encoder_m
+    felt = np.maximum(tension + rng.normal(0.0, errors.tension_N, tension.shape), _SLACK_N / 5.0)
+    return told, felt
 
 
 def _missed(wanted: FloatArray, errors: Errors, rng: np.random.Generator) -> FloatArray:

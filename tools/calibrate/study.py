@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.error_model import Errors, Noise, predicted_errors, simulated_errors
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, legend_beside_title

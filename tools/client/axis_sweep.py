@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.rawlog import AXIS_COLUMNS, RawLogWriter, column_names
 from cdpr_rt.identification.cogging_profile import DriveIdentity
 from cdpr_rt.procedures.commissioning.commission_files import Paths
@@ -129,7 +129,7 @@ class AxisSweep:
         control: HeldRight,
         axis: SweptAxis,
         stop_requested: Callable[[], bool],
-        out: Output | None = None,
+        out: Output,
     ) -> None:
         self._out = out
         self._control = control
@@ -139,25 +139,21 @@ class AxisSweep:
     def run(self, turns: int, speed_rad_s: float) -> RecordedSpan:
         """Find the index, sweep there and back, turn at other speeds; return when that was."""
         begin_ns, first = time.monotonic_ns(), self._file()
-        self._say("turning until the encoder's index passes ...")
+        self._out.note("turning until the encoder's index passes ...")
         self._turn(_INDEX_RAD, _INDEX_SPEED_RAD_S)
         if not self._status()["axes"][self._axis.place]["index_known"]:
             turned = f"{_INDEX_RAD / math.tau:g} turns"
             raise WorkFailedError(f"{self._axis.name}: no encoder index was seen in {turned}")
         distances = self._distances(SWEEP_LEAD_IN_RAD + turns * math.tau)
         minutes = 2.0 * (SWEEP_LEAD_IN_RAD + turns * math.tau) / speed_rad_s / 60.0
-        self._say(f"sweeping there and back, {minutes:.1f} min ...")
+        self._out.note(f"sweeping there and back, {minutes:.1f} min ...")
         self._run("sweep", {"distance_rad": distances, "speed_rad_s": speed_rad_s, "legs": 2})
-        self._say("turning at other speeds ...")
+        self._out.note("turning at other speeds ...")
         for speed, distance in _FAST_LEGS:
             self._turn(distance, speed)
             self._turn(-distance, speed)
         self._control.hold()
         return RecordedSpan(first, self._file(), begin_ns, time.monotonic_ns())
-
-    def _say(self, text: str) -> None:
-        if self._out is not None:
-            self._out.note(text)
 
     def _turn(self, distance_rad: float, speed_rad_s: float) -> None:
         distances = self._distances(distance_rad)
@@ -170,14 +166,9 @@ class AxisSweep:
 
     def _run(self, program: str, arguments: dict[str, Any]) -> None:
         self._control.post("/program", {"program": program, "wanted": arguments})
-        if (
-            await_end(self._control, program, self._stop_requested, math.inf, self._told(program))
-            is None
-        ):
+        out = self._out if program == "sweep" else None  # the others take a moment
+        if await_end(self._control, program, self._stop_requested, math.inf, out) is None:
             raise WorkFailedError(f"{self._axis.name}: stopped on request")
-
-    def _told(self, program: str) -> Output | None:
-        return self._out if program == "sweep" else None  # the others take a moment
 
     def _status(self) -> dict[str, Any]:
         return self._control.daemon.get("/status")

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from typing import Any
 
 from cdpr_tools.client.client import Daemon, HeldRight
-from cdpr_tools.client.dead_loop import DEAD, death_text
 from cdpr_tools.client.status_text import (
+    DEAD,
+    death_text,
     in_millimetres,
     place_text,
     platform_text,
@@ -39,11 +40,9 @@ def ended_text(daemon: Daemon, status: dict[str, Any]) -> str:
     """Return why a program does not run any more."""
     if status["state"] == DEAD:
         return death_text(status)
-    return str(status["reason"] or _last_command(daemon))
-
-
-def _last_command(daemon: Daemon) -> str:
-    """Return what was asked of the daemon last, and by whom."""
+    if status["reason"]:
+        return str(status["reason"])
+    # what was asked of the daemon last, and by whom
     asked = [one["text"] for one in daemon.get("/events")["events"] if one["kind"] == "command"]
     return str(asked[-1]) if asked else "another program runs"
 

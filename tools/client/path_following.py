@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 import time
-from dataclasses import dataclass
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Final
 
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_rt.motion.path.reading import require_kind
-from cdpr_tools.client.client import Daemon, HeldRight, open_daemon, remedy
+from cdpr_tools.client.client import Daemon, HeldRight, await_start, remedy
 from cdpr_tools.client.motion import RENEW_S, TELL_S, ended_text, finish
-from cdpr_tools.client.starting import await_start
 from cdpr_tools.client.status_text import (
     GO_ON,
     in_millimetres,
@@ -22,28 +21,19 @@ from cdpr_tools.client.status_text import (
     stage_text,
 )
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.output import Output
+from cdpr_tools.output import Output, time_text
 from cdpr_tools.paths.options import PathOptions
-from cdpr_tools.paths.times import time_text
 from cdpr_tools.signals import stop_on_signals
 
 _MOST_BYTES: Final = 1 << 20
 _NOT_IN_NAMES: Final = re.compile(r"[^A-Za-z0-9_. -]")
 _NAME_CHARS: Final = 48
+Opened = AbstractContextManager[Daemon]
+"""What `open_daemon` returns."""
 BACK: Final = "`cdpr path --back MM` steps back"
 
 
-@dataclass(frozen=True)
-class Where:
-    """Which daemon."""
-
-    robot: str | None
-    socket: Path | None
-    url: str | None
-    key_file: Path | None
-
-
-def follow(where: Where, out: Output, file: Path, options: PathOptions, feed: float) -> None:
+def follow(opened: Opened, out: Output, file: Path, options: PathOptions, feed: float) -> None:
     """Have the daemon plan a file's path, and follow it to its end."""
     body: dict[str, Any] = {
         "name": plain_name(file),
@@ -52,7 +42,7 @@ def follow(where: Where, out: Output, file: Path, options: PathOptions, feed: fl
         "ignore": " ".join(options.ignored()),
         "origin_mm": options.origin_mm,
     }
-    with open_daemon(*_four(where)) as daemon:
+    with opened as daemon:
         _require_platform(daemon, out)
         require_held(daemon.get("/status"))
         with out.stage(f"{file.name}: planning"):
@@ -72,9 +62,9 @@ def plain_name(file: Path) -> str:
     return f"{stem or 'path'}{suffix}"
 
 
-def take_up(where: Where, out: Output, back_mm: float | None, feed: float) -> None:
+def take_up(opened: Opened, out: Output, back_mm: float | None, feed: float) -> None:
     """Go on with the path that was left, or step back along it."""
-    with open_daemon(*_four(where)) as daemon:
+    with opened as daemon:
         _require_platform(daemon, out)
         wanted: dict[str, Any] = {"resume": True, "feed": feed}
         if back_mm is not None:
@@ -103,10 +93,6 @@ def _planned(daemon: Daemon, body: dict[str, Any]) -> dict[str, Any]:
 def go_on(daemon: Daemon, out: Output) -> None:
     """Go on along the path that was paused, at its feed."""
     _run(daemon, out, {"resume": True})
-
-
-def _four(where: Where) -> tuple[str | None, Path | None, str | None, Path | None]:
-    return where.robot, where.socket, where.url, where.key_file
 
 
 def _require_platform(daemon: Daemon, out: Output) -> None:

@@ -80,7 +80,8 @@ class PlatformMove:
 
     def refusal(self, message: str) -> str:
         """Return a refusal by the daemon in the words that were typed."""
-        return in_millimetres(_REFUSED.sub(self.typed, message))
+        refused = _REFUSED.sub(self.typed, message)
+        return in_millimetres(re.sub(r"^pose(?=: )", "move", refused))
 
     def _from_here(
         self,
@@ -157,3 +158,9 @@ def _in_space(values: Sequence[float], about: Sequence[int]) -> list[float]:
     for axis, value in zip(about, values, strict=False):
         vector[axis] = value
     return vector
+
+
+def resume_refusal(message: str) -> str:
+    """Return a refusal of the daemon to go on to a target that was left, as `cdpr resume` says."""
+    message = message.replace("pose: resume: ", "resume: ").replace("position_m", "cdpr move --to")
+    return in_millimetres(message)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.procedures.calibration.measure_poses import Look
 from cdpr_tools.client.client import Daemon
 from cdpr_tools.errors import WorkFailedError

@@ -39,7 +39,7 @@ from cdpr_tools.commission.robot_commissioning import (
     lines_for_robot,
 )
 from cdpr_tools.composition.session import confirm_motion, open_bus, open_winch
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
 from cdpr_tools.recordings.truth import true_angle
@@ -193,16 +193,12 @@ def prepare(folder: Path, overwrite: bool) -> Paths:
         shutil.rmtree(raw)
         for path in (paths.run, paths.results, paths.page, paths.profile, paths.truth):
             path.unlink(missing_ok=True)
-    try:
+    with os_error_as(BadInputError, f"--out {folder}: cannot be created"):
         raw.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInputError(f"--out {folder}: cannot be created: {error.strerror}") from error
     return paths
 
 
 def write(path: Path, text: str) -> None:
     """Write a small file; raises WorkFailedError naming it."""
-    try:
+    with os_error_as(WorkFailedError, f"{path}: cannot be written"):
         path.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise WorkFailedError(f"{path}: cannot be written: {error.strerror}") from error

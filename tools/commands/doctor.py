@@ -9,28 +9,25 @@ from typing import Annotated
 import typer
 
 from cdpr_tools.commands.options import JsonOption, OverwriteOption
-from cdpr_tools.errors import FAILED, BadInputError
+from cdpr_tools.errors import FAILED, BadInputError, os_error_as
 from cdpr_tools.host.host_checks import Finding, look_around
 from cdpr_tools.output import Output
 
 app = typer.Typer()
 
-_Report = Annotated[
-    Path | None,
-    typer.Option(
-        help="Write all that a report of a fault should have into this file; it holds no keys.",
-    ),
-]
-_Robot = Annotated[
-    list[str] | None,
-    typer.Option("--robot", help="With --report: a robot's file to put in; may be repeated."),
-]
-
 
 @app.command()
 def doctor(
-    report: _Report = None,
-    robot: _Robot = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write all that a report of a fault should have into this file; it holds no keys.",
+        ),
+    ] = None,
+    robot: Annotated[
+        list[str] | None,
+        typer.Option("--robot", help="With --report: a robot's file to put in; may be repeated."),
+    ] = None,
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,10 +51,8 @@ def doctor(
         from cdpr_tools.host.fault_report import fault_report  # noqa: PLC0415
 
         found = [line for f in findings for line in lines_of(f)]
-        try:
+        with os_error_as(BadInputError, f"--report {report}"):
             report.write_text(fault_report(found, robot or []), encoding="utf-8")
-        except OSError as error:
-            raise BadInputError(f"--report {report}: {error.strerror}") from error
         out.say(f"report: {report}; look through it before you send it")
     ok = all(f.level != "problem" for f in findings)
     out.result({"ok": ok, "findings": [asdict(f) for f in findings], "report": report})

@@ -1,16 +1,50 @@
-"""Options that several commands share."""
+"""Options that several commands share, and the decorator that adds shared ones to a command."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from cdpr_rt.procedures.commissioning.finding_index import Index
 from cdpr_tools.errors import BadInputError
+
+
+def shares(
+    options: Callable[..., AbstractContextManager[tuple[Any, ...]]],
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator of commands for typer that adds the parameters of `options` to theirs.
+
+    The command runs inside of the context that `options` returns; what that yields are its first
+    arguments, its own it gets by keyword. Parameters that must be given come before all of its own.
+    """
+
+    def parameters(function: Callable[..., Any]) -> list[Parameter]:
+        declared = signature(function, eval_str=True).parameters.values()
+        return [one.replace(kind=Parameter.KEYWORD_ONLY) for one in declared]
+
+    shared = parameters(options)
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def run(**given: Any) -> None:
+            with options(**{one.name: given.pop(one.name) for one in shared}) as first:
+                command(*first, **given)
+
+        own = parameters(command)[2:]
+        needed = [one for one in shared if one.default is Parameter.empty]
+        signed = [*needed, *own, *(one for one in shared if one not in needed)]
+        run.__signature__ = Signature(signed)  # type: ignore[attr-defined]
+        run.__annotations__ = {one.name: one.annotation for one in signed}
+        return run
+
+    return decorate
 
 
 def written_as(*endings: str) -> Callable[[typer.CallbackParam, Path | None], Path | None]:
@@ -39,6 +73,19 @@ PngOption = Annotated[
     ),
 ]
 
+RobotArgument = Annotated[
+    str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
+]
+RobotPlantOption = Annotated[
+    Path | None, typer.Option(help="Plant file: the truth about robot, cables and motors.")
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Random seed.")]
+CommissionedOption = Annotated[
+    Path | None, typer.Option(help="Folder that `cdpr commission ROBOT` has left.", metavar="DIR")
+]
+AgainOption = Annotated[
+    bool, typer.Option("--again", help="Evaluate the data in --out again; nothing moves.")
+]
 WinchArgument = Annotated[
     str, typer.Argument(help="Winch profile: a name or the path of a file.", metavar="WINCH")
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.modbus.tension import LoadCells, TensionSampler
 from cdpr_profiles import Winch, load_winch
 from cdpr_profiles.devices.tension_sensor import TensionSensors, load_tension_sensors
+from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.core.clock import Clock, PacedClock
 from cdpr_rt.procedures.tension import calibration
 from cdpr_rt.procedures.tension.anchor import TOLERANCE, AnchorPlan, measure_anchored, plan_anchor
@@ -26,7 +26,6 @@ from cdpr_rt.procedures.tension.masses import (
     measure_masses,
     plan_hoist,
 )
-from cdpr_rt.runtime.realtime import one_core
 from cdpr_tools.commands.options import (
     JsonOption,
     OverwriteOption,
@@ -34,15 +33,13 @@ from cdpr_tools.commands.options import (
     YesOption,
 )
 from cdpr_tools.commands.with_winch import WinchOnBus, with_winch
-from cdpr_tools.composition.session import confirm_motion, open_bus, open_winch
-from cdpr_tools.composition.simulator import OwnSimulator
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.composition.session import confirm_motion, find_bus, open_winch
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.raw_data import keeping_raw_data, refuse_loss
 from cdpr_tools.signals import stop_on_signals
 from cdpr_tools.tension import watch as watching
 from cdpr_tools.tension.hanging import by_prompt, on_board
-from cdpr_tools.tension.summary import show
 
 app = typer.Typer(
     name="tension", help="Cable tensions: watch, tare, calibrate.", no_args_is_help=True
@@ -54,7 +51,6 @@ _SensorsOption = Annotated[
 _PortOption = Annotated[
     str, typer.Option("--port", help="Serial port of the RS-485 line, as /dev/ttyUSB0.")
 ]
-_OutOption = Annotated[Path | None, typer.Option("--out", help="Folder for raw data and result.")]
 _FIRST_READING_S = 2.0
 _STANDARD_GRAVITY = 9.80665
 _MASS_SPEED_mm_s, _ANCHOR_SPEED_mm_s = 40.0, 5.0
@@ -164,7 +160,9 @@ def calibrate(
     cable: Annotated[
         str | None, typer.Option(help="The load cell's cable; the first by default.")
     ] = None,
-    out_dir: _OutOption = None,
+    out_dir: Annotated[
+        Path | None, typer.Option("--out", help="Folder for raw data and result.")
+    ] = None,
     overwrite: OverwriteOption = False,
     speed_mm_s: Annotated[
         float | None,
@@ -233,7 +231,9 @@ class _Run:
         """Make room for recordings and ask before a real motor is energised."""
         refuse_loss(self.folder, calibration.raw_folder(self.folder), overwrite)
         confirm_motion(self.winch.url, yes, what)
-        _make_room(self.folder)
+        with os_error_as(BadInputError, f"--out {self.folder}: cannot be written"):
+            calibration.discard(self.folder)
+            calibration.raw_folder(self.folder).mkdir(parents=True, exist_ok=True)
 
     def by_masses(
         self, plan: HoistPlan, masses_kg: list[float], gravity: float, board: Path | None
@@ -283,10 +283,8 @@ def _finish(out: Output, folder: Path, winch: Winch) -> None:
     path, picture = folder / calibration.FILE_NAME, folder / calibration.PICTURE
     from cdpr_tools.tension.picture import draw_calibration  # noqa: PLC0415  # slow to load
 
-    try:
+    with os_error_as(WorkFailedError, f"{picture}: cannot be written"):
         draw_calibration(picture, points, found)
-    except OSError as error:
-        raise WorkFailedError(f"{picture}: cannot be written: {error.strerror}") from error
     show(out, found, path)
     result = found.model_dump(mode="json")
     out.result({"ok": True, "calibration": str(path), "picture": str(picture), **result})
@@ -299,32 +297,33 @@ def _masses(text: str) -> list[float]:
         raise BadInputError(f"--masses {text}: numbers in kg are wanted, as 2,5,10") from None
 
 
-def _make_room(folder: Path) -> None:
-    """Have an empty folder for recordings; raises BadInputError where there can be none."""
-    try:
-        calibration.discard(folder)
-        calibration.raw_folder(folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInputError(f"--out {folder}: cannot be written: {error.strerror}") from error
-
-
 def _bus_and_hanging(
     stack: ExitStack, winch: WinchOnBus, board: Path | None
 ) -> tuple[BusUrl, Hang]:
     """Return the bus and what hangs masses there, with a simulator of our own for `simbus:`."""
     url, plant = winch.url, winch.plant
-    if not url.starts_own_simulator:
-        if plant is not None:
-            raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
-        return url, by_prompt if board is None else on_board(board)
-    place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-tension-")))
-    board = place / "board"
-    if plant is None:
-        plant = place / "plant.toml"
-        plant.write_text(_MASS_PLANT)
-    url = open_bus(f"simbus:own-{os.getpid()}")
-    winch.out.note("starting the simulated drive ...")
-    simulator = OwnSimulator(winch.profile.reference, str(url), plant, board=board)
-    stack.callback(simulator.stop)
-    stack.enter_context(one_core(simulator.process.pid))
-    return url, on_board(board)
+    if url.starts_own_simulator:
+        place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cdpr-tension-")))
+        board = place / "board"
+        if plant is None:
+            plant = place / "plant.toml"
+            plant.write_text(_MASS_PLANT)
+    url, _ = find_bus(stack, winch.profile, url, winch.out, plant, board=board)
+    return url, by_prompt if board is None else on_board(board)
+
+
+def show(out: Output, found: WinchCalibration, path: Path) -> None:
+    """Say what was found."""
+    gain, half = found.gain_m * 1e3, found.gain_half_width_m * 1e3
+    apart = 100.0 * (found.gain_m / found.nominal_gain_m - 1.0)
+    out.say(f"gain K_t         {gain:.3f} ± {half:.3f} mNm/N ({apart:+.1f} % from the geometry)")
+    out.say(
+        f"friction         {found.friction_Nm:.3f} ± {found.friction_half_width_Nm:.3f} Nm, and "
+        f"{found.friction_per_N_m * 1e3:.2f} ± {found.friction_per_N_half_width_m * 1e3:.2f} mNm/N"
+    )
+    top = found.highest_tension_N
+    share = 100.0 * found.friction_at_Nm(top) / found.torque_Nm(top)
+    out.say(f"                 {share:.1f} % of the torque at {top:.0f} N")
+    out.say(f"bias             {found.bias_Nm:+.3f} ± {found.bias_half_width_Nm:.3f} Nm")
+    out.say(f"residual         {found.residual_rms_Nm * 1e3:.1f} mNm rms")
+    out.say(f"calibration      {path}")

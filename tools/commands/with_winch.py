@@ -13,7 +13,6 @@ from cdpr_drivers.robot.session import Session
 from cdpr_drivers.robot.session_watch import Watching, no_watches, tension_watch
 from cdpr_profiles import Winch, load_winch
 from cdpr_rt.procedures.winch_operator import Tolerance
-from cdpr_tools.commands.option_decorator import shares
 from cdpr_tools.commands.options import (
     BusOption,
     JsonOption,
@@ -23,6 +22,7 @@ from cdpr_tools.commands.options import (
     SensorsPortOption,
     WinchArgument,
     YesOption,
+    shares,
 )
 from cdpr_tools.composition.session import confirm_motion, open_bus, open_network, open_winch
 from cdpr_tools.output import Output

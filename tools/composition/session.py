@@ -27,17 +27,15 @@ from cdpr_rt.runtime.realtime import one_core
 from cdpr_rt.runtime.warm_up import warm_up
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError, raised_as
 from cdpr_tools.output import Output
 from cdpr_tools.signals import StopRequest, stop_on_signals
 
 
 def open_bus(text: str) -> BusUrl:
     """Return the bus that `text` names; raises BadInputError."""
-    try:
+    with raised_as(BadInputError, BusError):
         return BusUrl.parse(text)
-    except BusError as error:
-        raise BadInputError(str(error)) from error
 
 
 def confirm_motion(url: BusUrl, yes: bool, what: str) -> None:
@@ -56,14 +54,12 @@ def open_network(
     """
     require_fit(winch)
     with ExitStack() as stack:
-        bus, _ = _find_bus(stack, winch, url, out, plant)
+        bus, _ = find_bus(stack, winch, url, out, plant)
         clock = open_clock([bus])
         stack.callback(clock.close)
         heartbeat_s = _heartbeat_s(winch)
-        try:
+        with raised_as(BadInputError, BusError):
             network = CanNetwork(bus, clock, [winch.node_id], winch.master_node_id, heartbeat_s)
-        except BusError as error:
-            raise BadInputError(str(error)) from error
         stack.callback(network.close)
         network.add_node(winch.node_id, load_dictionary(winch.drive.eds, winch.node_id))
         yield network
@@ -93,7 +89,7 @@ def open_winch(
     with ExitStack() as stack:
         stop_requested = stack.enter_context(stop_on_signals())
         robot = robot_of_winch(winch)
-        bus, pid = _find_bus(stack, winch, url, out, plant, truth_log, _compiled(robot))
+        bus, pid = find_bus(stack, winch, url, out, plant, truth_log, _compiled(robot))
         axis = replace(robot.axes[0], winch=winch)  # whose drive waits as long as its profile says
         robot = replace(robot, axes=(axis,), master_heartbeat_s=_heartbeat_s(winch))
         session = stack.enter_context(
@@ -153,7 +149,7 @@ def _heartbeat_s(winch: Winch) -> float:
     return winch.drive.heartbeat_consumer_s / HEARTBEATS_IN_TOLERANCE
 
 
-def _find_bus(
+def find_bus(
     stack: ExitStack,
     winch: Winch,
     url: BusUrl,
@@ -161,6 +157,7 @@ def _find_bus(
     plant: Path | None,
     truth_log: Path | None = None,
     meanwhile: Callable[[], None] | None = None,
+    board: Path | None = None,
 ) -> tuple[BusUrl, int | None]:
     """Return the winch's bus, and the process of its simulator where one was to be started.
 
@@ -168,7 +165,7 @@ def _find_bus(
     """
     if url.starts_own_simulator:
         out.note("starting the simulated drive ...")
-        (bus,), pid = _own_simulator(stack, winch.reference, plant, truth_log, meanwhile)
+        (bus,), pid = _own_simulator(stack, winch.reference, plant, truth_log, meanwhile, board)
         return open_bus(bus), pid
     if plant is not None:
         raise BadInputError("--plant: only for a simulator that the command starts (simbus:)")
@@ -181,9 +178,10 @@ def _own_simulator(
     plant: Path | None = None,
     truth_log: Path | None = None,
     meanwhile: Callable[[], None] | None = None,
+    board: Path | None = None,
 ) -> tuple[list[str], int]:
     bus = f"simbus:own-{os.getpid()}"
-    simulator = OwnSimulator(reference, bus, plant, truth_log, meanwhile=meanwhile)
+    simulator = OwnSimulator(reference, bus, plant, truth_log, board=board, meanwhile=meanwhile)
     stack.callback(simulator.stop)
     stack.enter_context(one_core(simulator.process.pid))
     return [bus], simulator.process.pid

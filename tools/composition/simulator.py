@@ -130,18 +130,17 @@ class OwnSimulator(_OwnProcess):
         command += ["--nodes", str(nodes)]
         if detached:
             command.append("--detached")
-        if plant is not None:
-            command += ["--plant", str(plant)]
-        if truth_log is not None:
-            command += ["--truth-log", str(truth_log)]
-        if scanner is not None:
-            command += ["--scanner", str(scanner)]
-        if board is not None:
-            command += ["--board", str(board)]
-        if camera is not None:
-            command += ["--camera", str(camera)]
-        if log := os.environ.get("CDPR_SIM_FRAME_LOG"):
-            command += ["--frame-log", str(_numbered(Path(log), next(_numbers)))]
+        log = os.environ.get("CDPR_SIM_FRAME_LOG")
+        for option, path in (
+            ("--plant", plant),
+            ("--truth-log", truth_log),
+            ("--scanner", scanner),
+            ("--board", board),
+            ("--camera", camera),
+            ("--frame-log", _numbered(Path(log), next(_numbers)) if log else None),
+        ):
+            if path is not None:
+                command += [option, str(path)]
         self.bus = bus
         super().__init__(*command, meanwhile=meanwhile)
 

@@ -1,4 +1,4 @@
-"""Emergency stop by a signal to the loop's process, independent of the daemon's service."""
+"""Emergency stop by a signal to the loop's process, and the end of a daemon without a service."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from cdpr_profiles.errors import brief
 from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
 from cdpr_rt.core.states import LoopState
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile
-from cdpr_tools.errors import WorkFailedError
+from cdpr_tools.daemon.paths import find_loop_files
+from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _LOOK_S = 0.02
 # the drives are asked over and over, and once more by SDO, where one does not confirm
@@ -188,3 +189,37 @@ def _user(uid: int) -> str:
         return pwd.getpwuid(uid).pw_name
     except KeyError:
         return f"#{uid}"
+
+
+_END_S: Final = 90.0
+"""A platform is let down in less."""
+
+
+def end_left_over(robot: str | None, socket: Path | None) -> list[str]:
+    """Have a loop that runs without a service stop under control; return what was done, as lines.
+
+    Nothing is done, and no line returned, where none runs. Raises BadInputError where several do
+    and none was named, WorkFailedError where it is another user's or does not end.
+    """
+    paths = find_loop_files(robot) if socket is None else [LoopFile.beside(socket)]
+    found = [LoopFile.read(path) for path in paths if path.exists()]
+    running = [one for one in found if one.runs()]
+    if len(running) > 1 and robot is None:
+        names = ", ".join(one.robot for one in running)
+        raise BadInputError(f"{len(running)} loops run: choose one by --robot ({names})")
+    return [_end(one) for one in running[:1]]
+
+
+def _end(loop: LoopFile) -> str:
+    pidfd = loop.open()
+    if pidfd is None:
+        return f"{loop.robot}: its loop has ended"
+    try:
+        signal.pidfd_send_signal(pidfd, signal.SIGTERM)
+        if not select.select([pidfd], [], [], _END_S)[0]:
+            raise WorkFailedError(f"{loop.robot}: its loop still runs {_END_S:g} s after SIGTERM")
+    except PermissionError:
+        raise WorkFailedError(f"{loop.robot}: its loop is another user's") from None
+    finally:
+        os.close(pidfd)
+    return f"{loop.robot}: its service did not answer; its loop was stopped under control"

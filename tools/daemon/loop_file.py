@@ -1,6 +1,7 @@
-"""The file that names a daemon's loop, so that a signal can have its process take the power.
+"""The files that name a daemon's loop and its launcher, beside the daemon's socket.
 
-It lies beside the daemon's socket. The launcher writes it once the loop obeys `POWER_OFF_SIGNAL`.
+By that of the loop a signal can have its process take the power: the launcher writes it once the
+loop obeys `POWER_OFF_SIGNAL`.
 What it says is believed of its owner's own processes only: who reads it may be root.
 """
 
@@ -10,7 +11,8 @@ import os
 import select
 import signal
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -18,7 +20,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.reading.bounded_input import open_regular, parse_json
-from cdpr_tools.daemon.paths import LOOP_SUFFIX, is_trusted
+from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, LOOP_SUFFIX, is_trusted
 from cdpr_tools.errors import WorkFailedError
 
 POWER_OFF_SIGNAL: Final = signal.SIGUSR1
@@ -133,3 +135,36 @@ def started(pid: int) -> int:
         return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
     except OSError:
         return 0
+
+
+_MOST_LAUNCHER_BYTES: Final = 64
+
+
+@contextmanager
+def named_launcher(socket: Path) -> Iterator[None]:
+    """Name this process as the launcher of the daemon with this socket, while the block runs.
+
+    Nobody is told where the file cannot be written: clients only do not wait then.
+    """
+    path = socket.with_suffix(LAUNCHER_SUFFIX)
+    with suppress(OSError):
+        path.unlink(missing_ok=True)  # of one that was killed
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(f"{os.getpid()} {started(os.getpid())}")
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            path.unlink()
+
+
+def launcher_runs(path: Path) -> bool:
+    """Whether the launcher that the file names runs; not where the file cannot be believed."""
+    try:
+        with os.fdopen(open_regular(path, links=False), "rb") as file:
+            words = file.read(_MOST_LAUNCHER_BYTES).split()
+            trusted = is_trusted(path, os.fstat(file.fileno()).st_uid)
+        pid, since = map(int, words)
+    except (OSError, ValueError, ProfileError):
+        return False
+    return trusted and since > 0 and started(pid) == since

@@ -69,7 +69,9 @@ def propose(eds: EdsFile) -> Proposal:
     _units_and_signs(made, eds)
     _times(made)
     _pdos(made, eds)
-    _absences(made, eds)
+    for index, why in _CONSEQUENCES.items():
+        if not eds.has(index):
+            made.find_out(f"{index:04X}h is not in the EDS", why, "ask the maker, or a newer EDS")
     return made
 
 
@@ -292,9 +294,3 @@ _CONSEQUENCES = {
     0x6076: "the motor's rated torque is taken from its profile",
     0x608F: "the encoder's resolution is taken from the winch's file",
 }
-
-
-def _absences(made: Proposal, eds: EdsFile) -> None:
-    for index, why in _CONSEQUENCES.items():
-        if not eds.has(index):
-            made.find_out(f"{index:04X}h is not in the EDS", why, "ask the maker, or a newer EDS")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -13,8 +14,8 @@ import numpy as np
 from cdpr_profiles import load_robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import read_bytes
-from cdpr_rt.core.exchange import FloatArray
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_rt.arrays import FloatArray
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.experiment import figures
 from cdpr_tools.experiment.path import centre_m, targets_m
 from cdpr_tools.experiment.points import Points, points_of_perfect_robot, points_of_session
@@ -49,13 +50,11 @@ def begin(settings: ExperimentSettings, folder: Path) -> None:
         if load(folder) != settings:
             raise BadInputError(f"{path}: holds an experiment with other options; choose --out")
         return
-    try:
+    with os_error_as(BadInputError, str(folder)):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
             raise BadInputError(f"{folder}: not empty; allowed: a new folder, or an experiment's")
-        path.write_text(to_json(settings.as_dict(), indent=1), encoding="utf-8")
-    except OSError as error:
-        raise BadInputError(f"{folder}: {error.strerror}") from error
+        path.write_text(to_json(asdict(settings), indent=1), encoding="utf-8")
 
 
 def load(folder: Path) -> ExperimentSettings:
@@ -151,7 +150,7 @@ def operator_alone(settings: ExperimentSettings) -> dict[str, Any]:
     points = perfect_robot_points(settings, settings.sessions())
     table = rows(points)
     result: dict[str, Any] = {
-        **settings.as_dict(),
+        **asdict(settings),
         "rows": table,
         "variance_analysis": variance_analysis(points),
     }
@@ -195,7 +194,7 @@ def judge(folder: Path, jobs: int) -> dict[str, Any]:
     table = rows(points)
     compared = [row["reached"] for row in table if "reached" in row]
     result: dict[str, Any] = {
-        **settings.as_dict(),
+        **asdict(settings),
         "sessions": f"{len(sessions)} of {len(settings.sessions())}",
         "rows": table,
         "operator_alone": rows(alone),

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.experiment import thesis
 from cdpr_tools.experiment.points import Points
 from cdpr_tools.experiment.statistics import PARTS, levels, spread_mm, thesis_row

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.trials.directions import Directions, platform_of
 

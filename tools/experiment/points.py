@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.stream_buttons import confirmation
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
@@ -84,7 +85,7 @@ def points_of_perfect_robot(
     true_m = np.array(robot.track_m)
     points = np.zeros(len(trial.points), POINT)
     for point, entry in zip(points, trial.points, strict=True):
-        _fill(point, condition.as_dict(), entry)
+        _fill(point, asdict(condition), entry)
         target = targets[entry["target"]]
         look = slice(entry["look_cycles"][0], entry["look_cycles"][1] + 1)
         point["error_m"] = true_m[entry["cycle"]] - target

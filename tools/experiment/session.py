@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.service.streams.stream_packet import Standing
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
@@ -52,10 +52,6 @@ class ExperimentSettings:
             for round_trip_s in self.round_trips_s
             for place in self.places
         }
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as it is stored."""
-        return asdict(self)
 
 
 class RobotPlant:
@@ -138,7 +134,7 @@ def _run_path(
     run.stay(_PLAYED_S)
     np.save(folder / f"{condition.name}.npy", trial.ticks)
     values: dict[str, Any] = {
-        "condition": condition.as_dict(),
+        "condition": asdict(condition),
         "first_cycle": first,
         "targets_m": trial.targets_m.tolist(),
         "points": list(trial.points),

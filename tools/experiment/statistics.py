@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
 from scipy import stats
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.experiment import thesis
 from cdpr_tools.experiment.points import Points
 
@@ -92,13 +93,8 @@ def _row(variable: str, name: str, value: Any, points: Points) -> dict[str, Any]
         "following_three_sigma_mm": spread_mm(points["following_m"]).tolist(),
     }
     if beside is not None:
-        row["thesis"] = {
-            "level": beside.level,
-            "mean_mm": list(beside.mean_mm),
-            "three_sigma_mm": list(beside.three_sigma_mm),
-            "time_s": beside.time_s,
-            "time_sigma_s": beside.time_sigma_s,
-        }
+        told = asdict(beside)
+        row["thesis"] = {key: told[key] for key in told if key != "variable"}
         wanted = GOAL_SHARE * np.array(beside.three_sigma_mm)
         row["share_of_thesis"] = (spread / beside.three_sigma_mm).tolist()
         row["reached"] = bool(np.all(spread <= wanted))

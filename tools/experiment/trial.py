@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.stream_buttons import confirmation
 from cdpr_tools.errors import WorkFailedError
-from cdpr_tools.experiment.model.hand_model import HandModel
+from cdpr_tools.experiment.model.hand_model import HandModel, PositionFilter
 from cdpr_tools.experiment.model.operator_model import OperatorModel
 from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
 from cdpr_tools.experiment.model.plants import Plant
 from cdpr_tools.experiment.model.vision import VisionModel
-from cdpr_tools.teleop.position_filter import PositionFilter
 
 PACKET_S: Final = 0.02
 """Between two packets: 50 a second (Tremblay, section 2.5.1: 30 to 60)."""
@@ -48,10 +47,6 @@ class Condition:
     def name(self) -> str:
         """Its name, for files."""
         return f"{self.place}-{self.scale:g}-{1e3 * self.round_trip_s:.0f}ms-{self.repeat}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as it is kept."""
-        return asdict(self)
 
     def random(self, seed: int) -> tuple[np.random.Generator, np.random.Generator]:
         """Return the randomness of hand and vision, the same for the same condition and seed."""

@@ -8,12 +8,11 @@ import platform
 import re
 import resource
 import socket
+import struct
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-
-from cdpr_tools.host.can_interfaces import CanInterface, list_interfaces
 
 _MEMLOCK_BYTES = 512 << 20
 _CPUS = Path("/sys/devices/system/cpu")
@@ -205,17 +204,14 @@ def _clock_source() -> Finding:
     if not used or used in _GOOD_CLOCKS:
         return Finding("clock source", "ok", used or "not told")
     found = f"{used}: each look at the clock is slow"
-    better = next((c for c in _text(_CLOCKS / "available_clocksource").split() if _is_good(c)), "")
+    available = _text(_CLOCKS / "available_clocksource").split()
+    better = next((clock for clock in available if clock in _GOOD_CLOCKS), "")
     if better:
         return Finding(
             "clock source", "note", found, f"echo {better} > {_CLOCKS}/current_clocksource"
         )
     remedy = "dmesg tells why tsc was given up; a firmware update may mend it"
     return Finding("clock source", "note", found, remedy)
-
-
-def _is_good(clock: str) -> bool:
-    return clock in _GOOD_CLOCKS
 
 
 def _governor() -> Finding:
@@ -260,3 +256,93 @@ _CHECKS: tuple[Callable[[], Finding], ...] = (
     _timers,
     _clock_source,
 )
+
+
+# linux/rtnetlink.h, linux/if_link.h, linux/if_arp.h, linux/can/netlink.h
+_RTM_NEWLINK, _RTM_GETLINK, _NLMSG_DONE = 16, 18, 3
+_REQUEST_DUMP = 0x301
+_TXQLEN, _IFNAME, _LINKINFO = 13, 3, 18
+_INFO_KIND, _INFO_DATA = 1, 2
+_BITTIMING, _STATE = 1, 4
+_ARPHRD_CAN, _IFF_UP = 280, 1
+_STATES = ("error-active", "error-warning", "error-passive", "bus-off", "stopped", "sleeping")
+_NESTED = 0x3FFF  # without the flags of an attribute's type
+
+_MESSAGE = struct.Struct("=IHHII")
+_LINK = struct.Struct("=BxHiII")
+_ATTRIBUTE = struct.Struct("=HH")
+_U32 = struct.Struct("=I")
+
+
+@dataclass(frozen=True)
+class CanInterface:
+    """One CAN interface; `state` is down, up where a controller has none to tell, or its own."""
+
+    name: str
+    is_up: bool
+    is_virtual: bool
+    queue_frames: int
+    state: str
+    bitrate_bit_s: int = 0
+
+
+def list_interfaces() -> list[CanInterface]:
+    """Return the CAN interfaces there are, by rtnetlink; none where the kernel cannot be asked."""
+    try:
+        with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as kernel:
+            size = _MESSAGE.size + _LINK.size
+            head = _MESSAGE.pack(size, _RTM_GETLINK, _REQUEST_DUMP, 1, 0)
+            kernel.send(head + _LINK.pack(socket.AF_UNSPEC, 0, 0, 0, 0))
+            return list(_answers(kernel))
+    except OSError:
+        return []
+
+
+def _answers(kernel: socket.socket) -> Iterator[CanInterface]:
+    while True:
+        data = kernel.recv(1 << 17)
+        while len(data) >= _MESSAGE.size:
+            size, kind, *_ = _MESSAGE.unpack_from(data)
+            if kind != _RTM_NEWLINK:
+                return
+            interface = parse_link(data[_MESSAGE.size : size])
+            if interface is not None:
+                yield interface
+            data = data[size + -size % 4 :]
+
+
+def parse_link(data: bytes) -> CanInterface | None:
+    """Return what an RTM_NEWLINK message tells, without its header; None unless it is CAN."""
+    _, kind, _, flags, _ = _LINK.unpack_from(data)
+    if kind != _ARPHRD_CAN:
+        return None
+    found = _attributes(data[_LINK.size :])
+    info = _attributes(found.get(_LINKINFO, b""))
+    own = _attributes(info.get(_INFO_DATA, b""))
+    is_up = bool(flags & _IFF_UP)
+    state = "up" if is_up else "down"
+    if is_up and _STATE in own:
+        state = _STATES[min(_number(own[_STATE]), len(_STATES) - 1)]
+    return CanInterface(
+        name=found.get(_IFNAME, b"").rstrip(b"\0").decode(errors="replace"),
+        is_up=is_up,
+        is_virtual=info.get(_INFO_KIND, b"").rstrip(b"\0") != b"can",
+        queue_frames=_number(found.get(_TXQLEN, b"")),
+        state=state,
+        bitrate_bit_s=_number(own.get(_BITTIMING, b"")),
+    )
+
+
+def _number(data: bytes) -> int:
+    return int(_U32.unpack_from(data)[0]) if len(data) >= _U32.size else 0
+
+
+def _attributes(data: bytes) -> dict[int, bytes]:
+    found: dict[int, bytes] = {}
+    while len(data) >= _ATTRIBUTE.size:
+        size, kind = _ATTRIBUTE.unpack_from(data)
+        if size < _ATTRIBUTE.size:
+            break
+        found[kind & _NESTED] = data[_ATTRIBUTE.size : size]
+        data = data[size + -size % 4 :]
+    return found

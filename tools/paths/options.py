@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.gcode import GcodeSettings
 from cdpr_tools.errors import BadInputError
 

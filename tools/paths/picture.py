@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.paths.preview import Preview
 from cdpr_tools.report.style import decimated
 

@@ -11,15 +11,15 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.reading.bounded_input import read_text as read_bounded
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.reading import MOST_BYTES, read_path
 from cdpr_rt.procedures.path.planning import Advance, Obstacle, PathPlan, PathPlanner
 from cdpr_rt.procedures.path.tensions import PathTensions, path_tensions
 from cdpr_rt.procedures.path.unit_slips import size_note
 from cdpr_rt.programs.platform.paths.path_progress import paths_folder
 from cdpr_rt.programs.platform.paths.path_store import write_plan
+from cdpr_tools.output import time_text
 from cdpr_tools.paths.options import PathOptions
-from cdpr_tools.paths.times import time_text
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import pyarrow as pa  # type: ignore[import-untyped]
 from pyarrow import csv, parquet
 
 from cdpr_rt.service.recordings.recording_reader import Columns
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.recordings.selection import Selection
 
 FORMATS = (".csv", ".parquet")
@@ -21,10 +21,8 @@ def check_target(path: Path, overwrite: bool) -> None:
     """Raise BadInputError where `path` cannot be written to."""
     if path.suffix not in FORMATS:
         raise BadInputError(f"--out {path}: allowed: a name that ends in {' or '.join(FORMATS)}")
-    try:
+    with os_error_as(BadInputError, f"--out {path}: cannot be written"):
         exists = path.exists()
-    except OSError as error:
-        raise BadInputError(f"--out {path}: cannot be written: {error.strerror}") from None
     if exists and not overwrite:
         raise BadInputError(f"--out {path}: exists already; give --overwrite to write over it")
 

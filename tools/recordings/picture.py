@@ -15,12 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
-from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.recordings.reasons import WHILE_ACTIVE, Reasons, is_fault, why_while_active
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.recordings.selection import ELAPSED, Selection
+from cdpr_tools.recordings.summary import WHILE_ACTIVE, Reasons, is_fault, why_while_active
 from cdpr_tools.report.style import decimated, legend_above, legend_beside_title
 
 FIELDS = (
@@ -101,11 +101,9 @@ def draw(selection: Selection, columns: Columns, axes: Sequence[str] | None, pat
     if panels:
         legend_above(grid.figure, grid.timed[0], columns=10 if beside else 4)
     grid.figure.align_ylabels()
-    try:
+    with os_error_as(WorkFailedError, f"{path}: cannot be written"):
         path.parent.mkdir(parents=True, exist_ok=True)
         grid.figure.savefig(path, format="png")
-    except OSError as error:
-        raise WorkFailedError(f"{path}: cannot be written: {error.strerror or error}") from error
     return int(columns["state"].size)
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import FIELDS
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.service.recordings.recording_file import RecordingError
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError, os_error_as, raised_as
 
 ELAPSED = "elapsed_s"
 """The column that is added: seconds since the first row, over all files."""
@@ -25,10 +25,8 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
     """Return the recordings that `paths` name: files, or all in a folder. Raises BadInputError."""
     found: list[Path] = []
     for path in paths:
-        try:
+        with os_error_as(BadInputError, f"{path}: cannot be read"):
             inside = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-        except OSError as error:
-            raise BadInputError(f"{path}: cannot be read: {error.strerror}") from None
         if not inside:
             raise BadInputError(f"{path}: no recordings (*.mcap) in this folder")
         found += inside
@@ -136,7 +134,5 @@ class Selection:
 
 
 def _readable(reader: RecordingReader, fields: Collection[str] | None) -> Iterator[Columns]:
-    try:
+    with raised_as(BadInputError, RecordingError):
         yield from reader.cycles(fields)
-    except RecordingError as error:
-        raise BadInputError(str(error)) from None

@@ -1,29 +1,80 @@
-"""What is in a recording, in figures."""
+"""Why motions, and recordings, ended, out of what a recording tells."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
+from cdpr_rt.service.recordings.recording_reader import CLOSED, Columns, RecordingReader
+from cdpr_tools.client.status_text import DEAD
 from cdpr_tools.output import Output
-from cdpr_tools.recordings.reasons import (
-    LOOP_ENDED,
-    WHILE_ACTIVE,
-    Reasons,
-    is_fault,
-    is_reason,
-    why_while_active,
-)
 from cdpr_tools.recordings.selection import ELAPSED, Selection
+
+_EARLY_ns: Final = 50_000_000
+"""A reason may be stamped so long before the row in which its reaction is seen."""
+
+WHILE_ACTIVE: Final = "the recording ends while the robot was active"
+LOOP_ENDED: Final = "the control loop ended without a stop"
+_WRITER_ENDED: Final = "its writer was ended, or still writes"
+
+
+class Reasons:
+    """The reasons that a loop gave, each stamped when its status was seen: soon after it reacted.
+
+    Stamps are of CLOCK_MONOTONIC, ns.
+    """
+
+    def __init__(self, events: Iterable[tuple[int, dict[str, Any]]]) -> None:
+        """Take events, each with its stamp."""
+        self._told = sorted(
+            (at_ns, str(event["text"])) for at_ns, event in events if is_reason(event)
+        )
+
+    def after(self, at_ns: int, next_ns: float = float("inf")) -> str:
+        """Return the reason of a reaction at `at_ns`, the next one being at `next_ns`; "" for none.
+
+        A state that follows on a reaction has that one's reason.
+        """
+        k = bisect_left(self._told, (at_ns - _EARLY_ns, ""))
+        if k < len(self._told) and self._told[k][0] < next_ns - _EARLY_ns:
+            return self._told[k][1]
+        return ""
+
+
+def is_reason(event: dict[str, Any]) -> bool:
+    """Whether an event is a reason: one of the service, or one seen in the loop's status."""
+    return event.get("kind") == "reason" or ("limit" in event and "cycle" not in event)
+
+
+def is_fault(event: dict[str, Any]) -> bool:
+    """Whether an event is a limit's reaction, or a state that became a fault."""
+    of_row = "reaction" in event and "cycle" in event
+    return of_row and (event["reaction"] > Reaction.CLAMP or "state fault" in event["text"])
+
+
+def why_while_active(reader: RecordingReader, last_state: int) -> str:
+    """Return why a recording, all of it read, ends in a row of state `last_state` that has power.
+
+    "" where that is none, or another file goes on from there.
+    """
+    if last_state != LoopState.ACTIVE:
+        return ""
+    if any(status.get("state") == DEAD for status in reader.status):
+        return LOOP_ENDED
+    next_name = f"{reader.metadata.get('session')}-{reader.part + 1:03d}.mcap"
+    if reader.ended == CLOSED or reader.path.with_name(next_name).exists():
+        return ""
+    return _WRITER_ENDED
+
 
 _FIELDS = (
     "cycle",
@@ -230,17 +281,14 @@ def worth_telling(events: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """
     found: list[dict[str, Any]] = []
     for event in events:
-        if event.get("kind") == "control" or _is_change_of_program(event):
+        is_change = "cycle" in event and re.fullmatch(r"program \S+", event["text"]) is not None
+        if event.get("kind") == "control" or is_change:
             continue
         if found and _alike(event["text"], found[-1]["text"]):
             found[-1]["times"] += 1
             continue
         found.append({**event, "times": 1})
     return found
-
-
-def _is_change_of_program(event: dict[str, Any]) -> bool:
-    return "cycle" in event and re.fullmatch(r"program \S+", event["text"]) is not None
 
 
 def _alike(text: str, last: str) -> bool:

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import open_regular, parse_json
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.rawlog import RawLog
 from cdpr_rt.procedures.commissioning.evaluation import AngleOf
 from cdpr_rt.procedures.measurement import Recording
@@ -39,6 +40,9 @@ class Truth:
                 raise ValueError(header["format"])
         except (ProfileError, OSError, ValueError, KeyError, TypeError) as error:
             raise BadInputError(f"{path}: not a log of the simulator: {error}") from error
+        self._at_sync: NDArray[np.intp] = np.zeros(0, np.intp)
+        """Numbers of the records that were made at a SYNC, of the `_searched` first ones."""
+        self._searched = 0
 
     def angle_of(self, log: RawLog, run: Recording) -> FloatArray:
         """Return the true angle of a recorded pass, (samples,); raises as `angle_at`."""
@@ -52,9 +56,8 @@ class Truth:
         Raises BadInputError where a SYNC is missing.
         """
         first, last = int(sync_index[0]), int(sync_index[-1])
-        records = np.fromfile(self._path, self._dtype, offset=_HEADER_BYTES)
         # one record a SYNC, counted from zero
-        records = records[records["sync_index"] != NO_SYNC][max(first, 0) : last + 1]
+        records = self._records_at_sync(max(first, 0), last)
         place = sync_index.astype(np.int64) - first
         if records.size != last - first + 1 or not np.array_equal(
             records["sync_index"][place], sync_index
@@ -65,6 +68,15 @@ class Truth:
         angle = np.asarray(records["angle_from_index_rad"][place], float)
         turns = round(float(np.median(measured_rad - angle)) / math.tau)
         return angle + turns * math.tau
+
+    def _records_at_sync(self, first: int, last: int) -> NDArray[np.void]:
+        """Return the records of the SYNCs that are there; the log may have grown meanwhile."""
+        whole = (self._path.stat().st_size - _HEADER_BYTES) // self._dtype.itemsize
+        records = np.memmap(self._path, self._dtype, "r", _HEADER_BYTES, (whole,))
+        found = np.flatnonzero(records["sync_index"][self._searched :] != NO_SYNC)
+        self._at_sync = np.concatenate([self._at_sync, found + self._searched])
+        self._searched = whole
+        return np.asarray(records[self._at_sync[first : last + 1]])
 
 
 def true_angle(path: Path) -> AngleOf | None:

@@ -1,15 +1,131 @@
-"""Whether several runs of a command have written the same."""
+"""Whether several runs of a command have written the same.
+
+Parts of a file that depend on the wall clock are left out."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from cdpr_tools.repeat.contents import NOT_COMPARED, UnreadableError, difference, normalised, pieces
-from cdpr_tools.repeat.run import Run
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+
+from cdpr_rt.service.recordings.recording_schema import TIMING
+from cdpr_tools.repeat.run import FRAMES, Run
+
+WALL_KEYS: Final = ("created", "date", "wall_s")
+"""Keys of JSON and TOML files whose values are the time of day, or how long it took."""
+NOT_COMPARED: Final = (".html", ".png", ".svg", ".pdf")
+"""Ends of the names of pages and pictures, which are drawn from what is compared."""
+
+Piece = tuple[str, bytes]
+"""Where it stands in the file, and what stands there."""
+_BLOCK_BYTES: Final = 1 << 16
+_SHOWN: Final = 60
+_DATES: Final = re.compile(r"(?<!\d)\d{8}(?:T\d{6}Z|-\d{6})(?!\d)")
+
+
+class UnreadableError(Exception):
+    """A file is not what the end of its name says."""
+
+
+def normalised(text: str, run: Run) -> str:
+    """Return a name without the run's folder, the time of day and ids of the run's processes."""
+    text = _DATES.sub("DATE", text.replace(str(run.folder), "."))
+    return re.sub(r"(?<=-)\d+(?!\d)", lambda m: "PID" if int(m[0]) in run.processes else m[0], text)
+
+
+def pieces(path: Path, run: Run) -> Iterator[Piece]:
+    """Yield the parts of a file that are compared; raises UnreadableError."""
+    try:
+        if path.suffix == ".mcap":
+            yield from _messages(path)
+        elif path.suffix == ".json":
+            yield from _leaves("", json.loads(path.read_bytes()), run)
+        elif path.suffix == ".toml":
+            yield from _leaves("", tomllib.loads(path.read_text(encoding="utf-8")), run)
+        elif path.name.startswith(Path(FRAMES).stem) and path.suffix == Path(FRAMES).suffix:
+            with path.open("rb") as file:
+                yield from ((f"line {k}", line) for k, line in enumerate(file, 1))
+        else:
+            with path.open("rb") as file:
+                while block := file.read(_BLOCK_BYTES):
+                    yield f"byte {file.tell() - len(block)}", block
+    except (OSError, ValueError, McapError) as error:
+        raise UnreadableError(str(error) or type(error).__name__) from error
+
+
+def _messages(path: Path) -> Iterator[Piece]:
+    """Yield the messages of each topic in the order of the file."""
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        if summary is None:
+            raise UnreadableError("the recording was not closed")
+        topics = sorted({channel.topic for channel in summary.channels.values()} - {TIMING})
+        for topic in topics:
+            messages = reader.iter_messages(topics=[topic], log_time_order=False)
+            for number, (_, _, message) in enumerate(messages, 1):
+                yield f"{topic}, message {number}", message.data
+
+
+def _leaves(where: str, value: Any, run: Run) -> Iterator[Piece]:
+    if isinstance(value, dict):
+        for key, one in value.items():
+            if key not in WALL_KEYS:
+                yield from _leaves(f"{where}.{key}" if where else key, one, run)
+    elif isinstance(value, list):
+        for number, one in enumerate(value):
+            yield from _leaves(f"{where}[{number}]", one, run)
+    else:
+        yield where, (normalised(value, run) if isinstance(value, str) else repr(value)).encode()
+
+
+def difference(one: Iterator[Piece], other: Iterator[Piece]) -> str:
+    """Return the first difference for people, "" where there is none."""
+    for a, b in zip_longest(one, other):
+        if a != b:
+            return _described(a, b)
+    return ""
+
+
+def _described(a: Piece | None, b: Piece | None) -> str:
+    if a is None or b is None:
+        ends, there = ("first", b) if a is None else ("second", a)
+        assert there is not None  # one of the two goes on
+        return f"{there[0]}: the {ends} has no more"
+    if a[0] != b[0]:
+        return f"{a[0]} in the one, {b[0]} in the other"
+    if a[0].startswith("byte "):
+        first = next(
+            (k for k, (x, y) in enumerate(zip(a[1], b[1], strict=False)) if x != y),
+            min(len(a[1]), len(b[1])),
+        )
+        return f"byte {int(a[0][5:]) + first}"
+    if a[0].startswith("/") and (inner := _inner(a[1], b[1])):
+        return f"{a[0]}: {inner}"
+    return f"{a[0]}: {_shown(a[1])} | {_shown(b[1])}"
+
+
+def _inner(a: bytes, b: bytes) -> str:
+    """Return the first difference of two messages by its name."""
+    no_run = Run(0, Path("/nowhere"), Path("/nowhere"), 0, 0.0, frozenset(), 0, 0.0)
+    try:
+        return difference(*(_leaves("", json.loads(text), no_run) for text in (a, b)))
+    except ValueError:
+        return ""
+
+
+def _shown(text: bytes) -> str:
+    shown = text.decode(errors="replace").strip()
+    return shown if len(shown) <= _SHOWN else shown[:_SHOWN] + " ..."
 
 
 @dataclass(frozen=True)

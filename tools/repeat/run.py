@@ -1,19 +1,89 @@
-"""One run of a command in a folder of its own."""
+"""One run of a command in a folder of its own, and what holds it up.
+
+Busy processes beside it, and processes of its own that are stopped."""
 
 from __future__ import annotations
 
+import math
 import os
+import random
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.repeat.disturbance import Stops, busy_processes
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
+
+_STOP_S = (0.1, 5.0)
+_PAUSE_S = 1.5
+# ends with its standard input, so also when we are killed
+_BUSY = """
+import os, sys, threading
+threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+while True:
+    pass
+"""
+
+
+@contextmanager
+def busy_processes(number: int) -> Iterator[None]:
+    """Keep so many processes busy meanwhile."""
+    command = [sys.executable, "-S", "-c", _BUSY]
+    processes: list[subprocess.Popen[bytes]] = []
+    try:
+        for _ in range(number):
+            processes.append(
+                subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
+            )
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+
+
+@dataclass
+class Stops:
+    """Stops one process at a time for 0.1 to 5 s (SIGSTOP), at moments left to `rng`."""
+
+    rng: random.Random
+    number: int = 0
+    held_s: float = 0.0
+    _next_s: float = 0.0
+    _held: list[int] = field(default_factory=list)
+    """Descriptor of the process that is stopped now."""
+
+    def turn(self, processes: Sequence[int]) -> None:
+        """Do what is due; `processes` are those that may be stopped."""
+        now_s = time.monotonic()
+        if now_s < self._next_s:
+            return
+        if self._held or not processes:
+            self.release()
+            self._next_s = now_s + self.rng.expovariate(1.0 / _PAUSE_S)
+            return
+        low, high = map(math.log, _STOP_S)
+        with suppress(ProcessLookupError):
+            descriptor = os.pidfd_open(self.rng.choice(processes))
+            self._held.append(descriptor)
+            signal.pidfd_send_signal(descriptor, signal.SIGSTOP)
+            duration_s = math.exp(self.rng.uniform(low, high))
+            self.number += 1
+            self.held_s += duration_s
+            self._next_s = now_s + duration_s
+
+    def release(self) -> None:
+        """Continue what is stopped (SIGCONT)."""
+        while self._held:
+            descriptor = self._held.pop()
+            with suppress(ProcessLookupError):
+                signal.pidfd_send_signal(descriptor, signal.SIGCONT)
+            os.close(descriptor)
+
 
 FRAMES = "frames.log"
 """The log of all frames among the files of a run."""
@@ -91,7 +161,7 @@ def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subproces
     path = f"{Path(sys.executable).parent}:{os.environ.get('PATH', os.defpath)}"
     environment = {**os.environ, "PATH": path, _LOG_KEY: str(work / FRAMES)}
     environment["XDG_STATE_HOME"] = str(work / "state")  # what one run learns, no other knows
-    try:
+    with os_error_as(BadInputError, f"{words[0]}: cannot be run"):
         process = subprocess.Popen(
             words,
             cwd=work,
@@ -101,8 +171,6 @@ def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subproces
             stderr=subprocess.STDOUT,
             start_new_session=True,  # a Ctrl-C at the terminal is ours to pass on
         )
-    except OSError as error:
-        raise BadInputError(f"{words[0]}: cannot be run: {error.strerror}") from error
     try:
         yield process
     finally:

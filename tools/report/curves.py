@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.validation import low_pass_velocity
-from cdpr_rt.core.exchange import BoolArray, FloatArray
 from cdpr_rt.core.rawlog import read_raw_log
 from cdpr_rt.identification import HarmonicResult, ThesisResult
 from cdpr_rt.identification.cogging.thesis import DEGREE, GRID, WINDOW_deg

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_tools.report.curves import ResidualEffort
 from cdpr_tools.report.style import (
     BACKWARD,

@@ -60,8 +60,11 @@ class _Report:
     def html(self) -> str:
         """Return the page."""
         title = f"Commissioning of {self._winch.name}"
-        ramps = self._ramps()
+        truth = Truth(self._paths.truth) if self._true else None
+        ramps = {m: curves.read_ramp(self._passes(m)[0], truth) for m in METHODS}
         judged = words.judged_on(self._validation, len(self._passes("better")))
+        found = self._found
+        methods = words.method_words(self._validation, found.thesis, found.better, ramps)
         parts = [
             f"<h1>{escape(title)}</h1>",
             paragraph(self._motor_and_drive(), small=True),
@@ -71,7 +74,7 @@ class _Report:
             section("Torque over a turn", *self._torque()),
             section("What was identified", *self._identified()),
             section("Validation on a ramp of 22 deg/s", *self._ramp(ramps)),
-            section("The thesis’ method beside the harmonic model", *self._methods(ramps)),
+            section("The thesis’ method beside the harmonic model", *map(paragraph, methods)),
             section("Softer and stiffer loops", *self._bandwidths()),
             section("What is left", *self._residual()),
             section("What to do next", *map(paragraph, words.next_words(self._results))),
@@ -91,10 +94,6 @@ class _Report:
 
     def _passes(self, method: str) -> list[Path]:
         return self._recorded(validation_name(method, self._results["bandwidth_Hz"]))
-
-    def _ramps(self) -> dict[str, Ramp]:
-        truth = Truth(self._paths.truth) if self._true else None
-        return {method: curves.read_ramp(self._passes(method)[0], truth) for method in METHODS}
 
     def _motor_and_drive(self) -> str:
         motor, drive = self._winch.motor, self._results["drive"]
@@ -234,21 +233,14 @@ class _Report:
             for key, label, figure, floor_label, caption in drawn
         ]
         encoder_deg = 360.0 / self._results["encoder_counts_per_turn"]
+        torque_Nm = float(self._results["torque_step_Nm"])
         return [
             paragraph(words.loop_words(self._results["pid"][0])),
             paragraph(words.standstill_words(ramps)),
             *pictures,
-            *map(paragraph, words.floor_words(self._validation, encoder_deg, self._torque_step())),
+            *map(paragraph, words.floor_words(self._validation, encoder_deg, torque_Nm)),
             *([tables.on_encoder(self._validation["encoder"])] if self._true else []),
         ]
-
-    def _torque_step(self) -> float:
-        return float(self._results["torque_step_Nm"])
-
-    def _methods(self, ramps: dict[str, Ramp]) -> list[str]:
-        found = self._found
-        sentences = words.method_words(self._validation, found.thesis, found.better, ramps)
-        return [paragraph(one) for one in sentences]
 
     def _bandwidths(self) -> list[str]:
         rows, default = self._validation["bandwidths"], self._results["bandwidth_Hz"]

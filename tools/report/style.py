@@ -12,7 +12,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 
 COLOURS = {"none": "#8a8f98", "thesis": "#2f6fb0", "better": "#d1581a", "floor": "#3b8f5a"}
 LABELS = {

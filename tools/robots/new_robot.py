@@ -13,7 +13,7 @@ from cdpr_drivers.robot.commissioned import folder_called
 from cdpr_profiles import ProfileError, Robot, Winch, load_robot
 from cdpr_profiles.platform import Platform
 from cdpr_profiles.reading.reader import closest
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.checks import lower_when_turned_m, refuse_impossible, standing_tensions_N
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.statics import Box, PlatformStatics
@@ -214,14 +214,6 @@ def text_of(answers: Answers) -> str:
         for i in range(kind.cables)
     ]
     buses = [answers["bus"], answers.get("bus_2")]
-    turning = ""
-    if answers.get("angle_deg", 0.0) > 0.0:
-        turning = _TURNING.format(
-            angle=round(answers["angle_deg"], 6),
-            degrees=f"{math.degrees(answers['angle_deg']):.3g}",
-            speed=round(answers["angular_speed_deg_s"], 6),
-            acceleration=round(answers["angular_acceleration_deg_s2"], 6),
-        )
     head = _HEAD.format(
         name=_quoted(answers["name"]),
         what=KINDS[kind.name],
@@ -229,7 +221,7 @@ def text_of(answers: Answers) -> str:
         buses="".join(
             _BUS.format(number=i, url=_quoted(url)) for i, url in enumerate(buses[: kind.buses])
         ),
-        turning=turning,
+        turning=_turning(answers),
         speed_limit=_speed_limit(answers),
         home=_array(answers["home_m"]),
         low=_array(answers["low_m"]),
@@ -247,6 +239,17 @@ def text_of(answers: Answers) -> str:
         },
     )
     return "\n".join(_aligned(line) for line in (head + "".join(axes)).splitlines()) + "\n"
+
+
+def _turning(answers: Answers) -> str:
+    if answers.get("angle_deg", 0.0) <= 0.0:
+        return ""
+    return _TURNING.format(
+        angle=round(answers["angle_deg"], 6),
+        degrees=f"{math.degrees(answers['angle_deg']):.3g}",
+        speed=round(answers["angular_speed_deg_s"], 6),
+        acceleration=round(answers["angular_acceleration_deg_s2"], 6),
+    )
 
 
 def _speed_limit(answers: Answers) -> str:

@@ -112,7 +112,8 @@ def _limits(kind: Kind) -> list[Question]:
 
     return [
         Question(
-            "torque_Nm", "Torque limit at the motors (Nm)", _torque, usual(torque, _rated_torque)
+            "torque_Nm", "Torque limit at the motors (Nm)", _torque,
+            usual(torque, lambda answers: f"{answers['winch'][1].motor.rated_torque_Nm:g}"),
         ),
         Question(
             "tension_min_N", "Least tension (N)", _number(0.1, 1e5),
@@ -344,10 +345,6 @@ def _size(kind: Kind) -> Callable[[str, Answers], tuple[float, ...]]:
 
 def _torque(text: str, answers: Answers) -> float:
     return _number(0.001, answers["winch"][1].motor.peak_torque_Nm)(text, answers)
-
-
-def _rated_torque(answers: Answers) -> str:
-    return f"{answers['winch'][1].motor.rated_torque_Nm:g}"
 
 
 def _tension_max(text: str, answers: Answers) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.cable_loss import worst_swings
 from cdpr_rt.robots.free_rotation import SWINGS_m, free_rotation

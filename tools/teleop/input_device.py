@@ -67,6 +67,10 @@ class Hand:
 
     def __init__(self, scale: float) -> None:
         self._reach_m = _REACH_USED * REACH_M / max(scale, 1.0)
+        self.go_back()
+
+    def go_back(self) -> None:
+        """Put it where it began."""
         self.position_m: Vector = (0.0, 0.0, 0.0)
         self.quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
 

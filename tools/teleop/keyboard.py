@@ -17,7 +17,6 @@ from cdpr_tools.teleop.input_device import (
     End,
     Hand,
     InputSample,
-    Quaternion,
     TURN_RAD_PER_m,
     Vector,
 )
@@ -41,15 +40,14 @@ _KEY = re.compile(r"\x1b[\[O]([A-D])|\x1b\[[0-9;]*[~A-Za-z]|\x1bO.|\x1b|([^\x1b]
 _UNFINISHED = re.compile(r"\x1b(\[[0-9;]*|O)?$")
 
 
-class Keys:
+class Keys(Hand):
     """What keys do to a hand; knows characters, but no terminal.
 
     There is no motion without keys that come: who lets go, or is gone, stops the hand.
     """
 
     def __init__(self, scale: float) -> None:
-        self._scale = scale
-        self._hand = Hand(scale)
+        super().__init__(scale)
         self._step = _FIRST_STEP
         self._left = ""
         self.clutch = False
@@ -60,16 +58,6 @@ class Keys:
     def step_m(self) -> float:
         """Return how far one press moves the hand."""
         return STEPS_mm[self._step] * 1e-3
-
-    @property
-    def position_m(self) -> Vector:
-        """Return where the hand is."""
-        return self._hand.position_m
-
-    @property
-    def quaternion(self) -> Quaternion:
-        """Return how the hand is turned."""
-        return self._hand.quaternion
 
     def press(self, text: str, passed_s: float) -> None:
         """Take the characters that came within the last `passed_s`.
@@ -94,14 +82,14 @@ class Keys:
     def _make_step(self, key: str) -> None:
         if key in _MOVES:
             x, y, z = (self.step_m * way for way in _MOVES[key])
-            self._hand.move((x, y, z))
+            self.move((x, y, z))
         else:
             x, y, z = (TURN_RAD_PER_m * self.step_m * way for way in _TURNS[key])
-            self._hand.turn((x, y, z))
+            self.turn((x, y, z))
 
     def reset(self) -> None:
         """Undo what keys have done so far, except a request to end."""
-        self._hand = Hand(self._scale)
+        self.go_back()
         self._step = _FIRST_STEP
         self.clutch = False
         self.confirmed = 0

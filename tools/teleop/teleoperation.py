@@ -121,14 +121,10 @@ def _shown(
 
 @contextmanager
 def _ended_by_signals() -> Iterator[Callable[[], bool]]:
-    """Yield what tells whether the user wants an end, or has closed the terminal."""
-    with stop_on_signals() as stop_requested, _hang_up() as hung_up:
-        yield lambda: stop_requested() or hung_up()
+    """Yield what tells whether the user wants an end, or has closed the terminal.
 
-
-@contextmanager
-def _hang_up() -> Iterator[Callable[[], bool]]:
-    """Yield what tells whether the terminal was closed, which would end the process at once."""
+    The latter would end the process at once.
+    """
     gone: list[int] = []
 
     def note(number: int, _frame: FrameType | None) -> None:
@@ -136,7 +132,8 @@ def _hang_up() -> Iterator[Callable[[], bool]]:
 
     before = signal.signal(signal.SIGHUP, note)
     try:
-        yield lambda: bool(gone)
+        with stop_on_signals() as stop_requested:
+            yield lambda: stop_requested() or bool(gone)
     finally:
         signal.signal(signal.SIGHUP, before)
 

@@ -12,9 +12,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from cdpr_drivers.modbus.tension import TensionSampler
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.exchange import FloatArray
-from cdpr_rt.core.tension import TensionFault
+from cdpr_rt.core.tension_feedback import TensionFault
 from cdpr_tools.output import Output
 
 _LOOK_S = 0.02

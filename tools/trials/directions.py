@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError
 
 _ABOUT = {"rx": 0, "ry": 1, "rz": 2, "angle": 2}

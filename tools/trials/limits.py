@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.trials.evaluation.figures import Figure
 from cdpr_tools.trials.evaluation.recorded import Recorded
@@ -20,6 +20,8 @@ SWING_mm: Final = 2.0
 SWING_S: Final = 2.0
 SMOOTHED_S: Final = 0.06
 """Over which a controller may average its set-point."""
+RESTED_S: Final = 0.5
+"""Where it has been so long at rest, the end of its leg is where it came to rest."""
 _FINISHED_SHARE: Final = 0.7
 _REST_S: Final = (0.0, 1.0)
 _LONG_REST_S: Final = 4.0
@@ -36,36 +38,47 @@ _TORQUE_STEP_SHARE: Final = 1e-3
 
 def drive(run: TrialRun, seconds: float) -> None:
     """Head for one target after the other; nearly a third are given up on the way."""
-    chance, finished = run.chance, 0
+    rng, finished = run.rng, 0
     while run.elapsed_s < seconds:
         target = run.start_random_move()
         run.mark("leg", **run.directions.marked(target, "target"))
-        if chance.random() < _FINISHED_SHARE:
+        if rng.random() < _FINISHED_SHARE:
             run.arrive()
-            rest_s = chance.uniform(*_REST_S)
+            rest_s = rng.uniform(*_REST_S)
             run.stay(rest_s if finished % _LONG_EVERY else _LONG_REST_S)
             finished += 1
         else:
-            run.stay(chance.uniform(*_CHANGED_AFTER_S))
+            run.stay(rng.uniform(*_CHANGED_AFTER_S))
 
 
 @dataclass(frozen=True)
 class TargetLeg:
-    """The rows of one leg, where it began, its target, and where it could be stopped, (d,) each."""
+    """The rows of one leg, where it began, its target, and where it could be stopped, (d,) each.
+
+    The set-point stands at the target in the last rows, `stood`.
+    """
 
     rows: slice
     origin: FloatArray
     target: FloatArray
     stop: FloatArray
+    stood: int
 
     def overshoot(self, true: FloatArray) -> FloatArray:
         """Return how far the platform (c, d) was beyond its target at most, in each direction.
 
         A direction in which it had hardly to move has none.
         """
+        return self._beyond(true, self.target)
+
+    def overshoot_of_rest(self, true: FloatArray, rested: int) -> FloatArray | None:
+        """Return the same beyond where it came to rest, None where it was not `rested` for long."""
+        return None if self.stood < rested else self._beyond(true, true[self.rows][-1])
+
+    def _beyond(self, true: FloatArray, place: FloatArray) -> FloatArray:
         way = self.target - self.origin
         sign = np.sign(way)
-        farthest = np.maximum(sign * self.target, sign * self.stop)
+        farthest = np.maximum(sign * place, sign * self.stop)
         beyond = (sign * true[self.rows]).max(axis=0) - farthest
         return np.where(np.abs(way) > _MOVED, np.maximum(beyond, 0.0), 0.0)
 
@@ -92,8 +105,15 @@ def legs(recorded: Recorded) -> list[TargetLeg]:
         runs_on = np.abs(speed) * (SMOOTHED_S + np.abs(speed) / (2.0 * acceleration))
         turn = np.where(speed > 0.0, setpoint.max(axis=0), setpoint.min(axis=0))
         stop = now + np.clip(turn - now, -runs_on, runs_on)
-        found.append(TargetLeg(rows, recorded.true_places[rows.start], mark, stop))
+        stood = _stood(recorded, mark, rows)
+        found.append(TargetLeg(rows, recorded.true_places[rows.start], mark, stop, stood))
     return found
+
+
+def _stood(recorded: Recorded, target: FloatArray, rows: slice) -> int:
+    """Return in how many of a leg's last rows the set-point stood at the target."""
+    coming = np.abs(recorded.setpoint_places[rows] - target).max(axis=1) > _THERE
+    return coming.size if not coming.any() else int(coming[::-1].argmax())
 
 
 def _legs(recorded: Recorded) -> list[tuple[FloatArray, slice]]:
@@ -114,9 +134,8 @@ def swings_s(recorded: Recorded) -> FloatArray:
     found = []
     for target, rows in _legs(recorded):
         k = recorded.directions.k
-        coming = np.abs(recorded.setpoint_places[rows] - target).max(axis=1) > _THERE
-        stood = 0 if not coming.any() else int(np.flatnonzero(coming)[-1]) + 1
-        off = np.linalg.norm(recorded.true_m[rows] - target[:k], axis=1)[stood:]
+        off = np.linalg.norm(recorded.true_m[rows] - target[:k], axis=1)
+        off = off[off.size - _stood(recorded, target, rows) :]
         if off.size * recorded.period_s >= SWING_S:
             swinging = np.flatnonzero(1e3 * off > SWING_mm)
             found.append(recorded.period_s * (swinging[-1] + 1 if swinging.size else 0))
@@ -129,6 +148,8 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
     found = legs(recorded)
     true = recorded.true_places
     beyond = np.array([leg.overshoot(true) for leg in found]).reshape(-1, directions.d)
+    rested = [leg.overshoot_of_rest(true, round(RESTED_S / recorded.period_s)) for leg in found]
+    of_rest = [1e3 * float(over[:k].max()) for over in rested if over is not None]
     off = max(leg.off_m(recorded.true_m) for leg in found)
     speed = np.abs(recorded.truth["velocity_m_s"][:, :k]).max(axis=0)
     swings = swings_s(recorded)
@@ -140,6 +161,9 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
         Figure("overshoot_mm", "overshoot", 1e3 * float(beyond[:, :k].max()), "mm", OVERSHOOT_mm),
         Figure("off_mm", "farthest from the box of a leg, sideways too", 1e3 * off, "mm"),
     ]
+    if of_rest:
+        text = "overshoot beyond where the platform came to rest"
+        figures.append(Figure("overshoot_of_rest_mm", text, max(of_rest), "mm"))
     if directions.angle_rad > 0.0:
         angle = float(np.degrees(beyond[:, k:].max(initial=0.0)))
         figures.append(Figure("overshoot_deg", "overshoot in angle", angle, "deg"))

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.trials.directions import Directions
 from cdpr_tools.trials.evaluation.figures import Figure
 from cdpr_tools.trials.evaluation.recorded import Recorded

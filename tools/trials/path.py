@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial import KDTree
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
 from cdpr_rt.motion.path.pieces import pieces_of
 from cdpr_rt.procedures.path.planning import PathPlan, PathPlanner

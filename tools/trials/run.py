@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import load_robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.trials.directions import Directions, platform_of
 from cdpr_tools.trials.evaluation.recorded import TRUTH
@@ -27,15 +27,15 @@ _BORDER = 1.0 - 1e-9
 class TrialRun:
     """A robot under trial whose platform is held, in the middle of its workspace.
 
-    `chance` decides, `advance` is told the bus time that has passed.
+    `rng` decides, `advance` is told the bus time that has passed.
     """
 
     def __init__(
-        self, rig: LockstepRobot, chance: np.random.Generator, advance: Callable[[float], None]
+        self, rig: LockstepRobot, rng: np.random.Generator, advance: Callable[[float], None]
     ) -> None:
         self.rig = rig
         self.directions = Directions.of(platform_of(rig.robot))
-        self.chance = chance
+        self.rng = rng
         self.refused = 0
         """Places that the robot has refused, with its reason."""
         self._advance = advance
@@ -67,19 +67,19 @@ class TrialRun:
         Angles are about any axis, and as large as they may be at the border.
         """
         low, high = self.directions.low_m, self.directions.high_m
-        chance, k = self.chance, self.directions.k
-        place = chance.uniform(low, high)
-        edge = chance.random(k) < _CORNER_SHARE
-        ends = np.where(chance.random(k) < 0.5, low, high)
+        rng, k = self.rng, self.directions.k
+        place = rng.uniform(low, high)
+        edge = rng.random(k) < _CORNER_SHARE
+        ends = np.where(rng.random(k) < 0.5, low, high)
         return np.append(np.where(edge, ends, place), self._random_turn())
 
     def _random_turn(self) -> FloatArray:
-        turns, chance = len(self.directions.turns), self.chance
+        turns, rng = len(self.directions.turns), self.rng
         if not turns or not self.directions.angle_rad:
             return np.zeros(turns)
-        axis = chance.standard_normal(turns)
-        share = chance.random() ** (1.0 / turns)
-        if chance.random() < _CORNER_SHARE:
+        axis = rng.standard_normal(turns)
+        share = rng.random() ** (1.0 / turns)
+        if rng.random() < _CORNER_SHARE:
             share = _BORDER
         return np.asarray(share * self.directions.angle_rad * axis / np.linalg.norm(axis))
 

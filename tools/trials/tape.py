@@ -14,7 +14,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.reading.bounded_input import read_toml
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_tools.trials.directions import platform_of
 from cdpr_tools.trials.evaluation.figures import Figure
 from cdpr_tools.trials.evaluation.recorded import Recorded

@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.markers.geometry.rotations import exponentials, logarithms
 from cdpr_rt.calibration.markers.reprojection import Views
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
 
 SIZE, LENS = 6, 7
 """Where the relative size of the sheets, and the lens, begin among the parameters."""

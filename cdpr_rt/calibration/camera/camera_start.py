@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdpr_profiles.devices.camera import rotation_vector_rad
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.camera.camera_model import CameraKnowledge, CameraModel
 from cdpr_rt.calibration.camera.corner_terms import corner_residuals
 from cdpr_rt.calibration.camera.hand_eye import Rigid, rigid_places, turned_camera
@@ -19,7 +20,6 @@ from cdpr_rt.calibration.markers.marker_map import MarkerMap
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.camera_data import CameraSetup
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
 
 _UNKNOWN_STD = (0.5, 0.5, 0.5, 1.0, 1.0, 1.0)
 """Of a camera's place on the platform of which nothing is told, m and rad."""

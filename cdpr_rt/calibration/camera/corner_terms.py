@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.camera.camera_model import LENS, SIZE, CameraModel
 from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import FloatArray, IntArray
 
 _WIDTH = 3.0
 

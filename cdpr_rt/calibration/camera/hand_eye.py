@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.geometry.rotations import angles, logarithms
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 _LEAST_TURN_rad = 0.02

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr_profiles.devices.camera import MarkerSheets
+from cdpr_rt.arrays import BoolArray
 from cdpr_rt.calibration.estimation.fit import Fit, fit
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import BoolArray
 from cdpr_rt.errors import InvalidRequestError
 
 _MAP_m, _MAP_rad = 5e-4, 5e-4

@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.camera_model import CameraModel
 from cdpr_rt.calibration.estimation.fit import Fit, fit
 from cdpr_rt.calibration.estimation.parameters import DRUM, CableGeometry
 from cdpr_rt.calibration.estimation.residuals import length_std_m
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
 
 FaultKind = Literal[
     "slack", "outlier", "jump", "drum", "elongation", "image", "marker", "lens", "size"
@@ -229,8 +229,8 @@ def parameter_faults(found: Fit) -> list[Fault]:
             if abs(error) > _FAR * known.drum:
                 text = (
                     f"cable {i + 1}: a turn of its motor pays out {100 * error:+.2f} % (± "
-                    f"{100 * std[i]:.2f} %) of what the file says: check drum_radius_m and "
-                    "gear_ratio of its winch"
+                    f"{100 * std[i]:.2f} %, 1 sigma) of what the file says: check "
+                    "drum_radius_m and gear_ratio of its winch"
                 )
                 faults.append(Fault("drum", i, -1, float(error), text))
     if geometry.shared and abs(geometry.elongation) > _FAR * known.elongation:

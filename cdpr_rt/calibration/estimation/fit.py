@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.camera_model import CameraModel
 from cdpr_rt.calibration.camera.corner_terms import (
     corner_cost,
@@ -17,9 +18,15 @@ from cdpr_rt.calibration.camera.corner_terms import (
 )
 from cdpr_rt.calibration.estimation.normal import NormalEquations
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.estimation.residuals import Linearised, linearise, noise_in_slope
+from cdpr_rt.calibration.estimation.residuals import Linearised, linearise
+from cdpr_rt.calibration.estimation.tension_noise import (
+    correlated,
+    elongations,
+    feigned,
+    slope_covariance,
+    without,
+)
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 _MOST_STEPS = 60
@@ -31,8 +38,6 @@ _HUBER = 2.5
 _NORMAL_MEDIAN = 1.1774
 """Median of the length of a vector of two normal numbers of deviation 1."""
 _JUMP_STD_m = 1.0
-_MOST_SHARE = 0.9
-"""Of a slope's square that is taken for noise."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,9 @@ class Fit:
     attenuation: FloatArray
     """By how much parameters may be off since the tensions err, (P,), a standard deviation: all of
     them together, and no further poses take it away."""
+    slope_noise: float
+    """What a further fit is to take out, as `Knowledge.slope_noise`, for the elongation to lie
+    where `tension_noise` has it."""
     at: Linearised
     """Residuals and derivatives of geometry and jumps at the result, without the robust loss."""
     weights: FloatArray
@@ -157,6 +165,7 @@ class _Search:
         if self._markers is not None and camera is not None:
             known.append(camera.known_std())
         self._known = np.concatenate(known)
+        self._taken_out = geometry.shared * geometry.knowledge.slope_noise * seen.poses
         self._damping = _DAMPING
         self.done = False
         start = replace(start, knowledge=geometry.knowledge)
@@ -178,6 +187,7 @@ class _Search:
             cost = corner_cost(camera, off_px, self._robust)
         prior = np.concatenate(known) / self._known
         cost += self._cost_of(at, geometry.n) + float((prior**2).sum())
+        cost -= self._taken_out * (1.0 + geometry.elongation) ** 2
         return _State(geometry, jumps, camera, poses, at, off_px, prior, cost)
 
     def _cost_of(self, at: Linearised, n: int) -> float:
@@ -203,14 +213,20 @@ class _Search:
             at.residual * root, at.by_parameter * root[..., None], at.by_pose * root[..., None]
         )
 
-    def _normal(self, at: Linearised) -> NormalEquations:
+    def _normal(self, at: Linearised, slope_noise: float) -> NormalEquations:
+        """Return the normal equations; so much information about the elongation is none."""
         here, seen, corners = self._here, self._markers, None
+        prior, taken_out = here.prior.copy(), np.zeros_like(self._known)
+        if slope_noise:
+            k = here.geometry.size - 1
+            taken_out[k] = slope_noise
+            prior[k] -= slope_noise * (1.0 + here.geometry.elongation) * self._known[k]
         if here.camera is not None and seen is not None:
             terms = corner_terms(here.camera, seen, here.poses)
             corners = corner_normals(
                 here.camera, seen, terms, self._corner_weights(), self._seen.poses
             )
-        return NormalEquations(at, self._known, here.prior, corners, here.geometry.free)
+        return NormalEquations(at, self._known, prior, corners, here.geometry.free, taken_out)
 
     def _corner_weights(self) -> FloatArray:
         here = self._here
@@ -220,7 +236,7 @@ class _Search:
 
     def step(self) -> None:
         """Go one step, trying shorter ones until the cost is not larger."""
-        normal, here = self._normal(self._weighted()), self._here
+        normal, here = self._normal(self._weighted(), self._taken_out), self._here
         size_g, size_j = here.geometry.size, here.jumps.size
         while self._damping < _MOST_DAMPING:
             change, moves, size = normal.solve(self._damping)
@@ -244,45 +260,55 @@ class _Search:
     def result(self, steps: int) -> Fit:
         """Return what was found."""
         here, weighted = self._here, self._weighted()
-        normal = self._normal(weighted)
+        geometry, n = here.geometry, here.geometry.n
+        normal = self._normal(weighted, 0.0)
         covariance, told = normal.covariance()
+        left, taken = normal.left_of(weighted)
+        hats = left @ covariance @ np.swapaxes(left, 1, 2)
+        hats += taken @ np.swapaxes(weighted.by_pose, 1, 2)
         rows = int((weighted.by_pose != 0.0).any(axis=2).sum())
         corner_factor = 1.0
         if here.camera is not None and self._markers is not None:
-            taken = normal.explained(weighted, covariance)
+            unknowns = float(np.trace(hats, axis1=1, axis2=2).sum())
             distance = float(np.median(np.linalg.norm(here.off_px, axis=2)))
             corner_factor = (distance / _NORMAL_MEDIAN / here.camera.knowledge.noise_px) ** 2
         else:
-            taken = here.poses.shape[0] * len(here.geometry.free) + told
-        factor = float((weighted.residual**2).sum()) / max(rows - taken, 1.0)
+            unknowns = here.poses.shape[0] * len(geometry.free) + told
+        factor = float((weighted.residual**2).sum()) / max(rows - unknowns, 1.0)
+        covariance, off, slope_noise = self._with_noise_of_tensions(
+            covariance, left[:, :n], hats[:, :n, :n]
+        )
         return Fit(
-            here.geometry, here.jumps, here.poses, self._seen,
-            covariance * max(factor, corner_factor, 1.0),
-            self._attenuation(covariance, max(rows - taken, 0.0) / max(rows, 1)),
+            geometry, here.jumps, here.poses, self._seen,
+            covariance * max(factor, corner_factor, 1.0), off, slope_noise,
             here.at, self._weights(), normal.across,
             normal.pose_covariance(), factor, corner_factor, here.cost, steps,
             self.done and self._damping < _MOST_DAMPING,
             here.camera if self._markers is not None else None,
         )  # fmt: skip
 
-    def _attenuation(self, covariance: FloatArray, spare: float) -> FloatArray:
-        """Return what noise of tensions may have put parameters off, (P,).
+    def _with_noise_of_tensions(
+        self, covariance: FloatArray, left: FloatArray, hats: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float]:
+        """Return the covariance with it, attenuation and slope noise as of `Fit`.
 
-        Where told tensions err about true ones, 1 + κ comes out as (1 + κ) (1 - γ), with γ the
-        share of its slope's square that is noise (Fuller, Measurement Error Models, 1.1); where
-        true ones err about told ones, as a controller sets these, it comes out right (Berkson).
-        Which it is, nobody knows: it is 0 or the whole, of which the root mean square is taken.
-        `spare` is the share of rows that no unknown takes.
+        `left` (N, n, P) and `hats` (N, n, n) are of the rows of lengths.
         """
-        geometry, off = self._here.geometry, np.zeros(len(covariance))
-        if not geometry.shared:
-            return off
-        k = geometry.size - 1
-        variance = float(covariance[k, k])
-        share = min(spare * noise_in_slope(geometry, self._seen) * variance, _MOST_SHARE)
-        largest = (1.0 + geometry.elongation) * share / (1.0 - share)
-        size = min(abs(largest) / np.sqrt(2.0), float(self._known[k]))
-        return np.asarray(covariance[:, k] * (size / variance))
+        geometry = self._here.geometry
+        noise = slope_covariance(geometry, self._seen)
+        spread = correlated(left, noise, geometry.knowledge.yielding)
+        off, slope_noise, out = np.zeros(len(covariance)), 0.0, self._taken_out
+        if geometry.shared:
+            k = geometry.size - 1
+            information = 1.0 / float(covariance[k, k])
+            told = feigned(hats, noise, information)
+            either = elongations(geometry.elongation, float(self._known[k]), told, information, out)
+            slope_noise = either.taken_out / self._seen.poses
+            covariance = without(covariance, k, out)
+            off = covariance[:, k] * (either.off(geometry.elongation) / float(covariance[k, k]))
+            spread[k, k] += out
+        covariance = covariance + covariance @ spread @ covariance
+        return covariance, off, slope_noise
 
 
 def moved(poses: FloatArray, moves: FloatArray, free: tuple[int, ...]) -> FloatArray:

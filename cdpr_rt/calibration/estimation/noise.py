@@ -8,31 +8,64 @@ the standard deviation of a tension.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.estimation.fit import Fit, fit
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_poses
 from cdpr_rt.robots.workspace import G_m_s2
 
 _LEAST_ROWS = 20
 _LEAST_N, _MOST_N = 0.3, 10.0
 _WEAK, _INERT = 1e-3, 1e-9
+_ROUNDS = 3
+_BELIEVED = 1.5
+_HELD = 3.0
+"""From so many times the median on, what is left over of a pose's balance is something else."""
 _LEAST_SHARE = 0.2
 """Of the standard deviation of a length that is taken before, to which the fit may take it."""
 
 
-def tension_std_N(found: Fit) -> float | None:
-    """Return the standard deviation of a tension, N, by the balance of the platform's forces.
+@dataclass(frozen=True)
+class Balance:
+    """Tensions as the balance of the platform's forces corrects them."""
 
-    Mass and centre of mass are found with it. What pulls alike in all cables it does not see. None
-    where hardly anything is left over; 0.3 to 10 N.
+    tension_N: FloatArray
+    """(N, n)"""
+    free: FloatArray
+    """Projections on what it leaves of their noise, (N, n, n)."""
+    std_N: float | None
+    """Standard deviation of a tension before; None where hardly anything is left over."""
+
+    def of(self, seen: Observations) -> Observations:
+        """Return observations with these tensions."""
+        return replace(seen, tension_N=self.tension_N, tension_free=self.free)
+
+
+def balance(found: Fit, seen: Observations) -> Balance:
+    """Return tensions that hold the platform at the poses of a fit, the nearest to those of `seen`.
+
+    Mass and centre of mass are found with it. What pulls alike in all cables it does not see. Poses
+    at which a length is left out stay as they are, and those at which the platform does not hang
+    free, as on its stand.
     """
-    geometry, seen = found.geometry, found.seen
-    there = seen.used.all(axis=1)
-    poses, tension = found.poses[there], seen.tension_N[there]
+    there = np.flatnonzero(found.seen.used.all(axis=1))
+    balanced, off_N = _balance_of(found, seen, there)
+    if balanced.std_N is None:
+        return balanced
+    held = off_N > _HELD * np.median(off_N)
+    return _balance_of(found, seen, there[~held])[0] if held.any() else balanced
+
+
+def _balance_of(found: Fit, seen: Observations, there: IntArray) -> tuple[Balance, FloatArray]:
+    """Return the balance at some poses (k,), and the root mean square of what is left at each."""
+    geometry = found.geometry
+    tension, free = seen.tension_N.copy(), np.tile(np.eye(geometry.n), (seen.poses, 1, 1))
+    poses = found.poses[there]
     cables = np.empty((len(poses), CABLE_ROWS, geometry.n))
     run_poses(geometry.kernel_geometry(), poses, cables)
     chosen, up = list(geometry.model.kinematics.directions), geometry.coordinates - 1
@@ -41,45 +74,76 @@ def tension_std_N(found: Fit) -> float | None:
     pull = np.zeros(3)
     pull[up] = -G_m_s2
     weight[:, 3:, 1:] = np.swapaxes(np.cross(np.swapaxes(poses[:, 1:], 1, 2), pull), 1, 2)
-    U, s, _ = np.linalg.svd(-cables[:, chosen], full_matrices=False)
+    U, s, V = np.linalg.svd(-cables[:, chosen], full_matrices=False)
     told = s > _WEAK * s.max(initial=0.0)
     across = np.swapaxes(U, 1, 2) / np.maximum(s, _INERT)[..., None]
-    pulled = (across @ -cables[:, chosen] @ tension[..., None])[..., 0][told]
-    by_mass = (across @ weight[:, chosen])[told]
-    mass, _, rank, _ = np.linalg.lstsq(by_mass, -pulled, rcond=_INERT)
+    V = np.where(told[..., None], V, 0.0)
+    pulled = (V @ tension[there][..., None])[..., 0]
+    by_mass = np.where(told[..., None], across @ weight[:, chosen], 0.0)
+    mass, _, rank, _ = np.linalg.lstsq(by_mass[told], -pulled[told], rcond=_INERT)
     left = pulled + by_mass @ mass
-    spare = left.size - int(rank)
+    spare = int(told.sum()) - int(rank)
     if spare < _LEAST_ROWS:
-        return None
-    return min(max(math.sqrt(float(left @ left) / spare), _LEAST_N), _MOST_N)
+        return Balance(tension, free, None), np.zeros(len(there))
+    tension[there] -= np.einsum("jdi,jd->ji", V, left)
+    free[there] -= np.swapaxes(V, 1, 2) @ V
+    std_N = math.sqrt(float((left**2).sum()) / spare)
+    off_N = np.sqrt((left**2).mean(axis=1))
+    return Balance(tension, free, std_N), off_N
 
 
-def with_noise_seen(found: Fit, file: CableGeometry) -> CableGeometry:
+def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> CableGeometry:
     """Return the robot's file with readings as good as a fit has found them to be.
 
     What encoders and torques are taken to be uncertain by is a guess for all robots. Tensions tell
-    theirs by the balance of forces; they are not worse than lengths bear out. Where a camera tells
-    poses, so much is left over of lengths that theirs is known as well, and lengths and corners
-    are weighed rightly; it is made smaller only.
+    theirs, `told_N`, by the balance of forces; they are not worse than lengths bear out. Where a
+    camera tells poses, so much is left over of lengths that theirs is known as well, and lengths
+    and corners are weighed rightly; it is made smaller only.
     """
-    geometry = found.geometry
-    known = geometry.knowledge
+    geometry, guess = found.geometry, file.knowledge
+    known, yielding = geometry.knowledge, max(1.0 + geometry.elongation, 0.0)
     soft = geometry.compliance_1_N * found.seen.length_m
     squares = float((soft**2).mean())
-    variance = found.variance_factor * (known.length_m**2 + squares * known.tension_N**2)
-    tension_N = tension_std_N(found) or known.tension_N
-    if squares:
-        most_N = math.sqrt(variance / squares) / (1.0 + geometry.elongation)
-        tension_N = max(min(tension_N, most_N), _LEAST_N)
-    length_m = known.length_m
+    if found.seen.tension_free is not None:
+        free = np.diagonal(found.seen.tension_free, axis1=1, axis2=2)
+        squares = float((soft**2 * free).mean())
+    before = known.length_m**2 + squares * (known.yielding * known.tension_N) ** 2
+    variance = found.variance_factor * before
+    tension_N = min(max(told_N or guess.tension_N, _LEAST_N), _MOST_N)
+    if squares and yielding:
+        tension_N = max(min(tension_N, math.sqrt(variance / squares) / yielding), _LEAST_N)
+    length_m = guess.length_m
     if found.camera is not None:
-        rest = variance - squares * tension_N**2
+        rest = variance - squares * (yielding * tension_N) ** 2
         length_m *= math.sqrt(min(max(rest / length_m**2, _LEAST_SHARE**2), 1.0))
-    return replace(file, knowledge=replace(known, length_m=length_m, tension_N=tension_N))
+    seen = replace(guess, length_m=length_m, tension_N=tension_N, yielding=yielding)
+    return replace(file, knowledge=seen)
 
 
 def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeometry]:
-    """Return a fit with readings as good as they have shown to be, and the file with these."""
-    weighed = with_noise_seen(found, file)
-    again = replace(found.seen, start=found.poses)
-    return fit(weighed, again, start=found.geometry, camera=found.camera), weighed
+    """Return a fit with readings as good as they have shown to be, and the file with these.
+
+    From the second time on the elongation is the mean of what it is by tensions that err about
+    those told, and of what it is where these err.
+    """
+    told, slope_noise = found.seen, 0.0
+    weighed = file
+    for _ in range(_ROUNDS):
+        weighed = with_noise_seen(found, file, balance(found, told).std_N)
+        weighed = replace(weighed, knowledge=replace(weighed.knowledge, slope_noise=slope_noise))
+        found = weighed_fit(found, weighed, told)
+        slope_noise = found.slope_noise
+    return found, weighed
+
+
+def weighed_fit(found: Fit, weighed: CableGeometry, told: Observations) -> Fit:
+    """Return the fit anew with tensions of `told` as they balance, and readings so weighed.
+
+    Where lengths do not bear out that tensions are as far off as the balance has them, something
+    else holds the platform, and they stay as they are.
+    """
+    balanced = balance(found, told)
+    if (balanced.std_N or math.inf) <= _BELIEVED * weighed.knowledge.tension_N:
+        told = balanced.of(told)
+    seen = replace(told, start=found.poses)
+    return fit(weighed, seen, start=found.geometry, camera=found.camera)

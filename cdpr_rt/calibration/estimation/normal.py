@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.corner_terms import CornerNormals
 from cdpr_rt.calibration.estimation.residuals import Linearised
-from cdpr_rt.core.exchange import FloatArray
 
 _WEAK, _SINGULAR = 1e-6, 1e-10
 _UNIT = 0.05
@@ -29,8 +29,12 @@ class NormalEquations:
         prior: FloatArray,
         corners: CornerNormals | None,
         free: tuple[int, ...],
+        taken_out: FloatArray,
     ) -> None:
-        """Take rows whose parameters come first, those of corners after them; (P,) in all."""
+        """Take rows whose parameters come first, those of corners after them; (P,) in all.
+
+        `taken_out` (P,) is information about single parameters that is none.
+        """
         size, first = known_std.size, at.by_parameter.shape[2]
         self._scale, self._size = known_std, size
         scaled = at.by_parameter * known_std[:first]
@@ -56,6 +60,7 @@ class NormalEquations:
             self._E[:, first:] = corners.E[:, :, chosen] * own[:, None]
             self._gp[:first] += gp
             self._gp[first:] += corners.by_parameter * own
+        self._H[range(size), range(size)] -= taken_out * known_std**2
         d = self._C.shape[1]
         diagonal = self._C[:, range(d), range(d)]
         self._level = np.maximum(diagonal, _WEAK * (1.0 + diagonal.max()))
@@ -109,10 +114,12 @@ class NormalEquations:
         told = float(self._size - np.trace(both))
         return np.asarray(both * np.outer(self._scale, self._scale)), told
 
-    def explained(self, at: Linearised, covariance: FloatArray) -> float:
-        """Return how many degrees of freedom of rows the unknowns take: the trace of their hat."""
+    def left_of(self, at: Linearised) -> tuple[FloatArray, FloatArray]:
+        """Return derivatives of rows by the parameters less what poses take of them, (N, R, P).
+
+        And J_x C^-1, (N, R, d).
+        """
         taken = at.by_pose @ self.pose_covariance()
         left = -(taken @ np.swapaxes(self.across, 1, 2))
         left[..., : at.by_parameter.shape[2]] += at.by_parameter
-        flat = left.reshape(left.shape[0] * left.shape[1], left.shape[2])
-        return float(((flat @ covariance) * flat).sum() + (taken * at.by_pose).sum())
+        return left, taken

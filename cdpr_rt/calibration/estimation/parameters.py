@@ -14,7 +14,7 @@ from typing import Final, Literal, Self
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
@@ -48,6 +48,11 @@ class Knowledge:
     """Of a cable length as the encoder has it, from one pose to the next."""
     tension_N: float = 3.0
     """Of a tension as the motor's torque tells it: its dry friction."""
+    yielding: float = 1.0
+    """By how many times the file's elongation noise of tensions makes lengths uncertain."""
+    slope_noise: float = 0.0
+    """Information about the elongation, of each pose, that noise of tensions feigns and that the
+    fit takes out, see `tension_noise`."""
 
     def of_cable(self) -> FloatArray:
         """Return the standard deviations of a cable's parameters, (9,)."""

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.estimation.parameters import (
     ANCHORS,
     CABLE_ROWS,
@@ -34,7 +35,6 @@ from cdpr_rt.calibration.estimation.parameters import (
 )
 from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ARC, AXIS, FREE, run_poses
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
 from cdpr_rt.robots.kinematics.cable_model import write_unstretched_lengths
@@ -86,16 +86,10 @@ def linearise(
 def length_std_m(geometry: CableGeometry, seen: Observations) -> FloatArray:
     """Return the standard deviation of each length, the tension's included, (N, n)."""
     known = geometry.knowledge
-    yielding = seen.length_m * geometry.compliance_1_N * known.tension_N
-    return np.asarray(np.hypot(known.length_m, yielding))
-
-
-def noise_in_slope(geometry: CableGeometry, seen: Observations) -> float:
-    """Return how much of Σ (∂f/∂κ / σ)² noise of the tensions makes, Σ (l c σ_t / σ)²."""
-    if not geometry.shared:
-        return 0.0
-    soft = seen.length_m * geometry.compliance_1_N * geometry.knowledge.tension_N
-    return float((seen.used * (soft / length_std_m(geometry, seen)) ** 2).sum())
+    uncertain = known.yielding * seen.length_m * geometry.compliance_1_N * known.tension_N
+    if seen.tension_free is not None:
+        uncertain *= np.sqrt(np.diagonal(seen.tension_free, axis1=1, axis2=2))
+    return np.asarray(np.hypot(known.length_m, uncertain))
 
 
 def lengths_told(geometry: CableGeometry, poses: FloatArray, tension_N: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import diags_array
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
 from cdpr_rt.calibration.markers.reprojection import (
     LENS_PARAMETERS,
@@ -22,7 +23,6 @@ from cdpr_rt.calibration.markers.reprojection import (
 )
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
 from cdpr_rt.calibration.markers.sheet_errors import SheetErrors, sheet_errors
-from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.errors import ControlError
 
 _STEPS = 60

@@ -2,7 +2,8 @@
 
 Each image that locates its camera by the other markers measures a marker anew. If these places
 differ by more than they can, the marker was moved (all images before some instant agree, and all
-after it), is there twice (they do not follow time), or is not as large as told.
+after it), is there twice (they do not follow time), or is not as large as told. Where what images
+show there is no square of its size, it is partly covered.
 """
 
 from __future__ import annotations
@@ -12,15 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.markers.bundle import Bundle, adjust
 from cdpr_rt.calibration.markers.reprojection import Estimate, residuals_and_jacobian
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_rt.errors import ControlError
 
 _BAD_SHARE = 0.25
 """Of a marker's images that do not fit, from which on it is looked at."""
 _BAD_SIGMAS = 6.0
+_LEAST_IMAGES = 3
+"""Of a marker that is partly covered in others, to stay in the map."""
 _LEAST_BAD_px = 0.5
 _MISFITS = 0.15
 """Share of images on the wrong side of an instant that are allowed."""
@@ -37,8 +40,17 @@ class Suspect:
 
     marker: int
     kind: str
-    """moved, twice, size or bad."""
+    """moved, twice, size, covered or bad."""
     text: str
+    images: tuple[int, ...] | None = None
+    """Numbers of those that spoil it; None for all."""
+
+    def without(self, seen: SeenMarkers) -> SeenMarkers:
+        """Return what was seen without what spoils the map."""
+        own = seen.marker == seen.ids.index(self.marker)
+        if self.images is not None:
+            own &= np.isin(seen.image, self.images)
+        return seen.keep(~own)
 
 
 @dataclass(frozen=True)
@@ -88,6 +100,15 @@ def _judged(
             "size",
             f"marker {marker} is {100.0 * (size - 1.0):+.1f} % of its size larger than told: was "
             "it printed at another scale?",
+        )
+    far = _off(bundle.off_px[rows]) > limit
+    if (~far).sum() >= _LEAST_IMAGES and not _fits_with(1.0, rows[far], bundle, seen, limit):
+        return Suspect(
+            marker,
+            "covered",
+            f"marker {marker} is partly covered in {far.sum()} of {len(rows)} images, by another "
+            "sheet or what else there is; these are left out",
+            tuple(images[far].tolist()),
         )
     split, apart = _two_places(place)
     if apart < 4.0 * max(scale, _looseness(place, split)):
@@ -183,7 +204,7 @@ def _size(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[float, flo
 def _fits_with(
     size: float, rows: IntArray, bundle: Bundle, seen: SeenMarkers, limit: float
 ) -> bool:
-    """Return whether a marker fits once it is so large, cameras as they are."""
+    """Return whether a marker fits somewhere once it is so large, cameras as they are."""
     own = seen.keep(np.isin(np.arange(len(seen)), rows))
     sizes = own.size_m.copy()
     sizes[seen.marker[rows[0]]] *= size

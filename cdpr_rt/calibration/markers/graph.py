@@ -13,11 +13,11 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.markers.geometry.rotations import angles
 from cdpr_rt.calibration.markers.geometry.square_pose import SquarePoses
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import FloatArray, IntArray
 
 _MOST_IMAGES = 24
 """Of a pair of markers, so many are compared."""

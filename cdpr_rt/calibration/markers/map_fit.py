@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets, rotation_vector_rad
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.bundle import Bundle, adjust
 from cdpr_rt.calibration.markers.coverage import Coverage, coverage, listed
 from cdpr_rt.calibration.markers.diagnosis import LensSuspicion, Suspect, lens_suspicion, suspects
@@ -19,7 +20,6 @@ from cdpr_rt.calibration.markers.marker_map import MarkerMap, best_fit
 from cdpr_rt.calibration.markers.reprojection import Estimate
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 _MOST_ROUNDS = 4
@@ -133,8 +133,9 @@ def _without_suspects(
         if not found or 2 * len(found) > len(seen.ids):  # not the markers are wrong, then
             break
         dropped += found
-        bad = [one.marker for one in found]
-        seen = seen.without_markers(bad)
+        for one in found:
+            seen = one.without(seen)
+        bad = [one.marker for one in found if one.images is None]
         reference = None if reference in bad else reference
     return bundle, seen, dropped
 
@@ -161,7 +162,7 @@ def aligned(
     corners = map_.corners_m()[numbers]
     flat = (corners - map_.position_m[numbers][:, None]) @ map_.rotation[numbers]
     own = flat @ turns.transpose(0, 2, 1) + places[:, None]
-    _, turn, shift = best_fit(corners.reshape(-1, 3), own.reshape(-1, 3))
+    turn, shift = best_fit(corners.reshape(-1, 3), own.reshape(-1, 3))
     return map_.moved(turn, shift, map_.ids[numbers[0]]), numbers, places, turns
 
 
@@ -281,7 +282,8 @@ def verdict(fit: MapFit) -> str:
     how = "good" if rms < _GOOD_px else "usable" if rms < _POOR_px else "poor"
     if fit.faults:
         how = "not to be trusted"
-    without = f", without {listed([one.marker for one in fit.dropped])}" if fit.dropped else ""
+    dropped = [one.marker for one in fit.dropped if one.images is None]
+    without = f", without {listed(dropped)}" if dropped else ""
     return (
         f"{how}{without}: {int(fit.map.placed.sum())} markers from "
         f"{int(fit.map.located.sum())} images, corners fit to "

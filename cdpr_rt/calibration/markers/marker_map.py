@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.geometry.rotations import logarithms
 from cdpr_rt.calibration.markers.seen_markers import CORNERS
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 
@@ -110,12 +110,11 @@ def difference(map_: MarkerMap, other: MarkerMap, reference: int | None = None) 
     )
 
 
-def best_fit(points: FloatArray, others: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-    """Return s, R, t with `others` ≈ s R `points` + t, both (n, 3): Umeyama 1991, least squares."""
+def best_fit(points: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return R, t with `others` ≈ R `points` + t, both (n, 3): Umeyama 1991, least squares."""
     middle, other = points.mean(axis=0), others.mean(axis=0)
     a, b = points - middle, others - other
-    left, sizes, right = np.linalg.svd(b.T @ a)
+    left, _, right = np.linalg.svd(b.T @ a)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(left) * np.linalg.det(right))])
     turn = left @ (sign[:, None] * right)
-    scale = float((sizes * sign).sum() / (a**2).sum())
-    return scale, turn, other - scale * turn @ middle
+    return turn, other - turn @ middle

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.geometry.lens import project, project_with_derivatives
 from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices, exponentials
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import FloatArray
 
 LENS_PARAMETERS = 9
 _NEAR_m = 1e-3

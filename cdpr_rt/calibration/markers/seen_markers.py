@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.errors import InvalidRequestError
 
 CORNERS = np.array([(-0.5, 0.5, 0.0), (0.5, 0.5, 0.0), (0.5, -0.5, 0.0), (-0.5, -0.5, 0.0)])
@@ -85,8 +85,3 @@ class SeenMarkers:
         kept = self.keep(place[self.image] >= 0)
         names = tuple(self.names[i] for i in chosen)
         return replace(kept, names=names, image=place[kept.image])
-
-    def without_markers(self, dropped: Iterable[int]) -> SeenMarkers:
-        """Return the same without some ids."""
-        numbers = [k for k, marker in enumerate(self.ids) if marker in set(dropped)]
-        return self.keep(~np.isin(self.marker, numbers))

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.reprojection import Estimate, residuals_and_jacobian
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import FloatArray
 
 _SEEN_SHARE, _NOISE_SHARE = 8.0 / 2.0, 5.0 / 2.0
 """A sheet's errors have 8 coordinates at 4 corners. Seen from about one direction its pose takes 6

@@ -11,8 +11,8 @@ from pydantic import Field
 
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.reading.reader import Profile
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.core.exchange import FloatArray
 
 _DECIMALS_px = 4
 _Length_m = Annotated[float, Field(ge=-100.0, le=100.0)]

@@ -18,10 +18,10 @@ from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_profiles.reading.reader import Profile, read_json_model
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.camera_data import CameraSetup, ImageReading
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.platform_model import PlatformModel
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
 from cdpr_rt.errors import InvalidRequestError
 
 
@@ -43,6 +43,9 @@ class Observations:
     """(cable, pose) where a cable's length jumped: from this pose on it has another offset."""
     markers: SeenMarkers | None = None
     """What the camera on the platform saw, an image for each pose."""
+    tension_free: FloatArray | None = None
+    """Projections on what noise of tensions is left, (N, n, n), where their balance has told the
+    rest; None for all of it."""
 
     @classmethod
     def of_lengths(
@@ -131,6 +134,7 @@ class Observations:
             rotation=self.rotation[index],
             rotation_std_rad=self.rotation_std_rad[index],
             jumps=jumps,
+            tension_free=None if self.tension_free is None else self.tension_free[index],
             markers=None if self.markers is None else self.markers.of_images(index),
         )
 

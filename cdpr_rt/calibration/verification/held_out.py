@@ -9,18 +9,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.calibration.camera.camera_faults import told_right
 from cdpr_rt.calibration.camera.camera_start import map_of_images, start_on_map
 from cdpr_rt.calibration.camera.seen_poses import markers_of_map
 from cdpr_rt.calibration.estimation.faults import fit_without_faults, without_slack
-from cdpr_rt.calibration.estimation.fit import Fit, fit, locate
+from cdpr_rt.calibration.estimation.fit import Fit, locate
+from cdpr_rt.calibration.estimation.noise import weighed_fit
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.markers.map_fit import MapFit
 from cdpr_rt.calibration.readings.camera_data import CameraSetup, Images
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.calibration.verification.verdict import predicted_std
 from cdpr_rt.calibration.verification.verification import Verification, verify
-from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
 
 _EACH = 5
 """One pose in so many is kept from the fit and verifies it."""
@@ -128,8 +129,7 @@ def hold_out(
     part, _ = fit_without_faults(geometry, seen.some(~held), slack_N, whole.camera)
     if first_map is not None:
         part, _ = told_right(geometry, part, first_map)
-    again = replace(part.seen, start=part.poses)
-    part = fit(weighed, again, start=part.geometry, camera=part.camera)
+    part = weighed_fit(part, weighed, part.seen)
     kept, index = np.flatnonzero(~held), np.flatnonzero(held)
     slipped = part.seen.jumps[len(seen.jumps) :]  # what the other poses have found
     some, _ = without_slack(seen.some(index), slack_N)

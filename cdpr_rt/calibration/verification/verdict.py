@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.camera_model import SIZE
 from cdpr_rt.calibration.estimation.fit import Fit
 from cdpr_rt.calibration.estimation.parameters import (
@@ -18,7 +20,6 @@ from cdpr_rt.calibration.estimation.parameters import (
 )
 from cdpr_rt.calibration.estimation.residuals import Linearised, lengths_told, linearise
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 _OPEN = 0.5
@@ -26,6 +27,8 @@ _OPEN = 0.5
 _EXPLAINED = 0.6
 _LEAST_SPARE = 4
 _AXES = "xyz"
+_CHANCE = 0.001
+"""Of a change that is noise to be taken for one that is there."""
 
 
 @dataclass(frozen=True)
@@ -154,18 +157,60 @@ def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> Floa
     By the parameters' uncertainty alone. `relative`: of what is left when all of the room is moved
     as one to where it fits best, since without measured points nobody knows better where it is.
     """
-    geometry, d = found.geometry, len(found.geometry.free)
-    size, count = geometry.size, len(poses)
+    A = _by_parameters(found, poses, relative)
+    size = found.geometry.size
+    variance = np.einsum("jdp,pq,jdq->jd", A, found.uncertainty[:size, :size], A)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+@dataclass(frozen=True)
+class Change:
+    """By how much a calibration changes a robot's file, all parameters together."""
+
+    moved_m: float
+    """Root mean square of by how much positions in the workspace move."""
+    chi_squared: float
+    told: float
+    """How many parameters the observations tell; chi squared on the average if the file is right.
+    """
+
+    @property
+    def chance(self) -> float:
+        """How often noise alone would change as much."""
+        return float(chi2.sf(self.chi_squared, self.told)) if self.told > 0.0 else 1.0
+
+    @property
+    def significant(self) -> bool:
+        """Whether it can hardly be noise."""
+        return self.chance < _CHANCE
+
+
+def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> Change:
+    """Return how far a fit is from the robot's file, at poses (M, 4, 3).
+
+    With parameters v, their covariance C and that known before K, v^T C^-1 v would be near to chi
+    squared of P - tr(C K^-1) degrees of freedom were the file right (Wald). `larger`: how many
+    times the predicted deviations count.
+    """
+    geometry = found.geometry
+    v, known, size = geometry.values(), geometry.known_std(), geometry.size
+    covariance = larger**2 * found.uncertainty[:size, :size]
+    told = size - float((np.diag(found.covariance)[:size] / found.inflation / known**2).sum())
+    scaled = covariance / np.outer(known, known)
+    squares = float(v / known @ np.linalg.solve(scaled, v / known)) if size else 0.0
+    A = _by_parameters(found, poses, relative)[:, : geometry.coordinates]
+    return Change(float(np.sqrt(((A @ v) ** 2).sum() / len(poses))), squares, max(told, 0.0))
+
+
+def _by_parameters(found: Fit, poses: FloatArray, relative: bool) -> FloatArray:
+    """Return the derivatives (M, d, P) of poses that lengths tell, as of `predicted_std`."""
+    geometry = found.geometry
     at = _at(found, poses)
     rows = geometry.n + int(geometry.turns)
-    x, p = at.by_pose[:, :rows], at.by_parameter[:, :rows, :size]
+    x, p = at.by_pose[:, :rows], at.by_parameter[:, :rows, : geometry.size]
     across = np.swapaxes(x, 1, 2)
     A = np.asarray(-np.linalg.solve(across @ x, across @ p))
-    if relative:
-        A = _less_rigid_motion(A, poses, geometry.free)
-    covariance = found.uncertainty[:size, :size]
-    variance = np.einsum("jdp,pq,jdq->jd", A, covariance, A)
-    return np.asarray(np.sqrt(np.maximum(variance, 0.0)).reshape(count, d))
+    return _less_rigid_motion(A, poses, geometry.free) if relative else A
 
 
 def _at(found: Fit, poses: FloatArray) -> Linearised:

@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.camera_model import CameraModel
 from cdpr_rt.calibration.estimation.fit import fit, locate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.estimation.residuals import length_std_m
 from cdpr_rt.calibration.markers.geometry.rotations import logarithms
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
 
 _LEAST_MARKERS = 2
 """That an image must show for a pose: the tilt of one alone is not known well."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.cogging.friction import FrictionShape, relative_friction, sliding
 from cdpr_rt.identification.cogging.sweep import TWO_PI
 from cdpr_rt.identification.cogging.windows import Windows, average

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.cogging import design
 from cdpr_rt.identification.cogging.design import Layout
 from cdpr_rt.identification.cogging.sweep import TWO_PI

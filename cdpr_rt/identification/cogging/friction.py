@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.cogging.windows import IntArray, Windows, average, average_by_sign
 from cdpr_rt.jit import jit
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import FrictionFeedforward
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.identification.cogging import design
 from cdpr_rt.identification.cogging.design import Equations, Layout
 from cdpr_rt.identification.cogging.estimate import Fit, Prior, fit

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import FrictionFeedforward
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.identification.cogging.friction import FrictionShape
 from cdpr_rt.identification.cogging.sweep import TWO_PI
 from cdpr_rt.identification.confidence import ConfidenceInterval

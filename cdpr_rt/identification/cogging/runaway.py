@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.identification.cogging.sweep import Stretch, period_s
 
 _SPAN_rad = np.deg2rad(1.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.identification.cogging.design import Equations, Layout, Normal
 from cdpr_rt.identification.cogging.windows import IntArray
 

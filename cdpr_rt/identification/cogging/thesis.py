@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.compensation import FrictionFeedforward
-from cdpr_rt.core.exchange import BoolArray, FloatArray
 from cdpr_rt.identification.cogging.runaway import runaway
 from cdpr_rt.identification.cogging.sweep import (
     TWO_PI,
@@ -140,12 +139,3 @@ def _repair(own: FloatArray, other: FloatArray, at: BoolArray, shared: BoolArray
     sound = shared if shared.any() else ~at
     step = float(np.mean(own[sound] - other[sound]))
     return np.where(at, other + step, own)
-
-
-def coverage(legs: Sequence[SweepData], bins: int = 360) -> float:
-    """Return which share of the turn the legs passed at constant speed, 0 to 1."""
-    seen = np.zeros(bins, np.bool_)
-    for part in stretches(legs):
-        turn = part.run.angle_rad[part.start : part.stop] / TWO_PI
-        seen[(np.floor((turn - np.floor(turn)) * bins)).astype(np.int64) % bins] = True
-    return float(math.fsum(seen) / bins)

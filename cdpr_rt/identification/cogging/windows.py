@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.identification.cogging.sweep import SweepData, period_s
 from cdpr_rt.jit import jit
 
@@ -130,7 +130,6 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     """
     period = period_s(run)
     speed = float(np.max(np.abs(run.setpoint_velocity_rad_s)))
-    fast, quick = speed > _FAST_rad_s, speed > _QUICK_rad_s
     # thinning widens or narrows a window by its rounding: harmless where the motion is slow
     thin = _odd(_THIN_s / period) if speed < _QUASI_STATIC_rad_s and not spacing_s else 1
     spacing = spacing_s or _spacing(speed)
@@ -143,20 +142,14 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
     noise = encoder_noise_rad(run)
     smoothing = _smoothing_s(noise, speed, period, 4.0 * spacing) / period
     angle, velocity = _smoothed(run, smoothing, period)
-    cycle = np.arange(run.time_s.size)
-    torque = np.interp(cycle - latency_s / period, cycle, run.torque_Nm)
     centre = (np.arange(rows) + 2) * step + (thin - 1) // 2
     boxed = ndimage.uniform_filter1d(
         ndimage.uniform_filter1d(run.angle_rad - run.angle_rad[0], step), step
     )
-    smooth_torque = np.convolve(torque, _HELD, mode="same")
-    for _ in range(4):
-        smooth_torque = ndimage.uniform_filter1d(smooth_torque, step)
+    smooth_torque = _smoothed_torque(run, latency_s / period, step)
     mean = ndimage.uniform_filter1d(velocity, 2 * step + 1)[centre]
     quasi_static = speed < _QUASI_STATIC_rad_s
-    moving = _slides(mean, run.setpoint_velocity_rad_s[centre], quasi_static)
-    if not quasi_static:  # the state of the friction before the slide is not known
-        moving &= np.abs(angle[centre] - angle[0]) > _RELAXED_rad
+    turned, wanted = angle[centre] - angle[0], run.setpoint_velocity_rad_s[centre]
     return Windows(
         angle_rad=angle[(thin - 1) // 2 :: thin],
         velocity_rad_s=velocity[(thin - 1) // 2 :: thin],
@@ -170,10 +163,10 @@ def cut(run: SweepData, latency_s: float, spacing_s: float | None = None) -> Win
         centre_s=run.time_s[centre],
         speed_rad_s=mean,
         direction=np.sign(mean),
-        moving=moving,
+        moving=_slides(mean, wanted, turned, quasi_static),
         quasi_static=quasi_static,
-        fast=fast,
-        quick=quick,
+        fast=speed > _FAST_rad_s,
+        quick=speed > _QUICK_rad_s,
         play_rad=_PLAY * noise / math.sqrt(max(1.0, 0.5 * smoothing * _GAUSSIAN_WIDTH)),
         cruise_rad_s=speed,
     )
@@ -194,12 +187,25 @@ def _smoothed(run: SweepData, width: float, period: float) -> tuple[FloatArray, 
     return angle, run.setpoint_velocity_rad_s + drift
 
 
-def _slides(speed: FloatArray, wanted: FloatArray, quasi_static: bool) -> BoolArray:
-    """Return where a rotor slides along with its set-point, both speeds in rad/s."""
+def _smoothed_torque(run: SweepData, latency: float, step: int) -> FloatArray:
+    """Return the torque that acted, some cycles after it was sent, smoothed over windows."""
+    cycle = np.arange(run.time_s.size)
+    torque = np.convolve(np.interp(cycle - latency, cycle, run.torque_Nm), _HELD, mode="same")
+    for _ in range(4):
+        torque = scipy.ndimage.uniform_filter1d(torque, step)
+    return torque
+
+
+def _slides(
+    speed: FloatArray, wanted: FloatArray, turned: FloatArray, quasi_static: bool
+) -> BoolArray:
+    """Return where a rotor that has `turned` slides along with its set-point, speeds in rad/s."""
     along = (speed * wanted > 0.0) & (np.abs(speed) > _STANDING * np.abs(wanted))
     if quasi_static:
         return np.asarray(along & (np.abs(speed) < _RUNAWAY * np.abs(wanted)), np.bool_)
-    return np.asarray(along & (np.abs(speed) > _SLOWEST_rad_s), np.bool_)
+    # the state of the friction before the slide is not known
+    relaxed = np.abs(turned) > _RELAXED_rad
+    return np.asarray(along & (np.abs(speed) > _SLOWEST_rad_s) & relaxed, np.bool_)
 
 
 def _bump(stride: int, thin: int) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 MOST_MOVES: Final = 200_000

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.arcs import arc_by_centre, arc_by_radius
 from cdpr_rt.motion.path.description import (
     Arc,
@@ -125,7 +125,7 @@ class _Reader:
         if words:
             raise self._error(block, f"{next(iter(words))}: has no meaning here")
         if "M0" in codes:
-            self._wait(block)
+            self._stop(Move(block.line, self._state.here, math.inf, waits=True))
 
     def _refuse_unknown(self, block: Block, codes: list[str]) -> None:
         for code in codes:
@@ -160,24 +160,23 @@ class _Reader:
         return target
 
     def _move(self, block: Block, words: dict[str, float], in_room: bool) -> None:
-        state = self._state
-        turning = state.motion in ("G2", "G3")
+        motion = self._state.motion
         target = self._target(block, words, in_room)
-        arc = self._arc(block, words, target) if turning else None
-        if self._path is None:
-            if turning:
-                raise self._error(block, f"{state.motion}: {self._missing()} not named before")
+        arc = self._arc(block, words, target) if motion in ("G2", "G3") else None
+        if self._path is None and arc is not None:
+            raise self._error(block, f"{motion}: {self._missing()} not named before")
+        self._append(block, target, arc)
+
+    def _append(self, block: Block, target: FloatArray, arc: Arc | None) -> None:
+        """Go to `target`; the path begins where all coordinates are named."""
+        state, path = self._state, self._path
+        if path is None:
             state.here = target
             if not self._missing():
                 self._path = PathDescription(
                     self._source, self._coordinates, target.copy(), block.line
                 )
             return
-        self._append(block, target, arc)
-
-    def _append(self, block: Block, target: FloatArray, arc: Arc | None) -> None:
-        state, path = self._state, self._path
-        assert path is not None  # callers have seen to it
         speed = math.inf
         if state.motion != "G0":
             if not math.isfinite(state.feed):
@@ -212,14 +211,7 @@ class _Reader:
         target = self._state.here.copy()
         for i in named or range(len(target)):
             target[i] = self._coordinates.reference[i]
-        if self._path is None:
-            self._state.here = target
-            if not self._missing():
-                self._path = PathDescription(
-                    self._source, self._coordinates, target.copy(), block.line
-                )
-        else:
-            self._append(block, target, None)
+        self._append(block, target, None)
         self._state.motion = motion
 
     # -- stops
@@ -229,9 +221,6 @@ class _Reader:
         if not 0.0 <= seconds <= LONGEST_DWELL_s:
             raise self._error(block, f"G4: allowed: P with 0 to {LONGEST_DWELL_s:g} seconds")
         self._stop(Move(block.line, self._state.here, math.inf, dwell_s=seconds))
-
-    def _wait(self, block: Block) -> None:
-        self._stop(Move(block.line, self._state.here, math.inf, waits=True))
 
     def _stop(self, stop: Move) -> None:
         if self._path is not None:  # before, there is nothing to be stopped

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 
 _NOTHING: Final = 1e-12
@@ -252,27 +252,36 @@ def strain_run(
             i += 1
         node[c] = i
         place_between(motion[c, 0], i, s, q, first, second, at)
-        v, a, j = motion[c, 1], motion[c, 2], motion[c, 3]
+        v, a = motion[c, 1], motion[c, 2]
         bends = 1.0 if s[i + 1] - s[i] > _SHORT_m else 0.0
-        worst, straight, turned = 0.0, 0.0, 0.0
-        for k in range(q.shape[1]):
-            rate = at[1, k] * v
-            slope = at[1, k] * a + at[2, k] * v * v
-            jerk = at[1, k] * j + 3.0 * at[2, k] * v * a + bends * at[3, k] * v * v * v
-            worst = max(worst, abs(rate) / limits[0, k])
-            worst = max(worst, math.sqrt(abs(slope) / limits[1, k]))
-            worst = max(worst, (abs(jerk) / limits[2, k]) ** (1.0 / 3.0))
-            if k < positions:
-                straight += rate * rate
-            else:
-                turned += rate * rate
-        along = math.sqrt(straight if straight > _NOTHING * v * v else turned)
+        worst, along = _direction_strain(at, motion[c], bends, limits, positions)
         wanted = speed[i] if motion[c, 0] - s[i] < 0.5 * (s[i + 1] - s[i]) else speed[i + 1]
         worst = max(worst, along / wanted)
         if rows[i] >= 0:
             by_wrench = _wrench_strain(rows[i], normals, lower, upper, by_u[i], by_x[i], v * v, a)
             worst = max(worst, by_wrench)
         strain[c] = worst
+
+
+@jit
+def _direction_strain(
+    at: FloatArray, motion: FloatArray, bends: float, limits: FloatArray, positions: int
+) -> tuple[float, float]:
+    """Return the worst strain of the directions' own limits, and the speed along the path."""
+    v, a, j = motion[1], motion[2], motion[3]
+    worst, straight, turned = 0.0, 0.0, 0.0
+    for k in range(at.shape[1]):
+        rate = at[1, k] * v
+        slope = at[1, k] * a + at[2, k] * v * v
+        jerk = at[1, k] * j + 3.0 * at[2, k] * v * a + bends * at[3, k] * v * v * v
+        worst = max(worst, abs(rate) / limits[0, k])
+        worst = max(worst, math.sqrt(abs(slope) / limits[1, k]))
+        worst = max(worst, (abs(jerk) / limits[2, k]) ** (1.0 / 3.0))
+        if k < positions:
+            straight += rate * rate
+        else:
+            turned += rate * rate
+    return worst, math.sqrt(straight if straight > _NOTHING * v * v else turned)
 
 
 @jit

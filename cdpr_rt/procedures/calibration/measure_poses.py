@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.camera_data import ImageReading
 from cdpr_rt.calibration.readings.data import PoseReading
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import TripError
 
 LOOK_S, SETTLE_S = 0.5, 1.0

@@ -15,7 +15,7 @@ from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_rt.control.compensation import AxisCompensation
 from cdpr_rt.control.tuning import PidDesign, TuningError, design_pid, stiffest_pid, sweep_gain
 from cdpr_rt.errors import TripError
-from cdpr_rt.identification import MOST_ROUNDS, HarmonicResult, SecondPass
+from cdpr_rt.identification import MOST_ROUNDS, SecondPass
 from cdpr_rt.identification.cogging_profile import CoggingProfile, stored_harmonic_model
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.evaluation import METHODS
@@ -68,10 +68,6 @@ THOROUGH = Plan()
 """The thesis' procedure (Tremblay, sections 1.4 and 1.5) and the comparison over bandwidths."""
 QUICK = Plan(math.radians(30.0), turns=1, rounds=2, both_ways=False, bandwidths_Hz=())
 """A look at a motor within two minutes of its time; the sweep is too fast for fine figures."""
-
-
-def _begin_second_pass(found: Identified, paths: Paths) -> SecondPass:
-    return SecondPass(found.better, legs(paths.passes("fast")))
 
 
 def _refine(second: SecondPass, recorded: list[Path]) -> None:
@@ -169,33 +165,21 @@ class Commissioning:
         session.expect_index()
         session.enable()
         turn = Pass(VALIDATION_SPEED_RAD_S, 0.0, _PROBE_TURNS * math.tau)
-        self._measure.track("index", self._first_design(), None, [turn])
+        design = self._design(session.winch.motor.rotor_inertia_kg_m2, DEFAULT_BANDWIDTH_HZ)
+        self._measure.track("index", design, None, [turn])
         session.disable()
         if not session.device.feedback.index_known.all():
             raise TripError(f"no encoder index was seen in {_PROBE_TURNS:g} turns")
 
-    def _stiffest_design(self) -> PidDesign:
-        """Return the stiffest of some loops that its latency allows, for legs at speed."""
-        session = self._session
-        inertia = session.winch.motor.rotor_inertia_kg_m2
-        return stiffest_pid(inertia, session.winch.latency_s, _STIFF_HZ, session.device.period_s)
-
-    def _first_design(self) -> PidDesign:
-        """Return a loop for the motor as its data sheet has it."""
-        session = self._session
-        inertia = session.winch.motor.rotor_inertia_kg_m2
-        return design_pid(
-            inertia, session.winch.latency_s, DEFAULT_BANDWIDTH_HZ, session.device.period_s
-        )
-
     def measure(self) -> None:
         """Record the sweeps and the fast legs."""
         session, plan = self._session, self._plan
-        inertia = session.winch.motor.rotor_inertia_kg_m2
+        inertia, latency_s = session.winch.motor.rotor_inertia_kg_m2, session.winch.latency_s
         self._out.note(f"sweeping at {math.degrees(plan.sweep_speed_rad_s):g} deg/s")
         session.enable()
-        self._sweep(sweep_gain(inertia, session.winch.latency_s))
-        self._measure.fast_legs(self._stiffest_design())
+        self._sweep(sweep_gain(inertia, latency_s))
+        stiffest = stiffest_pid(inertia, latency_s, _STIFF_HZ, session.device.period_s)
+        self._measure.fast_legs(stiffest)
         session.disable()
 
     def _sweep(self, gain_Nm_rad: float) -> None:
@@ -227,24 +211,25 @@ class Commissioning:
     def measure_again(self, found: Identified, bandwidth_Hz: float) -> Identified:
         """Record ramps under compensation and refine, until they do not get smoother."""
         session = self._session
-        second = session.run_blocking(partial(_begin_second_pass, found, self._paths))
+        second = session.run_blocking(
+            lambda: SecondPass(found.better, legs(self._paths.passes("fast")))
+        )
         passes = both_ways(VALIDATION_SPEED_RAD_S, _SHORT_LEAD_IN_RAD, 1)
         for number in range(self._plan.rounds):
             if second.done:
                 break
             self._out.note(f"second pass at 22 deg/s under compensation, round {number + 1}")
             session.enable()
-            design = self._design(second.current, bandwidth_Hz)
+            design = self._design(second.current.inertia_kg_m2.value, bandwidth_Hz)
             known = stored_harmonic_model(second.current).compensation(self._bounds)
             recorded = self._measure.track(round_name(number), design, known, passes)
             session.disable()
             session.run_blocking(partial(_refine, second, recorded))
         return dataclasses.replace(found, better=second.best)
 
-    def _design(self, better: HarmonicResult, bandwidth_Hz: float) -> PidDesign:
-        session = self._session
-        inertia = better.inertia_kg_m2.value
-        return design_pid(inertia, session.winch.latency_s, bandwidth_Hz, session.device.period_s)
+    def _design(self, inertia_kg_m2: float, bandwidth_Hz: float) -> PidDesign:
+        winch, period_s = self._session.winch, self._session.device.period_s
+        return design_pid(inertia_kg_m2, winch.latency_s, bandwidth_Hz, period_s)
 
     def validate(
         self, profile: CoggingProfile, bandwidth_Hz: float
@@ -265,9 +250,7 @@ class Commissioning:
         others = [b for b in self._plan.bandwidths_Hz if b != bandwidth_Hz]
         for wanted in (bandwidth_Hz, *others):
             try:
-                design = design_pid(
-                    profile.inertia_kg_m2, session.winch.latency_s, wanted, session.device.period_s
-                )
+                design = self._design(profile.inertia_kg_m2, wanted)
             except TuningError as error:
                 if wanted == bandwidth_Hz:
                     raise

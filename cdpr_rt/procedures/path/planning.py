@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.description import Coordinates, PathDescription, PathError
 from cdpr_rt.motion.path.nodes import PathNodes, nodes_of
 from cdpr_rt.motion.path.time_scaling import (

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.description import PathDescription, PathError
 
 _FACTORS: Final = {

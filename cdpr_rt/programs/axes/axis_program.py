@@ -6,8 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.approach import ramp_velocity
 from cdpr_rt.programs.model import AxesModel
 from cdpr_rt.programs.program_base import CommandedProgram
@@ -28,9 +29,10 @@ class BumplessController(Protocol):
 
 
 class AxisProgram(CommandedProgram):
-    """Moves the axes' set-points within the model's bounds; the base class brakes and holds.
+    """Moves the axes' set-points within the model's bounds.
 
-    Subclasses override `_move`, and `_parsed` and `_take` for their commands.
+    By itself it is the program `hold`, which brakes what moves and holds the axes where they come
+    to stand. Subclasses override `_move`, and `_parsed` and `_take` for their commands.
     """
 
     name = "hold"

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach
 from cdpr_rt.motion.pose_stream import PoseStream, StreamState

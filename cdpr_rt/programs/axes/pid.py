@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.axes.axis_program import AxisProgram, BumplessController
 from cdpr_rt.programs.axes.point_to_point import PointToPoint

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import Setpoint
 from cdpr_rt.motion.approach import approach
 from cdpr_rt.programs.model import AxesModel
 

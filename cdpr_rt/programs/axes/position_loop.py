@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.control.pid import Pid
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.model import AxesModel
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller, Idle
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.trajectory import Motion
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.program_base import ProgramDefaults

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller, Idle
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.program_base import ProgramDefaults
 
 

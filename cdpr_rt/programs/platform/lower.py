@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform.arrival import Arrival

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.jit import jit
 from cdpr_rt.motion.approach import approach, stopping_position
 from cdpr_rt.programs.base import ProgramError

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion import hand_target
 from cdpr_rt.motion.approach import soft_deadband, stopping_position
 from cdpr_rt.motion.pose_stream import PoseStream, StreamState
@@ -148,7 +149,7 @@ class PoseProgram(PlatformProgram):
         if what == "resume":
             if aim is None:
                 raise ProgramError("pose: resume: no target has been left; allowed: position_m")
-            why_not = self._control.path_obstacle(aim)
+            why_not = self._control.way_infeasibility(aim)
             if why_not:
                 raise ProgramError(f"pose: resume: on the way, {why_not}")
         return what, aim, speed
@@ -171,7 +172,7 @@ class PoseProgram(PlatformProgram):
         why_not = control.infeasibility(wanted)
         if why_not:
             raise ProgramError(f"pose: {', '.join(asked)}: {why_not}")
-        why_not = control.path_obstacle(wanted)
+        why_not = control.way_infeasibility(wanted)
         if why_not:
             raise ProgramError(f"pose: {', '.join(asked)}: on the way, {why_not}")
         return wanted
@@ -291,13 +292,13 @@ class PoseProgram(PlatformProgram):
         near = control.contact_at(goal)
         if near >= 0 or distance_m(goal, target, self._parts.scale_m) > 0.0:
             self._near = near
-        if near < 0 and (control.stands(goal) or not control.stands(target)):
+        if near < 0 and (control.is_feasible(goal) or not control.is_feasible(target)):
             target[:] = goal
             return
         # along the edge in one direction, where not in all; turning is one of them
         for part in self._steps:
             self._kept[part], target[part] = target[part], goal[part]
-            if control.stands(target) and control.contact_at(target) < 0:
+            if control.is_feasible(target) and control.contact_at(target) < 0:
                 return
             target[part] = self._kept[part]
 
@@ -310,7 +311,7 @@ class PoseProgram(PlatformProgram):
         self._stopping_position()
         if self._following:
             self._stop_straight()
-        stops = control.stands(self._rest)
+        stops = control.is_feasible(self._rest)
         # all of the way to a pose has been looked at before
         near = control.contact_ahead(self._rest) if self._following else -1
         if near >= 0:

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import bound
 from cdpr_rt.robots.interference import clearance_kernel as kernel
 from cdpr_rt.robots.interference.contact_kernel import (

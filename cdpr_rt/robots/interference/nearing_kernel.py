@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.interference.clearance_kernel import (
     BODY_BOX,

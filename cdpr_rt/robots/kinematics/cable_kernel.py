@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 
 ANCHOR, RADIUS, AXIS, GEOMETRY_ROWS = 3, 6, 7, 10

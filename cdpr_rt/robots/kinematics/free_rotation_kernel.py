@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR
 

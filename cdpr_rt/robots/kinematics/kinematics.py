@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.interface import PoseSolution
 from cdpr_rt.robots.kinematics import cable_kernel, normal_equations, pose_search
 from cdpr_rt.robots.kinematics.cable_model import CableModel, write_unstretched_lengths
 from cdpr_rt.robots.kinematics.pose import Pose
@@ -23,6 +23,18 @@ SPATIAL = (0, 1, 2, 3, 4, 5)
 _ACCEPTED_SIGMAS = 3.0
 _MOST_CORRECTIONS = 20
 _CORRECTED_m = 1e-10
+
+
+@dataclass
+class PoseSolution:
+    """A pose from cable lengths; it belongs to the kinematics and is overwritten by its next."""
+
+    pose: Pose
+    converged: bool = False
+    """False too where the lengths leave a direction free."""
+    steps: int = 0
+    residual_m: float = np.inf
+    """Root mean square over the cables of what their lengths are off."""
 
 
 class CableKinematics:

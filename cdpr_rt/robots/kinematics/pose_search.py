@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, ERROR, FREE, compare, run_cables
 from cdpr_rt.robots.kinematics.normal_equations import (

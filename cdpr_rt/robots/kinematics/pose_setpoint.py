@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, FREE, run_cables
 from cdpr_rt.robots.kinematics.pose import exponential, logarithm

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics import free_rotation_kernel as free
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, ERROR, FREE

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.rigid_body import inertia_kg_m2
 from cdpr_rt.robots.workspace import G_m_s2

@@ -12,30 +12,36 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdpr_profiles import RobotAxis
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.compensation import Compensation
-from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.jit import bound
-from cdpr_rt.robots.free_rotation import SHAPING_s, rotation_of
+from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
-from cdpr_rt.robots.platform.cell_check import CellCheck, balance_std_N
 from cdpr_rt.robots.platform.cell_feedback import CellFeedback
-from cdpr_rt.robots.platform.control_rows import loop_settings, motor_rows, tracking_filters
+from cdpr_rt.robots.platform.control_rows import (
+    cell_check,
+    loop_settings,
+    motor_rows,
+    tracking_filters,
+)
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.platform.motor_learning import MotorLearning
+from cdpr_rt.robots.platform.shaped_setpoint import ShapedSetpoint
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
 from cdpr_rt.robots.tension.tension_split import OK, split
 from cdpr_rt.robots.workspace import SHARES, infeasibility_text
 
+_ON_STAND = 0.1  # of the integral part
 _SETTLING_STEPS, _LIFT_S = 60, 0.05
-_MOST_LOOKS = 200
-"""At the contacts of a way, between two cycles."""
+_MOST_LOOKS = 200  # at the contacts of a way, between two cycles
 
 
 class CableControl:
@@ -71,7 +77,10 @@ class CableControl:
         """Between which the tensions are planned, (n,)."""
         self.least_N = model.low_N
         self.torque_Nm = np.array(torque_Nm, float)
-        self._begin_set_point()
+        self.setpoint = ShapedSetpoint(model.home, period_s)
+        self.position, self.velocity, self.acceleration = self.setpoint.rows
+        self.shaped: FloatArray = self.setpoint.shaped[0]
+        """The set-point's position as the control follows it: shaped, some cycles later, (d,)."""
         self.tension_N = np.array(self.low_N)
         self.outcome, self.share, self._limited = 0, 1.0, False
         self.effort_Nm, self.compensation_Nm, self.motor_loss_Nm = np.zeros((3, n))
@@ -80,11 +89,7 @@ class CableControl:
         self.estimated = np.array(model.home)
         """Where the platform is, (d,)."""
         self._compensation = compensation
-        self._motors = motor_rows(model, axes)
-        self._motors[tracking.TENSION] = self.low_N
-        self.gains = designed_loop(model, axes, period_s).gains
-        span_N = float((model.high_N - model.low_N).min())
-        self._settings = loop_settings(self.gains, span_N, period_s)
+        self._design(axes)
         known = np.zeros(n, np.bool_) if compensation is None else compensation.available
         self.learning: MotorLearning | None = None
         """What is learnt of the motors that nothing is known of."""
@@ -92,30 +97,21 @@ class CableControl:
             scale, reserve_N = model.wrench_scale, model.reserve_N
             self.learning = MotorLearning(axes, known, scale, reserve_N, period_s)
         self._cells: CellFeedback | None = None
-        self._check = self._cell_check(axes)
+        self._check = cell_check(model, axes, period_s)
         moves = np.zeros((4, 6))
         self._bind_pose(moves)
         self._bind_force(moves)
         self._bind_tensions()
 
-    def _begin_set_point(self) -> None:
-        self._setpoint, self._shaped = np.zeros((2, 3, self.model.size))
-        self.position, self.velocity, self.acceleration = self._setpoint
-        self.position[:] = self.model.home
-        self.shaped: FloatArray = self._shaped[0]
-        """The set-point's position as the control follows it: shaped, some cycles later, (d,)."""
-        cycles = max(1, round(SHAPING_s / self._period_s))
-        self._past, self._place = np.zeros((cycles, 3, self.model.size)), 0
-        self._shape_anew()
-
-    def _cell_check(self, axes: Sequence[RobotAxis]) -> CellCheck:
-        model = self.model
-        cable_m = np.abs(self._motors[tracking.M_PER_RAD])
-        rated_N = np.array([axis.winch.motor.rated_torque_Nm for axis in axes]) / cable_m
-        names, scale = [axis.name for axis in axes], model.wrench_scale
-        weight_N = float(np.abs(model.weight()[: model.positions]).max())
-        std_N = balance_std_N(weight_N, model.positions - 1, scale)
-        return CellCheck(names, rated_N, std_N, scale, self._period_s)
+    def _design(self, axes: Sequence[RobotAxis]) -> None:
+        """Design the loop for the platform and its motors."""
+        model, period_s = self.model, self._period_s
+        self._motors = motor_rows(model, axes)
+        self._motors[tracking.TENSION] = self.low_N
+        self.gains = designed_loop(model, axes, period_s).gains
+        span_N = float((model.high_N - model.low_N).min())
+        self._settings, self._on_stand = loop_settings(self.gains, span_N, period_s), False
+        self._integral_N = float(self._settings[loop.MOST_N])
 
     def _bind_pose(self, moves: FloatArray) -> None:
         """Fix the arrays of the kernels that find the pose and follow it, which write `moves`."""
@@ -137,11 +133,10 @@ class CableControl:
             pose_setpoint.coordinates_of_pose,
             self._pose.array, self._directions, self._home.array, self._scratch, self.estimated,
         )  # fmt: skip
-        self._shape = bound(loop.shape, self._past, then=(0, self._setpoint, self._shaped))
         self._motor_references = bound(
-            pose_setpoint.motor_references, self._shaped, self._directions, self._home.array,
-            self._period_s, kinematics.geometry, motors, self._pose.array, self._scratch,
-            self._wanted.array, np.zeros((CABLE_ROWS, n)), moves[loop.WANTED_TWIST],
+            pose_setpoint.motor_references, self.setpoint.shaped, self._directions,
+            self._home.array, self._period_s, kinematics.geometry, motors, self._pose.array,
+            self._scratch, self._wanted.array, np.zeros((CABLE_ROWS, n)), moves[loop.WANTED_TWIST],
             moves[loop.WANTED_ACCELERATION], moves[loop.POSE_ERROR], then=(position,) * 3,
         )  # fmt: skip
 
@@ -216,9 +211,10 @@ class CableControl:
 
         Without a reading a motor is believed its torque constant, and what is known of it.
         """
+        learnt_Nm = np.zeros(len(tension_N)) if self.learning is None else self.learning.torque_Nm
         self._cells = CellFeedback(
             tension_N, measured, self._motors[tracking.M_PER_RAD], self.model.reserve_N,
-            self._period_s, self._check, self._W, self._wrench,
+            self._period_s, self._check, self._W, self._wrench, learnt_Nm,
         )  # fmt: skip
 
     @property
@@ -233,11 +229,13 @@ class CableControl:
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Write torques and the axes' set-points for the platform's present set-point."""
         self.observe(feedback)
-        self._place = self._shape(self._place, self._setpoint, self._shaped)
+        self.setpoint.shape()
         slope = setpoint.acceleration_rad_s2
         self._motor_references(setpoint.position_rad, setpoint.velocity_rad_s, slope)
         if self.learning is not None:
             self.learning.learn(self._was_exerted())
+        if self._on_stand and self.velocity.any():
+            self._rest(on_stand=False)
         self._correct(self.share, self._rate_inconsistency_m_s)
         self._compensate(feedback, setpoint)
         if self._distribution is not None:
@@ -280,15 +278,18 @@ class CableControl:
             self.observe(feedback)
         self._swing[:] = 0.0
 
-    def stand_still(self) -> None:
-        """Have the set-point stand where the platform is."""
-        self.position[:] = self.estimated
-        self.velocity[:] = self.acceleration[:] = 0.0
-        self._shape_anew()
+    def stand_still(self, *, on_stand: bool = False) -> None:
+        """Have the set-point stand where the platform is.
 
-    def _shape_anew(self) -> None:
-        self._past[:] = self._shaped[:] = 0.0
-        self._past[:, 0] = self._shaped[0] = self.position
+        Until it moves, the integral part of one `on_stand` is bounded: it would press, and the
+        first way off the stand would begin against that.
+        """
+        self._rest(on_stand=on_stand)
+        self.setpoint.stand_at(self.estimated)
+
+    def _rest(self, *, on_stand: bool) -> None:
+        self._on_stand = on_stand
+        self._settings[loop.MOST_N] = self._integral_N * (_ON_STAND if on_stand else 1.0)
 
     def observe(self, feedback: AxisFeedback) -> None:
         """Bring the estimate of the platform's pose up to date, by one cycle."""
@@ -355,10 +356,10 @@ class CableControl:
         margin_N = float(np.minimum(needed_N - low_N, high_N - needed_N).min())
         return f"for this motion, {infeasibility_text(margin_N, needed_N, low_N, high_N)}"
 
-    def stands(self, position: FloatArray) -> bool:
+    def is_feasible(self, position: FloatArray) -> bool:
         """Return whether the platform can be held, and accelerated, at a position (d,)."""
         self._turn_to(position)
-        return self.workspace.stands(self._to)
+        return self.workspace.is_feasible(self._to)
 
     def contact_ahead(self, position: FloatArray) -> int:
         """Return a pair of things in contact on a short way from the set-point, -1 for none."""
@@ -380,14 +381,14 @@ class CableControl:
         self._turn_to(position)
         return self.workspace.infeasibility(self._to)
 
-    def path_obstacle(self, position: FloatArray, start: FloatArray | None = None) -> str:
+    def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
         """Return what is in the straight way to a position (d,), an empty text for nothing.
 
         The way begins at `start` (d,), or where the set-point is.
         """
         share, begin = SHARES[:, None], self.position if start is None else start
-        poses = self.model.poses((1.0 - share) * begin + share * np.asarray(position))
-        obstacle = self.workspace.first_obstacle(poses)
+        poses = self.model.poses((1.0 - share) * begin + share * position)
+        obstacle = self.workspace.first_infeasible(poses)
         if obstacle is None:
             contact = self._interference.first_contact(np.array([begin, position]), _MOST_LOOKS)
             return "" if contact is None else str(contact)

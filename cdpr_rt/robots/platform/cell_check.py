@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound, jit
 
 MOTOR_SHARE, CONSTANT_SHARE = 0.03, 0.05

@@ -7,31 +7,34 @@ disturbed. a is low-passed as the reading is.
 
 A cell may lie without being silent. What the loop's force leaves of the reserve between planned
 tensions and their bounds is all that b may take: whatever a cell says, a + b is within the bounds.
+What is learnt of the motors may be wrong as well: with it, b stays within what that may be at most.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.jit import bound, jit
 from cdpr_rt.robots.platform.cell_check import CellCheck
+from cdpr_rt.robots.platform.motor_learning import MOST_RESERVE_SHARE
 from cdpr_rt.robots.tension.tension_split import FAST
 
 RATE_1_s = 2.0
 """k: slower by far than amplifiers filter and readings are old, some 0.1 s together."""
 LAG_S, FALL_BACK_S = 0.07, 1.0
-SHARE = 1.0 - FAST
-"""Of the reserve, up to which tensions are corrected."""
+SHARE, TOGETHER_SHARE = 1.0 - FAST, 2.0 * MOST_RESERVE_SHARE
+"""Of the reserve, up to which tensions are corrected, and shifted by that and what is learnt."""
 
 
 @jit
 def follow(
     period_s: float,
-    most_N: float,
+    reserve_N: float,
     measured_N: FloatArray,
     measured: BoolArray,
     m_per_rad: FloatArray,
+    learnt: FloatArray,
     lagging: FloatArray,
     correction: FloatArray,
     torque: FloatArray,
@@ -39,10 +42,10 @@ def follow(
 ) -> bool:
     """Bring corrections (n,), N, up to date with a cycle, and write their torques (n,), Nm.
 
-    They stay within `most_N`, and return to 0 while there is no reading. Returns whether there is
-    any.
+    They stay within a share of the reserve, and return to 0 while there is no reading; the torques
+    together with those that were `learnt` (n,) within a larger one. Returns whether there is any.
     """
-    read = False
+    read, most_N = False, SHARE * reserve_N
     for i in range(asked.size):
         lagging[i] += period_s / (LAG_S + period_s) * (asked[i] - lagging[i])
         read = read or measured[i]
@@ -51,7 +54,9 @@ def follow(
             correction[i] = min(max(correction[i], -most_N), most_N)
         else:
             correction[i] -= period_s / FALL_BACK_S * correction[i]
-        torque[i] = -m_per_rad[i] * correction[i]
+        together = TOGETHER_SHARE * reserve_N * abs(m_per_rad[i])
+        both = learnt[i] - m_per_rad[i] * correction[i]
+        torque[i] = min(max(both, -together), together) - learnt[i]
     return read
 
 
@@ -68,18 +73,20 @@ class CellFeedback:
         check: CellCheck,
         W: FloatArray,
         wrench: FloatArray,
+        learnt_Nm: FloatArray,
     ) -> None:
         """Take the arrays of readings (n,), which are written elsewhere, and whether they hold.
 
         `reserve_N` is what planned tensions keep from their bounds. W (d, n) and the `wrench` (d,)
-        besides the cables' are those of the cycle, by which `check` holds the readings.
+        besides the cables' are those of the cycle, by which `check` holds the readings; `learnt_Nm`
+        (n,) is what is added besides for what was learnt of the motors.
         """
         n = m_per_rad.size
         self.torque_Nm = np.zeros(n)
         """What is added for it, (n,)."""
         self._lagging, self._correction = np.zeros((2, n))
         self._follow = bound(
-            follow, period_s, SHARE * reserve_N, measured_N, measured, m_per_rad, self._lagging,
+            follow, period_s, reserve_N, measured_N, measured, m_per_rad, learnt_Nm, self._lagging,
             self._correction, self.torque_Nm, then=(np.zeros(n),),
         )  # fmt: skip
         self.check = check

@@ -1,4 +1,4 @@
-"""Parameters of the platform controller's kernels, from the robot's file."""
+"""Parameters of the platform controller, from the robot's file."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdpr_profiles import RobotAxis
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.platform import loop_kernel as loop
+from cdpr_rt.robots.platform.cell_check import CellCheck, balance_std_N
 from cdpr_rt.robots.platform.loop_design import DAMPING_RATIO, LoopGains, OBSERVER_rad_s
 from cdpr_rt.robots.platform_model import PlatformModel
 
@@ -56,3 +57,13 @@ def loop_settings(gains: LoopGains, span_N: float, period_s: float) -> FloatArra
         _DEADBAND_m,
     )
     return row
+
+
+def cell_check(model: PlatformModel, axes: Sequence[RobotAxis], period_s: float) -> CellCheck:
+    """Return the check of the load cells of these axes, one for each cable."""
+    rated_N = np.array(
+        [a.winch.motor.rated_torque_Nm / abs(a.winch.cable_m_per_motor_rad) for a in axes]
+    )
+    weight_N = float(np.abs(model.weight()[: model.positions]).max())
+    std_N = balance_std_N(weight_N, model.positions - 1, model.wrench_scale)
+    return CellCheck([axis.name for axis in axes], rated_N, std_N, model.wrench_scale, period_s)

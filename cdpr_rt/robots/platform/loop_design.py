@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from cdpr_profiles import RobotAxis
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.body_kernel import body_of, write_mass_matrix
 from cdpr_rt.robots.platform.margin_kernel import keeps_margin

@@ -20,7 +20,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.interference.contact_kernel import STEP, TURN, place_on, size_of
 from cdpr_rt.robots.kinematics.cable_kernel import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.interference.contact_kernel import (
     BASE,

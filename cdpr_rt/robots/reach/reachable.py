@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import BoolArray, FloatArray, IntArray
+from cdpr_rt.arrays import BoolArray, FloatArray, IntArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.reach.reach_kernel import CONTACT, NOT_HELD, WHOLE, reach_all

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.tension.null_space import null_space, other_wrench
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 
 _RANK = 1e-9

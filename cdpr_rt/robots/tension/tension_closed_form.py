@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.tension.tension_projection import NOTHING, furthest_outside, gram_schmidt, start
+from cdpr_rt.robots.tension.tension_qp import NOTHING, furthest_outside, gram_schmidt, start
 
 
 @jit

@@ -12,13 +12,13 @@ from enum import IntEnum
 import numpy as np
 
 from cdpr_profiles.platform import TENSION_METHODS
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import ControlError
 from cdpr_rt.robots.tension.nearest_wrench import CARRIED, nearest_wrench
 from cdpr_rt.robots.tension.null_space import null_space
 from cdpr_rt.robots.tension.tension_closed_form import closed_form
 from cdpr_rt.robots.tension.tension_polygon import CENTROID, ONE_NORM, TWO_NORM, choose
-from cdpr_rt.robots.tension.tension_projection import project
+from cdpr_rt.robots.tension.tension_qp import project
 
 
 class TensionError(ControlError):

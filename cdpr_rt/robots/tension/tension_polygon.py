@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 
 ONE_NORM, TWO_NORM, CENTROID = 0, 1, 2

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import math
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 from cdpr_rt.robots.tension.nearest_wrench import nearest_wrench
 from cdpr_rt.robots.tension.null_space import null_space, other_wrench
-from cdpr_rt.robots.tension.tension_projection import project
+from cdpr_rt.robots.tension.tension_qp import project
 
 FAST = 0.85
 """Share of the reserve that a loop's force may use at once."""

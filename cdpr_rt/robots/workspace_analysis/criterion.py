@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import platform_model, platform_model_of
 from cdpr_rt.robots.rigid_body import orientations
 from cdpr_rt.robots.statics import PlatformStatics

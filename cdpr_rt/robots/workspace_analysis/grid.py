@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.criterion import Criterion
 from cdpr_rt.robots.workspace_analysis.rays import Rays

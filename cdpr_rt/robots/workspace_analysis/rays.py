@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.criterion import Criterion
 from cdpr_rt.robots.workspace_analysis.surface import Triangles, volume

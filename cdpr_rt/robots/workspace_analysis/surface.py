@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 
 Triangles = NDArray[np.int64]
 """Triples of vertices, anticlockwise as seen from outside, (f, 3)."""

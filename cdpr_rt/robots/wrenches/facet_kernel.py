@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.jit import jit
 
 _FLAT: Final = 1e-9

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import SharedBlockError
 from cdpr_rt.core.states import LoopState, Reaction, Transition
 from cdpr_rt.core.task import Task

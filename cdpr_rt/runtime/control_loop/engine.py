@@ -8,8 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle import Cycle
-from cdpr_rt.core.exchange import FloatArray, Setpoint
+from cdpr_rt.core.exchange import Setpoint
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import Reaction
 from cdpr_rt.runtime.control_loop.lifecycle import Lifecycle

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle import Cycle
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.limits import Limit
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.runtime.control_loop.engine import Engine

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.limits import LENGTHS_UNRELIABLE, POSE_UNRELIABLE, Limit
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.errors import ControlError

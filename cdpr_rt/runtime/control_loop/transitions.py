@@ -155,7 +155,7 @@ class Transitions:
     def _raise_on_trouble(self) -> None:
         cycle = self._engine.cycle
         assert cycle is not None  # cycles run
-        trouble = self._engine.lost_bus or cycle.device_alarm() or cycle.watch_alarm()
+        trouble = self._engine.lost_bus or cycle.device.alarm() or cycle.watch_alarm()
         trouble = trouble or cycle.stop_reason()
         if trouble:
             raise RefusedError(trouble)

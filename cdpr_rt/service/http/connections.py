@@ -40,20 +40,6 @@ class Connection(Protocol):
         """Whether it has no complete request that waits for its answer."""
 
 
-class SocketLike(Protocol):
-    """A socket, also as asyncio lets one have it."""
-
-    @property
-    def family(self) -> int:
-        """Of its address."""
-
-    def getsockopt(self, level: int, name: int, size: int, /) -> bytes:
-        """Return an option's bytes."""
-
-    def getpeername(self) -> Any:
-        """Return the address of the other end."""
-
-
 class ConnectionLimiter:
     """The connections to one listener; where they are too many, idle ones go first.
 
@@ -158,7 +144,7 @@ class FairQueue:
                 loop.call_soon(self._pass)
 
 
-def peer_of(connection: SocketLike) -> tuple[str, int]:
+def peer_of(connection: socket.socket) -> tuple[str, int]:
     """Return who is at the other end: address and port, or a process of this machine and 0.
 
     Raises OSError where nobody is any more.

@@ -17,8 +17,8 @@ from prometheus_client.core import (
 )
 from prometheus_client.registry import Collector
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, Field, Row
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.shared_block import RowReader
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.service.link import DEAD, STARTING

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from foxglove import Channel, Context
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock, SharedBlockError
 from cdpr_rt.errors import ControlError
+from cdpr_rt.service.part import Part
 from cdpr_rt.service.recordings import recording_schema as topics
 from cdpr_rt.service.recordings.recording_events import Events
 from cdpr_rt.service.recordings.recording_file import NameTakenError, RecordingError, RecordingFile
@@ -37,7 +37,7 @@ _MOST_REMARKS: Final = 1000
 _PASSING: Final = ("since_ns", "count", "slowest_exchange_s", "url")
 
 
-class Recorder:
+class Recorder(Part):
     """Writes rows, status, description and events of a block into MCAP files in `folder`.
 
     A file is named ROBOT-DATE-NNN.mcap; a session keeps its date, the next file begins where one
@@ -63,12 +63,12 @@ class Recorder:
         ended: Callable[[str], None] | None = None,
         retention: Retention | None = None,
     ) -> None:
+        super().__init__("recorder", ended)
         self._block = block
         self._folder = folder
         self._robot = re.sub(r"[^\w.-]", "_", robot)
         self._most_bytes = most_bytes
         self._reserve_bytes = reserve_bytes
-        self._ended = ended
         self._retention = retention or Retention()
         self._wall = WallClock(block)
         self._texts = RowTexts(block.n, topics.CYCLE_FIELDS)
@@ -89,23 +89,14 @@ class Recorder:
         self._told_lost = 0
         self._rows = 0
         self._bytes = 0
-        self._error = ""
         self._file: RecordingFile | None = None
         self._path: Path | None = None
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     def start(self) -> None:
         """Open the first file and record from now on, until `stop`; see `status`."""
         self.begin()
         if not self._error:
-            self._thread.start()
-
-    def stop(self) -> None:
-        """Record what is left and close the file."""
-        self._end.set()
-        if self._thread.is_alive():
-            self._thread.join()
+            super().start()
 
     def begin(self) -> None:
         """Open the first file; see `status`."""
@@ -148,7 +139,7 @@ class Recorder:
 
     # -- the thread
 
-    def _run(self) -> None:
+    def _serve(self) -> None:
         while not self._error and not self._end.wait(_INTERVAL_S):
             self.look()
         self.finish()
@@ -161,18 +152,16 @@ class Recorder:
         except (ControlError, OSError) as error:
             self._fail(str(error))
         except BaseException as error:
-            self._fail(f"the recorder ended: {type(error).__name__}: {error}")
+            self._fail(self._ended_by(error))
             raise
 
     def _fail(self, text: str) -> None:
-        self._error = text
         file, self._file = self._file, None
         if file is not None:
             with suppress(ControlError, OSError):
                 file.close()
             self._bytes += file.size
-        if self._ended is not None:
-            self._ended(text)
+        super()._fail(text)
 
     def _channel(self, topic: str, schema: dict[str, Any]) -> Channel:
         return Channel(topic, schema=schema, context=self._context)

@@ -99,11 +99,6 @@ class RecordingFile:
         _sync_folder(path.parent)
 
     @property
-    def name(self) -> str:
-        """The file's name without its folder."""
-        return self.path.name
-
-    @property
     def is_there(self) -> bool:
         """Whether the file can still be found by somebody."""
         return os.fstat(self._fd).st_nlink > 0

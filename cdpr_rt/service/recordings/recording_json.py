@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import Row, cycle_dtype
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.jit import jit
 
 _FLOAT, _INTEGER, _BOOLEAN, _NOTHING = 0, 1, 2, 3

@@ -7,7 +7,6 @@ import ipaddress
 import math
 import select
 import socket
-import threading
 import time
 from collections.abc import Callable
 from typing import Any, Final
@@ -15,6 +14,7 @@ from typing import Any, Final
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.errors import ControlError
 from cdpr_rt.service.lease import Lease
+from cdpr_rt.service.part import Part
 from cdpr_rt.service.streams.stream_packet import LONGEST_BYTES
 from cdpr_rt.service.streams.stream_sessions import Address, StreamSessionManager
 
@@ -28,13 +28,12 @@ class StreamError(ControlError):
     """The stream cannot be opened at this address; the message says what is allowed."""
 
 
-class SetpointStream:
+class SetpointStream(Part):
     """Takes packets from `sock`, as `listen_udp` returns one, from `start` until `stop`.
 
     Set-points go into `block` while their sender has the right to move, which `lease` gives.
     Without a `key` only sessions are served that `sessions.issue` has returned. Raises
-    ControlError for a key that is too short. `ended` is told why it ended, where it did other than
-    by `stop`.
+    ControlError for a key that is too short.
     """
 
     name = "stream"
@@ -47,25 +46,17 @@ class SetpointStream:
         key: bytes | None = None,
         ended: Callable[[str], None] | None = None,
     ) -> None:
+        super().__init__("set-point stream", ended)
         self.sessions = StreamSessionManager(block, lease, key)
         self._sock = sock
         host, port = sock.getsockname()[:2]
         self.address: tuple[str, int] = host, port
         """The host and the port it listens at."""
         self._holders: _HoldersSocket | None = None
-        self._ended = ended
-        self._error = ""
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="set-point stream", daemon=True)
-
-    def start(self) -> None:
-        """Begin to take packets."""
-        self._thread.start()
 
     def stop(self) -> None:
         """Stop; whoever holds the stream loses it."""
-        self._stop.set()
-        self._thread.join()
+        super().stop()
         self.sessions.close()
         self._follow_holder(self._sock)
         self._sock.close()
@@ -81,18 +72,10 @@ class SetpointStream:
             "error": self._error,
         }
 
-    def _run(self) -> None:
-        try:
-            self._serve()
-        except Exception as error:
-            self._error = f"the set-point stream ended: {type(error).__name__}: {error}"
-            if self._ended is not None:
-                self._ended(self._error)
-
     def _serve(self) -> None:
         buffer = memoryview(bytearray(LONGEST_BYTES + 1))
         first = self._sock
-        while not self._stop.is_set():
+        while not self._end.is_set():
             socks = [first] if self._holders is None else [self._holders.sock, first]
             readable = _readable(socks)
             begin = time.monotonic()
@@ -101,7 +84,7 @@ class SetpointStream:
             self.sessions.expire(time.monotonic_ns())
             self._follow_holder(first)
             if taken >= _MOST_A_TURN:
-                self._stop.wait(max(0.0, begin + _TURN_S - time.monotonic()))
+                self._end.wait(max(0.0, begin + _TURN_S - time.monotonic()))
 
     def _take(self, sock: socket.socket, buffer: memoryview) -> int:
         for count in range(_MOST_A_TURN):

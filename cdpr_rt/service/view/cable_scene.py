@@ -17,7 +17,7 @@ from foxglove.messages import (
 )
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 
 _LOOSE, _PLATFORM = Color(r=0.6, g=0.6, b=0.6, a=1.0), Color(r=0.82, g=0.35, b=0.1, a=1.0)
 _PIXELS = 3.0

@@ -7,7 +7,6 @@ import json
 import math
 import re
 import socket
-import threading
 import time
 from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
@@ -28,6 +27,7 @@ from foxglove.messages import (
 
 from cdpr_rt.core.cycle_row import AXIS_FIELDS, SCALAR_FIELDS, Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock, SharedBlockError
+from cdpr_rt.service.part import Part
 from cdpr_rt.service.recordings.recording import WallClock
 from cdpr_rt.service.recordings.recording_events import Events
 from cdpr_rt.service.rows import LABELS
@@ -47,11 +47,11 @@ _NUMBERS: Final = tuple(field.name for field in _SCALARS if field.kind == "<f8" 
 _COUNTS: Final = tuple(field.name for field in _SCALARS if field.kind != "<f8")
 
 
-class LiveView:
+class LiveView(Part):
     """Shows the newest row of a block `RATE_Hz` times a second to whoever connects to `listener`.
 
     Only what is subscribed to is prepared. Clients cannot change anything. `origins` are those web
-    pages that may look on too. `ended` is told why it ended, where it did other than by `stop`.
+    pages that may look on too.
     """
 
     name = "live_view"
@@ -64,9 +64,9 @@ class LiveView:
         origins: Collection[str] = (),
         ended: Callable[[str], None] | None = None,
     ) -> None:
+        super().__init__("live view", ended)
         self._block = block
         self._listener = listener
-        self._ended = ended
         self._wall = WallClock(block)
         self._reader = RowReader(block)
         self._events = Events()
@@ -75,19 +75,6 @@ class LiveView:
         self._server = FoxgloveServer(f"cdpr-rt {robot}", origins)
         self._url = "ws://{}:{}".format(*listener.getsockname())
         self._messages = 0
-        self._error = ""
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="live view", daemon=True)
-
-    def start(self) -> None:
-        """Let people look on."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Cut all clients off."""
-        self._end.set()
-        if self._thread.is_alive():
-            self._thread.join()
 
     def status(self) -> dict[str, Any]:
         """Return the URL to connect to, the number of moments shown, and what is wrong.
@@ -97,15 +84,10 @@ class LiveView:
         figures = {"url": self._url, "moments": self._messages, "error": self._error}
         return {**figures, **self._server.status()}
 
-    def _run(self) -> None:
-        try:
-            asyncio.run(self._serve())
-        except Exception as error:
-            self._error = f"the live view ended: {type(error).__name__}: {error}"
-            if self._ended is not None:
-                self._ended(self._error)
+    def _serve(self) -> None:
+        asyncio.run(self._serve_viewers())
 
-    async def _serve(self) -> None:
+    async def _serve_viewers(self) -> None:
         async with self._server.serving(self._listener):
             while not self._end.is_set():
                 self._show()

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 from canopen.objectdictionary import ObjectDictionary, ObjectDictionaryError, ODVariable
 
-from cdpr_drivers.canopen.boot import concise_dcf
-from cdpr_drivers.canopen.boot.concise_dcf import DcfEntry
 from cdpr_drivers.drive_units import torque_settings
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import DriveProfile, Pdo
@@ -21,6 +19,7 @@ _APPLICATION = 0x2000
 _QUICK_STOP = 3
 _SLOW_DOWN_THEN_OFF = 2
 _STAMP_DAYS, _STAMP_MS = 0xFFFF, 86_400_000
+_COUNT, _HEAD = struct.Struct("<I"), struct.Struct("<HBI")
 
 
 @dataclass(frozen=True)
@@ -49,6 +48,20 @@ class Stamp:
 
 
 @dataclass(frozen=True)
+class DcfEntry:
+    """One object to write: index, sub-index and the data as SDO carries it."""
+
+    index: int
+    sub: int
+    data: bytes
+
+    @property
+    def value(self) -> int:
+        """The data as an unsigned integer."""
+        return int.from_bytes(self.data, "little")
+
+
+@dataclass(frozen=True)
 class Configuration:
     """The objects to write into one drive, in this order."""
 
@@ -57,8 +70,12 @@ class Configuration:
     """Objects the master would set, which the drive's EDS does not have."""
 
     def concise_dcf(self) -> bytes:
-        """Return it as a concise DCF (1F22h)."""
-        return concise_dcf.encode(self.entries)
+        """Return it as the DOMAIN of 1F22h (CiA 302): how many, then index, sub, size, data each.
+
+        All numbers are little-endian (U32; U16, U8, U32).
+        """
+        parts = [_HEAD.pack(e.index, e.sub, len(e.data)) + e.data for e in self.entries]
+        return _COUNT.pack(len(parts)) + b"".join(parts)
 
     def stamp(self) -> Stamp:
         """Return the expected configuration date and time (1F26h, 1F27h).

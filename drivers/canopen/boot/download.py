@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from cdpr_drivers.canopen import sdo_abort
-from cdpr_drivers.canopen.boot.concise_dcf import DcfEntry
 from cdpr_drivers.canopen.boot.configuration import (
     Configuration,
+    DcfEntry,
     Stamp,
     is_application,
     is_pdo,

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cdpr_profiles import load_robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.estimation.parameters import USUAL, CableGeometry
 from cdpr_rt.calibration.readings.observations import Observations
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.kinematics.cable_model import CableModel
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
@@ -35,6 +35,7 @@ def made_up(
     drum: float = 0.003,
     elongation: float = -0.3,
     noise_m: float = 0.0,
+    offset_m: float = 0.01,
     identified: tuple[str, ...] = USUAL,
     first: float = 1.0,
     home_first: bool = False,
@@ -47,7 +48,7 @@ def made_up(
     cable = np.zeros((n, 9))
     cable[:, :k] = rng.normal(0.0, exit_m, (n, k))
     cable[:, 4] = rng.normal(0.0, drum, n)
-    cable[:, 3] = rng.normal(0.0, 0.01, n)
+    cable[:, 3] = rng.normal(0.0, offset_m, n)
     true = replace(file, cable=cable, elongation=elongation)
     model = file.model
     low, high = model.platform.workspace_min_m, model.platform.workspace_max_m

@@ -11,10 +11,11 @@ import pytest
 from cdpr_profiles import ProfileError, Winch, load_winch
 from cdpr_profiles.catalogue import list_profiles, load_motor
 from cdpr_profiles.limits.motor_bounds import MotorBounds
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.compensation import Compensation
 from cdpr_rt.control.pid import Pid
 from cdpr_rt.control.tuning import analyse
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.programs.model import position_loop
 from cdpr_sim_bus.robot import servo

@@ -15,7 +15,7 @@ from cdpr_rt.control.tuning import (
     TuningError,
     analyse,
     design_pid,
-    stand_firm,
+    standstill_gains,
     stiffest_pid,
     sweep_gain,
 )
@@ -102,7 +102,7 @@ def test_sweep_gain_leaves_the_latency_its_phase():
 def test_a_firm_loop_keeps_its_bounds_and_bears_more_inertia(inertia, period):
     latency = 0.8e-3 + 1.5 * period
     plain = stiffest_pid(inertia, latency, (30.0, 20.0, 10.0, 5.0), period)
-    firm = stand_firm(plain, period)
+    firm = standstill_gains(plain, period)
     assert firm.sensitivity_peak <= MAX_SENSITIVITY
     assert firm.gain_margin_dB >= GAIN_MARGIN_dB
     assert firm.gains.proportional_Nm_rad > 1.5 * plain.gains.proportional_Nm_rad
@@ -112,6 +112,6 @@ def test_a_firm_loop_keeps_its_bounds_and_bears_more_inertia(inertia, period):
 @pytest.mark.parametrize("period", [1e-3, 2e-3])
 def test_a_firm_loop_is_stiffer_than_cogging_is_steep(period):
     latency = 0.8e-3 + 1.5 * period
-    firm = stand_firm(stiffest_pid(1.13e-4, latency, (30.0, 20.0), period), period)
+    firm = standstill_gains(stiffest_pid(1.13e-4, latency, (30.0, 20.0), period), period)
     # 0.06 Nm, four times a turn
     assert firm.gains.proportional_Nm_rad > 4 * 0.06

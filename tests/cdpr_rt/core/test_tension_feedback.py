@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.core.tension import TensionExchange, TensionFault, TensionWatch
+from cdpr_rt.core.tension_feedback import TensionExchange, TensionFault, TensionWatch
 
 
 class Clock:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.platform import Platform
+from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.exchange import AxisFeedback, BoolArray, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.shared_block import SAMPLE, SharedBlock
 from cdpr_rt.motion.pose_stream import PoseStream
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
@@ -108,7 +109,7 @@ class IdealControl:
 
     def update(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None: ...
 
-    def stand_still(self) -> None:
+    def stand_still(self, *, on_stand: bool = False) -> None:
         self.position[:] = self.estimated
         self.velocity[:] = self.acceleration[:] = self.off[:] = 0.0
 
@@ -122,8 +123,8 @@ class IdealControl:
         self._there.array[:] = self.model.poses(position[None])[0]
         return self._there
 
-    def stands(self, position: FloatArray) -> bool:
-        return self.workspace.stands(self._at(position))
+    def is_feasible(self, position: FloatArray) -> bool:
+        return self.workspace.is_feasible(self._at(position))
 
     def contact_ahead(self, position: FloatArray) -> int:
         return self.model.interference.contact_ahead(self.position, position)
@@ -137,11 +138,11 @@ class IdealControl:
     def infeasibility(self, position: FloatArray) -> str:
         return self.workspace.infeasibility(self._at(position))
 
-    def path_obstacle(self, position: FloatArray, start: FloatArray | None = None) -> str:
+    def way_infeasibility(self, position: FloatArray, start: FloatArray | None = None) -> str:
         share, begin = SHARES[:, None], self.position if start is None else start
         self.ways.append((np.array(begin), np.array(position)))
         poses = self.model.poses((1.0 - share) * begin + share * position)
-        found = self.workspace.first_obstacle(poses)
+        found = self.workspace.first_infeasible(poses)
         return "" if found is None else found[1]
 
 

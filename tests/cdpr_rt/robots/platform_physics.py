@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles import RobotAxis, load_robot
 from cdpr_profiles.catalogue import load_motor
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.approach import approach
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model

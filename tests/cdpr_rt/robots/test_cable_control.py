@@ -144,12 +144,12 @@ def test_an_update_allocates_nothing_that_stays(name: str) -> None:
     n = motion.angle_rad.shape[1]
     feedback, setpoint, torque = AxisFeedback(n), Setpoint(n), np.zeros(n)
     feedback.position_rad[:] = motion.angle_rad[-1]
-    assert ours.stands(ours.position)
+    assert ours.is_feasible(ours.position)
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
     for _ in range(300):
         ours.update(feedback, setpoint, torque)
-        ours.stands(ours.position)
+        ours.is_feasible(ours.position)
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
     assert grown < 2000
@@ -160,14 +160,14 @@ def test_a_place_that_tensions_cannot_hold_is_told() -> None:
     control.stand_still()
     control.position[:] = 0.0, 1.9
     assert not control.infeasibility(np.array([0.0, 1.9]))
-    assert control.stands(np.array([0.0, 1.9]))
+    assert control.is_feasible(np.array([0.0, 1.9]))
     for place in ((-1.5, 1.0), (0.0, 2.95), (0.0, 3.5)):
         told = control.infeasibility(np.array(place))
         assert "cable" in told
         assert "reserve" in told
-        assert not control.stands(np.array(place))
-    assert "at " in control.path_obstacle(np.array([-1.5, 1.0]))
-    assert not control.path_obstacle(np.array([0.3, 1.6]))
+        assert not control.is_feasible(np.array(place))
+    assert "at " in control.way_infeasibility(np.array([-1.5, 1.0]))
+    assert not control.way_infeasibility(np.array([0.3, 1.6]))
 
 
 def test_an_obstacle_in_the_way_is_told() -> None:
@@ -177,14 +177,14 @@ def test_an_obstacle_in_the_way_is_told() -> None:
     blocked = replace(robot.platform, obstacles=(box,))
     model = platform_model_of(replace(robot, platform=blocked))
     control = CableControl(model, robot.axes, np.full(8, 6.0), PERIOD_S)
-    told = control.path_obstacle(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
+    told = control.way_infeasibility(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
     assert "at -0.050, 0.100, 1.810 m: platform and obstacle 1 come within 10 mm" in told
-    assert not control.path_obstacle(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
+    assert not control.way_infeasibility(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
 
 
 def test_an_orientation_that_tensions_cannot_hold_is_told() -> None:
     control = spatial().control()
-    assert control.stands(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 0.1]))
+    assert control.is_feasible(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 0.1]))
     assert "cable" in control.infeasibility(np.array([0.0, 0.0, 1.4, 0.0, 0.0, 1.5]))
 
 
@@ -221,7 +221,7 @@ def test_an_acceleration_that_tensions_cannot_give_is_told() -> None:
     control.acceleration[:] = [0.0, -200.0]
     for _ in range(100):
         control.update(feedback, setpoint, torque)
-    assert control.stands(place)
+    assert control.is_feasible(place)
     assert control.tension_infeasibility().startswith("for this motion, cable")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_rt.robots.platform.cell_check import CellCheck
-from cdpr_rt.robots.platform.cell_feedback import CellFeedback
+from cdpr_rt.robots.platform.cell_feedback import TOGETHER_SHARE, CellFeedback
 from cdpr_rt.robots.tension.tension_split import FAST
 
 PERIOD_S, RESERVE_N = 1e-3, 80.0
@@ -20,10 +20,11 @@ class Cables:
 
     def __init__(self) -> None:
         self.read_N, self.valid = np.full(3, 50.0), np.ones(3, np.bool_)
+        self.learnt_Nm = np.zeros(3)
         check = CellCheck(["a", "b", "c"], np.full(3, 150.0), np.ones(2), np.ones(2), PERIOD_S)
         self.feedback = CellFeedback(
             self.read_N, self.valid, CABLE_m, RESERVE_N, PERIOD_S, check,
-            np.zeros((2, 3)), np.zeros(2),
+            np.zeros((2, 3)), np.zeros(2), self.learnt_Nm,
         )  # fmt: skip
         self.asked_N, self.missing_N = np.full(3, 50.0), MISSING_N
         self.feedback.restart(self.asked_N)
@@ -31,7 +32,8 @@ class Cables:
 
     @property
     def true_N(self) -> np.ndarray:
-        return self.asked_N - self.missing_N - self.feedback.torque_Nm / CABLE_m
+        added_Nm = self.learnt_Nm + self.feedback.torque_Nm
+        return self.asked_N - self.missing_N - added_Nm / CABLE_m
 
     def run(self, seconds: float, stuck_N: float | None = None) -> np.ndarray:
         """Return the true tensions of each cycle, (k, 3); cells that are stuck read `stuck_N`."""
@@ -83,3 +85,16 @@ def test_a_stuck_cell_leaves_true_tensions_within_their_bounds(stuck_N: float) -
         cables.run(1.0, stuck_N)
         assert (cables.true_N > low_N - 1e-9).all() and (cables.true_N < high_N + 1e-9).all()
     assert np.abs(cables.true_N - edge_N).min() == pytest.approx(MOST_N)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_stuck_cell_and_what_was_learnt_wrongly_do_not_add_up(sign: float) -> None:
+    cables = Cables()
+    cables.missing_N = np.zeros(3)
+    most_N = TOGETHER_SHARE * RESERVE_N
+    cables.learnt_Nm[:] = sign * CABLE_m * (most_N - 0.25 * MOST_N)
+    cables.run(2.0, stuck_N=50.0 + sign * 900.0)
+    assert cables.true_N == pytest.approx(50.0 - sign * most_N)
+    cables.learnt_Nm[:] *= -1.0  # as friction does where the motion turns round
+    cables.run(PERIOD_S, stuck_N=50.0 + sign * 900.0)
+    assert cables.true_N == pytest.approx(50.0 + sign * (most_N - 1.25 * MOST_N))

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from cdpr_profiles import load_robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.free_rotation import free_rotation, rotation_of
 from cdpr_rt.robots.kinematics import free_rotation_kernel as kernel
 from cdpr_rt.robots.kinematics.pose import Pose

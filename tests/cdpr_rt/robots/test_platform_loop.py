@@ -12,7 +12,7 @@ from platform_physics import PERIOD_S, Machine, heavier, planar, spatial
 from scipy.linalg import expm, null_space
 
 from cdpr_profiles import RobotAxis, load_robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of

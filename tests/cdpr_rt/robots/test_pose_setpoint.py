@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from platform_physics import planar, spatial
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS

@@ -7,7 +7,7 @@ import pytest
 from platform_physics import Machine, planar, spatial
 from scipy.optimize import lsq_linear, nnls
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.tension.tension_split import FAST, INFEASIBLE, OK, SINGULAR, split
 

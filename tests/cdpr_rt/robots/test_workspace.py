@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics.kinematics import (
     PLANAR,
     PLANAR_POINT,
@@ -76,7 +76,7 @@ def test_the_margin_is_what_linear_programming_finds(
     assert missing.min() < 1e-6
     inside = np.minimum(t - workspace.low, workspace.high - t).min()
     assert inside == pytest.approx(margin, abs=1e-6)
-    assert workspace.stands(pose) == (margin >= 0.0)
+    assert workspace.is_feasible(pose) == (margin >= 0.0)
     assert (workspace.infeasibility(pose) == "") == (margin >= 0.0)
 
 
@@ -131,18 +131,20 @@ def test_the_first_place_in_the_way_is_found() -> None:
     weight, _ = wrenches_in_motion(10.0, 0.0, 2, POINT)
     workspace = CableWorkspace(robot, weight, np.full(4, 1.0), np.full(4, 200.0), np.ones(3))
 
-    def first_obstacle(start: tuple[float, ...], end: tuple[float, ...]) -> tuple[Pose, str] | None:
+    def first_infeasible(
+        start: tuple[float, ...], end: tuple[float, ...]
+    ) -> tuple[Pose, str] | None:
         poses = np.zeros((len(SHARES), 4, 3))
         poses[:, 0] = (1.0 - SHARES[:, None]) * np.array(start) + SHARES[:, None] * np.array(end)
         poses[:, 1:] = np.eye(3)
-        return workspace.first_obstacle(poses)
+        return workspace.first_infeasible(poses)
 
     start, end = (0.0, 0.0, 1.0), (4.0, 0.0, 1.0)
-    obstacle = first_obstacle(start, end)
+    obstacle = first_infeasible(start, end)
     assert obstacle is not None
     there, why = obstacle
     assert "N outside" in why and there.p[0] == pytest.approx(2.0, abs=0.25)
-    assert first_obstacle(start, (1.0, 0.5, 0.5)) is None
+    assert first_infeasible(start, (1.0, 0.5, 0.5)) is None
     # a start that is not held is left
-    assert first_obstacle((2.5, 0.0, 1.0), start) is None
-    assert first_obstacle((2.5, 0.0, 1.0), end) is not None
+    assert first_infeasible((2.5, 0.0, 1.0), start) is None
+    assert first_infeasible((2.5, 0.0, 1.0), end) is not None

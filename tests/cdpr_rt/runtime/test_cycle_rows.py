@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -83,3 +84,8 @@ def test_every_field_says_what_it_means() -> None:
     """And is in the row once."""
     assert all(field.meaning for field in FIELDS.values())
     assert [name for name in cycle_dtype(_N).names or () if name != "spare"] == list(FIELDS)
+
+
+def test_the_page_of_recordings_names_every_field() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "recordings.md").read_text()
+    assert [name for name in FIELDS if f"`{name}`" not in page] == []

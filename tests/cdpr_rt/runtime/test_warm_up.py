@@ -15,7 +15,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import Reaction
 from cdpr_rt.core.supervisor import Limits, Supervisor
-from cdpr_rt.core.tension import TensionFeedback
+from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.motion.trajectory import TrapezoidalMove
 from cdpr_rt.runtime.warm_up import warm_up
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from cdpr_drivers.axes import answer_wait
-from cdpr_drivers.axes.answer_wait import AnswerWait
+from cdpr_drivers.axes import axis_buses
+from cdpr_drivers.axes.axis_buses import AnswerWait
 
 MOST_S = 0.02
 SYNC_S = 100.0
@@ -18,7 +18,7 @@ def slept_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The sleeps that were asked for, by a clock that shows the instant of the SYNC."""
     slept: list[float] = []
     clock = SimpleNamespace(monotonic=lambda: SYNC_S, sleep=slept.append)
-    monkeypatch.setattr(answer_wait, "time", clock)
+    monkeypatch.setattr(axis_buses, "time", clock)
     return slept
 
 

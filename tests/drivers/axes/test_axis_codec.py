@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from cdpr_drivers.axes import axis_codec as codec
 from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
-from cdpr_drivers.axes.axis_state import GroupState
+from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE, State
 from cdpr_drivers.errors import DriverError
 from tests.drivers.axis_rig import DRIVE, PERIOD_S
@@ -33,7 +33,8 @@ class Group:
         drive = DRIVE.model_copy(update=signs)
         self.axes = [AxisConfig(i + 1, drive, 3.0, 8192, 0x3AD, 2.0) for i in range(n)]
         self.layout = GroupLayout(self.axes)
-        self.state = GroupState(self.axes, PERIOD_S, lockstep=True)
+        self.state = StateArrays(len(self.axes))
+        self.state.begin(self.axes, PERIOD_S, lockstep=True)
         self.state.ints[codec.MODE_REQUESTED] = self.state.ints[codec.MODE_DISPLAYED] = 10
 
     def take(self, *frames: tuple[int, bytes]) -> int:

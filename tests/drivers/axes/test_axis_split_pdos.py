@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from cdpr_drivers.axes import axis_codec as codec
 from cdpr_drivers.axes.axis_layout import AxisConfig, GroupLayout
-from cdpr_drivers.axes.axis_state import GroupState
+from cdpr_drivers.axes.axis_state import StateArrays
 from cdpr_drivers.cia402 import CONTROLWORD_TABLE, STATE_TABLE, State
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import DriveProfile, Pdo, load_drive
@@ -36,7 +36,8 @@ class Pair:
             AxisConfig(2, DRIVE, 3.0, 8192, 0x3AD, 2.0),
         ]
         self.layout = GroupLayout(axes)
-        self.state = GroupState(axes, PERIOD_S, lockstep=True)
+        self.state = StateArrays(len(axes))
+        self.state.begin(axes, PERIOD_S, lockstep=True)
 
     def take(self, *frames: tuple[int, bytes]) -> int:
         raw = b"".join(CAN_FRAME.pack(i, len(data), data) for i, data in frames)
@@ -179,7 +180,8 @@ def test_an_object_of_another_length_is_refused() -> None:
 @pytest.mark.parametrize("torque_Nm", [40.0, -40.0, 1e300])
 def test_more_millinewtonmetres_than_16_bits_hold_are_cut_and_not_wrapped(torque_Nm: float) -> None:
     axes = [AxisConfig(1, SPLIT, 3.0, 8192, 0x2D, 50.0)]
-    layout, state = GroupLayout(axes), GroupState(axes, PERIOD_S, lockstep=True)
+    layout, state = GroupLayout(axes), StateArrays(len(axes))
+    state.begin(axes, PERIOD_S, lockstep=True)
     state.ints[codec.TARGET] = state.ints[codec.STATE] = State.OPERATION_ENABLED
     state.command.torque_Nm[0] = torque_Nm
     for _ in range(3):

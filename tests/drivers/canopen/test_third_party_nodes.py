@@ -148,7 +148,7 @@ def test_a_transfer_that_goes_wrong_ends_with_a_reason(
     told: str,
 ) -> None:
     monkeypatch.setattr("cdpr_drivers.canopen.sdo._MOST_BYTES", 700)
-    monkeypatch.setattr("cdpr_drivers.canopen.objects._TIMEOUT_S", 0.2)
+    monkeypatch.setattr("cdpr_drivers.canopen.sdo_access._TIMEOUT_S", 0.2)
     with scripted(simulated_bus, FOREIGN_NODE, answer) as node:
         with pytest.raises(kind) as caught:
             network.read_bytes(FOREIGN_NODE, 0x1008)

@@ -18,9 +18,8 @@ from cdpr_sim_bus.camera.camera_plant import (
     PrintPlant,
     SensorPlant,
 )
-from cdpr_sim_bus.camera.lens import ray_table, seen_at
 from cdpr_sim_bus.camera.scene import build_scene
-from cdpr_sim_bus.camera.sim_camera import SimCamera
+from cdpr_sim_bus.camera.sim_camera import SimCamera, ray_table, seen_at
 from cdpr_sim_bus.errors import SimulatorError
 from cdpr_sim_bus.physics_board import PlatformState
 

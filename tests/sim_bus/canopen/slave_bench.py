@@ -10,7 +10,7 @@ from pathlib import Path
 import canopen
 
 from cdpr_sim_bus.canopen import CanopenSlave, NmtState, ObjectDictionary, ParameterStore
-from cdpr_sim_bus.canopen.application import SlaveApplication
+from cdpr_sim_bus.canopen.slave import SlaveApplication
 
 ROOT = Path(__file__).parents[3]
 GENERIC_EDS = ROOT / "profiles" / "drives" / "generic-cia402.eds"

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cdpr_sim_bus.canopen import Abort, SdoAbort
-from cdpr_sim_bus.canopen.sdo.sdo_server import TIMEOUT_S
+from cdpr_sim_bus.canopen.sdo import TIMEOUT_S
 from tests.sim_bus.canopen.slave_bench import NODE, Bench
 
 DOMAIN = 0x2F10

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_sim_bus.robot import rotor, servo
+from cdpr_sim_bus.robot import motor_physics, servo
 from cdpr_sim_bus.robot.motor import Motor
 from cdpr_sim_bus.robot.plant import Plant
 
@@ -80,11 +80,11 @@ def test_index_latches_once_a_turn_at_its_angle(
     latched = []
     for _ in range(200):
         sample = motor.step(1e-3, servo.OFF, 0.0)
-        if sample.flags & rotor.INDEX_ROSE:
+        if sample.flags & motor_physics.INDEX_ROSE:
             count = int(motor.record["rise_count"][0])
             if not latched or latched[-1] != count:
                 latched.append(count)
-        assert bool(sample.flags & rotor.INDEX_FELL) <= bool(latched) or begins_on_it
+        assert bool(sample.flags & motor_physics.INDEX_FELL) <= bool(latched) or begins_on_it
     turned = sample.angle_rad - start
     assert abs(len(latched) - abs(turned) / (2 * math.pi)) <= 1.0
     for count in latched:
@@ -98,11 +98,11 @@ def test_index_lies_at_the_same_count_in_both_directions() -> None:
     motor = spinning(20.0)
     forward = backward = None
     for _ in range(400):
-        if motor.step(1e-3, servo.OFF, 0.0).flags & rotor.INDEX_ROSE:
+        if motor.step(1e-3, servo.OFF, 0.0).flags & motor_physics.INDEX_ROSE:
             forward = int(motor.record["rise_count"][0])
     motor.record["velocity"] = -20.0
     for _ in range(400):
-        if motor.step(1e-3, servo.OFF, 0.0).flags & rotor.INDEX_ROSE:
+        if motor.step(1e-3, servo.OFF, 0.0).flags & motor_physics.INDEX_ROSE:
             backward = int(motor.record["rise_count"][0])
     assert forward is not None and backward is not None
     assert (forward - backward) % 8192 == 0
@@ -110,7 +110,7 @@ def test_index_lies_at_the_same_count_in_both_directions() -> None:
 
 def test_absent_index_never_comes() -> None:
     motor = spinning(100.0, encoder={"index_present": False})
-    edges = rotor.INDEX_ROSE | rotor.INDEX_FELL
+    edges = motor_physics.INDEX_ROSE | motor_physics.INDEX_FELL
     assert not any(motor.step(1e-3, servo.OFF, 0.0).flags & edges for _ in range(500))
 
 
@@ -122,7 +122,7 @@ def test_an_eccentric_disc_errs_once_a_turn_and_not_at_its_index(index_deg: floa
     for off_deg in (0.0, 40.0, 90.0, 200.0, 360.0):
         angle = math.radians(index_deg + off_deg)
         motor.record["angle"] = motor.record["slot_angle"] = angle
-        read = rotor.read_counter(motor.record[0], angle) * 2 * math.pi / 2**20
+        read = motor_physics.read_counter(motor.record[0], angle) * 2 * math.pi / 2**20
         phase = math.radians(50.0)
         error = 0.01 * (math.sin(math.radians(off_deg) + phase) - math.sin(phase))
         assert read == pytest.approx(angle - math.radians(12.0) + error, abs=2e-5)
@@ -134,7 +134,7 @@ def test_interpolation_errs_once_in_four_counts() -> None:
     zero = int(motor.record["zero"][0])
     per_rad = 8192 / (2 * math.pi)
     for place in np.arange(0.0, 12.0, 0.11):
-        read = rotor.read_counter(motor.record[0], place / per_rad) + zero
+        read = motor_physics.read_counter(motor.record[0], place / per_rad) + zero
         assert read == math.floor(place + 0.8 * math.sin(math.pi / 2 * place) + 0.5)
 
 

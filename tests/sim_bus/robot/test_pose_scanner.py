@@ -10,9 +10,9 @@ import pytest
 from body_lab import body
 from scipy.spatial.transform import Rotation
 
-from cdpr_sim_bus.record_file import HEADER_BYTES
 from cdpr_sim_bus.robot.cable_robot import CableRobot
-from cdpr_sim_bus.robot.logs.pose_scanner import PoseScanner
+from cdpr_sim_bus.robot.logs.pose_logs import PoseScanner
+from cdpr_sim_bus.robot.logs.truth_log import HEADER_BYTES
 from cdpr_sim_bus.robot.robot_plant import ScannerPlant
 
 PLANT = ScannerPlant(position_sigma_m=0.003, rotation_sigma_rad=0.01, rate_Hz=40.0)

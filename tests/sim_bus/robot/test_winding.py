@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cdpr_sim_bus.robot.rotor import paid_out
+from cdpr_sim_bus.robot.motor_physics import paid_out
 from tests.sim_bus.robot.body_lab import body, run
 
 LOWPASSED_ONCE = {

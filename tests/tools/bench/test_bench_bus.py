@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cdpr_tools.commands.bench.cyclic.bench_bus import _table
+from cdpr_tools.bench.cyclic.bus import report
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_the_packed_path_is_the_cheaper_one(figures: dict[str, Any]) -> None:
 def test_the_table_has_a_line_for_each(
     figures: dict[str, Any], result: subprocess.CompletedProcess[str]
 ) -> None:
-    for line in _table(figures):
+    for line in report(figures):
         assert line in result.stderr
-    names = [line.split()[0].rstrip(":") for line in _table(figures)[3:]]
+    names = [line.split()[0].rstrip(":") for line in report(figures)[3:]]
     assert set(names) >= {"simbus", "socketcan", "socketcand", "slcan"}

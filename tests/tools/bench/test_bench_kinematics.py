@@ -10,13 +10,13 @@ from typer.testing import CliRunner
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_tools.bench import kinematics as bench
 from cdpr_tools.bench.geometries import COGIRO, held_tensions
-from cdpr_tools.commands.bench.platforms import bench_kinematics
+from cdpr_tools.commands.bench import app
 
 
 def test_bad_starts_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "ANGLES_deg", (2.0, 40.0))
     monkeypatch.setattr(bench, "_SCIPY_POSES", 3)
-    done = CliRunner().invoke(bench_kinematics.app, ["--poses", "200"])
+    done = CliRunner().invoke(app, ["kinematics", "--poses", "200"])
     assert done.exit_code == 0, done.output
     assert done.output.count("success at least reached") == 2
     assert "p99 wanted at most 15 us" in done.output

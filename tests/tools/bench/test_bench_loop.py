@@ -13,7 +13,6 @@ from cdpr_profiles import load_robot
 from cdpr_tools.bench.daemon import baseline_process
 from cdpr_tools.bench.daemon import loop as loop_bench
 from cdpr_tools.bench.daemon.loop_daemon import BenchDaemon, with_tolerant_limits
-from cdpr_tools.commands.bench.cyclic.bench_loop import _table
 from cdpr_tools.output import Output
 
 SECONDS, PERIOD_S = 1.0, 4e-3
@@ -97,7 +96,7 @@ def test_a_platform_is_led_to_and_fro_by_both(tmp_path: Path, state_home: Path) 
 
 
 def test_figures_are_told_for_people(figures: dict[str, Any]) -> None:
-    text = "\n".join(_table(figures))
+    text = "\n".join(loop_bench.report(figures))
     for words in ("ours, recorded and watched", "at 125 Hz", "95 % of the 524 Hz"):
         assert words in text
     assert text.count("reached") + text.count("MISSED") == len(figures["reached"])

@@ -6,7 +6,6 @@ import pytest
 
 from cdpr_sim_bus.camera.camera_plant import CameraPlant, GridPlant, LensPlant
 from cdpr_tools.bench import markers as bench
-from cdpr_tools.commands.bench.bench_markers import _table
 from cdpr_tools.output import Output
 
 SMALL = CameraPlant(
@@ -25,4 +24,4 @@ def test_maps_are_near_the_truth_and_nearer_with_our_corners(
     assert ours["markers"] > 10
     assert ours["shape_rms_mm"] < 3.0
     assert ours["corner_sigma_px"] < 0.5 * theirs["corner_sigma_px"]
-    assert "detection and map wanted within 20 s" in _table(figures, 20.0)[-1]
+    assert "detection and map wanted within 20 s" in bench.report(figures)[-1]

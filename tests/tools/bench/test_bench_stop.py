@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from cdpr_tools.bench.daemon import stop as stop_bench
-from cdpr_tools.commands.bench.cyclic.bench_stop import _table
 from cdpr_tools.output import Output
 
 pytestmark = pytest.mark.long
@@ -34,7 +33,7 @@ def test_every_interface_is_flooded(figures: dict[str, Any]) -> None:
 
 
 def test_figures_are_told_for_people(figures: dict[str, Any]) -> None:
-    text = "\n".join(_table(figures))
+    text = "\n".join(stop_bench.report(figures))
     for words in ("nobody else asks, Unix socket", "4 clients flood", "http with key"):
         assert words in text
     assert text.count("reached") + text.count("MISSED") == 1

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.robots.tension.tension_distribution import METHODS
-from cdpr_tools.bench.tension.poses import ROBOTS, SPATIAL, CableRobot
+from cdpr_tools.bench.geometries import ROBOTS, SPATIAL, CableRobot
 
 OTHERS = ("daqp", "piqp", "osqp", "osqp-tight")
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typer.testing import CliRunner
 
 from cdpr_tools.bench import calibration as bench
-from cdpr_tools.commands.bench import bench_calibration
+from cdpr_tools.commands.bench import app
 
 
 def test_both_ways_are_told() -> None:
-    done = CliRunner().invoke(bench_calibration.app, ["--poses", "12", "--repeats", "2"])
+    done = CliRunner().invoke(app, ["calibration", "--poses", "12", "--repeats", "2"])
     assert done.exit_code == 0, done.output
     assert "poses unknown" in done.output and "SciPy takes" in done.output
 

@@ -14,7 +14,7 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_profiles import load_winch
-from cdpr_tools.commands.bus import bus_scan
+from cdpr_tools.commands import bus as bus_commands
 from tests.tools.busview.bus_lab import WINCH, Lab, last_json
 
 EDS = str(load_winch(WINCH).drive.eds)
@@ -65,7 +65,7 @@ def scan(lab: Lab, *arguments: str) -> dict[int, dict[str, Any]]:
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """A scan that listens only briefly, where no heartbeat is waited for."""
-    monkeypatch.setattr(bus_scan, "LISTEN_S", 0.25)
+    monkeypatch.setattr(bus_commands, "LISTEN_S", 0.25)
 
 
 hastily = pytest.mark.usefixtures("hasty")

@@ -115,6 +115,28 @@ def test_the_folder_of_a_run_can_be_fitted_again(tmp_path: Path) -> None:
     assert nothing.returncode == 2 and "nothing" in nothing.stderr
 
 
+def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_path: Path) -> None:
+    what = made_up(
+        *("spatial-8", 45, 2), exit_m=0.0, drum=0.0, elongation=0.0, offset_m=0.0, noise_m=3e-4,
+        home_first=True,
+    )  # fmt: skip
+    data = data_of(what, tmp_path / "data.json")
+    words = ["calibrate", "fit", "spatial-8", "--data", data, "--json"]
+    words += ["--points", points_of(what, tmp_path / "p.csv")]
+    done = cdpr_here(*words)
+    assert done.returncode == 0, done.stderr
+    told = result(done)
+    assert told["good"] and not told["change"]["significant"]
+    assert told["in_force"] is None and "not significant" in told["not_taken_over"]
+    assert "± 1 sigma" in done.stderr and "not significant: noise alone" in done.stderr
+    assert "nothing was taken over" in done.stderr and "--adopt" in done.stderr
+    assert "not significant" in Path(told["report"]).read_text()
+    assert calibrated(load_robot("spatial-8")).calibration is None
+    asked = cdpr_here(*words, "--adopt")
+    assert asked.returncode == 0, asked.stderr
+    assert result(asked)["in_force"]["version"] == 1 and result(asked)["not_taken_over"] is None
+
+
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
     what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
     data = data_of(what, tmp_path / "data.json")

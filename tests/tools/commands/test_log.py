@@ -18,9 +18,8 @@ from cdpr_rt.core.shared_block import RowWriter
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.service.recordings.recording import Recorder
 from cdpr_tools.recordings.picture import FIELDS, faults_of, pose_curves
-from cdpr_tools.recordings.reasons import Reasons
 from cdpr_tools.recordings.selection import Selection
-from cdpr_tools.recordings.summary import _chosen, worth_telling
+from cdpr_tools.recordings.summary import Reasons, _chosen, worth_telling
 from cdpr_tools.report.style import decimated
 from tests.cdpr_rt.service.recordings.recording_rig import block_with_clock, made_rows, put
 

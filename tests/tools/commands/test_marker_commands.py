@@ -76,13 +76,13 @@ def test_a_map_of_images_with_verdict_picture_and_file(photos: Path, tmp_path: P
 def test_intrinsics_of_another_lens_fail_with_the_reason(photos: Path, tmp_path: Path) -> None:
     true = CameraIntrinsics.load_file(photos / "camera.toml")
     wrong = true.model_copy(update={"focal_px": tuple(1.05 * f for f in true.focal_px)})
-    (tmp_path / "wrong.toml").write_text(wrong.to_toml())
+    (tmp_path / "wrong.toml").write_text(wrong.toml_text())
     done = cdpr_here(
         "markers", "map", photos, "--size-mm", "150", "--camera", tmp_path / "wrong.toml"
     )
     assert done.returncode == 1
     assert "the intrinsics are not this camera's" in done.stdout
-    (tmp_path / "small.toml").write_text(true.model_copy(update={"width_px": 640}).to_toml())
+    (tmp_path / "small.toml").write_text(true.model_copy(update={"width_px": 640}).toml_text())
     done = cdpr_here(
         "markers", "map", photos, "--size-mm", "150", "--camera", tmp_path / "small.toml"
     )

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_drivers.camera.open_camera import open_camera
 from cdpr_rt.core.clock import LockstepClock
-from cdpr_sim_bus.record_file import HEADER_BYTES
+from cdpr_sim_bus.robot.logs.truth_log import HEADER_BYTES
 from cdpr_tools.commands.sim.sim_fault import Fault, fault
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from tests.tools.robot_rig import Simulator, simulated, unique

@@ -24,7 +24,7 @@ from cdpr_tools.client.client import (
     open_daemon,
 )
 from cdpr_tools.commands.robot.path import robot_called
-from cdpr_tools.daemon.launcher_file import named_launcher
+from cdpr_tools.daemon.loop_file import named_launcher
 from cdpr_tools.errors import BadInputError
 
 

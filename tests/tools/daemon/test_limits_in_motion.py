@@ -12,9 +12,10 @@ import pytest
 
 from cdpr_drivers.cia402 import STATE_TABLE, State
 from cdpr_profiles.reading.places import SHIPPED
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.base import Idle
 from cdpr_rt.core.cycle_row import Row
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.core.states import LoopState, Reaction
 from cdpr_rt.core.supervisor import Limit
 from cdpr_rt.programs.program_base import ProgramDefaults

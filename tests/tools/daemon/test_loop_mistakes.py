@@ -13,7 +13,7 @@ from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_profiles import load_robot
 from cdpr_rt.core.shared_block import SharedBlock
 from cdpr_rt.core.states import LoopState, Reaction
-from cdpr_rt.programs.axes.hold import HoldProgram
+from cdpr_rt.programs.axes.axis_program import AxisProgram
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.registry import build_programs
@@ -24,7 +24,7 @@ from tests.tools.robot_rig import robot_file, simulated
 PERIOD_S = 2e-3
 
 
-class Careless(HoldProgram):
+class Careless(AxisProgram):
     """Holds, but cannot stop and cannot tell of itself."""
 
     name = "careless"
@@ -42,7 +42,7 @@ def rig(tmp_path: Path) -> Iterator[LoopRig]:
     robot = load_robot(path)
     model = model_of(robot.axes, PERIOD_S, [3e-3], limits_of(robot))
     hold = build_programs(model, SharedBlock.create(1, 1.0, 500.0))["hold"]
-    assert isinstance(hold, HoldProgram)
+    assert isinstance(hold, AxisProgram)
     programs = {"careless": Careless(model, hold._loop), "bare": IdleProgram(model)}
     with simulated(path) as url, opened(path, url, programs) as made:
         made.obeyed("enable", program="careless")

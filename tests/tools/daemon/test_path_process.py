@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_tools.daemon.processes import path_process
+from cdpr_tools.daemon.processes import service_process
 
 
 def test_a_file_does_not_take_more_memory_than_it_is_given(
@@ -16,7 +16,7 @@ def test_a_file_does_not_take_more_memory_than_it_is_given(
     file = tmp_path / "part.nc"
     file.write_text("M2\n")
     wanted = {"blend_mm": 1.0, "ignore": "", "origin_mm": None}
-    small = path_process._WITHIN.replace(str(path_process._MOST_KiB), str(100 << 10))
-    monkeypatch.setattr(path_process, "_WITHIN", small)
-    status, text = asyncio.run(path_process.plan_in_process("planar-3", file, wanted))
+    small = service_process._WITHIN.replace(str(service_process._MOST_KiB), str(100 << 10))
+    monkeypatch.setattr(service_process, "_WITHIN", small)
+    status, text = asyncio.run(service_process.plan_in_process("planar-3", file, wanted))
     assert status != 0 and not text.startswith("{")

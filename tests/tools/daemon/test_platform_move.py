@@ -14,7 +14,7 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from cdpr_tools.client.platform_move import Frame, PlatformMove
+from cdpr_tools.client.platform_move import Frame, PlatformMove, resume_refusal
 from cdpr_tools.client.status_text import platform_text
 from cdpr_tools.commands.daemon import daemon_motion, with_daemon
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -172,12 +172,23 @@ def test_where_a_relative_motion_leads_is_told() -> None:
             "0.250, -1.500 m turned by 0.100 rad: cable 1",
             "--to 300 2000: on the way, at 250.0, -1500.0 mm turned by 5.7 deg: cable 1",
         ),
+        (
+            "pose: the cables are not tight; run tighten first",
+            "move: the cables are not tight; run tighten first",
+        ),
     ],
 )
 def test_a_refusal_by_the_daemon_is_told_in_the_units_that_were_typed(
     message: str, told: str
 ) -> None:
     assert PlatformMove("300 2000", None, False, Frame.ROOM, None).refusal(message) == told
+
+
+def test_a_refusal_to_go_on_is_told_as_that_of_resume() -> None:
+    told = resume_refusal("pose: resume: no target has been left; allowed: position_m")
+    assert told == "resume: no target has been left; allowed: cdpr move --to"
+    told = resume_refusal("pose: resume: on the way, at 0.250, -1.500 m: cable 1")
+    assert told == "resume: on the way, at 250.0, -1500.0 mm: cable 1"
 
 
 def test_the_status_tells_where_a_platform_is_and_how_it_is_turned() -> None:

@@ -107,7 +107,7 @@ class Scene:
     """Who holds the right by the test's own account, and what has been said on the way there."""
 
     rig: LoopRig
-    chance: random.Random
+    rng: random.Random
     holder: Client | None = None
     number: int = 0
     until_ns: int = 0
@@ -140,7 +140,7 @@ class Scene:
         if self.holder is not None and not lapsed:
             self.rig.lease.release(self.holder.token)
         elif self.holder is not None:
-            self.rig.now_ns = self.until_ns + self.chance.randrange(2)
+            self.rig.now_ns = self.until_ns + self.rng.randrange(2)
         client.token = self.rig.lease.take(client.name, TTL_S)
         client.session = None
         self.holder, self.ordered = client, False
@@ -206,10 +206,10 @@ class Scene:
 
 def moves(scene: Scene, client: Client) -> None:
     """Have a client who believes to hold the right ask for motion, in one way or another."""
-    chance = scene.chance
-    speed = client.sign * SPEED_rad_s * chance.uniform(0.5, 1.0)
+    rng = scene.rng
+    speed = client.sign * SPEED_rad_s * rng.uniform(0.5, 1.0)
     jog = {"velocity_rad_s": [speed, 0.0], "timeout_s": 2.0}
-    (way,) = chance.choices(("jog", "stream", "set", "enable"), (4, 4, 2, 1))
+    (way,) = rng.choices(("jog", "stream", "set", "enable"), (4, 4, 2, 1))
     if way == "stream" and client is scene.holder:
         client.session = scene.sessions.issue(client.token)
         client.sequence, client.place_m = 0, 0.0
@@ -221,9 +221,9 @@ def moves(scene: Scene, client: Client) -> None:
         command = scene.asked(client, do, program="jog", wanted=jog)
     if command is None:
         return
-    if chance.random() < 0.2:  # it changes hands between the service's look and the loop's
-        late, other = client, chance.choice([one for one in CLIENTS if one is not client])
-        scene.take(other, lapsed=chance.random() < 0.5)
+    if rng.random() < 0.2:  # it changes hands between the service's look and the loop's
+        late, other = client, rng.choice([one for one in CLIENTS if one is not client])
+        scene.take(other, lapsed=rng.random() < 0.5)
         assert scene.holder is not late
     else:
         scene.ordered = True
@@ -232,12 +232,12 @@ def moves(scene: Scene, client: Client) -> None:
 
 def attacks(scene: Scene) -> None:
     """Guess, replay and forge; nothing of it may move axis 1, or axis 0 under another's right."""
-    scene.chance.choice((guesses, replays_orders, makes_orders, replays_packets, forges))(scene)
+    scene.rng.choice((guesses, replays_orders, makes_orders, replays_packets, forges))(scene)
 
 
 def guesses(scene: Scene) -> None:
     held = None if scene.holder is None else scene.holder.token
-    for token in (scene.chance.randbytes(18).hex(), "", scene.chance.choice(scene.tokens)):
+    for token in (scene.rng.randbytes(18).hex(), "", scene.rng.choice(scene.tokens)):
         for use in (scene.rig.lease.renew, scene.rig.lease.release, scene.sessions.issue):
             if token != held:
                 with pytest.raises(LeaseError):
@@ -246,28 +246,28 @@ def guesses(scene: Scene) -> None:
 
 def replays_orders(scene: Scene) -> None:
     past = [order for order in scene.orders if order["right"] != scene.number]
-    for order in scene.chance.sample(past, min(2, len(past))):
+    for order in scene.rng.sample(past, min(2, len(past))):
         scene.rig.block.post_command(order)
 
 
 def makes_orders(scene: Scene) -> None:
     wanted = {"velocity_rad_s": [0.0, SPEED_rad_s], "timeout_s": 2.0}
-    number = scene.chance.choice((scene.number - 1, 0, -1, 1 << 62, True, "1", None))
-    do = scene.chance.choice(("program", "set", "enable"))
+    number = scene.rng.choice((scene.number - 1, 0, -1, 1 << 62, True, "1", None))
+    do = scene.rng.choice(("program", "set", "enable"))
     order = {"do": do, "program": "jog", "wanted": wanted, "right": number}
     scene.rig.block.post_command(order)
 
 
 def replays_packets(scene: Scene) -> None:
-    for data, port in scene.chance.sample(scene.packets, min(8, len(scene.packets))):
-        address = "127.0.0.1", scene.chance.choice((port, ATTACKER.port))
+    for data, port in scene.rng.sample(scene.packets, min(8, len(scene.packets))):
+        address = "127.0.0.1", scene.rng.choice((port, ATTACKER.port))
         scene.sessions.receive(data, address, scene.rig.now_ns)
 
 
 def forges(scene: Scene) -> None:
     sessions = [one.session.number for one in CLIENTS if one.session is not None]
-    session = scene.chance.choice([scene.chance.randrange(1, 1 << 32), *sessions])
-    packet = StreamSetpoint(session, scene.chance.randrange(1 << 20), 1, (0.0, 0.1, 0.0))
+    session = scene.rng.choice([scene.rng.randrange(1, 1 << 32), *sessions])
+    packet = StreamSetpoint(session, scene.rng.randrange(1 << 20), 1, (0.0, 0.1, 0.0))
     for forged in (packet.pack(), *(seal(packet, key) for key in (bytes(32), b""))):
         assert (
             scene.sessions.receive(forged, ("127.0.0.1", ATTACKER.port), scene.rig.now_ns) is None
@@ -287,23 +287,23 @@ def test_no_motion_goes_on_under_somebody_elses_right(rig: LoopRig) -> None:
     scene = Scene(rig, random.Random(SEED), number=rig.right)
     rig.run(0.5)
     rig.drop_right()
-    chance = scene.chance
+    rng = scene.rng
     while scene.number < TAKINGS:
         nobody_moved = abs(scene.speed) <= STEP_rad_s
-        client = ATTACKER if chance.random() < 0.1 else chance.choice(CLIENTS)
-        lapsed = chance.random() < 0.5
-        if chance.random() < 0.4:
+        client = ATTACKER if rng.random() < 0.1 else rng.choice(CLIENTS)
+        lapsed = rng.random() < 0.5
+        if rng.random() < 0.4:
             scene.in_between = lambda client=client, lapsed=lapsed: scene.take(client, lapsed)
         else:
             scene.take(client, lapsed)
         scene.stopped += not nobody_moved
-        for _ in range(chance.randrange(1, 24)):
+        for _ in range(rng.randrange(1, 24)):
             scene.turn()
             for one in CLIENTS:  # who has lost it goes on as if nothing had been
                 scene.send(one)
-                if chance.random() < (0.1 if scene.ordered else 0.5):
+                if rng.random() < (0.1 if scene.ordered else 0.5):
                     moves(scene, one)
-            if chance.random() < 0.15:
+            if rng.random() < 0.15:
                 attacks(scene)
     counts = rig.loop.engine.parts.programs["follow"].progress()
     print(f"{scene.number} grants, {scene.stopped} in motion, {scene.driven} cycles moved")

@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 from typing_extensions import override
 
-from cdpr_tools.client.starting import await_socket
-from cdpr_tools.daemon.launcher_file import launcher_runs, named_launcher
-from cdpr_tools.daemon.loop_file import started
+from cdpr_tools.client.client import await_socket
+from cdpr_tools.daemon.loop_file import launcher_runs, named_launcher, started
 from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, default_socket
 from cdpr_tools.output import Output
 

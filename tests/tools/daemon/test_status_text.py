@@ -6,9 +6,14 @@ from typing import Any
 
 import pytest
 
-from cdpr_tools.client.dead_loop import death_text
 from cdpr_tools.client.motion import finish
-from cdpr_tools.client.status_text import compensation_text, learnt_text, stage_text, status_text
+from cdpr_tools.client.status_text import (
+    compensation_text,
+    death_text,
+    learnt_text,
+    stage_text,
+    status_text,
+)
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 

@@ -11,7 +11,7 @@ from scipy import signal
 from cdpr_profiles import load_robot
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.experiment import trial
-from cdpr_tools.experiment.model.hand_model import HandModel
+from cdpr_tools.experiment.model.hand_model import HandModel, PositionFilter
 from cdpr_tools.experiment.model.parameters import OperatorParameters, Station
 from cdpr_tools.experiment.model.plants import PerfectRobot
 from cdpr_tools.experiment.model.vision import VisionModel
@@ -19,7 +19,6 @@ from cdpr_tools.experiment.path import PLACES, centre_m, place_of, plane_of, tar
 from cdpr_tools.experiment.points import points_of_perfect_robot
 from cdpr_tools.experiment.statistics import spread_mm
 from cdpr_tools.experiment.trial import PACKET_S, SHARE_THERE, Condition, run_trial
-from cdpr_tools.teleop.position_filter import PositionFilter
 from cdpr_tools.trials.directions import Directions, platform_of
 
 ROBOT = load_robot("planar-3")

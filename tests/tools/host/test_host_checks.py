@@ -8,9 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_tools.host import can_interfaces, host_checks
-from cdpr_tools.host.can_interfaces import CanInterface, list_interfaces, parse_link
-from cdpr_tools.host.host_checks import Finding, can_interface, look_around, preemption
+from cdpr_tools.host import host_checks
+from cdpr_tools.host.host_checks import (
+    CanInterface,
+    Finding,
+    can_interface,
+    list_interfaces,
+    look_around,
+    parse_link,
+    preemption,
+)
 
 LOOPBACK = 772  # ARPHRD_LOOPBACK
 CAN = 280
@@ -63,7 +70,7 @@ def test_a_can_interface_is_judged_by_what_the_kernel_tells(
 def test_the_kernel_answers_in_the_same_words(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every machine has a loopback; only its type tells it from a CAN interface."""
     assert all(interface.name != "lo" for interface in list_interfaces())
-    monkeypatch.setattr(can_interfaces, "_ARPHRD_CAN", LOOPBACK)
+    monkeypatch.setattr(host_checks, "_ARPHRD_CAN", LOOPBACK)
     (loopback,) = list_interfaces()
     queue = int(Path("/sys/class/net/lo/tx_queue_len").read_text())
     is_up = bool(int(Path("/sys/class/net/lo/flags").read_text(), 16) & UP)

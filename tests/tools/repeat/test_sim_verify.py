@@ -17,8 +17,7 @@ from mcap.writer import Writer
 
 from cdpr_drivers.decode.candump import read_log
 from cdpr_tools.repeat.compare import compare
-from cdpr_tools.repeat.disturbance import Stops
-from cdpr_tools.repeat.run import Run, processes_of
+from cdpr_tools.repeat.run import Run, Stops, processes_of
 
 pytestmark = pytest.mark.long
 

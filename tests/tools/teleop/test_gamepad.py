@@ -20,8 +20,7 @@ from evdev import AbsInfo, InputEvent, ecodes
 from scipy.spatial.transform import Rotation
 
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.teleop.gamepad import EvdevDevice, EvdevFinder, Gamepad, stick_map
-from cdpr_tools.teleop.stick import StickMap
+from cdpr_tools.teleop.gamepad import EvdevFinder, Gamepad, StickMap, stick_map
 
 PLANE, ROOM = (2, ()), (3, (0, 1, 2))
 MAP = stick_map(PLANE, None, None, "BTN_TR", "BTN_SOUTH", 0.1, 0.05)
@@ -70,7 +69,7 @@ class Pads:
 
     there: list[StandIn] = field(default_factory=list)
 
-    def find(self) -> EvdevDevice | None:
+    def find(self) -> StandIn | None:
         return self.there.pop(0) if self.there else None
 
     def missing_text(self) -> str:

@@ -17,11 +17,10 @@ from cdpr_rt.service.streams.stream_packet import (
     StreamSession,
 )
 from cdpr_tools.teleop import view as view_module
-from cdpr_tools.teleop.canvas import Canvas
 from cdpr_tools.teleop.input_device import InputSample
 from cdpr_tools.teleop.script import ScriptDevice, ScriptLine
 from cdpr_tools.teleop.session import TeleopSession
-from cdpr_tools.teleop.view import View
+from cdpr_tools.teleop.view import Canvas, View
 
 PLATFORM = {
     "home_m": [0.0, 0.0],

@@ -89,6 +89,22 @@ def test_overshoot_is_what_lies_beyond_the_target(over_m):
     assert found["off_mm"].value == pytest.approx(4.0)  # in y, in which it had not to move
 
 
+@pytest.mark.parametrize(("rests_s", "over_mm"), [(0.4, None), (0.6, 1.5)])
+def test_overshoot_of_rest_leaves_out_how_far_off_the_platform_rests(rests_s, over_mm):
+    way = np.concatenate([np.linspace(0.0, 1.0, 1000), np.ones(round(rests_s / PERIOD_S))])
+    setpoint = REACH + np.outer(way, [-0.5, 0.0])
+    true = setpoint - [2e-3, 0.0] * (way > 0.999)[:, None]
+    true[1000:1100, 0] -= 1.5e-3
+    goal = [-0.2, 2.0]
+    marks = [{"mark": "leg", "target_m": goal, "row": 2}]
+    found = figures_of(limits.judge(recorded(true, setpoint, marks), ROBOT))
+    assert found["overshoot_mm"].value == pytest.approx(3.5)
+    assert ("overshoot_of_rest_mm" in found) == (over_mm is not None)
+    if over_mm is not None:
+        assert found["overshoot_of_rest_mm"].value == pytest.approx(over_mm)
+        assert found["overshoot_of_rest_mm"].limit is None
+
+
 def test_a_target_changed_on_the_way_is_not_overshot_while_the_set_point_brakes():
     speed, acceleration = 0.4, ROBOT.platform.acceleration_m_s2
     time_s = np.arange(600) * PERIOD_S

@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
-from typing import Any, Protocol
+from typing import Any
 
 import can
 import numpy as np
@@ -36,21 +36,6 @@ _US = 1e-3  # of a ns
 _RESOLUTION_US = 0.01
 _STOP_TIMEOUT_S = 10.0
 _DELIVERIES = 200
-
-
-class BusAccess(Protocol):
-    """An implementation of bus access, on the bus from `open` to `close` only."""
-
-    name: str
-
-    def open(self) -> None:
-        """Join the bus."""
-
-    def exchange(self) -> None:
-        """Send eight frames of 8 bytes and wait for the eight answers; raises BusError."""
-
-    def close(self) -> None:
-        """Leave the bus."""
 
 
 class OwnAccess:
@@ -152,6 +137,37 @@ def measure(exchanges: int, out: Output) -> dict[str, Any]:
     }
 
 
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, a line for each variant of each bus."""
+    lines = [
+        f"{figures['frames_per_exchange']} frames of 8 bytes an exchange, half of them answers; "
+        f"{figures['exchanges']} exchanges of each variant",
+        f"{'':24}{'':>10}{'host CPU us a frame':>30}{'wall us a frame':>20}{'python-can':>14}",
+        f"{'':24}{'frames/s':>10}{'mean':>10}"
+        + f"{'p50':>10}{'p99.9':>10}" * 2
+        + f"{'/ ours':>14}",
+    ]
+    for name in ("simbus", "socketcan", "socketcand", "slcan"):
+        measured = figures["buses"][name]
+        if "missing" in measured:
+            lines.append(f"{name}: not measured: {measured['missing']}")
+            continue
+        for variant in ("ours", "python-can"):
+            one = measured[variant]
+            cpu, wall = one["cpu_us_per_frame"], one["wall_us_per_frame"]
+            columns = (cpu["mean"], cpu["p50"], cpu["p99.9"], wall["p50"], wall["p99.9"])
+            numbers = "".join(f"{value:10.1f}" for value in columns)
+            ratio = f"{measured['python_can_over_ours']:14.2f}" if variant == "ours" else ""
+            lines.append(f"{name + ' ' + variant:24}{one['frames_per_s']:10}{numbers}{ratio}")
+        if "delivery_us" in measured:
+            late = measured["delivery_us"]
+            lines.append(
+                f"{'':24}from the kernel's time stamp to the program: "
+                f"p50 {late['p50']:.1f} us, p99.9 {late['p99.9']:.1f} us"
+            )
+    return lines
+
+
 def _on_vcan(exchanges: int, out: Output) -> dict[str, Any]:
     """Return the figures on a virtual CAN, or why there are none."""
     url = BusUrl.parse(f"socketcan:{VCAN}")
@@ -167,7 +183,7 @@ def _on_vcan(exchanges: int, out: Output) -> dict[str, Any]:
 
 
 def _compare(url: BusUrl, stock: PythonCanAccess, exchanges: int) -> dict[str, Any]:
-    variants: list[BusAccess] = [OwnAccess(url), stock]
+    variants = (OwnAccess(url), stock)
     times: dict[str, list[tuple[Times, Times]]] = {variant.name: [] for variant in variants}
     share = -(-exchanges // _BLOCKS)
     left = exchanges
@@ -197,7 +213,7 @@ def _percentiles(times_ns: NDArray[np.float64]) -> dict[str, float]:
     )
 
 
-def _run(variant: BusAccess, exchanges: int) -> tuple[Times, Times]:
+def _run(variant: OwnAccess | PythonCanAccess, exchanges: int) -> tuple[Times, Times]:
     """Return process time (of all threads) and wall time of each exchange, ns."""
     variant.open()
     try:

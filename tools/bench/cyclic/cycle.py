@@ -19,7 +19,7 @@ from cdpr_profiles import Winch, load_winch
 from cdpr_profiles.eds.dictionary import load_dictionary
 from cdpr_rt.runtime.realtime import one_core
 from cdpr_tools.bench.cyclic.exchanges import Exchange, FloorExchange, LibraryExchange, OwnExchange
-from cdpr_tools.bench.timing import Times, percentiles, timed
+from cdpr_tools.bench.timing import Times, percentiles, timed, verdict
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.output import Output
 
@@ -68,6 +68,33 @@ def measure(cycles: int, out: Output) -> dict[str, Any]:
         "statuswords": statuswords,
         **_judge(cpu_us),
     }
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, a line for each variant."""
+    cpu, wall = figures["cpu_us"], figures["wall_us"]
+    return [
+        f"one exchange with {figures['axes']} axes, {figures['cycles']} cycles of each",
+        f"{'':30}{'host CPU time, us':>20}{'wall, drives too, us':>24}",
+        f"{'':30}{'p50':>10}{'p99.9':>10}{'p50':>14}{'p99.9':>10}",
+        *(
+            f"{text:30}{cpu[name]['p50']:10.1f}{cpu[name]['p99.9']:10.1f}"
+            f"{wall[name]['p50']:14.1f}{wall[name]['p99.9']:10.1f}"
+            for name, text in (
+                ("ours", "ours: AxisGroup"),
+                ("canopen", "the canopen package's PDOs"),
+                ("floor", "floor: bare socket and struct"),
+            )
+        ),
+        *(
+            f"{text}: {figures['ratios'][key]:.2f}, wanted {bound} {figures['targets'][key]:g}: "
+            f"{verdict(figures['reached'][key])}"
+            for key, text, bound in (
+                ("canopen_over_ours", "canopen / ours", "at least"),
+                ("ours_over_floor", "ours / floor", "at most"),
+            )
+        ),
+    ]
 
 
 def _judge(cpu_us: dict[str, dict[str, float]]) -> dict[str, Any]:

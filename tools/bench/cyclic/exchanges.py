@@ -10,7 +10,7 @@ import socket
 import struct
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import canopen
 from canopen.objectdictionary import ObjectDictionary
@@ -24,24 +24,6 @@ _CONTROLWORD, _TARGET_TORQUE = 0x6040, 0x6071
 _FEEDBACK = (0x6041, 0x6064, 0x6077)
 _PATIENCE_S = 2.0
 _NOTIFIER_CYCLE_S = 0.05
-
-
-class Exchange(Protocol):
-    """An implementation of the exchange; it is on the bus from `open` to `close` only."""
-
-    name: str
-
-    def open(self) -> None:
-        """Join the bus."""
-
-    def cycle(self) -> None:
-        """Exchange one cycle; raises BusError when an axis does not answer."""
-
-    def close(self) -> None:
-        """Leave the bus."""
-
-    def statuswords(self) -> list[int]:
-        """Return the statusword of each axis in the last cycle."""
 
 
 class OwnExchange:
@@ -189,3 +171,7 @@ class FloorExchange:
     def statuswords(self) -> list[int]:
         """Return the statusword of each axis in the last cycle."""
         return [statusword for statusword, _, _ in self._feedback]
+
+
+Exchange = OwnExchange | LibraryExchange | FloorExchange
+"""An implementation of the exchange; it is on the bus from `open` to `close` only."""

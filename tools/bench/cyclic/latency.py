@@ -35,8 +35,8 @@ _BURN = "import hashlib\nblock = bytes(1 << 22)\nwhile True:\n    hashlib.sha256
 Lateness = dict[str, dict[str, Times]]
 
 
-def measure(rate_Hz: float, seconds: float, out: Output) -> tuple[dict[str, Any], Lateness]:
-    """Return figures and the lateness of every wake-up in ns, by load and variant.
+def measure(rate_Hz: float, seconds: float, picture: Path, out: Output) -> dict[str, Any]:
+    """Return figures of the lateness of wake-ups, by load and variant, and draw all of them.
 
     The variants take turns, so that what else the machine does hits both. Raises WorkFailedError.
     """
@@ -64,17 +64,37 @@ def measure(rate_Hz: float, seconds: float, out: Output) -> tuple[dict[str, Any]
             load: {variant: _figures(times) for variant, times in variants.items()}
             for load, variants in late.items()
         },
+        "picture": picture,
     }
-    return figures, late
+    _draw(figures, late, picture)
+    return figures
 
 
-def draw(figures: dict[str, Any], late: Lateness, path: Path) -> None:
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, a line for each load and variant."""
+    lines = [
+        f"{figures['wakeups']} wake-ups at {figures['rate_Hz']:g} Hz for each line, in us behind "
+        f"the deadline; kernel {figures['kernel']}, {figures['processors']} processors",
+        f"{'':30}{'p50':>9}{'p99':>9}{'p99.9':>9}{'worst':>10}",
+    ]
+    for load in LOADS:
+        for variant, text in VARIANTS.items():
+            us = figures["late_us"][load][variant]
+            values = f"{us['p50']:9.1f}{us['p99']:9.1f}{us['p99.9']:9.1f}{us['max']:10.1f}"
+            lines.append(f"{load + ':':8}{text:22}{values}")
+    lines += [f"not allowed: {notice}" for notice in figures["not_allowed"]]
+    return [*lines, f"picture: {figures['picture']}"]
+
+
+def _draw(figures: dict[str, Any], late: Lateness, path: Path) -> None:
     """Write the histograms as a picture; raises BadInputError where it cannot be written."""
     figure, axes = canvas(1, len(LOADS), height=3.2, sharey=True)
     most = (
         max(float(times.max()) for variants in late.values() for times in variants.values()) * _US
     )
-    bins = np.logspace(0.0, np.log10(max(most, 10.0)) + 0.02, _bins(most))
+    bins = np.logspace(
+        0.0, np.log10(max(most, 10.0)) + 0.02, int(_BINS_A_DECADE * np.log10(max(most, 10.0))) + 2
+    )
     for ax, (load, text) in zip(axes, LOADS.items(), strict=True):
         for variant, label in VARIANTS.items():
             _histogram(ax, late[load][variant], bins, label, _COLOURS[variant])
@@ -100,10 +120,6 @@ def draw(figures: dict[str, Any], late: Lateness, path: Path) -> None:
         figure.savefig(path)
     except (OSError, ValueError) as error:
         raise BadInputError(f"--out {path}: cannot be written: {error}") from error
-
-
-def _bins(most_us: float) -> int:
-    return int(_BINS_A_DECADE * np.log10(max(most_us, 10.0))) + 2
 
 
 def _histogram(ax: Axes, times: Times, bins: Any, label: str, colour: str) -> None:

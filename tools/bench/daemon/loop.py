@@ -17,10 +17,11 @@ import numpy as np
 from cdpr_drivers.bus import query_status
 from cdpr_drivers.bus.budget import machine_budget
 from cdpr_profiles import Robot, load_robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.cycle_row import Row
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.bench.daemon import baseline_process
 from cdpr_tools.bench.daemon.loop_daemon import BenchDaemon, with_tolerant_limits
+from cdpr_tools.bench.timing import verdict
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 
@@ -100,12 +101,11 @@ def measure(seconds: float, out: Output, name: str = "") -> dict[str, Any]:
         out.note("eight axes on one bus ...")
         full = _retried(partial(_full_bus, one_bus, seconds, Path(folder)))
     ours, unserved, unhurried = map(_combined, (served, bare, relaxed))
-    cost = ours["host_us"] / unserved["host_us"] - 1.0
     period_us = 1e6 * robot.sync_period_s
     shares = {
         "compute_share": ours["compute_us"]["p99.9"] / period_us,
         "obvious_over_ours": unhurried["host_us"] / ours["host_us"],
-        "recording_share": cost,
+        "recording_share": ours["host_us"] / unserved["host_us"] - 1.0,
     }
     return {
         "robot": name or ROBOT,
@@ -127,6 +127,45 @@ def measure(seconds: float, out: Output, name: str = "") -> dict[str, Any]:
         }
         | {"one_bus": full["overruns"] == 0},
     }
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, a line for each variant."""
+    lines = [
+        f"{figures['axes']} axes on {figures['buses']} buses, {figures['period_us']} us a cycle",
+        f"{'':32}{'host CPU':>10}{'computing, us':>22}{'late by, us':>22}{'late':>8}{'answers':>9}",
+        f"{'':32}{'us/cycle':>10}"
+        + f"{'p50':>11}{'p99.9':>11}" * 2
+        + f"{'cycles':>8}{'missed':>9}",
+    ]
+    for name, text in (
+        ("ours", "ours, recorded and watched"),
+        ("without_service", "ours, the loop's process alone"),
+        ("obvious", "the baseline loop on canopen"),
+        ("obvious_slow", f"the baseline loop at {figures['slow_Hz']} Hz"),
+    ):
+        if (one := figures.get(name)) is None:
+            continue
+        compute, late = one["compute_us"], one["lateness_us"]
+        lines.append(
+            f"{text:32}{one['host_us']:10.1f}"
+            f"{compute['p50']:11.1f}{compute['p99.9']:11.1f}"
+            f"{late['p50']:11.1f}{late['p99.9']:11.1f}{one['late']:8}{one['missed']:9}"
+        )
+    full, shares, targets = figures["one_bus"], figures["shares"], figures["targets"]
+    verdicts = {name: verdict(reached) for name, reached in figures["reached"].items()}
+    return [
+        *lines,
+        f"computing, p99.9: {100 * shares['compute_share']:.1f} % of the period, wanted at most "
+        f"{100 * targets['compute_share']:g} %: {verdicts['compute_share']}",
+        f"the baseline loop / ours: {shares['obvious_over_ours']:.2f}, wanted at least "
+        f"{targets['obvious_over_ours']:g}: {verdicts['obvious_over_ours']}",
+        f"recording and live views cost the loop {100 * shares['recording_share']:.1f} %, wanted "
+        f"at most {100 * targets['recording_share']:g} %: {verdicts['recording_share']}",
+        f"one bus, {full['axes']} axes: {full['rate_Hz']:g} Hz are {100 * full['share']:.0f} % "
+        f"of the {full['limit_Hz']} Hz it carries; {full['cycles']} cycles, {full['overruns']} "
+        f"overruns, {full['late']} late, {full['missed']} answers missed: {verdicts['one_bus']}",
+    ]
 
 
 def _retried(work: Callable[[], _T]) -> _T:

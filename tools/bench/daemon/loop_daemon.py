@@ -1,4 +1,4 @@
-"""The daemon's processes as the benchmark of the loop runs them, with or without the service."""
+"""What another process has used of the processors so far."""
 
 from __future__ import annotations
 
@@ -21,12 +21,20 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.shared_block import RowReader, SharedBlock
 from cdpr_rt.runtime.right import PublishedRight
-from cdpr_tools.bench.daemon.processor_time import processor_time_s
 from cdpr_tools.composition.simulator import OwnSimulator
-from cdpr_tools.daemon.processes.child_process import Child
+from cdpr_tools.daemon.processes.child import Child
 from cdpr_tools.daemon.processes.launcher import LOOP, SERVICE
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import WorkFailedError
+
+_SCHEDULED = 2  # CPUCLOCK_SCHED: as the scheduler counts, to the nanosecond
+
+
+def processor_time_s(pid: int) -> float:
+    """Return the processor time of all threads of a process, past ones included."""
+    # a process' clock is named by its id (clock_getcpuclockid, of which Python has none)
+    return time.clock_gettime_ns((~pid << 3) | _SCHEDULED) * 1e-9
+
 
 LIVE_CLIENT = "cdpr_tools.bench.daemon.live_client"
 _RING_S = 60.0
@@ -233,17 +241,13 @@ class BenchDaemon:
                 not done or status["program_progress"].get("done")
             ):
                 return
-            refusal = self._refusal()
+            reply = self.block.take_reply()
+            refusal = "" if reply is None or reply["ok"] else str(reply["text"])
             if refusal or (status.get("state") in ("fault", "inactive") and status.get("reason")):
                 break
             time.sleep(_TURN_S)
         reason = self.loop.end or refusal or status.get("reason", "")
         raise WorkFailedError(f"{self.robot.name}: does not become {state}: {reason}")
-
-    def _refusal(self) -> str:
-        """Return why the loop has refused a command, "" where it has not."""
-        reply = self.block.take_reply()
-        return "" if reply is None or reply["ok"] else str(reply["text"])
 
 
 def _ends(platform: Platform) -> tuple[dict[str, Any], ...]:

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from cdpr_profiles import load_robot
 from cdpr_tools.bench.daemon.loop_daemon import with_tolerant_limits
-from cdpr_tools.bench.timing import percentiles
+from cdpr_tools.bench.timing import percentiles, verdict
 from cdpr_tools.client.client import Daemon, open_daemon
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
@@ -68,6 +68,30 @@ def measure(stops: int, out: Output) -> dict[str, Any]:
         "bound_ms": BOUND_MS,
         "reached": worst <= BOUND_MS,
     }
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as a table, a line for each case and transport."""
+    lines = [
+        f"{figures['stops']} stops for each line, from the call to the loop's answer, in ms; "
+        f"{figures['processors']} processors",
+        f"{'':58}{'p50':>9}{'p99':>9}{'worst':>9}",
+    ]
+    for case, text in (
+        ("alone", "nobody else asks"),
+        ("flooded", f"{figures['clients']} clients flood every interface"),
+        ("flooded_lowest", "the same at lowest priority (nice 19)"),
+    ):
+        for transport, by in (("unix", "Unix socket"), ("http", "HTTP with the key")):
+            ms = figures["ms"][case][transport]
+            lines.append(f"{f'{text}, {by}':58}{ms['p50']:9.1f}{ms['p99']:9.1f}{ms['max']:9.1f}")
+    sent = ", ".join(f"{many} {kind}" for kind, many in figures["sent"].items())
+    return [
+        *lines,
+        f"the flood: {sent.replace('_', ' ')}",
+        f"wanted below {figures['bound_ms']:g} ms at the 99th percentile: "
+        f"{verdict(figures['reached'])}",
+    ]
 
 
 def _percentiles(ms: list[float]) -> dict[str, float]:

@@ -14,8 +14,8 @@ from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.reach.reach_kernel import CONTACT, NOT_HELD, WHOLE
 from cdpr_rt.robots.reach.reachable import Reach
 from cdpr_rt.robots.rigid_body import inertia_kg_m2
-from cdpr_tools.bench.poses.brute_contact import BruteRobot
-from cdpr_tools.bench.poses.brute_margin import BruteMargin
+from cdpr_tools.bench.poses.brute import BruteMargin, BruteRobot
+from cdpr_tools.bench.timing import verdict
 from cdpr_tools.output import Output
 
 Floats = NDArray[np.float64]
@@ -57,6 +57,24 @@ def measure(ways: int, seed: int, out: Output) -> dict[str, Any]:
             "no_false_acceptance": found["false_acceptances"] == 0,
         },
     }
+
+
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as lines."""
+    reached = figures["reached"]
+    return [
+        f"{figures['poses_1_s']:.0f} poses a second of processor time, wanted at least "
+        f"{figures['target_1_s']:.0f}: {verdict(reached['rate'])}",
+        f"{figures['over_plain_numpy']:.0f} times plain NumPy at every millimetre "
+        f"({figures['plain_numpy_1_s']:.1f} a second), {figures['over_thesis']:.0f} times the "
+        "thesis",
+        f"of {figures['ways']} ways {figures['whole']} lead to their end, "
+        f"{figures['cut_by_contact']} end at contact, {figures['cut_by_tensions']} where tensions "
+        "do not hold",
+        f"accepted, but not by brute force: {figures['false_acceptances']}, wanted 0: "
+        f"{verdict(reached['no_false_acceptance'])}",
+        f"ended more than 1 mm too soon: {figures['ended_1_mm_too_soon']}",
+    ]
 
 
 class Brute:

@@ -4,27 +4,35 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.tension.tension_distribution import (
     METHODS,
     TensionDistribution,
     TensionOutcome,
     tension_distribution,
 )
-from cdpr_tools.bench.tension.poses import ROBOTS, CableRobot, FloatArray
+from cdpr_tools.bench.geometries import ROBOTS, CableRobot
 from cdpr_tools.bench.tension.smoothness import smoothness
 from cdpr_tools.bench.tension.solvers import solvers
+from cdpr_tools.bench.timing import verdict
+from cdpr_tools.output import Output
 
 TARGET_US = 10.0
 """What one of ours may cost at p99."""
 IN_THE_CYCLE = "minimum-norm"
 _BLOCK = 500
 _SEED = 1
+_OTHERS = {
+    "daqp": "DAQP",
+    "piqp": "PIQP",
+    "osqp": "OSQP, its own tolerance",
+    "osqp-tight": "OSQP, 1e-9",
+}
 _FOUND = (TensionOutcome.FEASIBLE, TensionOutcome.SUBSTITUTED)
 _PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9}
 
@@ -41,9 +49,9 @@ class _Ours:
         return self.distribution.solve(W, self._w_e, self.t)
 
 
-def measure(poses: int, say: Callable[[str], None]) -> dict[str, Any]:
+def measure(poses: int, out: Output) -> dict[str, Any]:
     """Solve `poses` poses of each robot by every method and solver; return the figures."""
-    robots = {robot.name: _measure_robot(robot, poses, say) for robot in ROBOTS}
+    robots = {robot.name: _measure_robot(robot, poses, out) for robot in ROBOTS}
     return {
         "poses": poses,
         "target_us": TARGET_US,
@@ -53,16 +61,68 @@ def measure(poses: int, say: Callable[[str], None]) -> dict[str, Any]:
     }
 
 
-def _measure_robot(robot: CableRobot, poses: int, say: Callable[[str], None]) -> dict[str, Any]:
+def report(figures: dict[str, Any]) -> list[str]:
+    """Return the figures as tables, two for each robot."""
+    return [
+        line
+        for name, robot in figures["robots"].items()
+        for line in _robot_report(name, robot, figures)
+    ]
+
+
+def _robot_report(name: str, robot: dict[str, Any], figures: dict[str, Any]) -> list[str]:
+    lines = [
+        "",
+        f"{name}, {figures['poses']} poses",
+        f"{'':26}{'processor time, us':^27}{'wall, us':^18}{'found':>9}",
+        f"{'':26}{'p50':>9}{'p99':>9}{'p99.9':>9}{'p50':>9}{'p99':>9}{'%':>9}",
+    ]
+    for method, cpu in robot["cpu_us"].items():
+        wall = robot["wall_us"][method]
+        lines.append(
+            f"{_OTHERS.get(method, method):26}{cpu['p50']:9.1f}{cpu['p99']:9.1f}{cpu['p99.9']:9.1f}"
+            f"{wall['p50']:9.1f}{wall['p99']:9.1f}{100.0 * robot['found'][method]:9.2f}"
+        )
+    lines += [f"{_OTHERS[method]}: not installed" for method in robot["not_installed"]]
+    lines += [
+        f"{'change, where carried':30}{'N per mm of path':^27}{'steps':^20}",
+        f"{'':30}{'p50':>9}{'p99':>9}{'most':>9}{'paths':>11}{'largest, N':>12}",
+    ]
+    for method, smooth in robot["smoothness"].items():
+        steps = f"{smooth['paths_with_steps']} of {smooth['paths']}"
+        lines.append(
+            f"{method:30}{smooth['p50_N_mm']:9.3f}{smooth['p99_N_mm']:9.2f}"
+            f"{smooth['most_N_mm']:9.1f}{steps:>11}{smooth['largest_step_N']:12.2g}"
+        )
+    nearest = robot["smoothness_of_the_nearest"]
+    helped = 100.0 * robot["substituted"]["closed-form"]
+    method = figures["in_the_cycle"]
+    return [
+        *lines,
+        f"beyond what can be carried tensions step on {nearest['paths_with_steps']} of "
+        f"{nearest['paths']} paths, by {nearest['largest_step_N']:.2g} N at most; the wrench by "
+        f"{nearest['largest_step_of_the_wrench_N']:.1g} N",
+        f"closed form: in {helped:.2f} % of the poses it found none where there were some",
+        f"called feasible, within bounds, and missing of the wrench at most "
+        f"{robot['wrench_missing_N']:.1e} N",
+        f"{method}: p99 {robot['cpu_us'][method]['p99']:.1f} us of processor time, wanted at most "
+        f"{figures['target_us']:g}: {verdict(robot['reached']['cost'])}",
+        f"feasible for OSQP at 1e-9, not for {method}: {robot['only_osqp']} poses, wanted 0: "
+        f"{verdict(robot['reached']['feasible_wherever_osqp'])}; the other way round "
+        f"{robot['only_ours']}",
+    ]
+
+
+def _measure_robot(robot: CableRobot, poses: int, out: Output) -> dict[str, Any]:
     matrices = robot.wrench_matrix(*robot.poses(poses, _SEED))
     distributions = {name: _distribution(robot, name) for name in METHODS}
     n = matrices.shape[2]
     methods: dict[str, Any] = {name: _Ours(robot, d, n) for name, d in distributions.items()}
     others, absent = solvers(robot, matrices[0])
     methods |= others
-    say(f"{robot.name}: {poses} poses by {', '.join(methods)}")
+    out.say(f"{robot.name}: {poses} poses by {', '.join(methods)}")
     cpu, wall, found, tensions = _interleaved(matrices, methods)
-    say(f"{robot.name}: paths")
+    out.say(f"{robot.name}: paths")
     smooth = {name: smoothness(robot, d, poses, _SEED) for name, d in distributions.items()}
     ours, reference = found[IN_THE_CYCLE] < TensionOutcome.NEAREST, found["osqp-tight"] == 1
     p99 = float(np.percentile(cpu[IN_THE_CYCLE], 99.0))

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, TensionOutcome
-from cdpr_tools.bench.tension.poses import CableRobot, FloatArray
+from cdpr_tools.bench.geometries import CableRobot
 
 _POINTS = 500
 _APART_m = 1e-3

@@ -4,22 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import osqp
 import scipy.sparse as sp
 
-from cdpr_tools.bench.tension.poses import CableRobot, FloatArray
-
-
-class Solver(Protocol):
-    """A solver that is set up once and given one W after the other."""
-
-    t: FloatArray
-
-    def solve(self, W: FloatArray) -> bool:
-        """Solve for one W (6, n); tensions are in `t` (n,). Returns whether there are any."""
+from cdpr_rt.arrays import FloatArray
+from cdpr_tools.bench.geometries import CableRobot
 
 
 class Osqp:
@@ -117,6 +109,8 @@ class Daqp:
         return bool(flag == 1)
 
 
+Solver = Osqp | Piqp | Daqp
+"""It is set up once and given one W after the other."""
 _SOLVERS: dict[str, tuple[str, Callable[[CableRobot, FloatArray], Solver]]] = {
     "daqp": ("daqp", Daqp),
     "piqp": ("piqp", Piqp),

@@ -14,10 +14,10 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256, write_text
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.reading.reader import Profile, read_json_model
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.camera_data import CameraSetup
 from cdpr_rt.calibration.readings.data import CalibrationData, load_data
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.procedures.calibration.measure_poses import PoseRefusedError, read_pose
 from cdpr_tools.calibrate.measuring.run import COUNTED, DATA
 from cdpr_tools.client.client import Daemon

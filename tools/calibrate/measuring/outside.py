@@ -36,6 +36,6 @@ class OutsidePoses(Profile):
         write_text(path, self.model_dump_json() + "\n")
 
     @classmethod
-    def load_file(cls, path: Path) -> OutsidePoses:
+    def load_file(cls, path: str | Path) -> OutsidePoses:
         """Read such a file; raises ProfileError."""
-        return read_json_model(path, cls)
+        return read_json_model(Path(path), cls)

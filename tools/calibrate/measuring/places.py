@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_rt.robots.reach.reachable import SHARE, Reach

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles.reading.bounded_input import parse_json
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.core.limits import Limit
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import TripError

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import Robot
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.estimation.fit import Fit, locate
 from cdpr_rt.calibration.estimation.parameters import DRUM, OFFSET, CableGeometry
 from cdpr_rt.calibration.markers.marker_map import best_fit
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.verification.verification import relative_errors
-from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.calibrate.measuring.outside import OutsidePoses
 from cdpr_tools.commands.sim.sim_robot import TrueGeometry, true_geometry
@@ -203,7 +203,7 @@ def _parameters(outcome: Outcome, true: TrueGeometry) -> list[dict[str, Any]]:
     geometry, std = found.geometry, found.std
     exits = geometry.kernel_geometry()[:3].T
     if not outcome.known_room:  # where the room is, nothing has told
-        _, turn, shift = best_fit(exits, true.exit_points_m)
+        turn, shift = best_fit(exits, true.exit_points_m)
         exits = exits @ turn.T + shift
     rows: list[dict[str, Any]] = []
     names, place = geometry.names(), 0

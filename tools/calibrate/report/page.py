@@ -83,7 +83,8 @@ class _Report:
         outcome = self._outcome
         sigma = number(outcome.predicted_3_sigma_mm)
         good = [f"Positions are known to {sigma} mm (3 sigma, predicted)."]
-        lines = outcome.objections() or good
+        little = outcome.insignificance()
+        lines = outcome.objections() or [*good, *([f"It is {little}."] if little else [])]
         head = "Good" if outcome.good else "Not good"
         body = "".join(f"<p>{escape(line)}</p>" for line in lines)
         kind = "" if outcome.good else " missed"
@@ -142,7 +143,7 @@ class _Report:
             ]
             for row in parameter_table(self._outcome.found)
         ]
-        head = ["parameter", "change", "1 sigma", *(["true error"] if errors else [])]
+        head = ["parameter", "change", "± 1 sigma", *(["true error"] if errors else [])]
         return [figure, table(head, rows, _ADD)]
 
     def _camera(self) -> list[str]:

@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
+from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.camera.camera_model import CameraModel
 from cdpr_rt.calibration.estimation.fit import Fit
 from cdpr_rt.calibration.estimation.residuals import length_std_m
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.verification.verdict import predicted_std
-from cdpr_rt.core.exchange import FloatArray, IntArray
 from cdpr_tools.calibrate.report.judged import Judged, PoseErrors
 from cdpr_tools.report.style import BACKWARD, COLOURS, FORWARD, canvas, legend_above
 

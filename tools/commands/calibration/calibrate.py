@@ -10,8 +10,14 @@ import typer
 from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import undo as take_back
 from cdpr_tools.commands.calibration.calibrate_read import read
-from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.commands.options import (
+    JsonOption,
+    OverwriteOption,
+    PngOption,
+    RobotArgument,
+    SeedOption,
+)
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
 
@@ -25,9 +31,6 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 
-_Robot = Annotated[
-    str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
-]
 _Points = Annotated[
     Path | None,
     typer.Option(
@@ -55,12 +58,11 @@ _Plant = Annotated[
     typer.Option(help="Plant file: the truth about robot, cables, motors and camera."),
 ]
 _DryRun = Annotated[bool, typer.Option("--dry-run", help="Tell what is found; take nothing over.")]
+_Adopt = Annotated[
+    bool,
+    typer.Option("--adopt", help="Take it over even if its changes are not significant."),
+]
 _DRAWS, _FEW = 200, 5
-
-
-@app.callback()
-def _group() -> None:
-    """Calibrate a robot's geometry, drums and elongation."""
 
 
 app.command()(read)
@@ -68,7 +70,7 @@ app.command()(read)
 
 @app.command(name="fit")
 def fit_data(
-    robot: _Robot,
+    robot: RobotArgument,
     data: Annotated[
         Path,
         typer.Option(help="Folder of a run, or readings as its data.json.", metavar="FOLDER|FILE"),
@@ -78,12 +80,15 @@ def fit_data(
     known_mm: _KnownMm = None,
     out_dir: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
     dry_run: _DryRun = False,
+    adopt: _Adopt = False,
     as_json: JsonOption = False,
 ) -> None:
     """Identify from what was measured before, as in a run that is complete; nothing moves.
 
     Of a run's folder the poses not used are compared with its simulator's scanner and truth as
-    well. Ends with status 1, and takes nothing over, where the result is not good.
+    well. What stands behind ± is one standard deviation (1 sigma). Ends with status 1, and takes
+    nothing over, where the result is not good; with 0 where it changes nothing significantly, and
+    takes nothing over then either.
     """
     from cdpr_rt.calibration.readings.data import load_data  # noqa: PLC0415
     from cdpr_tools.calibrate.finish import finish  # noqa: PLC0415  # slow to load
@@ -97,13 +102,13 @@ def fit_data(
         data /= runs.DATA
     finish(
         *(out, profile, load_data(data), points, _geometry(profile, identify, known_mm)),
-        *(data, out_dir or data.parent, dry_run, judge),
+        *(data, out_dir or data.parent, dry_run, adopt, judge),
     )
 
 
 @app.command()
 def run(
-    robot: _Robot,
+    robot: RobotArgument,
     camera: Annotated[
         bool,
         typer.Option(
@@ -134,7 +139,7 @@ def run(
         Path | None,
         typer.Option(help="Sizes of the sheets, known places; else as ordered.", metavar="FILE"),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
+    seed: SeedOption = 1,
     identify: _Identify = None,
     known_mm: _KnownMm = None,
     out_dir: Annotated[
@@ -145,12 +150,15 @@ def run(
     ] = False,
     overwrite: OverwriteOption = False,
     dry_run: _DryRun = False,
+    adopt: _Adopt = False,
     as_json: JsonOption = False,
 ) -> None:
     """Move a simulated robot through poses, read its cables, identify, verify and take over.
 
     It runs on a simulator of its own, over the bus, from home and with the geometry of its file.
-    Ends with status 1, and takes nothing over, where the result is not good.
+    What stands behind ± is one standard deviation (1 sigma). Ends with status 1, and takes nothing
+    over, where the result is not good; with 0 where it changes nothing significantly, and takes
+    nothing over then either.
     """
     out = Output(as_json)
     with out.stage("looking at the robot's file"):
@@ -199,7 +207,10 @@ def run(
         raise BadInputError("--points: the run that goes on was begun with it; allowed: the file")
     data = runs.measure(out, profile, settings, kept, enough(out, profile, points, geometry))
     judge = runs.judge_of(profile, settings, folder)
-    finish(out, profile, data, points, geometry, folder / runs.DATA, folder, dry_run, judge)
+    finish(
+        *(out, profile, data, points, geometry),
+        *(folder / runs.DATA, folder, dry_run, adopt, judge),
+    )
 
 
 def _source(robot: Robot, asked: list[Source]) -> Source:
@@ -225,12 +236,12 @@ def _require_new(folder: Path, name: str, overwrite: bool) -> None:
 
 @app.command()
 def check(
-    robot: _Robot,
+    robot: RobotArgument,
     scanner: Annotated[
         bool, typer.Option("--scanner", help="With poses that the simulated scanner measures.")
     ] = False,
     plant: _Plant = None,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
+    seed: SeedOption = 1,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for the readings, check.json.")
     ] = None,
@@ -257,7 +268,7 @@ def check(
 
 
 @app.command()
-def undo(robot: _Robot, as_json: JsonOption = False) -> None:
+def undo(robot: RobotArgument, as_json: JsonOption = False) -> None:
     """Take back the calibration in force: the one before it, or the robot's file, counts again.
 
     A robot that runs goes on as it is; its next start takes it.
@@ -289,7 +300,7 @@ def study(
             min=2, max=100_000, help=f"Trials of each case; else {_DRAWS}, of --ablation {_FEW}."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
+    seed: SeedOption = 1,
     png: PngOption = None,
     ablation: Annotated[
         bool,
@@ -316,10 +327,8 @@ def study(
         rows = studies.study(robot, draws, seed, advance)
     out.say(*studies.lines(rows))
     if png is not None:
-        try:
+        with os_error_as(BadInputError, f"--png {png}: cannot be written"):
             studies.draw(png, rows)
-        except OSError as error:
-            raise BadInputError(f"--png {png}: cannot be written: {error.strerror}") from error
     out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, "cases": rows})
 
 

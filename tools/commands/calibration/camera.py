@@ -21,18 +21,16 @@ from cdpr_tools.report.save import save
 
 app = typer.Typer(name="camera", help="Cameras: images, and intrinsics.", no_args_is_help=True)
 
-_CameraArgument = Annotated[
-    str,
-    typer.Argument(
-        help="opencv:0, opencv:rtsp://..., genicam:PRODUCER.cti, sim:SOCKET, folder:DIR.",
-        metavar="CAMERA",
-    ),
-]
-
 
 @app.command()
 def grab(
-    camera: _CameraArgument,
+    camera: Annotated[
+        str,
+        typer.Argument(
+            help="opencv:0, opencv:rtsp://..., genicam:PRODUCER.cti, sim:SOCKET, folder:DIR.",
+            metavar="CAMERA",
+        ),
+    ],
     folder: Annotated[Path, typer.Option("--out", help="Folder for the images.")],
     count: Annotated[int, typer.Option(min=1, max=10000, help="Number of images.")] = 1,
     interval_s: Annotated[
@@ -98,7 +96,7 @@ def calibrate(
         _collect(source, images, most, out)
     fit = fit_intrinsics(images, board)
     _tell(out, fit)
-    save(target, fit.intrinsics.to_toml())
+    save(target, fit.intrinsics.toml_text())
     out.say(f"intrinsics: {target}")
     one = fit.intrinsics
     out.result(
@@ -140,11 +138,11 @@ def _tell(out: Output, fit: IntrinsicsFit) -> None:
     one = fit.intrinsics
     sigmas = one.sigmas or (0.0,) * 9
     names = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-    out.say(f"{len(fit.used)} images, corners fit to {one.rms_px:.3f} px (rms)")
+    out.say(f"{len(fit.used)} images, corners fit to {one.rms_px:.3f} px (rms); ± is 1 sigma")
     for name, value, sigma in zip(names, one.parameters, sigmas, strict=True):
         digits = 2 if name[0] in "fc" else 5
         unit = " px" if name[0] in "fc" else ""
-        out.say(f"{name:4}{value:12.{digits}f} \N{PLUS-MINUS SIGN} {sigma:.{digits}f}{unit}")
+        out.say(f"{name:4}{value:12.{digits}f} ± {sigma:.{digits}f}{unit}")
     out.say(*(f"left out: {line}" for line in fit.left_out))
     out.say(*(f"missing: {line}" for line in fit.missing))
     if not fit.missing:

@@ -13,6 +13,7 @@ from cdpr_drivers.camera.folder_camera import FolderCamera
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.reader import validated
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.coverage import Coverage
 from cdpr_rt.calibration.markers.geometry.rotations import logarithms
 from cdpr_rt.calibration.markers.images.charuco import Board
@@ -20,9 +21,8 @@ from cdpr_rt.calibration.markers.images.detection import MarkerDetector
 from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.core.clock import PacedClock
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_tools.commands.options import JsonOption, OverwriteOption, PngOption, written_as
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as, raised_as
 from cdpr_tools.markers.picture import draw_map
 from cdpr_tools.markers.sheets import PAGES_mm, write_board_sheet, write_marker_sheets
 from cdpr_tools.output import Output
@@ -63,10 +63,8 @@ def print_command(
     wanted = _ids(ids)
     _require_page(page)
     _require_free(target, overwrite)
-    try:
+    with os_error_as(BadInputError, f"--out {target}"):
         write_marker_sheets(target, described, wanted, page)
-    except OSError as error:
-        raise BadInputError(f"--out {target}: {error.strerror}") from None
     out.say(
         f"{target}: {len(wanted)} sheets on {page}. Print at 100 %, without fitting to the page; "
         "then measure the bar and a black square."
@@ -91,10 +89,8 @@ def board(
     _require_page(page)
     _require_free(target, overwrite)
     made = Board(columns, rows, square_mm / 1e3, marker_mm / 1e3, dictionary)
-    try:
+    with os_error_as(BadInputError, f"--out {target}"):
         write_board_sheet(target, made, page)
-    except OSError as error:
-        raise BadInputError(f"--out {target}: {error.strerror}") from None
     out.say(f"{target}: a board of {columns} x {rows} squares of {square_mm:g} mm on {page}")
     out.result({"ok": True, "out": target})
 
@@ -136,7 +132,8 @@ def map_command(
         save(target, _map_text(fit, described))
         out.say(f"map: {target}")
     if png is not None:
-        _draw(fit, png)
+        with os_error_as(BadInputError, f"--png {png}"):
+            draw_map(fit, png)
         out.say(f"picture: {png}")
     out.result(_as_dict(fit, problems))
     if fit.faults:
@@ -178,10 +175,8 @@ def _sheets(path: Path | None, size_mm: float | None, dictionary: str) -> Marker
     if size_mm is None:
         raise BadInputError("--size-mm is missing: the width of the black square, as measured")
     table = {"dictionary": dictionary, "size_m": size_mm / 1e3}
-    try:
+    with raised_as(BadInputError, ProfileError):
         return validated(Path("--dictionary"), table, MarkerSheets)
-    except ProfileError as error:
-        raise BadInputError(str(error)) from None
 
 
 def _ids(text: str) -> list[int]:
@@ -205,13 +200,6 @@ def _require_page(page: str) -> None:
 def _require_free(target: Path, overwrite: bool) -> None:
     if target.exists() and not overwrite:
         raise BadInputError(f"--out {target}: is there already; --overwrite replaces it")
-
-
-def _draw(fit: MapFit, png: Path) -> None:
-    try:
-        draw_map(fit, png)
-    except OSError as error:
-        raise BadInputError(f"--png {png}: {error.strerror}") from None
 
 
 def _say(out: Output, fit: MapFit) -> None:

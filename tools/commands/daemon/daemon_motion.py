@@ -1,15 +1,17 @@
-"""`cdpr jog|move|controller`: motion by a daemon, for as long as the command runs."""
+"""`cdpr jog|move|controller|tighten|lower|pause|resume`: motion by a daemon."""
 
 from __future__ import annotations
 
 import math
+import re
 import time
+from collections.abc import Callable, Sequence
+from enum import StrEnum
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, Final, TypeVar
 
 import typer
 
-from cdpr_tools.client.axis_words import in_typed_words
 from cdpr_tools.client.client import Daemon, axis_values, key_values
 from cdpr_tools.client.motion import (
     RENEW_S,
@@ -19,7 +21,7 @@ from cdpr_tools.client.motion import (
     is_done,
     require_program,
 )
-from cdpr_tools.client.platform_move import Frame, PlatformMove
+from cdpr_tools.client.platform_move import Frame, PlatformMove, resume_refusal
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.number_options import numbers_command
@@ -200,3 +202,134 @@ def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, 
         if not math.isfinite(value):
             raise BadInputError(f"{axes[axis]['name']}={value:g}: allowed: a finite number")
     return len(axes), values
+
+
+_T = TypeVar("_T")
+_DEG, _MM = math.degrees(1.0), 1e3
+_KEYS: Final = {
+    "velocity_rad_s": (_DEG, "deg/s", ""),
+    "cable_velocity_m_s": (_MM, "mm/s", ""),
+    "position_rad": (_DEG, "deg", ""),
+    "distance_rad": (_DEG, "deg", ""),
+    "cable_m": (_MM, "mm", ""),
+    "speed_rad_s": (_DEG, "deg/s", "--speed"),
+    "duration_s": (1.0, "s", "--seconds"),
+}
+"""By the key of a program: factor and unit of the command line, and the option, if it is one."""
+_REFUSED: Final = re.compile(
+    r"\w+: (?P<key>\w+)(?:\[(?P<axis>\d+)\])?: value (?P<value>\S+); "
+    r"allowed: a number from (?P<low>\S+) to (?P<high>\S+)"
+)
+
+
+def typed_refusal(message: str, names: Sequence[str]) -> str:
+    """Return a refusal with the name of the axis, or the option, and what is allowed as typed."""
+    found = _REFUSED.fullmatch(message)
+    if found is None or found["key"] not in _KEYS:
+        return message
+    factor, unit, option = _KEYS[found["key"]]
+    value, low, high = (factor * float(found[name]) for name in ("value", "low", "high"))
+    typed = f"{option} " if found["axis"] is None else f"{names[int(found['axis'])]}="
+    return f"{typed}{value:.6g}: allowed: {low:.4g} to {high:.4g} {unit}"
+
+
+def in_typed_words(do: Callable[[], _T], names: Sequence[str]) -> _T:
+    """Return what `do` does; its refusal is raised as bad input, in the words that were typed."""
+    try:
+        return do()
+    except (BadInputError, WorkFailedError) as error:
+        refusal = typed_refusal(str(error), names)
+        if refusal == str(error):
+            raise
+        raise BadInputError(refusal) from None
+
+
+class Source(StrEnum):
+    """From what the cables' lengths follow."""
+
+    HOME = "home"
+    LAST = "last"
+    LENGTHS = "lengths"
+
+
+@app.command()
+@with_daemon
+def tighten(
+    daemon: Daemon,
+    out: Output,
+    source: Annotated[
+        Source | None,
+        typer.Option(
+            "--from",
+            help="Lengths of the cables: the platform stands at home, those of the last stop, or "
+            "those that the daemon knows; home where it knows none.",
+        ),
+    ] = None,
+) -> None:
+    """Take up the slack of a platform's cables and learn where it is; it is held then."""
+    wanted = {} if source is None else {"from": source.value}
+    typed = "tighten" if source is None else f"tighten --from {source.value}"
+    try:
+        _carry_out(daemon, out, "tighten", wanted)
+    except (BadInputError, WorkFailedError) as error:
+        told = str(error).replace("tighten: from:", f"{typed}:")
+        raise type(error)(re.sub(r"\bfrom: (?=[a-z])", "--from ", told)) from None
+
+
+@app.command()
+@with_daemon
+def lower(
+    daemon: Daemon,
+    out: Output,
+    blind: Annotated[
+        bool,
+        typer.Option("--blind", help="Every winch just lets its cable out, wherever that leads."),
+    ] = False,
+) -> None:
+    """Let the platform down onto its stand; the power stays on, the cables are loose."""
+    wanted = {"blind": True} if blind else {}
+    tight = (daemon.get("/status").get("program_progress") or {}).get("tight")
+    where = "let down blind" if blind else "on its stand" if tight else "where it is"
+    _carry_out(daemon, out, "lower", wanted, f"{where}, cables loose, power on")
+
+
+@app.command()
+@with_daemon
+def pause(daemon: Daemon, out: Output) -> None:
+    """Stop the platform and hold it there; `resume` goes on."""
+    _require_platform(daemon, "pause")
+    daemon.post("/hold")
+    finish(daemon, out, stopped=False)
+
+
+@app.command()
+@with_daemon
+def resume(daemon: Daemon, out: Output) -> None:
+    """Go on to the position, or along the path, that was left when it was paused."""
+    if (daemon.get("/status").get("program_progress") or {}).get("path"):
+        from cdpr_tools.client.path_following import go_on  # noqa: PLC0415  # slow to load
+
+        go_on(daemon, out)
+        return
+    try:
+        _carry_out(daemon, out, "pose", {"resume": True})
+    except (BadInputError, WorkFailedError) as error:
+        raise type(error)(resume_refusal(str(error))) from None
+
+
+def _require_platform(daemon: Daemon, what: str) -> None:
+    programs = daemon.get("/description").get("programs", [])
+    if "lower" not in programs:
+        raise BadInputError(f"{what}: only for robots whose platform is moved as a whole")
+
+
+def _carry_out(
+    daemon: Daemon, out: Output, program: str, wanted: dict[str, Any], where: str = ""
+) -> None:
+    """Have a program run to its end, then hold; `where` are the words for its end."""
+    _require_platform(daemon, program)
+    with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
+        control.post("/program", {"program": program, "wanted": wanted})
+        ended = await_end(control, program, stop_requested, math.inf, out)
+        control.hold()
+    finish(daemon, out, stop_requested(), ended, where)

@@ -10,9 +10,8 @@ from rich.live import Live
 from rich.text import Text
 
 from cdpr_tools.client.client import Daemon, NoDaemonError, open_daemon
-from cdpr_tools.client.dead_loop import DEAD, power_text
 from cdpr_tools.client.motion import ProgressNotes
-from cdpr_tools.client.status_text import status_text
+from cdpr_tools.client.status_text import DEAD, power_text, status_text
 from cdpr_tools.commands.daemon.with_daemon import with_daemon, with_daemon_at_once
 from cdpr_tools.commands.options import (
     JsonOption,
@@ -23,7 +22,7 @@ from cdpr_tools.commands.options import (
     YesOption,
 )
 from cdpr_tools.consent import require_consent
-from cdpr_tools.daemon.left_over import end_left_over
+from cdpr_tools.daemon.estop import end_left_over
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.output import Output
 from cdpr_tools.signals import stop_on_signals

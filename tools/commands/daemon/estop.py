@@ -16,20 +16,18 @@ from cdpr_tools.daemon.paths import find_loop_files, unsearched_folders
 from cdpr_tools.errors import FAILED, BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
-_Robot = Annotated[
-    str | None,
-    typer.Argument(metavar="[ROBOT]", help="Which robot, where several daemons run."),
-]
-_All = Annotated[bool, typer.Option("--all", help="Every robot whose daemon is found.")]
-
-
 app = typer.Typer()
 
 
 @app.command()
 def estop(
-    robot: _Robot = None,
-    every: _All = False,
+    robot: Annotated[
+        str | None,
+        typer.Argument(metavar="[ROBOT]", help="Which robot, where several daemons run."),
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Every robot whose daemon is found.")
+    ] = False,
     socket: SocketOption = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -34,8 +34,7 @@ from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
-from cdpr_tools.daemon.launcher_file import named_launcher
-from cdpr_tools.daemon.loop_file import LoopFile
+from cdpr_tools.daemon.loop_file import LoopFile, named_launcher
 from cdpr_tools.daemon.paths import SOCKET_SUFFIX, default_recordings, default_socket
 from cdpr_tools.daemon.processes.launcher import Launcher
 from cdpr_tools.daemon.processes.notify import ServiceManager
@@ -47,100 +46,86 @@ _KEPT_DAYS, _KEPT_GB = 30.0, 20.0
 _ORIGIN = re.compile(r"https?://[a-z0-9.-]+(:\d{1,5})?", re.IGNORECASE)
 _RING_S = 15.0  # longer than a service that hangs is waited for and started again
 
-_Robot = Annotated[
-    str,
-    typer.Argument(
-        help="Robot or winch profile: a name or the path of a file.", metavar="ROBOT|WINCH"
-    ),
-]
-_Plant = Annotated[
-    Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")
-]
-_Camera = Annotated[
-    Path | None,
-    typer.Option(help="Socket to make of a camera on the platform, for that simulator."),
-]
-_Http = Annotated[
-    str | None,
-    typer.Option(metavar="HOST:PORT", help="Listen there too, besides the Unix socket."),
-]
-_Socket = Annotated[
-    Path | None,
-    typer.Option("--socket", help="Unix socket of the control interface, if not this user's."),
-]
-_KeyFile = Annotated[
-    Path | None,
-    typer.Option(help="Secret of those who may move the robot over --http or --stream."),
-]
-_Record = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Record into this folder instead of the user's.")
-]
-_NoRecord = Annotated[bool, typer.Option("--no-record", help="Record nothing.")]
-_KeepDays = Annotated[
-    float | None,
-    typer.Option(min=0.01, help="Remove older recordings of this robot; 30 in the user's folder."),
-]
-_KeepGb = Annotated[
-    float | None,
-    typer.Option(
-        "--keep-gb",
-        min=0.01,
-        help="Remove its oldest recordings beyond so much in all; 20 in the user's folder.",
-    ),
-]
-_Live = Annotated[
-    int | None,
-    typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
-]
-_LiveOrigin = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="ORIGIN",
-        help="A web page that may look at the live view, such as https://app.foxglove.dev.",
-    ),
-]
-_Stream = Annotated[
-    str | None,
-    typer.Option(metavar="HOST:PORT", help="Receive a set-point stream (UDP) there."),
-]
-_TensionPort = Annotated[
-    str | None,
-    typer.Option(metavar="PORT", help="Serial port of the robot's tension sensors."),
-]
-_Commissioned = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="DIR", help="What `cdpr commission ROBOT` has left: motors to compensate."
-    ),
-]
-_ReadOnly = Annotated[
-    bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
-]
-
 
 app = typer.Typer()
 
 
 @app.command()
 def run(
-    robot: _Robot,
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="Robot or winch profile: a name or the path of a file.", metavar="ROBOT|WINCH"
+        ),
+    ],
     bus: RobotBusOption = None,
-    plant: _Plant = None,
-    camera: _Camera = None,
-    http: _Http = None,
-    unix: _Socket = None,
-    key_file: _KeyFile = None,
-    record: _Record = None,
-    no_record: _NoRecord = False,
-    keep_days: _KeepDays = None,
-    keep_gb: _KeepGb = None,
-    live: _Live = None,
-    live_origin: _LiveOrigin = None,
-    stream: _Stream = None,
-    read_only: _ReadOnly = False,
+    plant: Annotated[
+        Path | None, typer.Option(help="Plant file for the simulator that `simbus:` starts.")
+    ] = None,
+    camera: Annotated[
+        Path | None,
+        typer.Option(help="Socket to make of a camera on the platform, for that simulator."),
+    ] = None,
+    http: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Listen there too, besides the Unix socket."),
+    ] = None,
+    unix: Annotated[
+        Path | None,
+        typer.Option("--socket", help="Unix socket of the control interface, if not this user's."),
+    ] = None,
+    key_file: Annotated[
+        Path | None,
+        typer.Option(help="Secret of those who may move the robot over --http or --stream."),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Record into this folder instead of the user's."),
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Record nothing.")] = False,
+    keep_days: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01, help="Remove older recordings of this robot; 30 in the user's folder."
+        ),
+    ] = None,
+    keep_gb: Annotated[
+        float | None,
+        typer.Option(
+            "--keep-gb",
+            min=0.01,
+            help="Remove its oldest recordings beyond so much in all; 20 in the user's folder.",
+        ),
+    ] = None,
+    live: Annotated[
+        int | None,
+        typer.Option(metavar="PORT", min=0, max=65535, help="Foxglove live view, on loopback."),
+    ] = None,
+    live_origin: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ORIGIN",
+            help="A web page that may look at the live view, such as https://app.foxglove.dev.",
+        ),
+    ] = None,
+    stream: Annotated[
+        str | None,
+        typer.Option(metavar="HOST:PORT", help="Receive a set-point stream (UDP) there."),
+    ] = None,
+    read_only: Annotated[
+        bool, typer.Option("--read-only", help="Listen to another master's bus; send nothing.")
+    ] = False,
     safety_io: SafetyIoOption = None,
-    tension_port: _TensionPort = None,
-    commissioned: _Commissioned = None,
+    tension_port: Annotated[
+        str | None,
+        typer.Option(metavar="PORT", help="Serial port of the robot's tension sensors."),
+    ] = None,
+    commissioned: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="What `cdpr commission ROBOT` has left: motors to compensate."
+        ),
+    ] = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:

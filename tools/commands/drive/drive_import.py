@@ -16,7 +16,7 @@ from cdpr_profiles.reading.bounded_input import read_bytes
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.drive_import.files import eds_text, profile_text
 from cdpr_tools.drive_import.proposal import Proposal, propose
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 
 _SUFFIXES = (".eds", ".dcf")
@@ -89,12 +89,10 @@ def _write(
     for path, _ in writes:
         if path.exists():
             raise BadInputError(f"{path}: is there already; choose another --name or --out")
-    try:
+    with os_error_as(WorkFailedError, f"{folder}: cannot be written"):
         folder.mkdir(parents=True, exist_ok=True)
         for path, written in writes:
             path.write_bytes(written)
-    except OSError as error:
-        raise WorkFailedError(f"{folder}: cannot be written: {error.strerror}") from error
     return profile, copy
 
 
@@ -117,16 +115,11 @@ def _show(
         out.say(f"      {unknown.why}")
         out.say(f"      to find out: {unknown.how}")
     out.say("")
-    if eds.node_id is not None or eds.bitrate_bit_s is not None:
-        out.say(_for_the_winch(eds))
+    told = {"node_id": eds.node_id, "bitrate_bit_s": eds.bitrate_bit_s}
+    if values := ", ".join(f"{key} = {one}" for key, one in told.items() if one is not None):
+        out.say(f"for the winch's file: {values}")
     out.say(f"{copy}" + (": rewritten, its flaws mended" if rewritten else ": as it was"))
     out.say(f"{profile}: name it as `drive` in your winch's file")
-
-
-def _for_the_winch(eds: EdsFile) -> str:
-    keys = {"node_id": eds.node_id, "bitrate_bit_s": eds.bitrate_bit_s}
-    values = ", ".join(f"{key} = {value}" for key, value in keys.items() if value is not None)
-    return f"for the winch's file: {values}"
 
 
 def _shown(key: str, value: Any) -> str:

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 import typer
 
-from cdpr_drivers.bus import BusUrl
 from cdpr_drivers.bus.simulated_bus import open_clock
 from cdpr_drivers.canopen.lss import (
     BITRATE_INDEX,
@@ -26,7 +25,8 @@ from cdpr_drivers.errors import BusError, SdoAbortError, SdoTimeoutError
 from cdpr_profiles import DriveProfile, list_profiles, load_drive
 from cdpr_tools.commands.options import JsonOption
 from cdpr_tools.composition.session import open_bus
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.consent import require_consent
+from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 from cdpr_tools.output import Output
 
 _UNITS = {"": 1, "k": 1_000, "m": 1_000_000}
@@ -127,10 +127,8 @@ def lss(
     wish = _Wish(node_id, rate, store, switch_delay_ms * 1e-3 if activate else None)
     kind = None if profile is None else load_drive(profile)
     clock = open_clock([url])
-    try:
+    with raised_as(BadInputError, BusError):
         master = LssMaster(url, clock, timeout_ms * 1e-3)
-    except BusError as error:
-        raise BadInputError(str(error)) from error
     with closing(clock), master:
         out.note("looking for devices ...")
         found = [_only_device(master)] if alone else _search(master, profile, kind, serial)
@@ -140,7 +138,8 @@ def lss(
         if str(wish):
             device = _choose(found, master)
             _check(master, device, found, wish)
-            _confirm(url, yes, f"{device.address} gets {wish}")
+            question = f"on {url}: {device.address} gets {wish}."
+            require_consent(question, yes or url.is_simulated, "nothing was changed")
             _set(master, device, wish, out)
     done = {
         "set": {"node_id": node_id, "bitrate_bit_s": rate, "stored": store} if str(wish) else None
@@ -244,17 +243,6 @@ def _check_power(master: LssMaster, node_id: int) -> None:
     raise WorkFailedError(
         f"node {node_id} does not tell whether its power stage is enabled: {reason}"
     )
-
-
-def _confirm(url: BusUrl, yes: bool, what: str) -> None:
-    if url.is_simulated or yes:
-        return
-    try:
-        agreed = typer.confirm(f"on {url}: {what}. Go on?", err=True)
-    except typer.Abort:  # nobody there to answer
-        agreed = False
-    if not agreed:
-        raise BadInputError("not confirmed (--yes does it beforehand); nothing was changed")
 
 
 def _set(master: LssMaster, device: _Device, wish: _Wish, out: Output) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import typer
-
-from cdpr_tools.command_group import group_of
+from cdpr_tools.command_group import lazy_group
 
 MODULES = {
     "drive.drive": {
@@ -14,6 +12,8 @@ MODULES = {
         "home": "Find the encoder index by homing; the motor turns by up to a turn.",
         "jog": "Turn the motor at a constant speed under the PID, then switch it off.",
         "od": "Read or write an object of the drive's dictionary.",
+        "configure": "Write into the drive what differs from its profile; nothing is enabled.",
+        "errors": "Show the errors that a drive remembers (1003h), the newest first; reads only.",
     },
     "drive.drive_setup": {
         "lss": "Find drives by LSS (CiA 305) and give one a node id and a bit rate.",
@@ -21,17 +21,6 @@ MODULES = {
     "drive.drive_import": {
         "import": "Make a drive profile from an EDS or DCF, and list what it could not know.",
     },
-    "drive.drive_configure": {
-        "configure": "Write into the drive what differs from its profile; nothing is enabled.",
-        "errors": "Show the errors that a drive remembers (1003h), the newest first; reads only.",
-    },
 }
 
-app = typer.Typer(
-    name="drive", cls=group_of(MODULES), help="One drive on the bus.", no_args_is_help=True
-)
-
-
-@app.callback()
-def _group() -> None:
-    """One drive on the bus."""
+app = lazy_group("drive", "One drive on the bus.", MODULES)

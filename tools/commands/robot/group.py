@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import typer
-
-from cdpr_tools.command_group import group_of
+from cdpr_tools.command_group import lazy_group
 
 MODULES = {
     "robot.robot": {
@@ -23,14 +21,4 @@ MODULES = {
     },
 }
 
-app = typer.Typer(
-    name="robot",
-    cls=group_of(MODULES),
-    help="Describe a cable robot, look at it, try it.",
-    no_args_is_help=True,
-)
-
-
-@app.callback()
-def _group() -> None:
-    """Describe a cable robot, look at it, try it."""
+app = lazy_group("robot", "Describe a cable robot, look at it, try it.", MODULES)

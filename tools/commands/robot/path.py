@@ -12,7 +12,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
 from cdpr_tools.commands.options import JsonOption, KeyFileOption, SocketOption, UrlOption
-from cdpr_tools.errors import BadInputError, CommandError
+from cdpr_tools.errors import BadInputError, CommandError, os_error_as
 from cdpr_tools.output import Output
 
 app = typer.Typer()
@@ -78,6 +78,7 @@ def path(
     running daemon plans and follows it.
     """  # fmt: skip
     from cdpr_tools.client import path_following as following  # noqa: PLC0415  # slow to load
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415  # slow to load
     from cdpr_tools.paths.options import PathOptions  # noqa: PLC0415  # slow to load
 
     out, options = Output(as_json), PathOptions(origin, blend, ignore)
@@ -95,11 +96,11 @@ def path(
             "the path that was left"
         )
     if follows:
-        where = following.Where(robot, socket, url, key_file)
+        opened = open_daemon(robot, socket, url, key_file)
         if file is not None:
-            following.follow(where, out, file, options, 0.01 * feed)
+            following.follow(opened, out, file, options, 0.01 * feed)
         else:
-            following.take_up(where, out, back, 0.01 * feed)
+            following.take_up(opened, out, back, 0.01 * feed)
         return
     assert file is not None  # see above
     if robot is None:
@@ -136,10 +137,8 @@ def _preview(
     if picture is not None:
         from cdpr_tools.paths.picture import draw_path  # noqa: PLC0415  # slow to load
 
-        try:
+        with os_error_as(BadInputError, f"--picture {picture}"):
             draw_path(shown, robot, picture)
-        except OSError as error:
-            raise BadInputError(f"--picture {picture}: {error.strerror}") from None
         out.say(f"picture: {picture}")
     if wrong := previews.obstacle_text(shown):
         raise BadInputError(wrong)

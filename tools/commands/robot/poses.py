@@ -10,16 +10,15 @@ import numpy as np
 import typer
 
 from cdpr_profiles.calibration.in_force import load_calibrated
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.reach.reachable import SHARE, Reach
-from cdpr_tools.commands.options import JsonOption, PngOption
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument, SeedOption
+from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.number_options import numbers, numbers_command
 from cdpr_tools.output import Output
-from cdpr_tools.robots.poses.choice import Choose, Chosen, choose
-from cdpr_tools.robots.poses.pose_file import checked_file, write_poses
+from cdpr_tools.robots.poses.choice import Choose, Chosen, checked_file, choose, write_poses
 
 app = typer.Typer()
 
@@ -28,9 +27,7 @@ _SHOWN = 5
 
 @app.command(cls=numbers_command("--from"))
 def poses(
-    robot: Annotated[
-        str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
-    ],
+    robot: RobotArgument,
     count: Annotated[
         int, typer.Option("-n", "--count", min=1, max=100_000, help="How many poses.")
     ] = 100,
@@ -38,7 +35,7 @@ def poses(
         str | None,
         typer.Option("--from", metavar="X Y [Z]", help="Where ways begin, in mm; else home."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
+    seed: SeedOption = 1,
     by: Annotated[
         Choose,
         typer.Option(
@@ -94,10 +91,8 @@ def poses(
     if png is not None:
         from cdpr_tools.robots.poses.picture import draw_poses  # noqa: PLC0415  # slow to load
 
-        try:
+        with os_error_as(BadInputError, str(png)):
             draw_poses(f"{profile.name}: {count} poses, {by}", reach, chosen, png)
-        except OSError as error:
-            raise BadInputError(f"{png}: {error.strerror}") from None
         out.say(f"{png}: written")
     out.result(
         {

@@ -16,8 +16,8 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.robots import checks
 from cdpr_rt.robots.calibration_state import mark_calibrated
 from cdpr_tools.calibrate.words import calibration_lines
-from cdpr_tools.commands.options import JsonOption, PngOption
-from cdpr_tools.errors import BAD_INPUT, BadInputError
+from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument
+from cdpr_tools.errors import BAD_INPUT, BadInputError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.robots import new_robot, summary
 from cdpr_tools.robots.kinds import KINDS, SKETCH
@@ -25,13 +25,9 @@ from cdpr_tools.robots.questions import Question
 
 app = typer.Typer()
 
-_Robot = Annotated[
-    str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
-]
-
 
 @app.command()
-def show(robot: _Robot, png: PngOption = None, as_json: JsonOption = False) -> None:
+def show(robot: RobotArgument, png: PngOption = None, as_json: JsonOption = False) -> None:
     """Show a robot's platform, cables and workspace, and check whether it can work.
 
     Ends with status 2 where something about it is impossible.
@@ -69,7 +65,7 @@ def show(robot: _Robot, png: PngOption = None, as_json: JsonOption = False) -> N
 
 @app.command("mark-calibrated")
 def mark_calibrated_(
-    robot: _Robot,
+    robot: RobotArgument,
     why: Annotated[str, typer.Option("--why", help="How the exit points in its file are known.")],
     as_json: JsonOption = False,
 ) -> None:
@@ -168,9 +164,7 @@ def _say_findings(out: Output, found: list[checks.Finding]) -> None:
 def _draw(profile: Robot, platform: Platform, path: Path, out: Output) -> None:
     from cdpr_tools.robots.picture import draw_robot  # noqa: PLC0415  # slow to load
 
-    try:
-        with out.stage(f"{path.name}: drawing the workspace"):
-            draw_robot(profile, platform, path)
-    except OSError as error:
-        raise BadInputError(f"--png {path}: {error.strerror}") from None
+    stage = out.stage(f"{path.name}: drawing the workspace")
+    with os_error_as(BadInputError, f"--png {path}"), stage:
+        draw_robot(profile, platform, path)
     out.say(f"\npicture: {path}")

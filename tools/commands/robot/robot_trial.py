@@ -10,7 +10,14 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles import load_robot
-from cdpr_tools.commands.options import JsonOption
+from cdpr_tools.commands.options import (
+    AgainOption,
+    CommissionedOption,
+    JsonOption,
+    RobotArgument,
+    RobotPlantOption,
+    SeedOption,
+)
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.loading import told_on_a_terminal
 from cdpr_tools.output import Output
@@ -33,9 +40,7 @@ app = typer.Typer()
 
 @app.command()
 def trial(
-    robot: Annotated[
-        str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
-    ],
+    robot: RobotArgument,
     kind: Annotated[
         KindOfTrial,
         typer.Argument(
@@ -45,10 +50,8 @@ def trial(
             "tape: exit points 20 to 50 mm off what the robot's file says."
         ),
     ],
-    plant: Annotated[
-        Path | None, typer.Option(help="Plant file: the truth about robot, cables and motors.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
+    plant: RobotPlantOption = None,
+    seed: SeedOption = 1,
     minutes: Annotated[
         float | None,
         typer.Option(min=0.05, max=600.0, help="Duration in the robot's time; not for line."),
@@ -57,10 +60,7 @@ def trial(
         float | None,
         typer.Option(min=0.1, help="Speed of lines, else 10; of a path, else the robot's."),
     ] = None,
-    commissioned: Annotated[
-        Path | None,
-        typer.Option(help="Folder that `cdpr commission ROBOT` has left.", metavar="DIR"),
-    ] = None,
+    commissioned: CommissionedOption = None,
     without_compensation: Annotated[
         bool,
         typer.Option("--without-compensation", help="Use nothing that commissioning has learnt."),
@@ -71,9 +71,7 @@ def trial(
             "--out", help="New folder for recordings, true poses and picture.", metavar="DIR"
         ),
     ] = None,
-    again: Annotated[
-        bool, typer.Option("--again", help="Evaluate the data in --out again; nothing moves.")
-    ] = False,
+    again: AgainOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Try a robot on a simulator of its own; the figures come from what was recorded and true.

@@ -13,12 +13,12 @@ import typer
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.platform import FURTHEST_m, Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import directions_of
 from cdpr_rt.robots.statics import Box, view_of
 from cdpr_rt.robots.workspace_analysis.criterion import criterion_of, turns_within
-from cdpr_tools.commands.options import JsonOption, PngOption, written_as
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument, written_as
+from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.number_options import numbers, numbers_command
 from cdpr_tools.output import Output
 from cdpr_tools.robots.workspace.search import Found, Search, in_mm, search
@@ -89,9 +89,7 @@ class _Typed:
 
 @app.command(cls=numbers_command("--rotate", "--centre", "--low", "--high"))
 def workspace(
-    robot: Annotated[
-        str, typer.Argument(help="Robot profile: a name or the path of a file.", metavar="ROBOT")
-    ],
+    robot: RobotArgument,
     static: Annotated[
         bool, typer.Option("--static", help="At rest, without the accelerations of its file.")
     ] = False,
@@ -183,16 +181,13 @@ def workspace(
 
 
 def _write(robot: Robot, wanted: Search, found: Found, png: Path | None, mesh: Path | None) -> None:
-    option = f"--png {png}"
-    try:
-        if png is not None:
-            from cdpr_tools.robots.workspace.picture import draw_workspace  # noqa: PLC0415
+    if png is not None:
+        from cdpr_tools.robots.workspace.picture import draw_workspace  # noqa: PLC0415
 
+        with os_error_as(BadInputError, f"--png {png}"):
             draw_workspace(robot, wanted, found, png)
-        option = f"--mesh {mesh}"
-        if mesh is not None:
-            from cdpr_tools.robots.workspace.mesh import save_mesh  # noqa: PLC0415
+    if mesh is not None:
+        import trimesh  # noqa: PLC0415  # slow to load
 
-            save_mesh(mesh, *found.grid.surface)
-    except OSError as error:
-        raise BadInputError(f"{option}: {error.strerror}") from None
+        with os_error_as(BadInputError, f"--mesh {mesh}"):
+            trimesh.Trimesh(*found.grid.surface, process=False).export(mesh)  # in m

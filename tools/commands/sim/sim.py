@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import typer
-
-from cdpr_tools.command_group import group_of
+from cdpr_tools.command_group import lazy_group
 
 MODULES = {
     "sim.sim_up": {
         "up": "Run simulated drives until Ctrl-C; tells on standard output when they are up.",
     },
-    "sim.sim_safety_io": {
+    "sim.sim_devices": {
         "safety-io": "Run a simulated safety I/O until Ctrl-C; tells on standard output when it is "
         "up.",
         "panel": "Press the emergency stop of a simulated safety I/O, release it, break or mend "
         "something.",
-    },
-    "sim.sim_rail": {
         "rail": "Run a simulated rail until Ctrl-C; tells on standard output when it is up.",
     },
     "sim.sim_fault": {
@@ -40,11 +36,4 @@ MODULES = {
     },
 }
 
-app = typer.Typer(
-    name="sim", cls=group_of(MODULES), help="Simulated winches on a CAN bus.", no_args_is_help=True
-)
-
-
-@app.callback()
-def _group() -> None:
-    """Simulated winches on a CAN bus."""
+app = lazy_group("sim", "Simulated winches on a CAN bus.", MODULES)

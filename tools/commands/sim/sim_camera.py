@@ -14,7 +14,7 @@ from cdpr_sim_bus.camera.camera_server import CameraServer
 from cdpr_sim_bus.camera.random_poses import Box, random_poses
 from cdpr_sim_bus.camera.sim_camera import SimCamera
 from cdpr_sim_bus.physics_board import PhysicsBoard
-from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption
+from cdpr_tools.commands.options import ExitWithStdinOption, JsonOption, SeedOption
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 from cdpr_tools.report.save import save
@@ -38,7 +38,7 @@ def camera(
 
     Type `dark`, `defocus 6`, `mend` or `unplug` to break and mend it.
     """
-    made = SimCamera(_plant(plant))
+    made = SimCamera(CameraPlant.load_file(plant))
     with PhysicsBoard.attach(board) as shared:
         platform = shared.platform
         if platform.state() is None:
@@ -53,7 +53,7 @@ def photos(
     folder: Annotated[Path, typer.Argument(help="New folder for the images.", metavar="FOLDER")],
     plant: _PlantOption = None,
     count: Annotated[int, typer.Option(min=1, max=2000, help="Number of images.")] = 40,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 1,
+    seed: SeedOption = 1,
     low: Annotated[
         str, typer.Option(help="Lowest position of the platform, m.", metavar='"X Y Z"')
     ] = "-0.5 -0.4 1.4",
@@ -71,7 +71,7 @@ def photos(
     The intrinsics are the true ones, in camera.toml beside the images.
     """
     out = Output(as_json)
-    truth = _plant(plant)
+    truth = CameraPlant.load_file(plant)
     box = Box(_vector(low, "--low"), _vector(high, "--high"), tilt_deg)
     if folder.exists() and any(folder.iterdir()) and not overwrite:
         raise BadInputError(f"{folder}: holds something already; --overwrite replaces images")
@@ -83,20 +83,10 @@ def photos(
             if not cv2.imwrite(str(path), made.grab(state)):
                 raise BadInputError(f"{path}: cannot be written")
             advance(k + 1.0)
-    intrinsics = CameraIntrinsics(
-        width_px=lens.width_px,
-        height_px=lens.height_px,
-        focal_px=lens.focal_px,
-        centre_px=lens.centre_px,
-        distortion=lens.distortion,
-    )
-    save(folder / "camera.toml", intrinsics.to_toml())
+    intrinsics = CameraIntrinsics.model_validate(lens, from_attributes=True)
+    save(folder / "camera.toml", intrinsics.toml_text())
     out.say(f"{count} images and camera.toml in {folder}")
     out.result({"ok": True, "folder": folder, "images": count})
-
-
-def _plant(path: Path | None) -> CameraPlant:
-    return CameraPlant() if path is None else CameraPlant.load_file(path)
 
 
 def _vector(text: str, option: str) -> tuple[float, float, float]:

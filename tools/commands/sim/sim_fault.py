@@ -14,7 +14,7 @@ from cdpr_profiles import Robot, RobotAxis, Winch, load_winch_or_robot
 from cdpr_profiles.eds.dictionary import load_dictionary
 from cdpr_profiles.robot import robot_of_winch
 from cdpr_rt.core.clock import PacedClock
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError, WorkFailedError, raised_as
 
 _OBJECT = 0x2F00
 
@@ -82,12 +82,10 @@ def fault(
     amount = _amount(what, how, value)
     url = robot_urls(robot, bus or _buses_of_daemon(profile.profile))[chosen.bus]
     winch = chosen.winch
-    try:
+    with raised_as(BadInputError, BusError):
         network = CanNetwork(
             url, PacedClock(), [winch.node_id], robot.master_node_id, robot.master_heartbeat_s
         )
-    except BusError as error:
-        raise BadInputError(str(error)) from error
     try:
         network.add_node(winch.node_id, load_dictionary(winch.drive.eds, winch.node_id))
         network.write(winch.node_id, _OBJECT, how.sub, amount)

@@ -19,18 +19,16 @@ from cdpr_sim_bus.canopen.dictionary.store import StoreError
 from cdpr_sim_bus.cia402.drive import SimDrive, transmission_of
 from cdpr_sim_bus.clock import ClockMode
 from cdpr_sim_bus.fleet import FleetBus, serve_fleet
-from cdpr_sim_bus.frame_log import FrameLog
+from cdpr_sim_bus.frame import FrameLog
 from cdpr_sim_bus.physics_board import PhysicsBoard
-from cdpr_sim_bus.robot.board_pose import BoardPose
 from cdpr_sim_bus.robot.cable_robot import CableRobot
 from cdpr_sim_bus.robot.logs.platform_record import RobotShape
-from cdpr_sim_bus.robot.logs.pose_log import PoseLog
-from cdpr_sim_bus.robot.logs.pose_scanner import PoseScanner
+from cdpr_sim_bus.robot.logs.pose_logs import BoardPose, PoseLog, PoseScanner
 from cdpr_sim_bus.robot.motor_state import Transmission
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.composition.simulator import OwnCamera
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError, os_error_as, raised_as
 
 
 def up(
@@ -65,36 +63,32 @@ def up(
             )
     with ExitStack() as stack:
         body, plants = _physics(robot, plant, detached)
+        if body is None:
+            _refuse_platforms(truth_log, scanner, camera)
         members = [None] * len(plants) if body is None else body.members()
         drives = []
         for i, (axis, own, member) in enumerate(zip(robot.axes, plants, members, strict=True)):
-            try:
+            with raised_as(BadInputError, StoreError):
                 drive = SimDrive.for_winch(
                     axis.winch, own, store=store_file(i + 1), serial=i + 1, robot=member
                 )
-            except StoreError as error:
-                raise BadInputError(str(error)) from error
             stack.callback(drive.close)
             drives.append(drive)
-        if truth_log is not None:
-            drives[0].record_with(_pose_log(truth_log, body))
-        if scanner is not None:
-            # each drive keeps one log: the last one's is this, the first one's is the truth's
-            drives[-1].record_with(_pose_scanner(scanner, body, plant))
         if camera is not None and board is None:
             folder = stack.enter_context(TemporaryDirectory(prefix="cdpr-board-"))
             board = Path(folder) / "board"
+        shared = None
         if board is not None:
             lockstep = mode is ClockMode.LOCKSTEP
             made = PhysicsBoard.create(board, len(drives), lockstep=lockstep)
             shared = stack.enter_context(made)
             for i, drive in enumerate(drives):
                 drive.connect(shared.axis(i))
-            if body is not None:
-                # neither the truth's drive nor the scanner's: a platform has more than two cables
-                drives[1].record_with(BoardPose(body, shared.platform))
+        if body is not None:
+            _record(drives, body, RobotPlant.load_file(plant), truth_log, scanner, shared)
         if camera is not None and board is not None:
-            stack.callback(_own_camera(camera, board, body, plant).stop)
+            described = "camera" in RobotPlant.load_file(plant).model_fields_set
+            stack.callback(OwnCamera(camera, board, plant if described else None).stop)
         fleet = [
             FleetBus(
                 bus.name,
@@ -112,15 +106,46 @@ def up(
         )
 
 
+def _refuse_platforms(truth_log: Path | None, scanner: Path | None, camera: Path | None) -> None:
+    """Raise BadInputError where something is asked of a platform that does not exist."""
+    robot = "a robot with its platform on the cables"
+    for option, path, whose in (
+        ("--truth-log", truth_log, f"a winch, or {robot}"),
+        ("--scanner", scanner, robot),
+        ("--camera", camera, robot),
+    ):
+        if path is not None:
+            raise BadInputError(f"{option}: for {whose}")
+
+
+def _record(
+    drives: Sequence[SimDrive],
+    body: CableRobot,
+    plant: RobotPlant,
+    truth_log: Path | None,
+    scanner: Path | None,
+    board: PhysicsBoard | None,
+) -> None:
+    """Have the pose written down; each drive keeps one log, and a platform has three at least."""
+    if truth_log is not None:
+        with os_error_as(BadInputError, f"--truth-log {truth_log}"):
+            drives[0].record_with(PoseLog(truth_log, body))
+    if board is not None:
+        drives[1].record_with(BoardPose(body, board.platform))
+    if scanner is not None:
+        with os_error_as(BadInputError, f"--scanner {scanner}"):
+            drives[-1].record_with(PoseScanner(scanner, body, plant.scanner, plant.seed))
+
+
 def _physics(
     robot: Robot, plant: Path | None, detached: bool
 ) -> tuple[CableRobot | None, Sequence[Plant]]:
     """Return what the axes move together, None where nothing, and the plant of each motor."""
     n, platform = len(robot.axes), robot.platform
     if platform is None:
-        one = Plant() if plant is None else Plant.load_file(plant)
+        one = Plant.load_file(plant)
         return None, [one.model_copy(update={"seed": (one.seed + i) % 2**32}) for i in range(n)]
-    whole = _robot_plant(plant)
+    whole = RobotPlant.load_file(plant)
     try:
         whole.require_fit(n, len(platform.home_m))
         motors = whole.motor_plants(n, [axis.winch for axis in robot.axes])
@@ -158,7 +183,7 @@ def true_geometry(robot: Robot, plant: Path | None) -> TrueGeometry:
     return TrueGeometry(
         body.platform["exit"][0][: body.n].copy(),
         np.abs(body.motors["cable_gain"]) / np.abs(nominal) - 1.0,
-        1.0 / (1.0 + _robot_plant(plant).cables.stiffness_error) - 1.0,
+        1.0 / (1.0 + RobotPlant.load_file(plant).cables.stiffness_error) - 1.0,
     )
 
 
@@ -177,38 +202,5 @@ def _shape(robot: Robot, platform: Platform) -> RobotShape:
     )
 
 
-def _pose_scanner(path: Path, body: CableRobot | None, plant: Path | None) -> PoseScanner:
-    if body is None:
-        raise BadInputError("--scanner: for a robot with its platform on the cables")
-    whole = _robot_plant(plant)
-    try:
-        return PoseScanner(path, body, whole.scanner, whole.seed)
-    except OSError as error:
-        raise BadInputError(f"--scanner {path}: {error.strerror}") from error
-
-
-def _own_camera(
-    socket: Path, board: Path, body: CableRobot | None, plant: Path | None
-) -> OwnCamera:
-    """Start the camera of a robot in a process of its own."""
-    if body is None:
-        raise BadInputError("--camera: for a robot with its platform on the cables")
-    described = "camera" in _robot_plant(plant).model_fields_set
-    return OwnCamera(socket, board, plant if described else None)
-
-
-def _robot_plant(path: Path | None) -> RobotPlant:
-    return RobotPlant() if path is None else RobotPlant.load_file(path)
-
-
 def _transmissions(robot: Robot) -> list[Transmission]:
     return [transmission_of(axis.winch) for axis in robot.axes]
-
-
-def _pose_log(path: Path, body: CableRobot | None) -> PoseLog:
-    if body is None:
-        raise BadInputError("--truth-log: for a winch, or a robot with its platform on the cables")
-    try:
-        return PoseLog(path, body)
-    except OSError as error:
-        raise BadInputError(f"--truth-log {path}: {error.strerror}") from error

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from cdpr_profiles.devices.tension_sensor import load_tension_sensors
-from cdpr_sim_bus.devices.modbus_rtu_server import serve_rtu
+from cdpr_sim_bus.devices.modbus_servers import serve_rtu
 from cdpr_sim_bus.devices.sim_load_cells import AmplifierPlant, SimAmplifier
 from cdpr_sim_bus.physics_board import PhysicsBoard, common_time
 from cdpr_tools.commands.options import ExitWithStdinOption
@@ -45,7 +45,7 @@ def tension(
     Type a fault and a unit, as `silent 3`, `mend all` or `unplug`, to break and mend things.
     """
     profile = load_tension_sensors(sensors)
-    truth = AmplifierPlant() if plant is None else AmplifierPlant.load_file(plant)
+    truth = AmplifierPlant.load_file(plant)
     with ExitStack() as stack:
         boards = [stack.enter_context(PhysicsBoard.attach(path)) for path in board]
         axes = [one.axis(i) for one in boards for i in range(one.axes)]

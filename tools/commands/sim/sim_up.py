@@ -20,13 +20,13 @@ from cdpr_sim_bus.canopen.dictionary.store import StoreError
 from cdpr_sim_bus.canopen.lss import UNCONFIGURED
 from cdpr_sim_bus.cia402.drive import SimDrive
 from cdpr_sim_bus.clock import ClockMode
-from cdpr_sim_bus.frame_log import FrameLog
+from cdpr_sim_bus.frame import FrameLog
 from cdpr_sim_bus.physics_board import PhysicsBoard
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_tools.commands.options import ExitWithStdinOption
 from cdpr_tools.commands.sim import sim_robot
 from cdpr_tools.compiling import tell_of_compiling
-from cdpr_tools.errors import BadInputError
+from cdpr_tools.errors import BadInputError, os_error_as, raised_as
 
 app = typer.Typer()
 
@@ -124,7 +124,7 @@ def up(
         raise BadInputError("--scanner, --camera: for a robot with a platform")
     if detached:
         raise BadInputError("--detached: for a robot; a winch's plant file says what it pulls")
-    truth = Plant() if plant is None else Plant.load_file(plant)
+    truth = Plant.load_file(plant)
     require_fit(profile)
     url = _bus(bus)
     if truth_log is not None and nodes > 1:
@@ -181,20 +181,16 @@ def _frame_log(path: Path | None) -> FrameLog | None:
     """Return the log that the buses close when they end."""
     if path is None:
         return None
-    try:
+    with os_error_as(BadInputError, f"--frame-log {path}"):
         return FrameLog(path)
-    except OSError as error:
-        raise BadInputError(f"--frame-log {path}: {error.strerror}") from error
 
 
 def _store_file(folder: Path | None, serial: int) -> Path | None:
     """Return the file in which the drive with this serial number keeps what is stored in it."""
     if folder is None:
         return None
-    try:
+    with os_error_as(BadInputError, f"--store {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInputError(f"--store {folder}: {error.strerror}") from error
     return folder / f"drive-{serial}.json"
 
 
@@ -202,10 +198,8 @@ def _bus(texts: list[str]) -> BusUrl:
     text = texts[0]
     if len(texts) > 1:
         raise BadInputError(f"--bus {texts[1]}: a winch has one bus, which is {text} already")
-    try:
+    with raised_as(BadInputError, BusError):
         url = BusUrl.parse(text)
-    except BusError as error:
-        raise BadInputError(str(error)) from error
     if url.interface not in ("simbus", "socketcan") or not url.channel:
         raise BadInputError(f"--bus {text}: simulated drives run on simbus:NAME or socketcan:IFACE")
     return url

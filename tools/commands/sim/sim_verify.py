@@ -13,11 +13,10 @@ from typing import Annotated
 import typer
 
 from cdpr_tools.commands.options import JsonOption
-from cdpr_tools.errors import BAD_INPUT, BadInputError, WorkFailedError
+from cdpr_tools.errors import BAD_INPUT, BadInputError, WorkFailedError, os_error_as
 from cdpr_tools.output import Output
 from cdpr_tools.repeat.compare import Verdict, compare
-from cdpr_tools.repeat.disturbance import Stops
-from cdpr_tools.repeat.run import Run, run_once
+from cdpr_tools.repeat.run import Run, Stops, run_once
 from cdpr_tools.signals import stop_on_signals
 
 _SEEDS = 2**31
@@ -59,7 +58,13 @@ def verify(
     besides = (os.cpu_count() or 1) + 1 if busy is None else busy
     out.say(f"seed of the disturbances: {chosen}")
     with ExitStack() as stack:
-        folder = _new(keep) if keep is not None else Path(stack.enter_context(_passing()))
+        if keep is None:
+            passing = tempfile.TemporaryDirectory(prefix="cdpr-verify-")
+            folder = Path(stack.enter_context(passing))
+        else:
+            with os_error_as(BadInputError, f"--keep {keep}: cannot be made"):
+                keep.mkdir(parents=True)
+            folder = keep.absolute()
         stop_requested = stack.enter_context(stop_on_signals())
         done: list[Run] = []
         for number in range(1, runs + 1):
@@ -98,10 +103,6 @@ def _show(out: Output, runs: Sequence[Run], verdicts: Sequence[Verdict]) -> bool
     return same
 
 
-def _passing() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="cdpr-verify-")
-
-
 def _run_line(run: Run, busy: int) -> str:
     how = "undisturbed"
     if run.number > 1:
@@ -125,11 +126,3 @@ def _last_words(output: str) -> str:
         return lines[-1]
     boxed = [line.strip(_BOX_SIDE) for line in lines if line.startswith(_BOX_SIDE[0])]
     return " ".join(" ".join(boxed).split())
-
-
-def _new(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True)
-    except OSError as error:
-        raise BadInputError(f"--keep {folder}: cannot be made: {error.strerror}") from error
-    return folder.absolute()

@@ -1,10 +1,18 @@
-"""The link of a daemon's processes to their launcher: they end when it ends."""
+"""The daemon's two processes: as their launcher sees them, and how they end when it ends."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from cdpr_tools.daemon.settings import RunSettings
 
 _PR_SET_PDEATHSIG = 1
 
@@ -34,3 +42,60 @@ def is_running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+# one thread for each library: the loop's process has one core to itself
+_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+
+
+class Child:
+    """One of the daemon's processes; it inherits the shared memory and `keep`."""
+
+    def __init__(self, module: str, settings: RunSettings, keep: Sequence[int] = ()) -> None:
+        # -P: no module of the working directory in place of ours; PYTHONPATH is its user's to set
+        command = [sys.executable, "-P", "-m", module, settings.model_dump_json()]
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=sys.stderr.fileno(),  # standard output is the launcher's alone
+            env={**os.environ, **_ONE_THREAD},
+            pass_fds=(settings.block_fd, *keep),
+            start_new_session=True,  # a Ctrl-C at the terminal is ours to handle, not its
+        )
+        self.started = time.monotonic()
+        self.pidfd = os.pidfd_open(self.process.pid)
+
+    @property
+    def end(self) -> str:
+        """How it ended, as text; empty while it runs."""
+        code = self.process.poll()
+        if code is None:
+            return ""
+        return f"killed by signal {-code}" if code < 0 else f"ended with exit status {code}"
+
+    def stop(self, timeout_s: float) -> bool:
+        """Terminate it and wait; return whether it ended before it had to be killed."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        try:
+            self.process.wait(timeout_s)
+            return True
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            return False
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Close the descriptor; safe to repeat."""
+        if self.pidfd >= 0:
+            os.close(self.pidfd)
+            self.pidfd = -1
+
+
+def move_to(pid: int, cores: set[int]) -> None:
+    """Keep all threads of a process on these cores, and those that they will start."""
+    with suppress(OSError):  # it, or one of its threads, has ended meanwhile
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            os.sched_setaffinity(int(task.name), cores)

@@ -15,7 +15,7 @@ from cdpr_rt.core.shared_block import SharedBlock, SharedBlockError
 from cdpr_rt.core.states import CUT_SHORT
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL, LoopFile, started
-from cdpr_tools.daemon.processes.child_process import Child, move_to
+from cdpr_tools.daemon.processes.child import Child, move_to
 from cdpr_tools.daemon.processes.notify import ServiceManager
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED

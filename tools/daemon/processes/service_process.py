@@ -12,7 +12,8 @@ import socket
 import sys
 import time
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
 from starlette.types import ASGIApp
 
@@ -31,13 +32,17 @@ from cdpr_rt.service.service import Service
 from cdpr_rt.service.streams.setpoint_stream import SetpointStream
 from cdpr_rt.service.view.foxglove_view import LiveView
 from cdpr_tools.daemon.processes.child import end_with_launcher, is_running, launcher_ended
-from cdpr_tools.daemon.processes.path_process import plan_in_process
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import DONE, FAILED, CommandError
 
 _LOOP_STOP_S, _TURN_S = 70.0, 0.05
 _MOST_FILES = 4096
 _SWITCH_S = 5e-4
+_PLANNING_S: Final = 600.0
+_NICER: Final = 10
+_MOST_KiB: Final = 4 << 20
+"""Of the process's memory: a file from outside does not take the daemon's."""
+_WITHIN: Final = f'ulimit -v {_MOST_KiB} && exec nice -n{_NICER} "$@"'
 
 
 def main() -> int:
@@ -157,6 +162,27 @@ def _listen(settings: RunSettings, app: ASGIApp, service: Service) -> list[Serve
         service.http = listener.getsockname()[:2]
         servers.append(Server(AccessControl(app, policy, *shared), listener, queue, note))
     return servers
+
+
+async def plan_in_process(robot: str, file: Path, wanted: dict[str, Any]) -> tuple[int, str]:
+    """Plan a file for a robot's profile; return exit status and the JSON line."""
+    options = [f"--blend={wanted['blend_mm']}", f"--ignore={wanted['ignore']}"]
+    if wanted["origin_mm"] is not None:
+        options.append(f"--origin={wanted['origin_mm']}")
+    command = [sys.executable, "-m", "cdpr_tools.cli", "path", str(file), "--robot", robot]
+    process = await asyncio.create_subprocess_exec(
+        "sh", "-c", _WITHIN, "sh", *command, "--keep", "--json", *options,
+        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        output, _ = await asyncio.wait_for(process.communicate(), _PLANNING_S)
+    except BaseException:
+        process.kill()
+        await process.wait()
+        raise
+    lines = output.decode("utf-8", "replace").strip().splitlines()
+    return process.returncode or 0, lines[-1] if lines else ""
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.stream_buttons import stream_buttons
 from cdpr_tools.experiment.model.hand_model import HandModel
 from cdpr_tools.experiment.model.parameters import OperatorParameters
@@ -88,11 +88,12 @@ class OperatorModel:
             yield from self._reach(number)
 
     def _reach(self, number: int) -> Iterator[bool]:
-        target, begun_s = self._targets[number], self._time_s
+        target, begun_s, p = self._targets[number], self._time_s, self._p
         self._moved = 0
         while True:
             error = yield from self._look(target)
-            content = bool(np.all(np.abs(error) <= self._good_enough()))
+            good_enough_m = p.tolerance_m * (1.0 + p.impatience * max(0, self._moved - p.tries))
+            content = bool(np.all(np.abs(error) <= good_enough_m))
             if content and self.clutch == self._has_clutch:
                 break
             if content:
@@ -107,10 +108,6 @@ class OperatorModel:
         )
         if self.clutch:
             yield from self._press_clutch(False)
-
-    def _good_enough(self) -> float:
-        p = self._p
-        return p.tolerance_m * (1.0 + p.impatience * max(0, self._moved - p.tries))
 
     def _look(self, target: FloatArray) -> Generator[bool, None, FloatArray]:
         """Wait until what was done last is seen and the picture stands still, then judge it."""

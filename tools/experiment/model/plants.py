@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.approach import approach
 from cdpr_rt.motion.stream_buttons import CLUTCH
 

@@ -1,21 +1,24 @@
-"""Poses that are reached, and which of them are chosen."""
+"""Poses that are reached, which are chosen, and a file of them: CSV, or TOML as a path's is."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.pose_choice import (
     cable_geometry,
     informative,
     predicted_deviation_m,
     spread,
 )
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.reach.reachable import Reach, Reached
+from cdpr_tools.errors import BadInputError, os_error_as
 
 AMONG = 20
 """Times as many poses are drawn as are chosen among them."""
@@ -71,3 +74,37 @@ def points_of(model: PlatformModel) -> tuple[FloatArray, FloatArray]:
     """Return exit and anchor points (n, 3)."""
     geometry = model.kinematics.geometry
     return geometry[:3].T, geometry[3:6].T
+
+
+KINDS = (".csv", ".toml")
+
+
+def checked_file(path: Path) -> Path:
+    """Return a path that can be written as a list of poses; raises BadInputError."""
+    if path.suffix not in KINDS or not path.parent.is_dir():
+        raise BadInputError(f"{path}: allowed: NAME.csv or NAME.toml in a folder that is there")
+    return path
+
+
+def write_poses(path: Path, positions: FloatArray, names: Sequence[str], lengths: int) -> None:
+    """Write positions (m, d), of whose directions, called `names`, the first are `lengths`.
+
+    Raises BadInputError where it cannot be written.
+    """
+    if path.suffix == ".csv":
+        units = ["m"] * lengths + ["rad"] * (len(names) - lengths)
+        lines = [",".join(f"{name}_{unit}" for name, unit in zip(names, units, strict=True))]
+        lines += [",".join(f"{x:.6f}" for x in position) for position in positions]
+    else:
+        lines = []
+        for position in positions:
+            lines += ["[[points]]", f"position_m = [{_listed(position[:lengths])}]"]
+            if len(position) > lengths:
+                lines.append(f"rotation_rad = [{_listed(position[lengths:])}]")
+            lines.append("")
+    with os_error_as(BadInputError, str(path)):
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _listed(values: FloatArray) -> str:
+    return ", ".join(f"{x:.6f}" for x in values)

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.reach.reachable import Reach
 from cdpr_tools.robots.poses.choice import Chosen
 

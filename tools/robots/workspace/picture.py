@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -16,10 +18,10 @@ from scipy.interpolate import RegularGridInterpolator
 
 import cdpr_tools.report.style  # noqa: F401 - how the project's pictures look
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.rays import Rays
-from cdpr_tools.robots.workspace.mesh import section
+from cdpr_rt.robots.workspace_analysis.surface import Triangles
 from cdpr_tools.robots.workspace.search import Found, Search, in_mm
 
 _RAYS, _GRID, _MACHINE = "#d1581a", "#1b4f8a", "#444444"
@@ -132,5 +134,14 @@ def _draw_borders(ax: Axes, found: Found, view: tuple[int, int], cells: FloatArr
         border = np.stack([ends, np.roll(ends, -1, axis=0)], axis=1)
     else:
         across = ({0, 1, 2} - set(view)).pop()
-        border = section(rays.ends_m, rays.triangles, rays.centre_m, across)[:, :, view]
+        border = _section(rays.ends_m, rays.triangles, rays.centre_m, across)[:, :, view]
     ax.add_collection(LineCollection(list(border), colors=_RAYS, linewidths=1.4))
+
+
+def _section(
+    vertices: FloatArray, triangles: Triangles, centre_m: FloatArray, axis: int
+) -> FloatArray:
+    """Return the lines (s, 2, 3) in which a plane across a coordinate axis cuts a surface."""
+    normal = [float(k == axis) for k in range(3)]
+    cut: Callable[..., Any] = trimesh.intersections.mesh_plane
+    return np.asarray(cut(trimesh.Trimesh(vertices, triangles, process=False), normal, centre_m))

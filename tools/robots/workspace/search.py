@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.criterion import Criterion
 from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, WayJob, grid_points, shape_of
@@ -53,8 +53,9 @@ def search(wanted: Search, out: Output) -> Found:
     shape = shape_of(wanted.box, wanted.cells)
     turns = len(wanted.criterion.turns_rad)
     checks = turns * (int(np.prod(shape)) + _CHECKS_A_RAY * wanted.rays)
+    usual = 1 if checks < _WORTH_PROCESSES else len(os.sched_getaffinity(0))
     with (
-        runner(_workers(wanted, checks), wanted.cluster) as run,
+        runner(wanted.workers or usual, wanted.cluster) as run,
         out.progress("poses", checks / _CHECKS_A_SECOND) as advance,
     ):
 
@@ -95,12 +96,6 @@ def _reached(criterion: Criterion, grid: Grid, centre: FloatArray, run: Runner) 
     ]
     depths[held] *= np.concatenate(list(run(jobs)))
     return Grid(grid.box, depths.reshape(grid.depths.shape))
-
-
-def _workers(wanted: Search, checks: int) -> int:
-    if wanted.workers is not None:
-        return wanted.workers
-    return 1 if checks < _WORTH_PROCESSES else len(os.sched_getaffinity(0))
 
 
 def _centre(wanted: Search, grid: Grid) -> FloatArray:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
 from cdpr_profiles import Robot
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.report.style import canvas, decimated, legend_above, legend_beside_title
 from cdpr_tools.trials import limits, line, path, targets

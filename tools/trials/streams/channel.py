@@ -21,11 +21,11 @@ class Network:
 
 
 class Channel:
-    """Holds packets until they arrive; `chance` decides what becomes of each."""
+    """Holds packets until they arrive; `rng` decides what becomes of each."""
 
-    def __init__(self, network: Network, chance: np.random.Generator) -> None:
+    def __init__(self, network: Network, rng: np.random.Generator) -> None:
         self._network = network
-        self._chance = chance
+        self._rng = rng
         self._under_way: list[tuple[float, int, bytes]] = []
         self._numbers = count()
         self._newest = -1
@@ -33,16 +33,16 @@ class Channel:
 
     def send(self, packet: bytes, now_s: float) -> None:
         """Take a packet that is sent now."""
-        network, chance = self._network, self._chance
+        network, rng = self._network, self._rng
         self.sent += 1
-        if chance.random() < network.loss:
+        if rng.random() < network.loss:
             self.lost += 1
             return
-        copies = 1 + (chance.random() < network.duplicates)
+        copies = 1 + (rng.random() < network.duplicates)
         self.doubled += copies - 1
         number = next(self._numbers)
         for _ in range(copies):
-            arrives = now_s + network.delay_s + network.jitter_s * chance.random()
+            arrives = now_s + network.delay_s + network.jitter_s * rng.random()
             heapq.heappush(self._under_way, (arrives, number, packet))
 
     def arrived(self, now_s: float) -> list[bytes]:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.stream_buttons import stream_buttons
 from cdpr_tools.trials.directions import Directions
 from cdpr_tools.trials.evaluation.figures import Figure
@@ -30,15 +30,15 @@ _CLUTCH_S: Final = 0.4
 class RandomHandMotion:
     """A random motion of a hand: waves of some seconds, with flicks, pauses and the clutch.
 
-    Place and phases are drawn from `chance`; it goes as far as `reach` (d,), m or rad, in the
+    Place and phases are drawn from `rng`; it goes as far as `reach` (d,), m or rad, in the
     hand's own space, and at times faster than any robot.
     """
 
-    def __init__(self, chance: np.random.Generator, reach: FloatArray) -> None:
-        self._chance = chance
+    def __init__(self, rng: np.random.Generator, reach: FloatArray) -> None:
+        self._rng = rng
         self._reach = reach
-        self._rates = chance.uniform(0.3, 1.6, (3, reach.size))
-        self._phases = chance.uniform(0.0, math.tau, (3, reach.size))
+        self._rates = rng.uniform(0.3, 1.6, (3, reach.size))
+        self._phases = rng.uniform(0.0, math.tau, (3, reach.size))
         self._shift = np.zeros(reach.size)
         self._until_s = 0.0
         self.mood = "waves"
@@ -51,21 +51,21 @@ class RandomHandMotion:
         return np.asarray(self._reach * (waves + self._shift))
 
     def _change(self, time_s: float) -> None:
-        chance = self._chance
-        self.mood = str(chance.choice(["waves", "flick", "clutch", "silence"]))
+        rng = self._rng
+        self.mood = str(rng.choice(["waves", "flick", "clutch", "silence"]))
         lasts = {"clutch": _CLUTCH_S, "silence": _SILENCE_S}
-        self._until_s = time_s + lasts.get(self.mood, chance.uniform(*_PHASE_S))
+        self._until_s = time_s + lasts.get(self.mood, rng.uniform(*_PHASE_S))
         if self.mood == "flick":
-            self._shift = chance.uniform(-0.5, 0.5, self._shift.size)
+            self._shift = rng.uniform(-0.5, 0.5, self._shift.size)
 
 
 def drive(run: TrialRun, seconds: float) -> None:
     """Lead the platform by a hand at 50 Hz, through the network."""
-    rig, chance = run.rig, run.chance
-    channel, directions = Channel(Network(), chance), run.directions
+    rig, rng = run.rig, run.rng
+    channel, directions = Channel(Network(), rng), run.directions
     reach = 0.5 * (directions.high_m - directions.low_m) / SCALE
     turned = np.full(len(directions.turns), directions.angle_rad)
-    way = RandomHandMotion(chance, np.append(reach, turned))
+    way = RandomHandMotion(rng, np.append(reach, turned))
     hand = rig.stream.sender()
     rig.program("pose", stream=True)
     between = round(1.0 / (RATE_Hz * rig.period_s))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 
 _INVERSE_STEPS = 30
 _INVERSE_END = 1e-12

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.geometry.lens import directions
 from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices, exponentials
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.core.exchange import FloatArray
 
 _STEPS = 8
 _DAMPING = 1e-9

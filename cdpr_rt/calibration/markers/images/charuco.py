@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles.devices.camera import CameraIntrinsics
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import ControlError, InvalidRequestError
 
 _LEAST_CORNERS, _LEAST_VIEWS, _ENOUGH_VIEWS = 8, 5, 15

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.images.edge_fit import fit_corners
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import InvalidRequestError
 
 _DARK, _FLAT = 30.0, 12.0

@@ -9,7 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.motion.approach import stopping_position
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.base import ProgramError
@@ -179,7 +180,7 @@ class PathProgram(PlatformProgram):
         most, here = np.zeros((2, there.size))
         along_velocity(control.velocity, self._parts.acceleration, most)
         stopping_position(control.position, control.velocity, most, here)
-        obstacle = control.infeasibility(there) or control.path_obstacle(there, here)
+        obstacle = control.infeasibility(there) or control.way_infeasibility(there, here)
         if obstacle:
             raise ProgramError(f"path: on the way to where it begins: {obstacle}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 
 TIME, RATE = 0, 1

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.shared_block import PATH
 from cdpr_rt.motion.path.time_scaling import PERIOD_S, TimedPath
 from cdpr_rt.private_files import FILE_MODE, make_private_folder

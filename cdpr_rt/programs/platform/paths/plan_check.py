@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.programs.platform.paths import path_playback as playback
 from cdpr_rt.robots.platform_model import PlatformModel
 

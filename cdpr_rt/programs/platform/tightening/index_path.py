@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
 
 _TURNS = 1.05

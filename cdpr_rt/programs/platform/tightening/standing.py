@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.platform_program import PlatformParts, distance_m
 from cdpr_rt.programs.platform.tightening.standing_tensions import StandingTensions
 from cdpr_rt.robots.interference.interference import in_words
@@ -17,12 +18,34 @@ _TURNED_MORE_rad = math.radians(30.0)
 _MOST_LOOKS = 200
 _CARRIED_SHARE = 0.8
 """Sum of the tensions over the weight, below which the cables do not carry the platform."""
-FALLEN = (
-    "tighten: from: the platform hung when the power was taken, or a drive lost: it has fallen, "
+_FALLEN = (
+    "the platform hung when the power was taken, or a drive lost: it has fallen, "
     "may have turned over, and cables may lie around it. Look at it. Where it stands at home, "
     "upright, all cables free: say from: home"
 )
-FALLEN_ELSEWHERE = "; where it stands so elsewhere: say from: lengths"
+_FALLEN_ELSEWHERE = "; where it stands so elsewhere: say from: lengths"
+
+
+def why_not_from(parts: PlatformParts, source: str, *, said: bool) -> str:
+    """Return why not to take the lengths from a source, an empty text for nothing.
+
+    Where the platform was let go, or fell, somebody has to have `said` where from.
+    """
+    last = parts.last
+    if last.fallen and not said:
+        return _FALLEN + (_FALLEN_ELSEWHERE if parts.known else "")
+    if source == "home" and last.displaced and not said:
+        return (
+            "the platform was let go elsewhere, and where it stands is not known; stand it at "
+            "home, then say from: home"
+        )
+    if source == "lengths" and not parts.known:
+        return "the cables' lengths are not known; allowed: home"
+    if source == "last" and last.lengths is None:
+        return f"no lengths of the last stop: {last.why}"
+    if source == "home" and parts.known and not parts.tight:
+        return why_not_to_wind_in(parts, parts.estimator.estimate.cable_length_m)
+    return ""
 
 
 def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:

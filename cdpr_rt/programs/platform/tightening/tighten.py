@@ -7,26 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray, Setpoint
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.platform.tightening.standing import (
-    FALLEN,
-    FALLEN_ELSEWHERE,
     disagreement,
     hangs,
     why_not_at_home,
+    why_not_from,
     why_not_to_hold,
     why_not_to_pull,
-    why_not_to_wind_in,
     would_move,
 )
 from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
 from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
-from cdpr_rt.robots.last_lengths import StoppedLengths, off_index_m
+from cdpr_rt.robots.last_lengths import StoppedLengths, index_disagreement
 
 TAKE_UP_m_s = 0.05
 """Speed at which slack is taken up."""
@@ -39,6 +38,7 @@ _RISE_1_s = 1.0
 _FALL_S = 0.2
 _STILL_m = 0.0003
 _STILL_S = 0.3
+_HAND_OVER_S = 0.5
 _PULLED = 0.95
 _MOST_m, _ONCE_TIGHT_m = 1.0, 0.05
 _MOST_S = 60.0
@@ -74,7 +74,7 @@ class TightenProgram(PlatformProgram):
         self._from_N, self._to_N = self._pretension_N.copy(), self._pretension_N.copy()
         """Between which the pretension goes over to that for where the platform stands."""
         self._blend = 1.0
-        self._hangs = False
+        self._hangs = self._hands_over = False
         self._checked = AxisFeedback(cable_m.size)
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
@@ -106,7 +106,7 @@ class TightenProgram(PlatformProgram):
         self._stopping = self._at_rest = False
         self._source = self._default_source()
         self._pretension_N[:] = self._from_N[:] = self._to_N[:] = self._home_pretension_N
-        self._blend, self._hangs = 1.0, False
+        self._blend, self._hangs, self._hands_over = 1.0, False, False
         self._last = None
         self._stage = self._still = self._cycles = 0
         if parts.tight:
@@ -129,6 +129,9 @@ class TightenProgram(PlatformProgram):
             super().update(feedback, setpoint, torque_Nm)
             self._at_rest = self._at_rest and (self._stopping or self._arrival.over)
             return
+        if self._hands_over:
+            self._let_go(feedback, setpoint, torque_Nm)
+            return
         goal = 0.0 if self._stopping else _STAGES[self._stage][1]
         step = self._parts.period_s * (1.0 / _FALL_S if self._stopping else _RISE_1_s)
         self._share += min(max(goal - self._share, -step), step)
@@ -142,14 +145,15 @@ class TightenProgram(PlatformProgram):
         if self._stopping:
             self._at_rest = self._share == 0.0
         elif self._stands_still(feedback, self._share == goal and self._blend == 1.0):
-            self._next_stage(feedback, setpoint, torque_Nm)
+            self._next_stage(feedback, torque_Nm)
         else:
             self._fail_if(self._trouble(feedback))
 
     def progress(self) -> dict[str, Any]:
         """Return the stage, the cables' tensions, and what went wrong."""
         tight = self._parts.tight
-        stage = _STAGES[self._stage][0] if not tight else "index" if self._path else "held"
+        held = tight or self._hands_over
+        stage = _STAGES[self._stage][0] if not held else "index" if self._path else "held"
         done = tight and self._at_rest
         state = {"stage": stage, "tight": tight, "done": float(done), "trouble": self._failure}
         if tight:
@@ -166,25 +170,12 @@ class TightenProgram(PlatformProgram):
         CommandArguments(self.name, arguments, ("from",))
         if arguments and self._parts.tight:
             raise ProgramError("tighten: from: the cables are tight already; lower it first")
-        source, last = arguments.get("from", self._default_source()), self._parts.last
+        source = arguments.get("from", self._default_source())
         if source not in _SOURCES:
             allowed = ", ".join(_SOURCES)
             raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
-        if last.fallen and not arguments:
-            raise ProgramError(FALLEN + (FALLEN_ELSEWHERE if self._parts.known else ""))
-        if source == "home" and last.displaced and not arguments:
-            raise ProgramError(
-                "tighten: from: the platform was let go elsewhere, and where it stands is not "
-                "known; stand it at home, then say from: home"
-            )
-        if source == "lengths" and not self._parts.known:
-            raise ProgramError("tighten: from: the cables' lengths are not known; allowed: home")
-        if source == "last" and last.lengths is None:
-            raise ProgramError(f"tighten: from: no lengths of the last stop: {last.why}")
-        if source == "home" and self._parts.known and not self._parts.tight:
-            length_m = self._parts.estimator.estimate.cable_length_m
-            if why := why_not_to_wind_in(self._parts, length_m):
-                raise ProgramError(f"tighten: from: {why}")
+        if why := why_not_from(self._parts, source, said=bool(arguments)):
+            raise ProgramError(f"tighten: from: {why}")
         return str(source), source != "home" and self._is_to_hold(source)
 
     def _is_to_hold(self, source: str) -> bool:
@@ -193,7 +184,7 @@ class TightenProgram(PlatformProgram):
         The control's estimate is of no use to others while cables may be slack: it is taken anew.
         """
         parts, now = self._parts, self._checked
-        if parts.tight or not hangs(parts):
+        if parts.tight or self._hands_over or not hangs(parts):
             return False
         now.position_rad[:] = parts.estimator.position_rad
         length_m = self._lengths_before(source, now)
@@ -214,6 +205,8 @@ class TightenProgram(PlatformProgram):
         self._control.observe(feedback)
         self._take_last()
         self._home_rad[:] = np.nan
+        self._take_over(feedback, torque_Nm)
+        self._control.stand_still()
         self._finish(feedback, setpoint, torque_Nm)
 
     # -- taking up slack
@@ -228,14 +221,12 @@ class TightenProgram(PlatformProgram):
         self._still += 1
         return self._still * self._parts.period_s > _STILL_S
 
-    def _next_stage(
-        self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray
-    ) -> None:
+    def _next_stage(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         self._still = 0
         if self._stage == 0:
             self._start_rad[:] = feedback.position_rad
         if self._stage + 1 == len(_STAGES):
-            self._end_tight(feedback, setpoint, torque_Nm)
+            self._end_tight(feedback, torque_Nm)
             return
         self._fail_if(self._why_not_to_pull(feedback))
         if self._failure:
@@ -244,13 +235,26 @@ class TightenProgram(PlatformProgram):
             self._rising_rad[:] = feedback.position_rad
         self._stage += 1
 
-    def _end_tight(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+    def _end_tight(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Take the lengths, and hold the platform where they have it, unless they disagree."""
         self._take_last()
         self._control.take_lengths(self._lengths(feedback), feedback)
         self._control.begin(feedback)
         self._fail_if(disagreement(self._parts))
         if not self._failure:
+            self._take_over(feedback, torque_Nm)
+            self._hands_over, self._path = True, []
+
+    def _let_go(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        """Blend out what the platform is pressed on its stand with; then it may be moved.
+
+        Meanwhile its cables are stretched otherwise than the control has it, so that the set-point
+        stands wherever the control finds the platform: it is not pushed against its stand.
+        """
+        self._control.stand_still(on_stand=True)
+        self._loop.update(feedback, setpoint, torque_Nm)
+        self._still += 1
+        if self._still * self._parts.period_s > _HAND_OVER_S:
             self._finish(feedback, setpoint, torque_Nm)
 
     def _take_last(self) -> None:
@@ -293,15 +297,21 @@ class TightenProgram(PlatformProgram):
         hysteresis = self._cable * (feedback.position_rad - self._home_rad)
         return np.asarray(self._control.lengths_at_home(self._home_N) + hysteresis)
 
-    def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
-        parts, control = self._parts, self._control
-        parts.estimator.set_lengths(feedback.position_rad, control.free_lengths_m)
-        control.stand_still()
+    def _take_over(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
+        """Begin to have the platform's control ask for the torques, from those of this cycle on."""
+        parts = self._parts
+        parts.estimator.set_lengths(feedback.position_rad, self._control.free_lengths_m)
         parts.loop.take_over(feedback, torque_Nm)
-        parts.cycle = feedback.cycle
-        parts.tight, parts.last.displaced, parts.last.fallen = True, False, False
+        parts.last.displaced = parts.last.fallen = False
+
+    def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
+        stopping, self._hands_over = self._stopping, False
+        self._parts.cycle, self._parts.tight = feedback.cycle, True
         super().start(feedback, setpoint, torque_Nm)
-        self._look_for_indices()
+        if stopping:
+            self.stop()
+        else:
+            self._look_for_indices()
 
     def _trouble(self, feedback: AxisFeedback) -> str:
         moved_m = np.abs((feedback.position_rad - self._start_rad) * self._cable)
@@ -379,16 +389,10 @@ class TightenProgram(PlatformProgram):
 
     def _compare_indices(self) -> str:
         """Return which index contradicts the lengths of the last stop, or an empty text."""
-        last = self._last
-        if last is None:
+        if self._last is None:
             return ""
-        length_m = self._parts.estimator.estimate.cable_length_m
-        off = np.abs(off_index_m(last, length_m, self._feedback, self._cable))
-        off[np.isnan(off)] = 0.0
-        worst, allowed_m = int(off.argmax()), self._parts.lengths_allowed_m
-        if off[worst] <= allowed_m:
-            return ""
-        return (
-            f"cable {worst + 1}: its motor's index is {1e3 * off[worst]:.0f} mm from where the "
-            f"last stop has it, {1e3 * allowed_m:.0f} mm allowed: lower, and tighten from home"
+        length_m, allowed_m = (
+            self._parts.estimator.estimate.cable_length_m,
+            self._parts.lengths_allowed_m,
         )
+        return index_disagreement(self._last, length_m, self._feedback, self._cable, allowed_m)

@@ -54,6 +54,10 @@ class Room:
         self, marker: int, off_m: tuple[float, float, float], when: Callable[[int], bool]
     ) -> Room:
         """Return the room in which a marker is elsewhere in some images, by their numbers."""
+        return self.with_corners_off(marker, np.tile(off_m, (4, 1)), when)
+
+    def with_corners_off(self, marker: int, off_m: np.ndarray, when: Callable[[int], bool]) -> Room:
+        """Return the room in which each corner of a marker, (4, 3), is elsewhere in some images."""
         k, corners = self.seen.ids.index(marker), self.seen.corners_px.copy()
         map_ = self.truth
         for row in np.flatnonzero(self.seen.marker == k):

@@ -18,9 +18,8 @@ from cdpr_sim_bus.camera.camera_plant import (
     MountPlant,
     PrintPlant,
 )
-from cdpr_sim_bus.camera.lens import seen_at
 from cdpr_sim_bus.camera.random_poses import Box, random_poses
-from cdpr_sim_bus.camera.sim_camera import SimCamera
+from cdpr_sim_bus.camera.sim_camera import SimCamera, seen_at
 
 LENS = LensPlant(
     width_px=480, height_px=384, focal_px=(415.0, 416.0), centre_px=(242.0, 189.0), blur_px=0.6

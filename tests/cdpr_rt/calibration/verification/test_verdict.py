@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
+from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.error_model import Noise, predicted_errors, simulated_errors
 from cdpr_rt.calibration.estimation.faults import fit_without_faults
 from cdpr_rt.calibration.estimation.fit import fit
-from cdpr_rt.calibration.outcome import calibrate, calibration_of
+from cdpr_rt.calibration.outcome import calibration_of
 from cdpr_rt.calibration.verification.verdict import open_directions, predicted_std, require_enough
 from cdpr_rt.calibration.verification.verification import verify
 from cdpr_rt.errors import InvalidRequestError
@@ -147,6 +148,26 @@ def test_a_calibration_is_verified_on_other_poses_and_becomes_a_file() -> None:
     words = "\n".join(outcome.verdict())
     assert "verified on" in words
     assert "3 sigma" in words
+
+
+@pytest.mark.parametrize("robot", ["planar-3", "spatial-8"])
+def test_changes_that_noise_explains_are_not_significant(robot: str) -> None:
+    chances = []
+    for seed in range(4):
+        right = made_up(
+            *(robot, 45, seed), exit_m=0.0, drum=0.0, elongation=0.0, offset_m=0.0, noise_m=3e-4,
+            home_first=True,
+        )  # fmt: skip
+        outcome = calibrate(load_robot(robot), right.file, measured(right, 1e-3, 2e-3, 8), "points")
+        assert outcome.good, outcome.objections()
+        chances.append(outcome.change.chance)
+        if not outcome.change.significant:
+            assert "may be right already" in "\n".join(outcome.verdict())
+    print(chances)
+    assert min(chances) > 0.001 and np.mean(chances) > 0.1  # 0.5 on the average
+    wrong = made_up(robot, 45, 1, exit_m=0.003, drum=0.001, offset_m=0.0, noise_m=3e-4)
+    outcome = calibrate(load_robot(robot), wrong.file, measured(wrong, 1e-3, 2e-3, 8), "points")
+    assert outcome.change.significant and outcome.insignificance() is None
 
 
 def test_a_slip_next_to_a_pose_held_out_counts_on_neither_side_there() -> None:

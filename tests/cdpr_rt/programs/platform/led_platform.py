@@ -54,8 +54,7 @@ class LedPlatform(SteppedPlatform):
         self.parts.cycle = -2
         self.parts.tight = True
         self.program.start(self.feedback, self.setpoint, self.torque)
-        self.control.position[:] = middle
-        self.control._shape_anew()
+        self.control.setpoint.stand_at(middle)
         self.program.command({})
         self.stretch_rad = np.zeros(3)
         self.path = [self.control.position.copy()]

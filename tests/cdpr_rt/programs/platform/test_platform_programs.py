@@ -94,6 +94,56 @@ def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
     assert np.abs(np.diff(asked_N, axis=0)).max() < fastest_N_s * PERIOD_S
 
 
+def handing_over(robot: Standing) -> Standing:
+    """Tighten up to where what presses on the stand is let go."""
+    robot.switch("tighten")
+    for _ in range(2000):
+        robot.run(0.01)
+        if robot.program.progress()["stage"] == "held":
+            assert not robot.parts.tight
+            return robot
+    raise AssertionError("not tight")
+
+
+def test_it_is_not_moved_before_it_is_let_go(robot: Standing):
+    handing_over(robot)
+    with pytest.raises(ProgramError, match="the cables are not tight; run tighten first"):
+        robot.programs["pose"].check({"stream": True})
+    steps_Nm = []
+    while not robot.parts.tight:
+        before_Nm = robot.torque.copy()
+        robot.run(PERIOD_S)
+        steps_Nm.append(np.abs(robot.torque - before_Nm).max())
+    assert 0.4 < len(steps_Nm) * PERIOD_S < 0.6
+    assert max(steps_Nm) < 0.1
+    here = robot.parts.control
+    assert here.position == pytest.approx(here.estimated, abs=1e-4)
+    assert robot.until_done(10.0)["done"]
+
+
+def test_a_stop_meanwhile_ends_on_tight_cables(robot: Standing):
+    handing_over(robot)
+    robot.program.stop()
+    robot.run(0.7)
+    assert robot.program.at_rest
+    assert robot.parts.tight
+
+
+@pytest.mark.parametrize("name", ["hold", "lower", "tighten"])
+def test_other_programs_meanwhile_go_on_without_a_step(robot: Standing, name: str):
+    handing_over(robot)
+    before_Nm, lengths_m = robot.torque.copy(), robot.estimator.estimate.cable_length_m.copy()
+    robot.switch(name)
+    robot.run(0.003)
+    assert robot.torque == pytest.approx(before_Nm, abs=0.15)
+    assert robot.estimator.estimate.cable_length_m == pytest.approx(lengths_m, abs=1e-3)
+    robot.run(12.0)
+    assert robot.parts.tight == (name == "tighten")
+    if name == "lower":
+        assert robot.program.at_rest
+        assert not robot.torque.any()
+
+
 def test_a_cable_that_ends_nowhere_is_told_and_all_are_let_go(robot: Standing):
     robot.slack_m[1] = 5.0
     robot.switch("tighten")

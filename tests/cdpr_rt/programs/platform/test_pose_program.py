@@ -160,7 +160,7 @@ def test_a_place_in_the_box_that_tensions_cannot_hold_is_refused_with_the_reason
     wide.check_motion()
     assert "N outside" in wide.program.progress()["held_back"]
     assert wide.control.velocity == pytest.approx(np.zeros(2), abs=1e-6)
-    assert all(wide.control.stands(place) for place in wide.path)
+    assert all(wide.control.is_feasible(place) for place in wide.path)
     wide.lead(hand[::-1])  # it does not stay caught there
     assert wide.control.position[0] < 0.5 * max(place[0] for place in wide.path)
 
@@ -173,7 +173,7 @@ def test_what_no_tensions_hold_is_not_entered_on_the_way_either_and_that_is_told
     assert wide.program._aim is not None
     wide.program._aim[:] = 1.7, 0.8
     wide.run(6.0)
-    assert all(wide.control.stands(place) for place in wide.path)
+    assert all(wide.control.is_feasible(place) for place in wide.path)
     assert wide.control.velocity == pytest.approx(np.zeros(2), abs=1e-9)
     wide.check_motion()
     told = wide.program.progress()
@@ -190,7 +190,7 @@ def on_the_border(robot: LedPlatform, angle: float) -> np.ndarray:
     held, not_held = 0.0, 1.0
     for _ in range(25):
         share = 0.5 * (held + not_held)
-        if robot.control.stands(middle + share * way):
+        if robot.control.is_feasible(middle + share * way):
             held = share
         else:
             not_held = share
@@ -207,7 +207,7 @@ def test_a_way_between_places_on_the_border_is_gone_to_its_end(
     wide.until_rest()
     wide.check_motion()
     assert wide.control.position == pytest.approx(target, abs=1e-9)
-    assert all(wide.control.stands(place) for place in wide.path)
+    assert all(wide.control.is_feasible(place) for place in wide.path)
 
 
 def test_a_platform_let_down_where_no_tensions_hold_it_is_taken_out_of_there_again(
@@ -216,7 +216,7 @@ def test_a_platform_let_down_where_no_tensions_hold_it_is_taken_out_of_there_aga
     wide.run(0.1)
     stand = np.array([0.0, 2.7])
     wide.restart(stand)
-    assert not wide.control.stands(stand)
+    assert not wide.control.is_feasible(stand)
     wide.program.command({"position_m": [0.0, 1.8]})
     wide.until_rest()
     assert wide.control.position == pytest.approx([0.0, 1.8])
@@ -231,7 +231,7 @@ def test_a_new_target_in_motion_along_the_border_is_reached(wide: LedPlatform) -
     wide.until_rest()
     wide.check_motion()
     assert wide.control.position == pytest.approx(target, abs=1e-9)
-    assert all(wide.control.stands(place) for place in wide.path)
+    assert all(wide.control.is_feasible(place) for place in wide.path)
 
 
 def test_resume_goes_on_to_the_target_that_was_left(robot: LedPlatform) -> None:

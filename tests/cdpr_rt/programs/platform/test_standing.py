@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.exchange import AxisFeedback, FloatArray
+from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.tightening.standing import (

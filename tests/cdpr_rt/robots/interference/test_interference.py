@@ -15,7 +15,7 @@ from cdpr_rt.robots.interference.interference import Interference, in_words
 from cdpr_rt.robots.kinematics.kinematics import SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
-from cdpr_tools.bench.poses.brute_contact import BruteRobot
+from cdpr_tools.bench.poses.brute import BruteRobot
 
 PLACES = 500
 

@@ -12,7 +12,6 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.interface import Kinematics
 from cdpr_rt.robots.kinematics.cable_model import CableModel
 from cdpr_rt.robots.kinematics.kinematics import (
     PLANAR,
@@ -269,7 +268,7 @@ def test_what_cannot_be_found_says_so() -> None:
 
 
 def test_it_is_what_the_controller_asks_of_a_robot() -> None:
-    robot: Kinematics = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
+    robot = CableKinematics(SPATIAL_8.exit_points_m, SPATIAL_8.anchor_points_m)
     assert robot.n == 8
     assert robot.directions == SPATIAL
 

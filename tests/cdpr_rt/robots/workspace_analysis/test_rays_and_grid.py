@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import platform_model, platform_model_of
 from cdpr_rt.robots.statics import Box
 from cdpr_rt.robots.workspace_analysis.criterion import Criterion, criterion_of, turns_within

@@ -10,7 +10,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_rt.core.exchange import FloatArray
+from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.workspace_analysis.surface import area, isosurface, volume
 
 

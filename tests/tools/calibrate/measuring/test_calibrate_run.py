@@ -14,13 +14,13 @@ from cdpr_drivers.camera.camera import CameraError
 from cdpr_profiles import load_robot
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
 from cdpr_profiles.errors import ProfileError
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.estimation.residuals import lengths_told
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.calibration.outcome import calibrate
 from cdpr_rt.calibration.readings.camera_data import CameraSetup
 from cdpr_rt.calibration.readings.data import CalibrationData, load_data
-from cdpr_rt.core.exchange import FloatArray
 from cdpr_rt.errors import TripError
 from cdpr_rt.procedures.calibration.measure_poses import (
     SETTLE_S,

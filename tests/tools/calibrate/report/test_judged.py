@@ -11,7 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
-from cdpr_rt.calibration.outcome import Outcome, calibrate
+from cdpr_rt.calibration.calibrate import calibrate
+from cdpr_rt.calibration.outcome import Outcome
 from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
 from cdpr_tools.calibrate.report import judged as judging
 from cdpr_tools.calibrate.report.judged import Judged, judged

@@ -1,0 +1,336 @@
+"""Jitter buffer of the pose stream: samples put in order, and played with an adaptive delay.
+
+Times are in seconds: `NOW` and `ARRIVED` by the cycles, the others by the sender's clock since the
+first sample.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.shared_block import SAMPLES
+from cdpr_rt.jit import jit
+
+IntArray = NDArray[np.int64]
+
+QUEUE_LENGTH = 64
+"""The most samples that wait to be played."""
+SCALE, BUTTONS, COLUMNS = 7, 8, 9
+"""Columns of a row, after the pose: x y z, quaternion w x y z."""
+PLAYED, ARRIVED, NOW, EARLIEST, EARLIEST_BEFORE = range(5)
+_LATEST, _LATEST_BEFORE, _WINDOW_START, _SENDER_ZERO, _INTERVAL = range(5, 10)
+SCALARS = 10
+"""Places in `scalars`: time played, arrival of the newest sample, the cycle's time, shortest and
+longest transits of this window and the one before, its start, the sender's zero, the interval
+between samples."""
+SIZE, SESSION, EPOCH, _PLAYED_UP_TO, _HIGHEST = range(5)
+ACCEPTED, REPEATED, LATE, REFUSED, MISSING, OVERRUN, OTHER_RIGHT = range(5, 12)
+COUNTS = 12
+"""Places in `counts`: samples that wait, the session, starts of the stream, the sequence numbers
+played and seen, and samples by outcome."""
+STOPPED, HELD, FRESH = range(3)
+
+_WINDOW_S = 2.0
+_SHORTEST_INTERVAL_S, _FIRST_INTERVAL_S, _LONGEST_INTERVAL_S = 0.002, 1.0 / 30.0, 0.1
+_INTERVAL_WEIGHT = 0.1
+_INTERVALS_WAITED = 1.5
+_LONGEST_DELAY_S = 0.3
+_CATCH_UP_S = 0.1
+_SLOWEST, _QUICKEST = 0.8, 2.0
+_LARGEST_STEP_OF_CLOCK_S = 1.0
+_NORM_TOLERANCE = 0.1
+_LARGEST_SCALE = 1000.0
+_NEARLY_PARALLEL = 1.0 - 1e-9
+
+
+@jit
+def _begin(
+    now: float,
+    sent_s: float,
+    sequence: int,
+    session: int,
+    row: FloatArray,
+    played: FloatArray,
+    scalars: FloatArray,
+    counts: IntArray,
+) -> None:
+    """Start the stream with one sample; it is played after a first delay."""
+    scalars[_SENDER_ZERO] = sent_s
+    scalars[_INTERVAL] = _FIRST_INTERVAL_S
+    scalars[_WINDOW_START] = now
+    scalars[EARLIEST] = scalars[EARLIEST_BEFORE] = now
+    scalars[_LATEST] = scalars[_LATEST_BEFORE] = now
+    scalars[PLAYED] = -_INTERVALS_WAITED * _FIRST_INTERVAL_S
+    played[:] = row
+    counts[SIZE] = 0
+    counts[SESSION] = session
+    counts[_PLAYED_UP_TO] = sequence - 1
+    counts[_HIGHEST] = sequence
+    counts[EPOCH] += 1
+
+
+@jit
+def _valid(row: FloatArray) -> bool:
+    """Return whether a sample is valid; its quaternion is normalised."""
+    norm = 0.0
+    for i in range(BUTTONS):
+        if not math.isfinite(row[i]):
+            return False
+    for i in range(3, 7):
+        norm += row[i] * row[i]
+    norm = math.sqrt(norm)
+    if abs(norm - 1.0) > _NORM_TOLERANCE or not 0.0 <= row[SCALE] <= _LARGEST_SCALE:
+        return False
+    for i in range(3, 7):
+        row[i] /= norm
+    return True
+
+
+@jit
+def _insertion_index(sequence: int, sequences: IntArray, size: int) -> int:
+    """Return the place of a sample in the queue, -1 where it is a repetition."""
+    place = size
+    while place > 0 and sequences[place - 1] >= sequence:
+        place -= 1
+    return -1 if place < size and sequences[place] == sequence else place
+
+
+@jit
+def _continues(
+    place: int,
+    sent: float,
+    row: FloatArray,
+    most_m_s: float,
+    most_rad_s: float,
+    played: FloatArray,
+    times: FloatArray,
+    rows: FloatArray,
+    scalars: FloatArray,
+    counts: IntArray,
+) -> bool:
+    """Return whether clock and pose continue those of the sample before."""
+    before, last = scalars[PLAYED], played
+    if place > 0:
+        before, last = times[place - 1], rows[place - 1]
+    earliest = min(scalars[EARLIEST], scalars[EARLIEST_BEFORE])
+    transit = scalars[NOW] - sent
+    if sent <= before or abs(transit - earliest) > _LARGEST_STEP_OF_CLOCK_S:
+        return False
+    if place < counts[SIZE] and sent >= times[place]:
+        return False
+    squared, along = 0.0, 0.0
+    for i in range(3):
+        squared += (row[i] - last[i]) ** 2
+    for i in range(3, 7):
+        along += row[i] * last[i]
+    passed = max(sent - before, _SHORTEST_INTERVAL_S)
+    turned = 2.0 * math.acos(min(abs(along), 1.0))
+    return bool(math.sqrt(squared) <= most_m_s * passed and turned <= most_rad_s * passed)
+
+
+@jit
+def _update_transit(transit: float, scalars: FloatArray) -> None:
+    """Update the extreme transits, by late samples too, lest all that follow are late."""
+    now = scalars[NOW]
+    if now - scalars[_WINDOW_START] > _WINDOW_S:
+        scalars[_WINDOW_START] = now
+        scalars[EARLIEST_BEFORE] = scalars[EARLIEST]
+        scalars[_LATEST_BEFORE] = scalars[_LATEST]
+        scalars[EARLIEST] = scalars[_LATEST] = transit
+    scalars[EARLIEST] = min(scalars[EARLIEST], transit)
+    scalars[_LATEST] = max(scalars[_LATEST], transit)
+
+
+@jit
+def _insert(
+    place: int,
+    sent: float,
+    sequence: int,
+    row: FloatArray,
+    times: FloatArray,
+    sequences: IntArray,
+    rows: FloatArray,
+    scalars: FloatArray,
+    counts: IntArray,
+) -> None:
+    """Insert a sample into the queue, and update interval and transits."""
+    size, now = counts[SIZE], scalars[NOW]
+    if place == size and size > 0:
+        interval = (sent - times[size - 1]) / (sequence - sequences[size - 1])
+        interval = min(max(interval, _SHORTEST_INTERVAL_S), _LONGEST_INTERVAL_S)
+        scalars[_INTERVAL] += _INTERVAL_WEIGHT * (interval - scalars[_INTERVAL])
+    for k in range(size, place, -1):
+        times[k] = times[k - 1]
+        sequences[k] = sequences[k - 1]
+        rows[k] = rows[k - 1]
+    times[place] = sent
+    sequences[place] = sequence
+    rows[place] = row
+    counts[SIZE] = size + 1
+    ahead = sequence - counts[_HIGHEST]
+    counts[MISSING] += ahead - 1 if ahead > 0 else -1 if ahead < 0 else 0
+    counts[_HIGHEST] = max(counts[_HIGHEST], sequence)
+    counts[ACCEPTED] += 1
+    scalars[ARRIVED] = now
+    _update_transit(now - sent, scalars)
+
+
+@jit
+def _accept(
+    sequence: int,
+    session: int,
+    sent_s: float,
+    row: FloatArray,
+    most_m_s: float,
+    most_rad_s: float,
+    stopped: bool,
+    played: FloatArray,
+    times: FloatArray,
+    sequences: IntArray,
+    rows: FloatArray,
+    scalars: FloatArray,
+    counts: IntArray,
+) -> None:
+    """Accept one sample, or count why it is refused."""
+    if not _valid(row):
+        counts[REFUSED] += 1
+        return
+    known = session == counts[SESSION]
+    sent = sent_s - scalars[_SENDER_ZERO]
+    transit = scalars[NOW] - sent
+    if known and sequence <= counts[_PLAYED_UP_TO]:
+        counts[LATE] += 1
+        if transit - scalars[EARLIEST] < _LONGEST_DELAY_S:
+            _update_transit(transit, scalars)
+        return
+    place = _insertion_index(sequence, sequences, counts[SIZE]) if known else 0
+    if place == -1:
+        counts[REPEATED] += 1
+        return
+    steady = known and not stopped
+    if steady and not _continues(
+        place, sent, row, most_m_s, most_rad_s, played, times, rows, scalars, counts
+    ):
+        if sequence < counts[_HIGHEST]:
+            counts[LATE] += 1
+            return
+        steady = False
+    if steady and counts[SIZE] == QUEUE_LENGTH:
+        counts[REFUSED] += 1
+        return
+    if not steady:
+        _begin(scalars[NOW], sent_s, sequence, session, row, played, scalars, counts)
+        place, sent = 0, 0.0
+    _insert(place, sent, sequence, row, times, sequences, rows, scalars, counts)
+
+
+@jit
+def receive(
+    first: int,
+    last: int,
+    sequence: IntArray,
+    session: NDArray[np.uint32],
+    right: IntArray,
+    sent_ns: IntArray,
+    position: FloatArray,
+    quaternion: FloatArray,
+    scale: FloatArray,
+    buttons: NDArray[np.uint32],
+    mover: int,
+    most_m_s: float,
+    most_rad_s: float,
+    silence_s: float,
+    row: FloatArray,
+    played: FloatArray,
+    times: FloatArray,
+    sequences: IntArray,
+    rows: FloatArray,
+    scalars: FloatArray,
+    counts: IntArray,
+) -> None:
+    """Take the posted samples numbered from `first` up to `last`.
+
+    Those of another grant of the right to move than `mover` are only counted.
+    """
+    for k in range(first, last):
+        slot = k % SAMPLES
+        if right[slot] != mover:
+            counts[OTHER_RIGHT] += 1
+            continue
+        for i in range(3):
+            row[i] = position[slot, i]
+        for i in range(4):
+            row[3 + i] = quaternion[slot, i]
+        row[SCALE] = scale[slot]
+        row[BUTTONS] = buttons[slot]
+        _accept(
+            sequence[slot], session[slot], 1e-9 * np.float64(sent_ns[slot]), row, most_m_s,
+            most_rad_s, scalars[NOW] - scalars[ARRIVED] > silence_s, played, times, sequences,
+            rows, scalars, counts,
+        )  # fmt: skip
+
+
+@jit
+def _slerp(part: float, towards: FloatArray, quaternion: FloatArray) -> None:
+    """Interpolate a unit quaternion towards another, spherically and linearly, in place."""
+    along = 0.0
+    for i in range(4):
+        along += quaternion[i] * towards[i]
+    sign = 1.0 if along >= 0.0 else -1.0
+    here, there = 1.0 - part, sign * part
+    if sign * along < _NEARLY_PARALLEL:
+        angle = math.acos(min(sign * along, 1.0))
+        here = math.sin((1.0 - part) * angle) / math.sin(angle)
+        there = sign * math.sin(part * angle) / math.sin(angle)
+    norm = 0.0
+    for i in range(4):
+        quaternion[i] = here * quaternion[i] + there * towards[i]
+        norm += quaternion[i] * quaternion[i]
+    norm = math.sqrt(norm)
+    for i in range(4):
+        quaternion[i] /= norm
+
+
+@jit
+def play(
+    period: float,
+    silence_s: float,
+    played: FloatArray,
+    times: FloatArray,
+    sequences: IntArray,
+    rows: FloatArray,
+    scalars: FloatArray,
+    counts: IntArray,
+) -> int:
+    """Advance the playback by a cycle, at most to the newest sample; return the state."""
+    earliest = min(scalars[EARLIEST], scalars[EARLIEST_BEFORE])
+    latest = max(scalars[_LATEST], scalars[_LATEST_BEFORE])
+    delay = min(latest - earliest + _INTERVALS_WAITED * scalars[_INTERVAL], _LONGEST_DELAY_S)
+    behind = scalars[NOW] - earliest - delay - scalars[PLAYED] - period
+    pace = min(max(1.0 + behind / _CATCH_UP_S, _SLOWEST), _QUICKEST)
+    until = scalars[PLAYED] + pace * period
+    passed = 0
+    while passed < counts[SIZE] and times[passed] <= until:
+        passed += 1
+    if passed > 0:
+        played[:] = rows[passed - 1]
+        scalars[PLAYED] = times[passed - 1]
+        counts[_PLAYED_UP_TO] = sequences[passed - 1]
+        counts[SIZE] -= passed
+        for k in range(counts[SIZE]):
+            times[k] = times[k + passed]
+            sequences[k] = sequences[k + passed]
+            rows[k] = rows[k + passed]
+    if counts[SIZE] > 0:
+        part = (until - scalars[PLAYED]) / (times[0] - scalars[PLAYED])
+        for i in range(3):
+            played[i] += part * (rows[0, i] - played[i])
+        _slerp(part, rows[0, 3:7], played[3:7])
+        scalars[PLAYED] = until
+    if scalars[NOW] - scalars[ARRIVED] > silence_s:
+        return STOPPED
+    return FRESH if counts[SIZE] > 0 else HELD

@@ -1,1 +1,0 @@
-"""Bench of path planning: a large file as CAM writes it, beside what else would plan it."""

@@ -1,1 +1,0 @@
-"""`cdpr bench` of buses, cycles and the loop."""

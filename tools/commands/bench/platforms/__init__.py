@@ -1,1 +1,0 @@
-"""`cdpr bench` of platforms: kinematics, tensions, control, paths, workspace."""

@@ -1,0 +1,327 @@
+"""`cdpr bus`: look at a CAN bus: who is there, what is said, whether it fits."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cdpr_drivers.bus import BusUrl, Filters
+from cdpr_drivers.bus.budget import BusBudget, machine_budget
+from cdpr_drivers.errors import BusError
+from cdpr_drivers.robot.bus_fit import refusal
+from cdpr_profiles import DriveProfile, load_winch_or_robot
+from cdpr_tools.busview.identifiers import filters, parse_identifiers, parse_node_ids
+from cdpr_tools.busview.known import known_bus
+from cdpr_tools.busview.monitor import LineWriter, LogFile, Summary, Viewer, watch
+from cdpr_tools.busview.replay import BLOCK, Pacer, Sender, check, filtered, play, read_frames
+from cdpr_tools.busview.scan import (
+    LISTEN_S,
+    Scan,
+    drive_profiles,
+    entry,
+    lines,
+    responding,
+    signs_of_a_master,
+)
+from cdpr_tools.busview.source import SimbusSource, open_source, running_bus
+from cdpr_tools.commands.options import JsonOption, YesOption
+from cdpr_tools.consent import require_consent
+from cdpr_tools.errors import BAD_INPUT, WorkFailedError
+from cdpr_tools.output import Output
+from cdpr_tools.signals import stop_on_signals
+
+app = typer.Typer(name="bus", help="Look at a CAN bus.", no_args_is_help=True)
+
+_LATE_S = 0.05
+"""For how long frames that the bus has counted may be under way to us."""
+
+
+_ProfileOption = Annotated[
+    str | None, typer.Option("--profile", help="Decode every node as this drive.", metavar="DRIVE")
+]
+_WinchOption = Annotated[
+    str | None, typer.Option("--winch", help="Decode the node of this winch, with its ratings.")
+]
+_RobotOption = Annotated[
+    str | None,
+    typer.Option("--robot", help="Decode this robot's nodes; ROBOT:BUS for one of its buses."),
+]
+_IdsOption = Annotated[
+    str | None,
+    typer.Option("--ids", help="Only these identifiers, hexadecimal: 181,700-77F", metavar="IDS"),
+]
+_RawOption = Annotated[bool, typer.Option("--raw", help="Print candump lines, undecoded.")]
+
+
+@app.command()
+def monitor(
+    bus: Annotated[
+        str, typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
+    ],
+    profile: _ProfileOption = None,
+    winch: _WinchOption = None,
+    robot: _RobotOption = None,
+    ids: _IdsOption = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="Log all frames to this file, in candump format.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.1, help="End after this many seconds.")
+    ] = None,
+    raw: _RawOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what is said on a bus, decoded, until Ctrl-C; only listens."""
+    out = Output(as_json)
+    url = running_bus(bus)
+    known = known_bus(url, profile, winch, robot)
+    summary = Summary(known.bitrate_bit_s)
+    with ExitStack() as stack:
+        stack.callback(_show, out, summary)
+        lines = stack.enter_context(LineWriter(sys.stderr if as_json else sys.stdout))
+        viewer = Viewer(known.decoder(), summary, lines, raw=raw)
+        source = open_source(url, _filters(ids))
+        stack.callback(source.close)
+        file = None if log is None else stack.enter_context(LogFile(log))
+        stop_wanted = stack.enter_context(stop_on_signals())
+        watch(source, viewer, file, seconds, stop_wanted)
+        if isinstance(source, SimbusSource):
+            _ask_bus(source, summary)
+    if source.lost is not None:
+        raise source.lost
+    if not summary.frames:
+        out.note("nothing was heard")
+    out.result({"ok": True, "bus": str(url), "log": log, **summary.table()})
+
+
+@app.command()
+def replay(
+    file: Annotated[
+        Path, typer.Argument(help="Log of candump, or another that python-can reads; - for stdin.")
+    ],
+    profile: _ProfileOption = None,
+    winch: _WinchOption = None,
+    robot: _RobotOption = None,
+    ids: _IdsOption = None,
+    channel: Annotated[
+        str | None, typer.Option("--channel", help="Which bus, where the file holds several.")
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed",
+            min=0.001,
+            help="Speed factor of the replay; by default 1 with --to, else without waiting.",
+        ),
+    ] = None,
+    to: Annotated[
+        str | None, typer.Option("--to", help="Also send all of it to this bus.", metavar="URL")
+    ] = None,
+    raw: _RawOption = False,
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a recorded session as the monitor does, or send it to a bus again."""
+    out = Output(as_json)
+    known = known_bus(None, profile, winch, robot)
+    wanted = None if ids is None else parse_identifiers(ids)
+    url = None if to is None else running_bus(to)
+    if url is not None:
+        check(file, channel)
+        what = f"the recorded frames are sent to {url}, commands to motors among them."
+        require_consent(what, yes or url.is_simulated)
+    summary = Summary(known.bitrate_bit_s)
+    with ExitStack() as stack:
+        stack.callback(_show, out, summary)
+        lines = stack.enter_context(LineWriter(sys.stderr if as_json else sys.stdout))
+        viewer = Viewer(known.decoder(), summary, lines, raw=raw)
+        stop_wanted = stack.enter_context(stop_on_signals())
+        frames = filtered(read_frames(file, channel), wanted)
+        if url is None:
+            whole = speed is None and str(file) != "-"
+            pacer = Pacer(speed, stop_wanted)
+            play(frames, viewer, pacer, stop_wanted, block=BLOCK if whole else 1)
+            sent: dict[str, int] = {}
+        else:
+            sender = stack.enter_context(Sender(url, out.note))
+            play(frames, viewer, Pacer(speed or 1.0, stop_wanted), stop_wanted, sender)
+            sent = {"sent": sender.sent, "not_sent": sender.not_sent}
+    out.result({"ok": True, "file": file, **sent, **summary.table()})
+
+
+def _filters(ids: str | None) -> Filters | None:
+    return None if ids is None else filters(parse_identifiers(ids))
+
+
+def _ask_bus(source: SimbusSource, summary: Summary) -> None:
+    """Complete the summary by what a simulated bus tells: its time, and what we missed."""
+    try:
+        if source.lost is not None:
+            raise source.lost
+        passed = source.ask()
+    except BusError:
+        summary.untimed = True  # it has ended, and its time with it
+        return
+    summary.time_s, summary.led = passed["bus_time_s"], bool(passed["led"])
+    if source.seen is None:
+        return
+    before = -1
+    while before < source.seen < passed["frames"]:
+        before = source.seen
+        source.receive(_LATE_S)
+    summary.missed = max(0, int(passed["frames"]) - source.seen)
+
+
+def _show(out: Output, summary: Summary) -> None:
+    if not summary.frames:
+        return
+    for line in summary.lines():
+        out.note(line)
+
+
+@app.command()
+def scan(
+    bus: Annotated[
+        list[str], typer.Option("--bus", help="simbus:NAME, socketcan:can0, ...", metavar="URL")
+    ],
+    nodes: Annotated[
+        str, typer.Option("--nodes", help="Node ids to ask, as 1-127 or 1,5,20-23.")
+    ] = "1-127",
+    profiles: Annotated[
+        Path | None, typer.Option("--profiles", help="Folder with drive profiles of your own.")
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Scan even while another master makes SDO transfers.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """List the nodes on one or several buses: state, identity, modes, profile; reads only."""
+    out = Output(as_json)
+    urls = [running_bus(text) for text in bus]
+    node_ids = parse_node_ids(nodes)
+    drives = drive_profiles(profiles)
+    with ThreadPoolExecutor(len(urls)) as pool:
+        visits = [pool.submit(_visit, url, node_ids, drives, force) for url in urls]
+    results = [visit.result() for visit in visits]
+    for one in results:
+        count = len(one["nodes"])
+        out.say(f"{one['bus']}: {count or 'no'} node{'s' if count != 1 else ''}")
+        out.say(*(lines(one["nodes"]) if count else [_NOBODY]))
+        if one["warning"]:
+            out.say(f"! {one['warning']}")
+    out.result({"ok": True, "buses": results})
+
+
+_NOBODY = "nobody answers: check power, wiring, termination, bit rate and node ids"
+
+
+def _visit(
+    url: BusUrl, node_ids: list[int], drives: dict[str, DriveProfile], force: bool
+) -> dict[str, Any]:
+    """Scan one bus; raises WorkFailedError where another master is in the way."""
+    begun = time.monotonic()
+    with Scan(url, node_ids) as scan_:
+        scan_.listen(LISTEN_S)
+        if scan_.traffic.sdo_requests and not force:
+            raise WorkFailedError(
+                f"{url}: another master is busy with {signs_of_a_master(scan_.traffic)}: "
+                "answers to our requests would reach it as well, in the middle of its own "
+                "transfers; wait until it is done, or use --force"
+            )
+        scan_.ask()
+    signs = signs_of_a_master(scan_.traffic)
+    warning = f"a master is at work ({signs}); the scan has only read" if signs else ""
+    return {
+        "bus": str(url),
+        "nodes": [entry(found, drives) for found in responding(scan_.found)],
+        "warning": warning,
+        "seconds": time.monotonic() - begun,
+    }
+
+
+_US = 1e6
+_LOW, _HIGH = 1.0, 10_000.0
+
+
+@app.command()
+def budget(
+    machine: Annotated[
+        str, typer.Argument(help="Robot or winch profile: a name or the path of a file.")
+    ],
+    rate: Annotated[
+        float | None,
+        typer.Option(min=_LOW, max=_HIGH, help="Cycles a second, instead of the profile's."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute the worst-case time of the cycle on each bus, the highest rate, and what is left.
+
+    Exit status 2 when the cycle does not fit.
+    """
+    out = Output(as_json)
+    profile = load_winch_or_robot(machine)
+    period_s = None if rate is None else 1.0 / rate
+    budgets = machine_budget(profile, period_s)
+    out.say(*_report(profile.name, budgets))
+    reason = refusal(budgets)
+    figures = {"rate_Hz": 1.0 / budgets[0].period_s, "buses": [_figures(b) for b in budgets]}
+    if reason:
+        typer.echo(f"cdpr: {profile.path}: {reason}", err=True)
+        out.result({"ok": False, "error": reason, "exit_status": BAD_INPUT, **figures})
+        raise typer.Exit(BAD_INPUT)
+    out.result({"ok": True, **figures})
+
+
+def _figures(budget: BusBudget) -> dict[str, Any]:
+    return {
+        "bus": budget.bus,
+        "bitrate_bit_s": budget.bitrate_bit_s,
+        "nodes": budget.nodes,
+        "period_us": round(budget.period_s * _US, 3),
+        "cycle_us": round(budget.cycle_s * _US, 3),
+        "cycle_without_stuffing_us": round(budget.bare_cycle_s * _US, 3),
+        "heartbeats_us_per_cycle": round(budget.heartbeat_share * budget.period_s * _US, 3),
+        "margin_us": round(budget.margin_s * _US, 3),
+        "cycle_limit_Hz": round(budget.cycle_limit_Hz, 2),
+        "highest_rate_Hz": math.floor(budget.highest_rate_Hz * 100) / 100,
+        "sdo_transfers_per_s": round(budget.sdo_transfers_s, 1),
+        "changes_us": round(budget.changes_s * _US, 3),
+        "changes_told_after_cycles": budget.recovery_cycles,
+        "longest_wait_of_sync_us": round(budget.longest_wait_s * _US, 3),
+        "fits": budget.fits,
+    }
+
+
+def _report(name: str, budgets: list[BusBudget]) -> list[str]:
+    period_s = budgets[0].period_s
+    lines = [
+        f"{name} at {1.0 / period_s:.6g} Hz: {period_s * _US:.0f} us a cycle",
+        f"{'bus':14}{'bit/s':>9}{'drives':>8}{'cycle, us':>11}{'unstuffed':>11}{'share':>9}"
+        f"{'left, us':>10}{'highest':>10}",
+    ]
+    for b in budgets:
+        lines.append(
+            f"{b.bus:14}{b.bitrate_bit_s:9}{len(b.nodes):8}{b.cycle_s * _US:11.0f}"
+            f"{b.bare_cycle_s * _US:11.0f}{b.cycle_s / b.period_s:9.1%}"
+            f"{b.margin_s * _US:10.1f}{math.floor(b.highest_rate_Hz):7} Hz"
+        )
+    return lines + [_explanation(b) for b in budgets if b.fits]
+
+
+def _explanation(b: BusBudget) -> str:
+    """Say what the time left over has to serve."""
+    text = (
+        f"{b.bus}: heartbeats take {b.heartbeat_share * b.period_s * _US:.1f} us a cycle; what is "
+        f"left is for computing, EMCY and {b.sdo_transfers_s:.0f} SDO transfers a second"
+    )
+    if b.changes_s and math.isfinite(b.recovery_cycles):
+        cycles = f"{b.recovery_cycles:.0f} cycle{'s' if b.recovery_cycles > 1 else ''}"
+        text += f", and tells a change in every drive within {cycles}"
+    return text + f"; SYNC may come up to {b.longest_wait_s * _US:.0f} us late"
