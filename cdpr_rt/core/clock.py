@@ -24,11 +24,15 @@ _LONGEST_GRANT_S = 0.1
 """Bus time goes on by so much at a time, so that a request to end is seen between."""
 
 
-class Source(Protocol):
-    """What waits listen to, such as a port on a bus; none of its methods waits."""
+class Readable(Protocol):
+    """What has a descriptor to wait for."""
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when something has come."""
+
+
+class Source(Readable, Protocol):
+    """What waits listen to, such as a port on a bus; none of its methods waits."""
 
     def poll(self) -> bool:
         """Process what has come; return whether there was anything."""
@@ -220,6 +224,10 @@ class PacedClock(Clock):
         left_s = until_s - time.monotonic()
         if left_s > 0.0:
             time.sleep(left_s)
+
+    def await_readable(self, source: Readable, until_s: float) -> None:
+        """Wait until there is something to read from `source`, at most until `until_s`."""
+        select.select([source], [], [], max(until_s - self.now_s, 0.0))
 
     def _listen(self, until_s: float) -> None:
         waiting = select.poll()

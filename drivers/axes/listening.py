@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import select
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -33,6 +31,7 @@ _ANSWER_SHARE = 1.0
 _LOCKSTEP_ANSWER_S = 0.2
 _SETTLE_SHARE = 0.25
 """Of a period, after a cycle's answers: by then its SYNC has come on all buses."""
+_LOCKSTEP_SETTLE_S = 0.005
 _MOST_CYCLES_AHEAD = 8
 _FRAMES_PER_AXIS, _SPARE_FRAMES = 8, 64
 _OTHER_MASTERS_ALARMS = codec.WRONG_MODE | codec.LEFT_ENABLED
@@ -83,7 +82,7 @@ class ListeningDevice:
         try:
             for bus in buses:
                 view = arrays.view(first, first + len(bus.axes))
-                self._monitors.append(_BusMonitor(bus, period_s, view))
+                self._monitors.append(_BusMonitor(bus, period_s, view, clock))
                 first += len(bus.axes)
         except BaseException:
             self.close()
@@ -94,7 +93,8 @@ class ListeningDevice:
         if self._reordering.needed:
             self.feedback, self.command = self._reordering.feedback, self._reordering.command
         self._columns = np.argsort(np.array(order, np.intp))
-        self._settle_s = _SETTLE_SHARE * period_s
+        lockstep = any(monitor.lockstep for monitor in self._monitors)
+        self._settle_s = max(_SETTLE_SHARE * period_s, _LOCKSTEP_SETTLE_S if lockstep else 0.0)
         self._cycles_ahead = 0
         self._synced = False
         self._last_sync_s = -math.inf  # no master yet
@@ -111,12 +111,12 @@ class ListeningDevice:
         first, *others = self._monitors
         if others:
             self._align_buses()
-        self._synced = first.await_sync(time.monotonic() + _SYNC_WAIT_S)
+        self._synced = first.await_sync(self.clock.now_s + _SYNC_WAIT_S)
         if not self._synced:
             for monitor in self._monitors:
                 monitor.valid.fill(False)
             return
-        now = time.monotonic()
+        now = self.clock.now_s
         if now - self._last_sync_s > _PAUSE_S:
             self.forget_alarms()
         self._last_sync_s = now
@@ -130,7 +130,7 @@ class ListeningDevice:
         answered = 0
         if self._synced:
             for monitor in self._monitors:
-                answered += monitor.collect_answers(time.monotonic() + monitor.wait_s)
+                answered += monitor.collect_answers(self.clock.now_s + monitor.wait_s)
                 monitor.end_cycle()
         if self._reordering.needed:
             self._reordering.gather()
@@ -141,19 +141,14 @@ class ListeningDevice:
 
         Only after several cycles, since SYNC does not come on all buses at the same instant.
         """
-        first = self._monitors[0]
-        ahead = self._buses_ahead()
-        if first not in ahead and not first.sync_waiting(time.monotonic() + self._settle_s):
-            ahead = self._buses_ahead()
+        deadline_s = self.clock.now_s + self._settle_s
+        ahead = [monitor for monitor in self._monitors if monitor.sync_waiting(deadline_s)]
         self._cycles_ahead += 1 if 0 < len(ahead) < len(self._monitors) else -1
         self._cycles_ahead = max(self._cycles_ahead, 0)
         if self._cycles_ahead >= _MOST_CYCLES_AHEAD:
             self._cycles_ahead = 0
             for monitor in ahead:
                 monitor.skip_cycle()
-
-    def _buses_ahead(self) -> list[_BusMonitor]:
-        return [monitor for monitor in self._monitors if monitor.sync_waiting()]
 
     def transmit(self) -> None:
         """Send nothing, whatever `command` says."""
@@ -210,9 +205,12 @@ class ListeningDevice:
 class _BusMonitor:
     """Receives the frames of one bus and keeps the state of its axes."""
 
-    def __init__(self, bus: MonitoredBus, period_s: float, arrays: StateArrays) -> None:
+    def __init__(
+        self, bus: MonitoredBus, period_s: float, arrays: StateArrays, clock: PacedClock
+    ) -> None:
         self.name = bus.name
         self.axes = tuple(bus.axes)
+        self._clock = clock
         self.health = BusHealth()
         self.alarms = 0
         self._layout = layout = GroupLayout(self.axes)
@@ -228,8 +226,8 @@ class _BusMonitor:
         self._compile()
         filters = [(i, 0x7FF) for i in (_SYNC_ID, *layout.identifiers)]
         self._port = open_port(bus.url, filters, self.health)
-        lockstep = bus.url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
-        self.wait_s = _LOCKSTEP_ANSWER_S if lockstep else _ANSWER_SHARE * period_s
+        self.lockstep = bus.url.asks_for_lockstep or self._port.status.get("mode") == "lockstep"
+        self.wait_s = _LOCKSTEP_ANSWER_S if self.lockstep else _ANSWER_SHARE * period_s
         self._port.settimeout(0.0)
         self._port.drain()
 
@@ -252,7 +250,7 @@ class _BusMonitor:
         self.ints[codec.PROBE_ARMED] = self._layout.probe_mapped & ~known
         self.alarms = 0
 
-    def sync_waiting(self, deadline: float = 0.0) -> bool:
+    def sync_waiting(self, deadline: float) -> bool:
         """Decode what waits, or comes until `deadline`; return whether the next SYNC has come."""
         if not self._sync_pending:
             self._sync_pending = self._listen(deadline)
@@ -305,11 +303,10 @@ class _BusMonitor:
                 self._missing -= min(self._decode(last), self._missing)
             if came or (awaited and not self._missing):
                 return came
-            left = deadline - time.monotonic()
-            if left <= 0.0:
+            if self._clock.now_s >= deadline:
                 return False
             if last < len(rows):
-                select.select([self._port], [], [], left)
+                self._clock.await_readable(self._port, deadline)
 
     def _decode(self, last: int) -> int:
         layout = self._layout
