@@ -191,6 +191,7 @@ def watched_session(folder: Path, bus: str, cells: Simulator) -> None:
     assert "go together" in run(*home, status=BAD_INPUT)["error"]
 
 
+@pytest.mark.alone  # a simulated line answers within 50 ms of wall-clock time
 def test_a_load_cell_gives_the_same(tmp_path: Path) -> None:
     plant = ANCHOR + "drum_radius_error = 0.03\n"
     out = tmp_path / "out"

@@ -25,9 +25,9 @@ stale_cycles = 1000
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
-    """Its master may be held up for longer than the shipped tenth of a second."""
+    """Its master may be held up for as long as LIMITS say, not for a tenth of a second alone."""
     path = write_robot(tmp_path, PERIOD_S, LIMITS)
-    path.write_text("master_heartbeat_s = 1.0\n" + path.read_text())
+    path.write_text("master_heartbeat_s = 6.0\n" + path.read_text())
     return path
 
 

@@ -156,12 +156,12 @@ class Recorder(Part):
             raise
 
     def _fail(self, text: str) -> None:
+        super()._fail(text)
         file, self._file = self._file, None
         if file is not None:
             with suppress(ControlError, OSError):
                 file.close()
             self._bytes += file.size
-        super()._fail(text)
 
     def _channel(self, topic: str, schema: dict[str, Any]) -> Channel:
         return Channel(topic, schema=schema, context=self._context)

@@ -75,6 +75,7 @@ class TightenProgram(PlatformProgram):
         """Between which the pretension goes over to that for where the platform stands."""
         self._blend = 1.0
         self._hangs = self._hands_over = False
+        self._let_go_cycle = 0
         self._checked = AxisFeedback(cable_m.size)
         inertia = np.full(cable_m.size, parts.control.inertia_kg_m2)
         self._winches = WinchSpeedLoop(inertia, cable_m, parts.period_s)
@@ -159,7 +160,8 @@ class TightenProgram(PlatformProgram):
         if tight:
             told = super().progress()
             return {**told, **state, "trouble": self._failure or told["trouble"]}
-        return {"tension_N": self._winches.tension_N.tolist(), **state}
+        tension_N = self._control.tension_N if held else self._winches.tension_N
+        return {"tension_N": tension_N.tolist(), **state}
 
     # -- commands
 
@@ -184,7 +186,9 @@ class TightenProgram(PlatformProgram):
         The control's estimate is of no use to others while cables may be slack: it is taken anew.
         """
         parts, now = self._parts, self._checked
-        if parts.tight or self._hands_over or not hangs(parts):
+        # another program may have ended the hand-over since
+        handing_over = self._hands_over and self._feedback.cycle - self._let_go_cycle <= 1
+        if parts.tight or handing_over or not hangs(parts):
             return False
         now.position_rad[:] = parts.estimator.position_rad
         length_m = self._lengths_before(source, now)
@@ -244,6 +248,7 @@ class TightenProgram(PlatformProgram):
         if not self._failure:
             self._take_over(feedback, torque_Nm)
             self._hands_over, self._path = True, []
+            self._let_go_cycle = feedback.cycle
 
     def _let_go(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         """Blend out what the platform is pressed on its stand with; then it may be moved.
@@ -254,6 +259,7 @@ class TightenProgram(PlatformProgram):
         self._control.stand_still(on_stand=True)
         self._loop.update(feedback, setpoint, torque_Nm)
         self._still += 1
+        self._let_go_cycle = feedback.cycle
         if self._still * self._parts.period_s > _HAND_OVER_S:
             self._finish(feedback, setpoint, torque_Nm)
 
@@ -302,11 +308,12 @@ class TightenProgram(PlatformProgram):
         parts = self._parts
         parts.estimator.set_lengths(feedback.position_rad, self._control.free_lengths_m)
         parts.loop.take_over(feedback, torque_Nm)
-        parts.last.displaced = parts.last.fallen = False
 
     def _finish(self, feedback: AxisFeedback, setpoint: Setpoint, torque_Nm: FloatArray) -> None:
         stopping, self._hands_over = self._stopping, False
-        self._parts.cycle, self._parts.tight = feedback.cycle, True
+        parts = self._parts
+        parts.cycle, parts.tight = feedback.cycle, True
+        parts.last.displaced = parts.last.fallen = False
         super().start(feedback, setpoint, torque_Nm)
         if stopping:
             self.stop()

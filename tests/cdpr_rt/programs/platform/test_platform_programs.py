@@ -12,6 +12,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.programs.registry import platform_parts
@@ -94,9 +95,9 @@ def test_tensions_for_where_it_stands_are_not_stepped_to(robot: Standing):
     assert np.abs(np.diff(asked_N, axis=0)).max() < fastest_N_s * PERIOD_S
 
 
-def handing_over(robot: Standing) -> Standing:
+def handing_over(robot: Standing, source: str | None = None) -> Standing:
     """Tighten up to where what presses on the stand is let go."""
-    robot.switch("tighten")
+    robot.switch("tighten", {"from": source} if source else {})
     for _ in range(2000):
         robot.run(0.01)
         if robot.program.progress()["stage"] == "held":
@@ -127,6 +128,41 @@ def test_a_stop_meanwhile_ends_on_tight_cables(robot: Standing):
     robot.run(0.7)
     assert robot.program.at_rest
     assert robot.parts.tight
+
+
+def let_go_of(robot: Standing) -> None:
+    """Take the power away as a safe stop does, which asks no program."""
+    robot.program = robot.programs["idle"]
+    robot.program.start(robot.feedback, robot.setpoint, robot.torque)
+    robot.run(0.05)
+
+
+def test_what_ends_it_meanwhile_leaves_the_platform_as_displaced_as_it_was(robot: Standing):
+    robot.parts.last.displaced = True
+    handing_over(robot, "home")
+    let_go_of(robot)
+    assert robot.parts.last.displaced
+    assert handing_over(robot, "home").until_done(10.0)["done"]
+    assert not robot.parts.last.displaced
+
+
+def test_whether_it_hangs_is_looked_at_again_once_that_was_ended(
+    robot: Standing, monkeypatch: pytest.MonkeyPatch
+):
+    looked = []
+
+    def hangs(parts: PlatformParts) -> bool:
+        looked.append(parts)
+        return False
+
+    monkeypatch.setattr("cdpr_rt.programs.platform.tightening.tighten.hangs", hangs)
+    handing_over(robot)
+    looked.clear()
+    robot.program.check({"from": "lengths"})
+    assert not looked
+    let_go_of(robot)
+    robot.programs["tighten"].check({"from": "lengths"})
+    assert looked
 
 
 @pytest.mark.parametrize("name", ["hold", "lower", "tighten"])
