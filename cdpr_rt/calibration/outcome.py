@@ -66,6 +66,15 @@ class Outcome:
     """By how much it changes the robot's file."""
     birge_ratio: float
     """How many times as large errors at measured points not used are as predicted; nan without."""
+    adopt: bool = False
+    """Whether it is to be taken over even where its changes are not significant."""
+
+    @property
+    def worse(self) -> bool:
+        """Whether poses that the fit had not seen are told no better than by the robot's file."""
+        if self.verified.errors_m.size:
+            return self.verified.mean_mm > self.before.mean_mm
+        return self.verified.residual_m > self.before.residual_m
 
     @property
     def good(self) -> bool:
@@ -99,10 +108,7 @@ class Outcome:
                 f"predicted; allowed: {most_mm:.1f} mm): measure points, or say how well the exit "
                 "points of the robot's file are known (--known-mm)"
             )
-        worse = self.verified.residual_m > self.before.residual_m
-        if self.verified.errors_m.size:
-            worse = self.verified.mean_mm > self.before.mean_mm
-        if worse and self.change.significant:
+        if self.worse and (self.change.significant or self.adopt):
             told.append(
                 "poses that the fit had not seen are told no better than by the robot's file: take "
                 "more poses, further apart"

@@ -20,7 +20,7 @@ INTERFACES = ("vcan0", "vcan1")
 PACKAGES = ("user-mode-linux", "busybox-static")
 MEMORY_MB = 2048
 DOWNLOAD_TIMEOUT_S = 240
-RUN_TIMEOUT_S = 480
+RUN_TIMEOUT_S = 1200
 _CONSOLE_TAIL_LINES = 30
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,12 +94,13 @@ def finish(
 ) -> None:
     """Identify, tell, report, and take over what is good; `source` is the file of the data.
 
-    What changes nothing significantly is taken over only to `adopt`.
+    What changes nothing significantly is taken over only to `adopt`, and only where it tells poses
+    not used better than the robot's file does.
 
     Raises typer.Exit with status 1 where nothing was taken over because it is not good.
     """
     with out.stage(f"fitting {len(data.poses)} poses"):
-        outcome = identified(robot, data, points, geometry)
+        outcome = replace(identified(robot, data, points, geometry), adopt=adopt)
         known = None if judge is None else judge(outcome)
     told: dict[str, Any] = {**outcome.told(), "data": str(source)}
     out.say(*_lines(outcome, data))
@@ -106,7 +108,7 @@ def finish(
         told["verification"] = {**told["verification"], **known.verification()}
         told["truth"] = known.true_errors()
         out.say(*known.lines())
-    why_not = _why_not(outcome, dry_run, adopt)
+    why_not = _why_not(outcome, dry_run)
     taken: dict[str, Any] | None = None
     more = [f"nothing was taken over: {why_not}"]
     if why_not is None:
@@ -120,14 +122,16 @@ def finish(
         raise typer.Exit(WorkFailedError.exit_status)
 
 
-def _why_not(outcome: Outcome, dry_run: bool, adopt: bool) -> str | None:
+def _why_not(outcome: Outcome, dry_run: bool) -> str | None:
     """Return why a calibration is not taken over, None where it is."""
     if dry_run:
         return "--dry-run"
     if not outcome.good:
         return "it is not good"
-    if adopt or outcome.change.significant:
+    if outcome.adopt or outcome.change.significant:
         return None
+    if outcome.worse:
+        return "its changes are not significant, and poses not used are told worse with them"
     return "its changes are not significant (--adopt takes it over all the same)"
 
 

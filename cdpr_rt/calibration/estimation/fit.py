@@ -23,6 +23,7 @@ from cdpr_rt.calibration.estimation.tension_noise import (
     correlated,
     elongations,
     feigned,
+    most_taken_out,
     slope_covariance,
     without,
 )
@@ -38,6 +39,8 @@ _HUBER = 2.5
 _NORMAL_MEDIAN = 1.1774
 """Median of the length of a vector of two normal numbers of deviation 1."""
 _JUMP_STD_m = 1.0
+_NO_MORE = 1e-12
+"""Relative, by which a cost may be larger and counts as the same."""
 
 
 @dataclass(frozen=True)
@@ -125,10 +128,10 @@ def fit(
     if seen.poses == 0:
         raise InvalidRequestError("no poses; allowed: at least one")
     search = _Search(geometry, seen, robust, start or geometry, camera)
-    steps = 0
-    while steps < _MOST_STEPS and not search.done:
-        search.step()
-        steps += 1
+    steps = search.settle()
+    if geometry.shared and geometry.knowledge.slope_noise:
+        search.take_out()
+        steps += search.settle()
     return search.result(steps)
 
 
@@ -165,9 +168,11 @@ class _Search:
         if self._markers is not None and camera is not None:
             known.append(camera.known_std())
         self._known = np.concatenate(known)
-        self._taken_out = geometry.shared * geometry.knowledge.slope_noise * seen.poses
+        self._taken_out = 0.0
+        self._fixed: tuple[FloatArray, FloatArray] | None = None
+        """Weights of lengths and corners, once they do not follow residuals any more."""
         self._damping = _DAMPING
-        self.done = False
+        self._done, self._converged = False, True
         start = replace(start, knowledge=geometry.knowledge)
         self._here = self._state(start, np.zeros(len(seen.jumps)), camera, seen.start)
 
@@ -184,7 +189,7 @@ class _Search:
         if camera is not None and self._markers is not None:
             known.append(camera.off_known())
             off_px = corner_residuals(camera, self._markers, poses)
-            cost = corner_cost(camera, off_px, self._robust)
+            cost = self._corner_cost(camera, off_px)
         prior = np.concatenate(known) / self._known
         cost += self._cost_of(at, geometry.n) + float((prior**2).sum())
         cost -= self._taken_out * (1.0 + geometry.elongation) ** 2
@@ -192,14 +197,23 @@ class _Search:
 
     def _cost_of(self, at: Linearised, n: int) -> float:
         squares = at.residual**2
-        if self._robust:
+        if self._fixed is not None:
+            squares[:, :n] *= self._fixed[0]
+        elif self._robust:
             size = np.sqrt(squares[:, :n])
             far = size > _HUBER
             squares[:, :n] = np.where(far, 2.0 * _HUBER * size - _HUBER**2, squares[:, :n])
         return float(squares.sum())
 
+    def _corner_cost(self, camera: CameraModel, off_px: FloatArray) -> float:
+        if self._fixed is None:
+            return corner_cost(camera, off_px, self._robust)
+        return corner_cost(camera, off_px * np.sqrt(self._fixed[1])[..., None], robust=False)
+
     def _weights(self) -> FloatArray:
         """Return the weights of lengths, (N, n)."""
+        if self._fixed is not None:
+            return self._fixed[0]
         size = np.abs(self._here.at.residual[:, : self._here.geometry.n])
         return np.asarray(_HUBER / np.maximum(size, _HUBER)) if self._robust else np.ones_like(size)
 
@@ -230,14 +244,39 @@ class _Search:
 
     def _corner_weights(self) -> FloatArray:
         here = self._here
+        if self._fixed is not None:
+            return self._fixed[1]
         if here.camera is None or not self._robust:
             return np.ones(here.off_px.shape[:2])
         return corner_weights(here.camera, here.off_px)
+
+    def settle(self) -> int:
+        """Go to where no step is large any more; return how many steps it took."""
+        steps, self._done, self._damping = 0, False, _DAMPING
+        while steps < _MOST_STEPS and not self._done:
+            self.step()
+            steps += 1
+        self._converged &= self._done and self._damping < _MOST_DAMPING
+        return steps
+
+    def take_out(self) -> None:
+        """Have noise of tensions taken out of the information about the elongation.
+
+        How much it is another fit has told, and there may be less information here. Weights stay
+        as they are from here on: smaller ones would leave less and less of it.
+        """
+        here, k = self._here, self._here.geometry.size - 1
+        information = 1.0 / float(self._normal(self._weighted(), 0.0).covariance()[0][k, k])
+        wanted = here.geometry.knowledge.slope_noise * self._seen.poses
+        self._fixed = self._weights(), self._corner_weights()
+        self._taken_out = most_taken_out(wanted, information)
+        self._here = self._state(here.geometry, here.jumps, here.camera, here.poses)
 
     def step(self) -> None:
         """Go one step, trying shorter ones until the cost is not larger."""
         normal, here = self._normal(self._weighted(), self._taken_out), self._here
         size_g, size_j = here.geometry.size, here.jumps.size
+        most = here.cost + _NO_MORE * abs(here.cost)
         while self._damping < _MOST_DAMPING:
             change, moves, size = normal.solve(self._damping)
             camera = here.camera
@@ -249,13 +288,13 @@ class _Search:
                 camera,
                 moved(here.poses, moves, here.geometry.free),
             )
-            if np.isfinite(trial.cost) and trial.cost <= here.cost * (1.0 + 1e-12):
+            if np.isfinite(trial.cost) and trial.cost <= most:
                 self._here = trial
                 self._damping = max(0.1 * self._damping, _LEAST_DAMPING)
-                self.done = size < _DONE
+                self._done = size < _DONE
                 return
             self._damping *= 10.0
-        self.done = True
+        self._done = True
 
     def result(self, steps: int) -> Fit:
         """Return what was found."""
@@ -283,7 +322,7 @@ class _Search:
             covariance * max(factor, corner_factor, 1.0), off, slope_noise,
             here.at, self._weights(), normal.across,
             normal.pose_covariance(), factor, corner_factor, here.cost, steps,
-            self.done and self._damping < _MOST_DAMPING,
+            self._converged,
             here.camera if self._markers is not None else None,
         )  # fmt: skip
 
@@ -297,11 +336,12 @@ class _Search:
         geometry = self._here.geometry
         noise = slope_covariance(geometry, self._seen)
         spread = correlated(left, noise, geometry.knowledge.yielding)
-        off, slope_noise, out = np.zeros(len(covariance)), 0.0, self._taken_out
+        off, slope_noise, out = np.zeros(len(covariance)), 0.0, 0.0
         if geometry.shared:
             k = geometry.size - 1
             information = 1.0 / float(covariance[k, k])
             told = feigned(hats, noise, information)
+            out = most_taken_out(self._taken_out, information)
             either = elongations(geometry.elongation, float(self._known[k]), told, information, out)
             slope_noise = either.taken_out / self._seen.poses
             covariance = without(covariance, k, out)

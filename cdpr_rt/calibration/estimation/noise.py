@@ -58,7 +58,11 @@ def balance(found: Fit, seen: Observations) -> Balance:
     if balanced.std_N is None:
         return balanced
     held = off_N > _HELD * np.median(off_N)
-    return _balance_of(found, seen, there[~held])[0] if held.any() else balanced
+    if not held.any():
+        return balanced
+    free, _ = _balance_of(found, seen, there[~held])
+    # too few hang free to correct tensions by, but all together have told how far off these are
+    return replace(free, std_N=balanced.std_N) if free.std_N is None else free
 
 
 def _balance_of(found: Fit, seen: Observations, there: IntArray) -> tuple[Balance, FloatArray]:
@@ -74,10 +78,12 @@ def _balance_of(found: Fit, seen: Observations, there: IntArray) -> tuple[Balanc
     pull = np.zeros(3)
     pull[up] = -G_m_s2
     weight[:, 3:, 1:] = np.swapaxes(np.cross(np.swapaxes(poses[:, 1:], 1, 2), pull), 1, 2)
-    U, s, V = np.linalg.svd(-cables[:, chosen], full_matrices=False)
-    told = s > _WEAK * s.max(initial=0.0)
-    across = np.swapaxes(U, 1, 2) / np.maximum(s, _INERT)[..., None]
-    V = np.where(told[..., None], V, 0.0)
+    U, s, V = np.linalg.svd(-cables[:, chosen])
+    told, d = s > _WEAK * s.max(initial=0.0), s.shape[1]
+    across = np.swapaxes(U, 1, 2)[:, :d] / np.maximum(s, _INERT)[..., None]
+    untold = V.copy()
+    untold[:, :d][told] = 0.0
+    V = np.where(told[..., None], V[:, :d], 0.0)
     pulled = (V @ tension[there][..., None])[..., 0]
     by_mass = np.where(told[..., None], across @ weight[:, chosen], 0.0)
     mass, _, rank, _ = np.linalg.lstsq(by_mass[told], -pulled[told], rcond=_INERT)
@@ -86,7 +92,8 @@ def _balance_of(found: Fit, seen: Observations, there: IntArray) -> tuple[Balanc
     if spare < _LEAST_ROWS:
         return Balance(tension, free, None), np.zeros(len(there))
     tension[there] -= np.einsum("jdi,jd->ji", V, left)
-    free[there] -= np.swapaxes(V, 1, 2) @ V
+    # not 1 - V^T V, whose diagonal rounding makes negative where as many are told as cables are
+    free[there] = np.swapaxes(untold, 1, 2) @ untold
     std_N = math.sqrt(float((left**2).sum()) / spare)
     off_N = np.sqrt((left**2).mean(axis=1))
     return Balance(tension, free, std_N), off_N
@@ -110,7 +117,7 @@ def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> Ca
     before = known.length_m**2 + squares * (known.yielding * known.tension_N) ** 2
     variance = found.variance_factor * before
     tension_N = min(max(told_N or guess.tension_N, _LEAST_N), _MOST_N)
-    if squares and yielding:
+    if squares > 0.0 and yielding > 0.0:
         tension_N = max(min(tension_N, math.sqrt(variance / squares) / yielding), _LEAST_N)
     length_m = guess.length_m
     if found.camera is not None:
@@ -129,9 +136,10 @@ def fit_with_noise_seen(found: Fit, file: CableGeometry) -> tuple[Fit, CableGeom
     told, slope_noise = found.seen, 0.0
     weighed = file
     for _ in range(_ROUNDS):
-        weighed = with_noise_seen(found, file, balance(found, told).std_N)
+        balanced = balance(found, told)
+        weighed = with_noise_seen(found, file, balanced.std_N)
         weighed = replace(weighed, knowledge=replace(weighed.knowledge, slope_noise=slope_noise))
-        found = weighed_fit(found, weighed, told)
+        found = _weighed_fit(found, weighed, told, balanced)
         slope_noise = found.slope_noise
     return found, weighed
 
@@ -142,7 +150,10 @@ def weighed_fit(found: Fit, weighed: CableGeometry, told: Observations) -> Fit:
     Where lengths do not bear out that tensions are as far off as the balance has them, something
     else holds the platform, and they stay as they are.
     """
-    balanced = balance(found, told)
+    return _weighed_fit(found, weighed, told, balance(found, told))
+
+
+def _weighed_fit(found: Fit, weighed: CableGeometry, told: Observations, balanced: Balance) -> Fit:
     if (balanced.std_N or math.inf) <= _BELIEVED * weighed.knowledge.tension_N:
         told = balanced.of(told)
     seen = replace(told, start=found.poses)

@@ -50,7 +50,12 @@ def feigned(hats: FloatArray, noise: FloatArray, information: float) -> float:
     """Return n for hats (N, n, n) of lengths, `noise` S and the information I about κ."""
     spare = np.eye(noise.shape[1]) - hats
     told = float((spare * noise).sum())
-    return min(max(told, 0.0), _MOST_SHARE * information)
+    return most_taken_out(max(told, 0.0), information)
+
+
+def most_taken_out(wanted: float, information: float) -> float:
+    """Return what is taken out of the information I about κ: not so much that none is left."""
+    return min(wanted, _MOST_SHARE * information)
 
 
 @dataclass(frozen=True)

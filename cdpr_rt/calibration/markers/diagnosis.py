@@ -3,7 +3,7 @@
 Each image that locates its camera by the other markers measures a marker anew. If these places
 differ by more than they can, the marker was moved (all images before some instant agree, and all
 after it), is there twice (they do not follow time), or is not as large as told. Where what images
-show there is no square of its size, it is partly covered.
+show there is no square of its size, at one place or at several, it is partly covered.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ def _judged(
             "it printed at another scale?",
         )
     far = _off(bundle.off_px[rows]) > limit
-    if (~far).sum() >= _LEAST_IMAGES and not _fits_with(1.0, rows[far], bundle, seen, limit):
+    whole = _stand(rows[far], bundle, seen, limit)
+    if (~far).sum() >= _LEAST_IMAGES and whole <= (1.0 - _BAD_SHARE) * far.sum():
         return Suspect(
             marker,
             "covered",
@@ -199,6 +200,18 @@ def _size(rows: IntArray, bundle: Bundle, seen: SeenMarkers) -> tuple[float, flo
     step, *_ = np.linalg.lstsq(J[weight], -off[weight], rcond=None)
     sigma = bundle.sigma_px * np.sqrt(np.linalg.pinv(J[weight].T @ J[weight])[6, 6])
     return 1.0 + float(step[6]), float(sigma)
+
+
+def _stand(rows: IntArray, bundle: Bundle, seen: SeenMarkers, limit: float) -> int:
+    """Return in how many images a marker fits somewhere: at one place, or at several."""
+    if _fits_with(1.0, rows, bundle, seen, limit):
+        return len(rows)
+    second, apart = _two_places(_each_place(rows, bundle, seen)[0])
+    if apart == 0.0:
+        return 0
+    # nearly any four corners of a single image are those of a square that is turned
+    groups = [one for one in (rows[~second], rows[second]) if len(one) > 1]
+    return sum(_stand(one, bundle, seen, limit) for one in groups)
 
 
 def _fits_with(

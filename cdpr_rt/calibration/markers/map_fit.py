@@ -199,7 +199,10 @@ def warnings(sightings: Sequence[Sighting], dropped: Sequence[Suspect]) -> list[
         if images >= _MIRRORED_IMAGES or not read:
             where = "an image" if images == 1 else f"{images} images"
             said.append(f"marker {marker} is printed as its mirror image, by {where}; left out")
-    return said + [one.text for one in dropped]
+    texts: dict[int, list[str]] = {}
+    for one in dropped:
+        texts.setdefault(one.marker, []).append(one.text)
+    return said + ["; without these: ".join(each) for each in texts.values()]
 
 
 def island_faults(cover: Coverage) -> list[str]:

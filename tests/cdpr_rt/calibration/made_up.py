@@ -11,9 +11,12 @@ from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.estimation.parameters import USUAL, CableGeometry
 from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_poses
 from cdpr_rt.robots.kinematics.cable_model import CableModel
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.workspace import G_m_s2
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,12 @@ def made_up(
     identified: tuple[str, ...] = USUAL,
     first: float = 1.0,
     home_first: bool = False,
+    in_balance: bool = False,
 ) -> MadeUp:
-    """Return a robot with errors of a normal distribution and its lengths with noise."""
+    """Return a robot with errors of a normal distribution and its lengths with noise.
+
+    Tensions are drawn; `in_balance` has the nearest to them that hold the platform.
+    """
     profile = load_robot(robot)
     rng = np.random.default_rng(seed)
     file = CableGeometry.of(profile, identified)
@@ -51,11 +58,7 @@ def made_up(
     cable[:, 3] = rng.normal(0.0, offset_m, n)
     true = replace(file, cable=cable, elongation=elongation)
     model = file.model
-    low, high = model.platform.workspace_min_m, model.platform.workspace_max_m
-    places = np.zeros((poses, model.size))
-    places[:, :k] = rng.uniform(low, high, (poses, k))
-    turns = model.size - k
-    places[:, k:] = rng.uniform(-1, 1, (poses, turns)) * model.angle_rad * first / np.sqrt(3)
+    places = _places(model, poses, first, rng)
     if home_first:
         places[0] = model.home
     tension = rng.uniform(model.low_N, model.high_N, (poses, n))
@@ -71,6 +74,8 @@ def made_up(
         pose = Pose(array[0], array[1:])
         if file.turns:
             pose = _balanced(pose, exits, anchors, tension[j])
+        if in_balance:
+            tension[j] = _holding(true, pose, tension[j])
         held.append(pose)
         lengths[j] = truly.lengths(pose, tension[j])
     # what the encoders say: offset and drum taken away again
@@ -80,6 +85,25 @@ def made_up(
     start = model.poses(places)
     seen = Observations.of_lengths(reading, tension, start)
     return MadeUp(file, true, held, replace(seen, reference_m=reference))
+
+
+def _places(model: PlatformModel, poses: int, first: float, rng: np.random.Generator) -> FloatArray:
+    low, high = model.platform.workspace_min_m, model.platform.workspace_max_m
+    k = len(low)
+    places = np.zeros((poses, model.size))
+    places[:, :k] = rng.uniform(low, high, (poses, k))
+    turns = model.size - k
+    places[:, k:] = rng.uniform(-1, 1, (poses, turns)) * model.angle_rad * first / np.sqrt(3)
+    return places
+
+
+def _holding(true: CableGeometry, pose: Pose, wanted_N: FloatArray) -> FloatArray:
+    cables = np.empty((1, CABLE_ROWS, true.n))
+    run_poses(true.kernel_geometry(), pose.array[None], cables)
+    wrench = -cables[0, :6]
+    load = np.zeros(6)
+    load[2] = -true.model.platform.mass_kg * G_m_s2
+    return np.asarray(wanted_N - np.linalg.pinv(wrench) @ (wrench @ wanted_N + load))
 
 
 def _balanced(pose: Pose, exits: FloatArray, anchors: FloatArray, t: FloatArray) -> Pose:

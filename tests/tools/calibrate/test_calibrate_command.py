@@ -115,14 +115,18 @@ def test_the_folder_of_a_run_can_be_fitted_again(tmp_path: Path) -> None:
     assert nothing.returncode == 2 and "nothing" in nothing.stderr
 
 
-def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_path: Path) -> None:
+def hardly_off(tmp_path: Path, seed: int, exit_m: float) -> list[Any]:
+    """Return the command that fits data of a robot whose file is right, or nearly so."""
     what = made_up(
-        *("spatial-8", 45, 2), exit_m=0.0, drum=0.0, elongation=0.0, offset_m=0.0, noise_m=3e-4,
-        home_first=True,
+        *("spatial-8", 45, seed), exit_m=exit_m, drum=0.0, elongation=0.0, offset_m=0.0,
+        noise_m=3e-4, home_first=True,
     )  # fmt: skip
-    data = data_of(what, tmp_path / "data.json")
-    words = ["calibrate", "fit", "spatial-8", "--data", data, "--json"]
-    words += ["--points", points_of(what, tmp_path / "p.csv")]
+    words = ["calibrate", "fit", "spatial-8", "--data", data_of(what, tmp_path / "data.json")]
+    return [*words, "--json", "--points", points_of(what, tmp_path / "p.csv")]
+
+
+def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_path: Path) -> None:
+    words = hardly_off(tmp_path, 21, 2.5e-4)
     done = cdpr_here(*words)
     assert done.returncode == 0, done.stderr
     told = result(done)
@@ -135,6 +139,18 @@ def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_pa
     asked = cdpr_here(*words, "--adopt")
     assert asked.returncode == 0, asked.stderr
     assert result(asked)["in_force"]["version"] == 1 and result(asked)["not_taken_over"] is None
+
+
+def test_what_tells_poses_not_used_worse_is_not_taken_over_even_when_asked(tmp_path: Path) -> None:
+    words = hardly_off(tmp_path, 2, 0.0)
+    done = cdpr_here(*words)
+    assert done.returncode == 0 and not result(done)["change"]["significant"]
+    assert "poses not used are told worse" in result(done)["not_taken_over"]
+    asked = cdpr_here(*words, "--adopt")
+    assert asked.returncode == 1, asked.stderr
+    assert "NOT GOOD: poses that the fit had not seen are told no better" in asked.stderr
+    assert result(asked)["in_force"] is None and result(asked)["not_taken_over"]
+    assert calibrated(load_robot("spatial-8")).calibration is None
 
 
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:

@@ -14,8 +14,10 @@ from cdpr_rt.calibration.estimation.noise import (
     weighed_fit,
 )
 from cdpr_rt.calibration.estimation.parameters import DRUM
+from cdpr_rt.calibration.estimation.residuals import length_std_m
 from cdpr_tools.calibrate.made_readings import Errors
 from tests.cdpr_rt.calibration.camera_robot import KNOWN, CameraRobot, camera_robot
+from tests.cdpr_rt.calibration.made_up import made_up, measured
 
 
 def fitted(what: CameraRobot) -> Fit:
@@ -64,6 +66,83 @@ def test_balanced_tensions_hold_the_platform_and_err_less() -> None:
     assert np.trace(told.free[1:], axis1=1, axis2=2) == pytest.approx(2.0)
     moved = told.tension_N - tension
     assert np.einsum("jab,jb->ja", told.free[1:], moved[1:]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_tensions_of_a_robot_whose_weight_alone_tells_them_are_corrected_by_it() -> None:
+    what = made_up("suspended-6", 40, 5, noise_m=1e-4, in_balance=True)
+    noise_N = np.random.default_rng(6).normal(0.0, 1.0, what.seen.tension_N.shape)
+    seen = measured(what, 1e-3, 2e-3, 4)
+    first = fit(what.file, replace(seen, tension_N=what.seen.tension_N + noise_N))
+    told = balance(first, first.seen)
+    assert told.std_N == pytest.approx(1.0, rel=0.2)
+    assert told.free == pytest.approx(0.0, abs=1e-12)
+    assert (np.diagonal(told.free, axis1=1, axis2=2) >= 0.0).all()
+    assert np.isfinite(length_std_m(what.file, told.of(first.seen))).all()
+    found, weighed = fit_with_noise_seen(first, what.file)
+    assert found.converged
+    assert weighed.knowledge.tension_N == pytest.approx(1.0, rel=0.2)
+    off = found.geometry.values() - what.true.values()
+    # chi squared of 31 unknowns: 1 in 10^4 on both sides
+    assert 0.3 < float(off @ np.linalg.solve(found.uncertainty, off)) / off.size < 2.3
+
+
+def test_where_few_poses_hang_free_tensions_tell_their_noise_and_stay() -> None:
+    found = fitted(camera_robot(15, 5))
+    few = replace(found, seen=found.seen.some(np.arange(5)), poses=found.poses[:5])
+    told = balance(few, few.seen).std_N
+    tension = few.seen.tension_N.copy()
+    # something else holds the platform at two poses: 18 rows are left, less four for the mass
+    tension[:2] += np.random.default_rng(0).normal(0.0, 60.0, (2, 8))
+    held = balance(few, replace(few.seen, tension_N=tension))
+    assert told is not None and held.std_N is not None and held.std_N > told
+    assert held.tension_N == pytest.approx(tension)
+    assert held.free == pytest.approx(np.tile(np.eye(8), (5, 1, 1)))
+
+
+@pytest.mark.parametrize("slope_noise", [150.0, 1e4])
+def test_no_more_is_taken_out_of_the_elongation_than_a_fit_knows_of_it(slope_noise: float) -> None:
+    what = made_up("spatial-8", 30, 5, noise_m=3e-4)
+    first = fit(what.file, measured(what, 1e-3, 2e-3, 4))
+    known = replace(what.file.knowledge, slope_noise=slope_noise)
+    seen = replace(first.seen, start=first.poses).some(np.arange(30) >= 8)
+    found = fit(replace(what.file, knowledge=known), seen, start=first.geometry)
+    assert found.converged
+    assert 0.0 <= 1.0 + found.geometry.elongation < 10.0 * (1.0 + first.geometry.elongation)
+    assert np.isfinite(found.attenuation).all()
+    std = np.sqrt(np.diag(found.covariance))
+    assert np.linalg.eigvalsh(found.covariance / np.outer(std, std)).min() > 0.0
+    assert std[-1] > np.sqrt(first.covariance[-1, -1])  # what is taken out makes it less certain
+
+
+def test_a_fit_that_begins_where_another_ended_settles_there() -> None:
+    what = made_up("spatial-8", 30, 5, noise_m=3e-4)
+    file = replace(what.file, knowledge=replace(what.file.knowledge, slope_noise=20.0))
+    there = fit(file, measured(what, 1e-3, 2e-3, 4))
+    assert there.total_cost < 0.0  # by what is taken out
+    again = fit(file, replace(there.seen, start=there.poses), start=there.geometry)
+    assert again.converged
+    assert again.geometry.values() == pytest.approx(there.geometry.values(), abs=1e-5)
+
+
+def test_errors_are_as_large_as_predicted_where_tensions_err_as_much_as_they_differ() -> None:
+    by_all, by_noise = [], []
+    for seed in range(30, 33):
+        what = camera_robot(40, seed, Errors(tension_N=3.0, spread_N=10.0))
+        found, _ = fit_with_noise_seen(fitted(what), what.geometry)
+        rows, n = found.geometry.rows, what.geometry.n
+        drums = rows.index(DRUM) + np.arange(n) * len(rows)
+        off = found.geometry.cable[:, DRUM] - what.made.drums
+        square = found.uncertainty[np.ix_(drums, drums)]
+        by_all.append([float(off @ np.linalg.solve(square, off)) / n])
+        k, stretch = n * len(rows), (found.geometry.elongation - 0.43) ** 2
+        by_all[-1].append(stretch / float(found.uncertainty[k, k]))
+        by_noise.append(stretch / float(found.covariance[k, k]))
+    print(by_all, by_noise)
+    drums_off, elongation_off = np.mean(by_all, axis=0)
+    # chi squared of 24 and 3 degrees of freedom
+    assert 0.25 < drums_off < 2.5
+    assert elongation_off < 2.5
+    assert np.mean(by_noise) > 2.5  # noise alone does not make them
 
 
 def with_tensions_about_those_told(what: CameraRobot, std_N: float, seed: int) -> CameraRobot:

@@ -13,9 +13,10 @@ from scipy.spatial.transform import Rotation
 from cdpr_profiles.devices.camera import KnownMarker, MarkerSheets, MarkerSize
 from cdpr_rt.calibration.markers.bundle import adjust
 from cdpr_rt.calibration.markers.coverage import coverage
+from cdpr_rt.calibration.markers.diagnosis import Suspect
 from cdpr_rt.calibration.markers.geometry.square_pose import square_poses
 from cdpr_rt.calibration.markers.graph import first_map
-from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict
+from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map, verdict, warnings
 from cdpr_rt.calibration.markers.marker_map import best_fit, difference
 from cdpr_rt.calibration.markers.reprojection import Estimate, residuals
 from cdpr_rt.calibration.markers.sighting import Sighting
@@ -171,6 +172,26 @@ def test_a_marker_that_is_partly_covered_is_not_said_to_have_been_moved(one: Roo
     assert difference(fit.map, one.truth).position_error_m.max() < 0.004
     images = fit.seen.image[fit.seen.marker == k]
     assert len(images) and images.max() < 14
+
+
+def test_a_marker_that_was_moved_twice_is_not_said_to_be_partly_covered(one: Room) -> None:
+    moved = one.with_marker_off(ODD, (0.04, 0.02, 0.0), lambda i: i >= 12)
+    moved = moved.with_marker_off(ODD, (0.05, -0.25, 0.0), lambda i: i >= 17)
+    fit = fit_map(moved.sightings(), intrinsics(), SHEETS)
+    (warning,) = fit.warnings
+    assert f"marker {ODD} " in warning and "covered" not in warning
+    assert ODD not in np.array(fit.map.ids)[fit.map.placed]
+    assert difference(fit.map, one.truth).position_error_m.max() < 0.004
+
+
+def test_what_is_wrong_with_a_marker_is_said_in_one_warning() -> None:
+    found = [
+        Suspect(9, "covered", "marker 9 is partly covered", (3, 4)),
+        Suspect(2, "twice", "marker 2 is there twice"),
+        Suspect(9, "moved", "marker 9 was moved"),
+    ]
+    said = ["marker 9 is partly covered; without these: marker 9 was moved"]
+    assert warnings([], found) == [*said, "marker 2 is there twice"]
 
 
 def test_an_id_that_is_there_twice_is_named(one: Room) -> None:

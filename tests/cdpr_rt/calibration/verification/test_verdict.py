@@ -170,6 +170,25 @@ def test_changes_that_noise_explains_are_not_significant(robot: str) -> None:
     assert outcome.change.significant and outcome.insignificance() is None
 
 
+def test_what_tells_unused_poses_worse_is_not_taken_over_only_because_it_is_asked_for() -> None:
+    right = made_up(
+        *("planar-3", 45, 1), exit_m=0.0, drum=0.0, elongation=0.0, offset_m=0.0, noise_m=3e-4,
+        home_first=True,
+    )  # fmt: skip
+    outcome = calibrate(
+        load_robot("planar-3"), right.file, measured(right, 1e-3, 2e-3, 8), "points"
+    )
+    asked = replace(outcome, adopt=True)
+    assert not outcome.change.significant and outcome.good
+    for share, worse in ((1.1, True), (0.9, False)):
+        errors_m = share * outcome.before.errors_m
+        told = replace(asked, verified=replace(asked.verified, errors_m=errors_m))
+        assert told.worse == worse and told.good != worse
+        said = "NOT GOOD: poses that the fit had not seen are told no better"
+        assert any(said in line for line in told.verdict()) == worse
+        assert replace(told, adopt=False).good  # not significant, which it says
+
+
 def test_a_slip_next_to_a_pose_held_out_counts_on_neither_side_there() -> None:
     what = made_up("planar-4", 45, 9, noise_m=2e-4)
     seen = measured(what, 1e-3, 2e-3, 4)
