@@ -197,6 +197,7 @@ def test_a_hold_goes_before_all_orders_of_its_own_connection(rig: Rig) -> None:
         refused = [json.loads(connection.recv(60.0)) for _ in range(2)]
         assert [(one["id"], one["ok"]) for one in refused] == [(1, False), (2, False)]
         assert refused[0]["error"] == "set: a stop was asked for after it"
+        wait_for(lambda: len(rig.service.link._pending) >= 2)  # the hold is posted as well
         rig.loop.answers = True
         answers = {one["id"]: one for one in (json.loads(connection.recv(60.0)) for _ in range(3))}
         assert answers.keys() == {0, 3, 4}
