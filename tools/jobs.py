@@ -7,26 +7,30 @@ import multiprocessing
 import os
 import signal
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.pool import Pool
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
-from cdpr_rt.arrays import FloatArray
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _ANSWER_S = 5.0
+_T = TypeVar("_T")
+_T_co = TypeVar("_T_co", covariant=True)
 
 
-class Job(Protocol):
+class Job(Protocol[_T_co]):
     """One part of the work; it can be pickled and knows all that it takes."""
 
-    def run(self) -> FloatArray:
+    def run(self) -> _T_co:
         """Return the result, which depends on the job alone."""
 
 
-Runner = Callable[[Sequence[Job]], Iterator[FloatArray]]
-"""Yields the results of jobs in their order."""
+class Runner(Protocol):
+    """Runs jobs."""
+
+    def __call__(self, jobs: Sequence[Job[_T]], /) -> Iterator[_T]:
+        """Yield the results of jobs in their order."""
 
 
 @contextmanager
@@ -39,10 +43,19 @@ def runner(workers: int, cluster: str | None) -> Iterator[Runner]:
         with _ray(cluster) as run:
             yield run
     elif workers == 1:
-        yield lambda jobs: map(_run, jobs)
+        yield _here
     else:
         with processes(workers) as pool:
-            yield lambda jobs: pool.imap(_run, jobs)
+
+            def in_processes(jobs: Sequence[Job[_T]], /) -> Iterator[_T]:
+                return pool.imap(_run, jobs)
+
+            yield in_processes
+
+
+def cores() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0))
 
 
 def processes(workers: int) -> Pool:
@@ -69,7 +82,7 @@ def _ray(address: str) -> Iterator[Runner]:
     try:
         remote = ray.remote(_run)
 
-        def run(jobs: Sequence[Job]) -> Iterator[FloatArray]:
+        def run(jobs: Sequence[Job[_T]], /) -> Iterator[_T]:
             for result in [remote.remote(job) for job in jobs]:
                 try:
                     yield ray.get(result)
@@ -89,5 +102,9 @@ def _knock(address: str) -> None:
         socket.create_connection((host, int(port)), timeout=_ANSWER_S).close()
 
 
-def _run(job: Job) -> FloatArray:
+def _here(jobs: Sequence[Job[_T]], /) -> Iterator[_T]:
+    return map(_run, jobs)
+
+
+def _run(job: Job[_T]) -> _T:
     return job.run()

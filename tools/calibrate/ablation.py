@@ -8,9 +8,7 @@ seen from the frame of the markers.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
@@ -45,6 +43,7 @@ from cdpr_tools.calibrate.made_readings import (
     made_readings,
 )
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.jobs import cores, runner
 
 VERIFIED, _AMONG = 10, 20
 THESIS: Final = Errors(
@@ -113,25 +112,36 @@ class Accuracy:
     """Of the errors of exit points and drums by their predicted covariance, over their number."""
 
 
+@dataclass(frozen=True)
+class _Trial:
+    """One calibration of a case."""
+
+    robot: str
+    case: Case
+    seed: int
+
+    def run(self) -> Accuracy:
+        """Return how good it is."""
+        return trial(self.robot, self.case, self.seed)
+
+
 def ablation(
-    robot: str, draws: int, seed: int, advance: Callable[[float], None]
+    robot: str, draws: int, seed: int, cluster: str | None, advance: Callable[[float], None]
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows of both tables, computed on all cores; raises BadInputError."""
+    """Return the rows of both tables, computed on all cores or a Ray cluster.
+
+    Raises CommandError for a robot without six directions, or a cluster that fails.
+    """
     platform = load_robot(robot).platform
     if platform is None or len(platform.controlled) != 6:
         raise BadInputError(f"{robot}: allowed: a robot whose platform has six directions")
     every = [*SOURCES, *STEPS[1:]]
-    found: dict[int, list[Accuracy]] = {k: [] for k in range(len(every))}
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        jobs = {
-            pool.submit(trial, robot, case, seed + draw): k
-            for draw in range(draws)
-            for k, case in enumerate(every)
-        }
-        for done, job in enumerate(as_completed(jobs)):
-            found[jobs[job]].append(job.result())
-            advance(float(done + 1))
-    rows = [_row(case, found[k]) for k, case in enumerate(every)]
+    found = []
+    with runner(cores(), cluster) as run:
+        for one in run([_Trial(robot, c, seed + draw) for draw in range(draws) for c in every]):
+            found.append(one)
+            advance(float(len(found)))
+    rows = [_row(case, found[k :: len(every)]) for k, case in enumerate(every)]
     return {"sources": rows[: len(SOURCES)], "steps": [rows[0], *rows[len(SOURCES) :]]}
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +16,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.error_model import Errors, Noise, predicted_errors, simulated_errors
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_tools.errors import BadInputError
+from cdpr_tools.jobs import cores, runner
 from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, legend_beside_title
 
 COUNTS: Final = (6, 10, 20, 50, 100, 150, 200, 300, 400)
@@ -46,6 +45,29 @@ class Case:
     noise: Noise
     poses: int
     share: float = 1.0
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Trials of one case; `poses` are those of which each draws its own."""
+
+    case: Case
+    exits_m: FloatArray
+    anchors_m: FloatArray
+    poses: FloatArray
+    draws: int
+    seed: int
+
+    def run(self) -> tuple[Errors, Errors]:
+        """Return errors by the model and by trial, the means over other choices of poses too."""
+        rng = np.random.default_rng(self.seed)
+        model, trial = [], []
+        for _ in range(self.draws):
+            chosen = self.poses[rng.choice(len(self.poses), self.case.poses, replace=False)]
+            known = self.exits_m, self.anchors_m, chosen, self.case.noise
+            model.append(predicted_errors(*known))
+            trial.append(simulated_errors(*known, 1, rng))
+        return _mean(model), _mean(trial)
 
 
 def held_poses(robot: str, count: int, seed: int) -> FloatArray:
@@ -80,45 +102,31 @@ def cases() -> list[Case]:
     return noisy + counted
 
 
-def _measure(
-    case: Case, geometry: tuple[FloatArray, FloatArray], poses: FloatArray, draws: int, seed: int
-) -> tuple[Errors, Errors]:
-    """Return errors by the model and by trial, the means over other choices of poses too."""
-    rng = np.random.default_rng(seed)
-    model, trial = [], []
-    for _ in range(draws):
-        chosen = poses[rng.choice(len(poses), case.poses, replace=False)]
-        model.append(predicted_errors(*geometry, chosen, case.noise))
-        trial.append(simulated_errors(*geometry, chosen, case.noise, 1, rng))
-    return _mean(model), _mean(trial)
-
-
 def _mean(errors: list[Errors]) -> Errors:
     squares = np.array([(one.exit_m**2, one.offset_m**2) for one in errors]).mean(axis=0)
     return Errors(*np.sqrt(squares).tolist())
 
 
 def study(
-    robot: str, draws: int, seed: int, advance: Callable[[float], None]
+    robot: str, draws: int, seed: int, cluster: str | None, advance: Callable[[float], None]
 ) -> list[dict[str, Any]]:
-    """Return a row of figures for each case, computed on all cores; raises BadInputError."""
+    """Return a row of figures for each case, computed on all cores or a Ray cluster.
+
+    Raises CommandError for a robot without six directions, or a cluster that fails.
+    """
     every = cases()
     poses = held_poses(robot, 2 * max(COUNTS), seed)
     platform = load_robot(robot).platform
     assert platform is not None  # see `held_poses`
     geometry = np.array(platform.exit_points_m), np.array(platform.anchor_points_m)
     seeds = np.random.SeedSequence(seed).generate_state(len(every)).tolist()
-    rows: dict[int, dict[str, Any]] = {}
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        jobs = {
-            pool.submit(_measure, case, geometry, poses, draws, seeds[k]): k
-            for k, case in enumerate(every)
-        }
-        for done, job in enumerate(as_completed(jobs)):
-            k = jobs[job]
-            rows[k] = _row(every[k], *job.result())
-            advance(float(done + 1))
-    return [rows[k] for k in range(len(every))]
+    jobs = [_Trials(case, *geometry, poses, draws, seeds[k]) for k, case in enumerate(every)]
+    rows = []
+    with runner(cores(), cluster) as run:
+        for case, errors in zip(every, run(jobs), strict=True):
+            rows.append(_row(case, *errors))
+            advance(float(len(rows)))
+    return rows
 
 
 def _row(case: Case, model: Errors, trial: Errors) -> dict[str, Any]:

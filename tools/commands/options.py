@@ -149,6 +149,10 @@ UrlOption = Annotated[
 KeyFileOption = Annotated[
     Path | None, typer.Option("--key-file", help="File with the key for --url.")
 ]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="A Ray cluster that does the work instead."),
+]
 OverwriteOption = Annotated[
     bool, typer.Option("--overwrite", help="Replace what is in --out already.")
 ]

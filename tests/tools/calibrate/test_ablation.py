@@ -9,7 +9,7 @@ import pytest
 from cdpr_here import cdpr_here
 
 from cdpr_tools.calibrate import ablation
-from cdpr_tools.calibrate.ablation import SOURCES, STEPS, Accuracy, trial
+from cdpr_tools.calibrate.ablation import SOURCES, STEPS, Accuracy, Case, trial
 
 
 def test_the_joint_fit_is_several_times_better_than_the_thesis_way() -> None:
@@ -25,6 +25,25 @@ def test_the_joint_fit_is_several_times_better_than_the_thesis_way() -> None:
 def test_the_last_step_is_within_what_is_wanted() -> None:
     last = trial("spatial-8", replace(STEPS[-1], poses=30), 4)
     assert last.position_mm < 2.0 and last.turn_deg < 0.15
+
+
+def test_each_case_has_its_own_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def one(robot: str, case: Case, seed: int) -> Accuracy:
+        asked.append((robot, seed))
+        return Accuracy(float(case.poses), float(case.joint), float(seed), 0.0)
+
+    monkeypatch.setattr(ablation, "trial", one)
+    monkeypatch.setattr(ablation, "cores", lambda: 1)
+    done: list[float] = []
+    tables = ablation.ablation("spatial-8", 2, 5, None, done.append)
+    assert done == [float(k + 1) for k in range(ablation.count(2))]
+    assert set(asked) == {("spatial-8", 5), ("spatial-8", 6)}
+    assert [row["name"] for row in tables["sources"]] == [case.name for case in SOURCES]
+    for row, case in zip(tables["steps"], STEPS, strict=True):
+        told = row["name"], row["position_mm"], row["turn_deg"], row["marker_mm"]
+        assert told == (case.name, float(case.poses), float(case.joint), 5.5)
 
 
 def test_both_tables_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -96,20 +96,6 @@ def test_any_number_of_workers_finds_the_same() -> None:
     assert searched("planar-4", *COARSE, "--within", "5", "--workers", "2") == alone
 
 
-@pytest.mark.long
-def test_a_cluster_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    ray_cluster = pytest.importorskip("ray.cluster_utils")
-    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-    cluster = ray_cluster.Cluster(
-        initialize_head=True, head_node_args={"num_cpus": 2, "include_dashboard": False}
-    )
-    try:
-        found = searched("planar-3", *COARSE, "--cluster", cluster.address)
-    finally:
-        cluster.shutdown()
-    assert found == searched("planar-3", *COARSE)
-
-
 def test_a_cluster_that_is_not_there_is_told() -> None:
     done = cdpr_here("robot", "workspace", "planar-3", "--cluster", "127.0.0.1:1")
     assert done.returncode == 1 and done.stderr.startswith("cdpr: --cluster 127.0.0.1:1: ")

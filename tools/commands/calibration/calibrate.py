@@ -11,6 +11,7 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_profiles.calibration.in_force import undo as take_back
 from cdpr_tools.commands.calibration.calibrate_read import read
 from cdpr_tools.commands.options import (
+    ClusterOption,
     JsonOption,
     OverwriteOption,
     PngOption,
@@ -308,11 +309,13 @@ def study(
             "--ablation", help="Tell instead what makes the error of a calibration with a camera."
         ),
     ] = False,
+    cluster: ClusterOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Tell how errors of measurement become errors of the geometry: by a model and by trial.
 
-    Table 3.1 and figures 3.7 and 3.8 of the thesis for a robot of ours, on all cores. With
+    Table 3.1 and figures 3.7 and 3.8 of the thesis for a robot of ours, on all cores or a
+    cluster. With
     --ablation: what made the thesis' 31 mm, and what each improvement takes off.
     """
     with told_on_a_terminal():
@@ -320,11 +323,11 @@ def study(
 
     out = Output(as_json)
     if ablation:
-        _ablation(out, robot, draws or _FEW, seed, png)
+        _ablation(out, robot, draws or _FEW, seed, cluster, png)
         return
     draws = draws or _DRAWS
     with out.progress("cases", float(len(studies.cases()))) as advance:
-        rows = studies.study(robot, draws, seed, advance)
+        rows = studies.study(robot, draws, seed, cluster, advance)
     out.say(*studies.lines(rows))
     if png is not None:
         with os_error_as(BadInputError, f"--png {png}: cannot be written"):
@@ -332,7 +335,9 @@ def study(
     out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, "cases": rows})
 
 
-def _ablation(out: Output, robot: str, draws: int, seed: int, png: Path | None) -> None:
+def _ablation(
+    out: Output, robot: str, draws: int, seed: int, cluster: str | None, png: Path | None
+) -> None:
     try:
         with told_on_a_terminal():
             from cdpr_tools.calibrate import ablation as ablations  # noqa: PLC0415  # slow to load
@@ -343,7 +348,7 @@ def _ablation(out: Output, robot: str, draws: int, seed: int, png: Path | None) 
     if png is not None:
         raise BadInputError("--png and --ablation: give one of them")
     with out.progress("trials", float(ablations.count(draws))) as advance:
-        tables = ablations.ablation(robot, draws, seed, advance)
+        tables = ablations.ablation(robot, draws, seed, cluster, advance)
     out.say(*ablations.lines(tables))
     out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, **tables})
 

@@ -17,7 +17,13 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import directions_of
 from cdpr_rt.robots.statics import Box, view_of
 from cdpr_rt.robots.workspace_analysis.criterion import criterion_of, turns_within
-from cdpr_tools.commands.options import JsonOption, PngOption, RobotArgument, written_as
+from cdpr_tools.commands.options import (
+    ClusterOption,
+    JsonOption,
+    PngOption,
+    RobotArgument,
+    written_as,
+)
 from cdpr_tools.errors import BadInputError, os_error_as
 from cdpr_tools.number_options import numbers, numbers_command
 from cdpr_tools.output import Output
@@ -146,10 +152,7 @@ def workspace(
         int | None,
         typer.Option(min=1, max=256, help="Processes; by default as many as there are cores."),
     ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="A Ray cluster that does the work instead."),
-    ] = None,
+    cluster: ClusterOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Search where the cables can hold a robot's platform, by a grid and by rays from a centre.

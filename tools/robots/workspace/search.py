@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,7 +13,7 @@ from cdpr_rt.robots.workspace_analysis.criterion import Criterion
 from cdpr_rt.robots.workspace_analysis.grid import Grid, GridJob, WayJob, grid_points, shape_of
 from cdpr_rt.robots.workspace_analysis.rays import RayJob, Rays, directions
 from cdpr_tools.errors import BadInputError, WorkFailedError
-from cdpr_tools.jobs import Job, Runner, runner
+from cdpr_tools.jobs import Job, Runner, cores, runner
 from cdpr_tools.output import Output
 
 _CHECKS_A_JOB = 100_000
@@ -53,13 +52,13 @@ def search(wanted: Search, out: Output) -> Found:
     shape = shape_of(wanted.box, wanted.cells)
     turns = len(wanted.criterion.turns_rad)
     checks = turns * (int(np.prod(shape)) + _CHECKS_A_RAY * wanted.rays)
-    usual = 1 if checks < _WORTH_PROCESSES else len(os.sched_getaffinity(0))
+    usual = 1 if checks < _WORTH_PROCESSES else cores()
     with (
         runner(wanted.workers or usual, wanted.cluster) as run,
         out.progress("poses", checks / _CHECKS_A_SECOND) as advance,
     ):
 
-        def computed(jobs: Sequence[Job], first: int, each: int) -> FloatArray:
+        def computed(jobs: Sequence[Job[FloatArray]], first: int, each: int) -> FloatArray:
             results = []
             for k, result in enumerate(run(jobs), start=1):
                 results.append(result)
