@@ -15,6 +15,8 @@ from typing import Any, Protocol, TypeVar
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 _ANSWER_S = 5.0
+_LOOK_S = 1.0
+"""How often is looked whether all processes live while a result is waited for."""
 _T = TypeVar("_T")
 _T_co = TypeVar("_T_co", covariant=True)
 
@@ -48,9 +50,25 @@ def runner(workers: int, cluster: str | None) -> Iterator[Runner]:
         with processes(workers) as pool:
 
             def in_processes(jobs: Sequence[Job[_T]], /) -> Iterator[_T]:
-                return pool.imap(_run, jobs)
+                return _by_pool(pool, jobs)
 
             yield in_processes
+
+
+def _by_pool(pool: Pool, jobs: Sequence[Job[_T]]) -> Iterator[_T]:
+    """Yield results; raises WorkFailedError once a process has died, which the pool replaces."""
+    started = {child.pid for child in multiprocessing.active_children()}
+    results = pool.imap(_run, jobs)
+    while True:
+        try:
+            yield results.next(_LOOK_S)
+        except StopIteration:
+            return
+        except multiprocessing.TimeoutError:
+            if not started <= {child.pid for child in multiprocessing.active_children()}:
+                raise WorkFailedError(
+                    "a process that did a part of the work has died; is there too little memory?"
+                ) from None
 
 
 def cores() -> int:

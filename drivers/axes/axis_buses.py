@@ -240,7 +240,7 @@ class AxisBuses:
     @property
     def torque_modes(self) -> list[int]:
         """Return the mode in which each drive obeys a torque, by its profile."""
-        return [axis.drive.mode_torque for axis in self.axes]
+        return self._by_axis(lambda group: group.torque_modes)
 
     def ask_mode(self, modes: int | Sequence[int]) -> None:
         """Ask for a mode of operation, one for all or one each; see `AxisGroup.ask_mode`."""

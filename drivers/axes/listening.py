@@ -143,6 +143,9 @@ class ListeningDevice:
         """
         deadline_s = self.clock.now_s + self._settle_s
         ahead = [monitor for monitor in self._monitors if monitor.sync_waiting(deadline_s)]
+        if 0 < len(ahead) < len(self._monitors):  # it may have come at that very time
+            deadline_s = self.clock.now_s + self._settle_s
+            ahead = [monitor for monitor in self._monitors if monitor.sync_waiting(deadline_s)]
         self._cycles_ahead += 1 if 0 < len(ahead) < len(self._monitors) else -1
         self._cycles_ahead = max(self._cycles_ahead, 0)
         if self._cycles_ahead >= _MOST_CYCLES_AHEAD:
@@ -281,7 +284,7 @@ class _BusMonitor:
     def _listen(self, deadline: float) -> bool:
         """Receive frames until a SYNC (true), the last answer awaited, or `deadline` (false).
 
-        While answers are awaited, their coming ends it as well; 0 for what waits already.
+        While answers are awaited, their coming ends it as well.
         """
         recv_into, rows = self._port.recv_into, self._rx.rows
         awaited = self._missing > 0

@@ -32,7 +32,8 @@ def _numbers(option: str, text: str, base: int, known: range, allowed: str) -> s
             high = int(last, base) if dash else low
         except ValueError:
             low, high = 1, 0
-        if not (low in known and high in known and low <= high):
+        written = (first + last).isalnum()  # int() takes signs, blanks and underscores as well
+        if not (written and low in known and high in known and low <= high):
             raise BadInputError(f"{option} {text}: {part!r} is {allowed}")
         found |= set(range(low, high + 1))
     return found

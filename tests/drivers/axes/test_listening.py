@@ -305,6 +305,34 @@ def test_a_bus_that_has_lost_cycles_is_caught_up_with(
         assert all(together[-20:])
 
 
+@pytest.mark.parametrize(
+    ("answered", "apart"), [(0.3, 0.01), (0.755, 0.01), (0.76, 0.05), (0.8, 0.1), (0.9, 0.05)]
+)
+def test_buses_in_step_stay_so_whenever_drives_answer(
+    two: list[Stage], answered: float, apart: float
+) -> None:
+    clock = ScriptedClock()
+
+    def sync(bus: Stage) -> None:
+        bus.says(0x080)
+        bus.settle()
+
+    def answer(bus: Stage, k: int) -> None:
+        bus.answers(1, k)
+        bus.settle()
+
+    with device(two, [[1], [1]], clock) as ears:
+        for k in range(40):
+            for number, bus in enumerate(two):
+                clock.at((k + apart * number) * PERIOD_S, partial(sync, bus))
+            for bus in two:
+                clock.at((k + answered) * PERIOD_S, partial(answer, bus, k))
+        while clock.script:
+            cycle(ears)
+            first, second = np.rint(ears.feedback.position_rad * COUNTS / math.tau).tolist()
+            assert first == second
+
+
 def test_a_flood_does_not_hold_a_cycle_up(stage: Stage) -> None:
     with device([stage], [[1]]) as ears:
         stop = threading.Event()

@@ -77,6 +77,6 @@ def test_filters_let_just_the_identifiers_through(text: str) -> None:
 
 def test_node_ids() -> None:
     assert parse_node_ids("3,1-2, 127") == [1, 2, 3, 127]
-    for text in ("0", "128", "5-2", "x", "", "1--2"):
+    for text in ("0", "128", "5-2", "x", "", "1--2", "1_0", "+5", "5 - 7"):
         with pytest.raises(BadInputError, match="1 to 127"):
             parse_node_ids(text)

@@ -315,8 +315,7 @@ def study(
     """Tell how errors of measurement become errors of the geometry: by a model and by trial.
 
     Table 3.1 and figures 3.7 and 3.8 of the thesis for a robot of ours, on all cores or a
-    cluster. With
-    --ablation: what made the thesis' 31 mm, and what each improvement takes off.
+    cluster. With --ablation: what made the thesis' 31 mm, and what each improvement takes off.
     """
     with told_on_a_terminal():
         from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
