@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 from cdpr_here import cdpr_here
-
-import cdpr_profiles
+from patient_drive import write_patient_drive
 
 pytestmark = pytest.mark.vcan
 
@@ -45,24 +44,11 @@ def simulated_drive(winch: Path) -> Iterator[None]:
         process.stdout.close()
 
 
-def patient_drive(folder: Path) -> None:
-    """Write the shipped drive, whose watch on its master lets a busy machine hold that up."""
-    shipped = Path(cdpr_profiles.__file__).parent / "drives" / "generic-cia402.toml"
-    text = shipped.read_text()
-    for before, after in (
-        ("heartbeat_consumer_s = 0.5", "heartbeat_consumer_s = 10.0"),
-        ('eds = "generic-cia402.eds"', f'eds = "{shipped.with_suffix(".eds")}"'),
-    ):
-        assert before in text
-        text = text.replace(before, after)
-    (folder / "patient.toml").write_text(text)
-
-
 def test_a_motor_is_measured_over_socketcan(tmp_path: Path) -> None:
     """Compensation, which no bus changes, is judged where cycles cost less."""
     winch, out = tmp_path / "winch.toml", tmp_path / "out"
     winch.write_text(WINCH)
-    patient_drive(tmp_path)
+    write_patient_drive(tmp_path)
     with simulated_drive(winch):
         bus = "socketcan:vcan0?lockstep=true"
         arguments = ["cogging", "sweep", str(winch), "--bus", bus, "--out", str(out), "--yes"]

@@ -10,11 +10,14 @@ from pathlib import Path
 
 import pytest
 from daemon_rig import RealDaemon, write_robot
+from patient_drive import NAME, write_patient_drive
+
+import cdpr_profiles
 
 pytestmark = pytest.mark.vcan
 
 BUS = "can0=socketcan:vcan0"
-PERIOD_S = 0.02  # the guest's kernel is slow, and has one processor for all of it
+PERIOD_S = 0.05  # the guest's kernel is slow, and has one processor for all of it
 LIMITS = """
 late_s = 5.0
 missed_cycles = 200
@@ -25,9 +28,14 @@ stale_cycles = 1000
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
-    """Its master may be held up for as long as LIMITS say, not for a tenth of a second alone."""
+    """Its master and drives may be held up for as long as LIMITS say, not a few cycles alone."""
     path = write_robot(tmp_path, PERIOD_S, LIMITS)
-    path.write_text("master_heartbeat_s = 6.0\n" + path.read_text())
+    shipped = "winch-mpp0923d"
+    text = path.read_text().replace(f'"{shipped}"', '"winch.toml"')
+    path.write_text("master_heartbeat_s = 6.0\n" + text)
+    winch = (Path(cdpr_profiles.__file__).parent / "winches" / f"{shipped}.toml").read_text()
+    (tmp_path / "winch.toml").write_text(winch.replace('"generic-cia402"', f'"{NAME}"'))
+    write_patient_drive(tmp_path)
     return path
 
 
