@@ -38,6 +38,8 @@ def run_in_guest(names: Sequence[str]) -> Outcome:
             REPORTS_VARIABLE: str(written),
             "HOME": os.environ.get("HOME", "/root"),
             "PYTHONDONTWRITEBYTECODE": "1",
+            # there a copy of a process that has all loaded costs more than to load it anew
+            "CDPR_TEST_FORKS": "0",
             **_KEEP_MEMORY,
         }
         try:
