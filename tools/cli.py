@@ -77,7 +77,7 @@ MODULES = {
     "drive.group": {
         "drive": "One drive on the bus.",
     },
-    "io": {
+    "devices.io": {
         "io": "The safety I/O beside the drives.",
     },
     "log": {
@@ -95,7 +95,7 @@ MODULES = {
     "profiles": {
         "profiles": "Profiles of motors, drives, cables, winches and robots.",
     },
-    "rail": {
+    "devices.rail": {
         "rail": "The rails on which winches stand.",
     },
     "robot.group": {

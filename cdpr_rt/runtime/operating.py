@@ -10,10 +10,10 @@ from typing import TypeVar
 from cdpr_rt.control.base import Controller
 from cdpr_rt.core.cycle import Lateness
 from cdpr_rt.core.exchange import AxisDevice
-from cdpr_rt.core.rawlog import RawLogWriter, raw_rows
 from cdpr_rt.core.shared_block import RowReader
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import InterruptedMotionError, NotInTimeError, TripError
+from cdpr_rt.identification.rawlog import RawLogWriter, raw_rows
 from cdpr_rt.motion.trajectory import Motion
 from cdpr_rt.programs.axes.track import TrackProgram
 from cdpr_rt.runtime.control_loop.engine import HOLD, IDLE

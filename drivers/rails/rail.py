@@ -10,7 +10,7 @@ from typing import Final, Protocol
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles.devices.rail import RailProfile
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.robots.calibration_state import mark_not_calibrated
+from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated
 
 _LOOK_S: Final = 0.01
 _SETTLE_S: Final = 0.3

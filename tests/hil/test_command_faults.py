@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_winch
-from cdpr_rt.core.rawlog import read_raw_log
+from cdpr_rt.identification.rawlog import read_raw_log
 
 WINCH = "winch-mpp0923d"
 PROFILES = Path(sys.modules[load_winch.__module__].__file__ or "").parent

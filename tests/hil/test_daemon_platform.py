@@ -19,7 +19,7 @@ from cdpr_profiles import load_robot
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.estimation.residuals import lengths_told
 from cdpr_rt.calibration.readings.data import load_data
-from cdpr_rt.robots.calibration_state import mark_not_calibrated
+from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated
 
 PERIOD_S = 0.004
 SHIPPED = Path(cdpr_profiles.__file__).parent / "robots"

@@ -24,7 +24,7 @@ from cdpr_drivers.errors import DriveFaultError, ModeRefusedError, SdoError
 from cdpr_drivers.robot.session import Session
 from cdpr_profiles import DriveProfile, load_winch
 from cdpr_rt.control.tuning import design_pid
-from cdpr_rt.core.rawlog import read_raw_log
+from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.procedure import Commissioning
 from cdpr_rt.procedures.commissioning.winch_passes import Measurement

@@ -43,7 +43,7 @@ from cdpr_sim_bus.devices.sim_rail import RailFault
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
 from cdpr_tools import cli
-from cdpr_tools.commands import rail as rail_commands
+from cdpr_tools.commands.devices import rail as rail_commands
 from cdpr_tools.errors import BAD_INPUT, BadInputError
 
 FAILED = 1

@@ -28,7 +28,7 @@ from cdpr_profiles import load_winch
 from cdpr_rt.errors import ControlError
 from cdpr_sim_bus.devices.sim_safety_io import SafetyIoFault
 from cdpr_sim_bus.physics_board import BoardAxis, PhysicsBoard
-from cdpr_tools.commands import io as io_commands
+from cdpr_tools.commands.devices import io as io_commands
 from cdpr_tools.commands.drive import drive as drive_commands
 from cdpr_tools.errors import BadInputError, WorkFailedError
 

@@ -33,12 +33,12 @@ from cdpr_profiles.reading.places import SHIPPED
 from cdpr_profiles.reading.reader import dotted
 from cdpr_profiles.winch_calibration import WinchCalibration
 from cdpr_rt.control.tuning import design_pid
-from cdpr_rt.core.rawlog import RawLogWriter, column_names, read_raw_log
 from cdpr_rt.errors import ControlError, InvalidRequestError
+from cdpr_rt.identification.rawlog import RawLogWriter, column_names, read_raw_log
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.results import read_run
 from cdpr_rt.procedures.measurement import recording
-from cdpr_rt.robots.last_lengths import LastLengths
+from cdpr_rt.robots.persistence.last_lengths import LastLengths
 from cdpr_rt.robots.robot_arrays import described, limits_of, winches_of
 from cdpr_sim_bus.canopen.dictionary.od import ObjectDictionary
 from cdpr_sim_bus.cia402.drive import SimDrive
@@ -48,8 +48,8 @@ from cdpr_sim_bus.errors import SimulatorError
 from cdpr_sim_bus.robot.plant import Plant
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.errors import CommandError
+from cdpr_tools.recordings.stored_settings import load_settings
 from cdpr_tools.report import tables, words
-from cdpr_tools.stored_settings import load_settings
 from cdpr_tools.teleop.script import read_script
 from cdpr_tools.trials.trial import TrialSettings
 from tests.profiles.test_robot_limits import calibration

@@ -19,12 +19,12 @@ from cdpr_rt.calibration.outcome import Method, Outcome, calibration_of
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.data import CalibrationData, load_points, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
-from cdpr_rt.robots.calibration_state import (
+from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.persistence.calibration_state import (
     mark_calibrated,
     mark_not_calibrated,
     not_calibrated_reason,
 )
-from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 

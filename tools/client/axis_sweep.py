@@ -14,8 +14,8 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.rawlog import AXIS_COLUMNS, RawLogWriter, column_names
 from cdpr_rt.identification.cogging_profile import DriveIdentity
+from cdpr_rt.identification.rawlog import AXIS_COLUMNS, RawLogWriter, column_names
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.winch_passes import SWEEP_LEAD_IN_RAD
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader

@@ -12,9 +12,9 @@ import typer
 from cdpr_drivers.robot.commissioned import load_profile
 from cdpr_profiles import Winch, load_robot, load_winch
 from cdpr_profiles.limits.motor_bounds import MotorBounds
-from cdpr_rt.core.rawlog import read_raw_log
 from cdpr_rt.errors import RawLogError
 from cdpr_rt.identification.cogging_profile import CoggingProfileError, DriveIdentity
+from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.evaluation import METHODS, compare
 from cdpr_rt.procedures.commissioning.identified import identify, store_profile, validation_name

@@ -24,7 +24,7 @@ from cdpr_tools.experiment.session import ExperimentSettings, run_session
 from cdpr_tools.experiment.statistics import rows, variance_analysis
 from cdpr_tools.jobs import processes
 from cdpr_tools.output import Output, to_json
-from cdpr_tools.stored_settings import load_settings
+from cdpr_tools.recordings.stored_settings import load_settings
 from cdpr_tools.trials.directions import platform_of
 
 SETTINGS: Final = "experiment.json"

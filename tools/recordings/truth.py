@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cdpr_profiles.errors import ProfileError
 from cdpr_profiles.reading.bounded_input import open_regular, parse_json
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.core.rawlog import RawLog
+from cdpr_rt.identification.rawlog import RawLog
 from cdpr_rt.procedures.commissioning.evaluation import AngleOf
 from cdpr_rt.procedures.measurement import Recording
 from cdpr_tools.errors import BadInputError

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_profiles import Winch
-from cdpr_rt.core.rawlog import read_raw_log
+from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.commissioning.evaluation import METHODS
 from cdpr_rt.procedures.commissioning.identified import Identified, identify, validation_name

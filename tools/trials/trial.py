@@ -14,7 +14,7 @@ from cdpr_profiles import Robot, load_robot
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
-from cdpr_tools.stored_settings import load_settings
+from cdpr_tools.recordings.stored_settings import load_settings
 from cdpr_tools.trials import limits, line, path, tape, targets
 from cdpr_tools.trials.directions import platform_of
 from cdpr_tools.trials.evaluation import pictures

@@ -11,7 +11,7 @@ from typing import Any
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.tuning import PidDesign
 from cdpr_rt.control.validation import Metrics, evaluate, floor, ratios, worst
-from cdpr_rt.core.rawlog import RawLog, read_raw_log
+from cdpr_rt.identification.rawlog import RawLog, read_raw_log
 from cdpr_rt.procedures.measurement import Recording, recording
 
 METHODS = ("none", "thesis", "better")

@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from cdpr_profiles import Winch
-from cdpr_rt.core.rawlog import read_raw_log
 from cdpr_rt.identification import (
     MOST_ROUNDS,
     HarmonicResult,
@@ -24,6 +23,7 @@ from cdpr_rt.identification.cogging_profile import (
     stored_harmonics,
     stored_thesis,
 )
+from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_rt.procedures.measurement import recording
 

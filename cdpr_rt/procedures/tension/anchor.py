@@ -13,9 +13,9 @@ from cdpr_profiles import Winch
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.pid import Pid, PidGains
 from cdpr_rt.core.exchange import Setpoint
-from cdpr_rt.core.rawlog import RawLogWriter, read_raw_log
 from cdpr_rt.core.tension_feedback import TensionExchange
 from cdpr_rt.errors import InvalidRequestError, RawLogError, TripError
+from cdpr_rt.identification.rawlog import RawLogWriter, read_raw_log
 from cdpr_rt.identification.tension_gain import CalibrationRefusedError, TorquePoint
 from cdpr_rt.motion.trajectory import Hold, Motion
 from cdpr_rt.procedures.winch_operator import Notifier, Tolerance, WinchOperator

@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 from cdpr_profiles import Winch
 from cdpr_profiles.winch_calibration import WinchCalibration
-from cdpr_rt.core.rawlog import read_raw_log
 from cdpr_rt.errors import InvalidRequestError, RawLogError
+from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.identification.tension_gain import (
     CalibrationRefusedError,
     TorquePoint,

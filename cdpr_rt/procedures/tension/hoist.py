@@ -11,8 +11,8 @@ import numpy as np
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.control.pid import Pid, PidGains
 from cdpr_rt.core.exchange import Setpoint
-from cdpr_rt.core.rawlog import RawLog
 from cdpr_rt.errors import RawLogError
+from cdpr_rt.identification.rawlog import RawLog
 from cdpr_rt.identification.tension_gain import CalibrationRefusedError, TorquePoint
 from cdpr_rt.motion.trajectory import Hold, Motion, TrapezoidalMove
 

@@ -10,8 +10,8 @@ from typing import Any
 from cdpr_profiles import Winch
 from cdpr_profiles.limits.motor_bounds import MOST_GAIN_ERROR
 from cdpr_rt.core.clock import Clock
-from cdpr_rt.core.rawlog import RawLogWriter, column_names, read_raw_log
 from cdpr_rt.errors import InvalidRequestError, TripError
+from cdpr_rt.identification.rawlog import RawLogWriter, column_names, read_raw_log
 from cdpr_rt.identification.tension_gain import (
     LEAST_LEVELS,
     LEAST_SPAN,

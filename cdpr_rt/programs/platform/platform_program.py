@@ -22,7 +22,7 @@ from cdpr_rt.programs.program_base import CommandedProgram
 from cdpr_rt.robots.free_rotation import SWINGS_m
 from cdpr_rt.robots.interface import PlatformControl
 from cdpr_rt.robots.kinematics.pose_setpoint import pose_of_coordinates, write_quaternion
-from cdpr_rt.robots.last_lengths import LastLengths
+from cdpr_rt.robots.persistence.last_lengths import LastLengths
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.robot_arrays import exit_point_diagonal_m
 

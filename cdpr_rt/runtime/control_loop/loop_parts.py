@@ -9,7 +9,7 @@ from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.programs.base import Program
 from cdpr_rt.programs.platform.paths.path_store import PathStore
-from cdpr_rt.robots.last_lengths import LastLengths
+from cdpr_rt.robots.persistence.last_lengths import LastLengths
 
 
 @dataclass(frozen=True)

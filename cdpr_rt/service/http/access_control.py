@@ -17,8 +17,8 @@ from urllib.parse import parse_qs
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from cdpr_rt.service.http.connections import TokenBuckets
 from cdpr_rt.service.http.tickets import Tickets
-from cdpr_rt.service.http.token_buckets import TokenBuckets
 from cdpr_rt.service.link import URGENT
 
 MOST_BODY_BYTES: Final = 16384

@@ -1,4 +1,4 @@
-"""Connections: which are kept where there are too many, and whose work is done next."""
+"""Connections: which are kept where there are too many, how often who asks, who is served next."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 import socket
 import struct
 import termios
-from collections import Counter, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
@@ -16,6 +16,8 @@ MOST: Final = 64
 MOST_OF_PEER: Final = 24
 MOST_FOR_STOPS: Final = 16
 """Places beyond these, for connections that ask for nothing but a stop."""
+MOST_PEERS: Final = 1024
+"""Of rates: who was not seen for longest is forgotten beyond these."""
 _STOP_S, _WORK_BESIDE_S = 0.03, 0.01
 """A stop is through its passes in that time; a piece of other work is done so often meanwhile."""
 _CREDENTIALS: Final = struct.Struct("3i")  # struct ucred: pid, uid, gid
@@ -98,6 +100,25 @@ class ConnectionLimiter:
                 one.transport.abort()
                 return True
         return False
+
+
+class TokenBuckets:
+    """A bucket of `burst` tokens for each peer, filled at `rate_Hz`."""
+
+    def __init__(self, rate_Hz: float, burst: float) -> None:
+        self._rate_Hz = rate_Hz
+        self._burst = burst
+        self._peers: OrderedDict[str, tuple[float, float]] = OrderedDict()
+
+    def take(self, peer: str, now_s: float) -> bool:
+        """Take a token of `peer`; return whether there was one."""
+        left, before_s = self._peers.pop(peer, (self._burst, now_s))
+        left = min(self._burst, left + (now_s - before_s) * self._rate_Hz)
+        allowed = left >= 1.0
+        self._peers[peer] = (left - 1.0 if allowed else left), now_s
+        if len(self._peers) > MOST_PEERS:
+            self._peers.popitem(last=False)
+        return allowed
 
 
 class FairQueue:

@@ -18,8 +18,7 @@ from websockets.frames import Frame
 
 from cdpr_rt.service.http.acceptor import LONGEST_STOP, STOPS, Acceptor, may_stop
 from cdpr_rt.service.http.access_control import MOST_BODY_BYTES, AccessControl
-from cdpr_rt.service.http.connections import ConnectionLimiter, FairQueue, peer_of
-from cdpr_rt.service.http.token_buckets import TokenBuckets
+from cdpr_rt.service.http.connections import ConnectionLimiter, FairQueue, TokenBuckets, peer_of
 
 _REQUEST_S, _ANSWER_S, _LOOK_S = 10.0, 90.0, 2.0
 _LEAVE_S: Final = 5.0

@@ -16,7 +16,7 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
-from cdpr_tools.bench.control import Motion, controls, run_block
+from cdpr_tools.bench.control.measure import Motion, controls, run_block
 
 ROBOTS = ("planar-3", "spatial-8", "suspended-8")
 PLANE = ((0.5, 1.5), (-0.5, 2.3), (0.55, 2.35), (-0.4, 1.45))

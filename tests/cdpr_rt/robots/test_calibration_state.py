@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_rt.robots.calibration_state import (
+from cdpr_rt.robots.persistence.calibration_state import (
     calibrated_flag_file,
     calibration_state,
     mark_calibrated,

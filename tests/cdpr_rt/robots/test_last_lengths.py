@@ -11,7 +11,7 @@ import pytest
 
 from cdpr_rt.core.estimate import AxisEstimate
 from cdpr_rt.core.exchange import AxisFeedback
-from cdpr_rt.robots.last_lengths import LastLengths, off_index_m
+from cdpr_rt.robots.persistence.last_lengths import LastLengths, off_index_m
 from cdpr_rt.state_file import StateFileError
 
 CABLE_m = np.array([0.026, -0.026, 0.03])

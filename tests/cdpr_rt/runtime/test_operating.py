@@ -10,9 +10,9 @@ import pytest
 
 from cdpr_rt.control.proportional import Proportional
 from cdpr_rt.core.exchange import Setpoint
-from cdpr_rt.core.rawlog import read_raw_log
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.errors import InterruptedMotionError, RawLogError, TripError
+from cdpr_rt.identification.rawlog import read_raw_log
 from cdpr_rt.motion.trajectory import Hold, TrapezoidalMove
 from tests.cdpr_rt.runtime.operating_rig import (
     DAMPING,

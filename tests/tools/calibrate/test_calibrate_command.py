@@ -16,7 +16,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
-from cdpr_rt.robots.calibration_state import mark_not_calibrated, not_calibrated_reason
+from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated, not_calibrated_reason
 from cdpr_tools.calibrate.made_readings import HAND_EYE_m
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up

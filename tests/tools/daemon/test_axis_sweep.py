@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
-from cdpr_rt.core.rawlog import AXIS_COLUMNS
+from cdpr_rt.identification.rawlog import AXIS_COLUMNS
 from cdpr_rt.procedures.commissioning.commission_files import Paths
 from cdpr_tools.client.axis_sweep import SweptAxis, write_passes
 from cdpr_tools.errors import BadInputError, WorkFailedError

@@ -10,7 +10,7 @@ from cdpr_drivers.robot.robot_buses import refuse_simulated_calibration
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.in_force import load_calibrated, take_over, undo
 from cdpr_profiles.catalogue import list_profiles
-from cdpr_rt.robots.calibration_state import mark_calibrated
+from cdpr_rt.robots.persistence.calibration_state import mark_calibrated
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.daemon.processes.loop_process import description, look_at_calibration

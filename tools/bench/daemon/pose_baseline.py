@@ -19,7 +19,7 @@ import numpy as np
 
 from cdpr_profiles import load_robot
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
-from cdpr_tools.bench.control import controls
+from cdpr_tools.bench.control.measure import controls
 from cdpr_tools.bench.daemon.loop_baseline import BaselineLoop, run
 
 _TIGHTEN_S, _GO_S, _ROUND_S = 3.0, 4.0, 4.0

@@ -37,8 +37,8 @@ from cdpr_rt.programs.registry import (
     platform_parts,
     warm_up_programs,
 )
-from cdpr_rt.robots.calibration_state import not_calibrated_reason
 from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_rt.robots.persistence.calibration_state import not_calibrated_reason
 from cdpr_rt.robots.robot_arrays import described, limits_of, supervisor_limits, winches_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering

@@ -25,7 +25,7 @@ from cdpr_rt.programs.platform.tightening.standing import (
 )
 from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
 from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
-from cdpr_rt.robots.last_lengths import StoppedLengths, index_disagreement
+from cdpr_rt.robots.persistence.last_lengths import StoppedLengths, index_disagreement
 
 TAKE_UP_m_s = 0.05
 """Speed at which slack is taken up."""

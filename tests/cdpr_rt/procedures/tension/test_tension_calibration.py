@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_winch
-from cdpr_rt.core.rawlog import RawLogWriter
 from cdpr_rt.errors import InvalidRequestError, RawLogError
+from cdpr_rt.identification.rawlog import RawLogWriter
 from cdpr_rt.procedures.tension.anchor import plan_anchor
 from cdpr_rt.procedures.tension.calibration import recorded_winch
 from cdpr_rt.procedures.tension.masses import check_masses, mass_points

@@ -15,7 +15,7 @@ from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_tools.bench.control_baseline import BaselineCableControl
+from cdpr_tools.bench.control.baseline import BaselineCableControl
 from cdpr_tools.bench.timing import verdict
 from cdpr_tools.output import Output
 

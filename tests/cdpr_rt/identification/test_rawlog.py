@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_rt.core.rawlog import RawLogWriter, read_raw_log
 from cdpr_rt.errors import RawLogError
+from cdpr_rt.identification.rawlog import RawLogWriter, read_raw_log
 
 ROWS = np.arange(30.0).reshape(10, 3)
 

@@ -18,7 +18,7 @@ from cdpr_drivers.rails.rail_session import (
     slack_watch,
 )
 from cdpr_profiles.devices.rail import load_rail
-from cdpr_rt.robots.calibration_state import calibration_state
+from cdpr_rt.robots.persistence.calibration_state import calibration_state
 from cdpr_tools.commands.options import JsonOption, SafetyIoOption, YesOption
 from cdpr_tools.consent import require_consent
 from cdpr_tools.errors import BadInputError

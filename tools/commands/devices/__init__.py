@@ -1,0 +1,1 @@
+"""Commands of devices beside the winches: rails, safety inputs and outputs."""
