@@ -40,7 +40,7 @@ def _skip_blas() -> None:
 _skip_blas()
 
 
-class _Teller(event.Listener):
+class _CompileListener(event.Listener):
     """Tells of what is compiled for want of machine code that is kept."""
 
     @override
@@ -54,7 +54,7 @@ class _Teller(event.Listener):
 
 
 _listen: Callable[[str, event.Listener], None] = event.register
-_listen("numba:compile", _Teller())
+_listen("numba:compile", _CompileListener())
 
 
 def _call_template(dispatcher: Any, args: Any, kws: Any) -> Any:

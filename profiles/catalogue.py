@@ -113,17 +113,17 @@ def load_winch(name: str | Path, beside: Path | None = None) -> Winch:
     )
 
 
-def load_robot(name: str | Path, beside: Path | None = None) -> Robot:
+def load_robot(name: str | Path) -> Robot:
     """Return a robot by name or path with the winches it names; raises ProfileError.
 
     The winches are looked for beside the robot's own file first. Where `name` is that of a winch,
     the robot has this one axis.
     """
-    path = find("robots", name, beside)
+    path = find("robots", name)
     if path is None or "motor" in read_toml(path):
-        if find("winches", name, beside) is None:
-            raise unknown_profile("robots", name, beside, _names("winches"))
-        return robot_of_winch(load_winch(name, beside))
+        if find("winches", name) is None:
+            raise unknown_profile("robots", name, None, _names("winches"))
+        return robot_of_winch(load_winch(name))
     file = read_toml_model(path, RobotFile)
     _raise_faults(path, list(file.faults()))
     axes = _axes(path, file)

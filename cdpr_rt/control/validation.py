@@ -113,19 +113,18 @@ def floor(
     encoder_step_rad: float,
     torque_step_Nm: float,
     samples: int = 16000,
-    carries_residual: bool = True,
 ) -> Metrics:
     """Return what quantised readings and torques alone leave on the true angle, friction aside.
 
-    Both roundings count as white noise of their step over √12; a drive that carries the rounding's
-    residual to the next cycle shapes the torque's by 1 - z⁻¹. The noises pass the loop of
+    Both roundings count as white noise of their step over √12; the rounding's residual,
+    carried to the next cycle, shapes the torque's by 1 - z⁻¹. The noises pass the loop of
     `tuning.loop_response`; a peak is the expected largest of as many Gaussian values as there are
     independent ones in `samples` cycles. Stick-slip comes on top and is not part of this.
     """
     omega = np.linspace(2.0 * math.pi / (samples * period_s), math.pi / period_s, samples // 2)
     loop = loop_response(gains, inertia_kg_m2, latency_s, period_s, omega)
     plant = 1.0 / (inertia_kg_m2 * omega**2)
-    shape = np.abs(1.0 - np.exp(-1j * omega * period_s)) if carries_residual else 1.0
+    shape = np.abs(1.0 - np.exp(-1j * omega * period_s))
     reading = encoder_step_rad / math.sqrt(12.0)
     torque = torque_step_Nm / math.sqrt(12.0) * shape
     position = (reading * np.abs(loop / (1.0 + loop))) ** 2 + (

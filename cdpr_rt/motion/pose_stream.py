@@ -8,8 +8,8 @@ which the next sample has arrived before it is due.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import IntEnum
+from typing import Final
 
 import numpy as np
 
@@ -30,17 +30,11 @@ class StreamState(IntEnum):
 
 
 _STATES = tuple(StreamState)
-
-
-@dataclass(frozen=True)
-class StreamSettings:
-    """Time-out and plausible speed of a stream."""
-
-    silence_s: float = 0.5
-    """Time-out: the motion is to be braked after so long without a sample."""
-    fastest_m_s: float = 10.0
-    fastest_rad_s: float = 30.0
-    """A faster step between samples is a discontinuity: the stream starts anew."""
+SILENCE_s: Final = 0.5
+"""Time-out: the motion is to be braked after so long without a sample."""
+FASTEST_m_s: Final = 10.0
+FASTEST_rad_s: Final = 30.0
+"""A faster step between samples is a discontinuity: the stream starts anew."""
 
 
 class PoseStream:
@@ -52,11 +46,8 @@ class PoseStream:
     time-out, or after a jump of pose or clock the stream starts anew.
     """
 
-    def __init__(
-        self, block: SharedBlock, period_s: float, settings: StreamSettings = StreamSettings()
-    ) -> None:
+    def __init__(self, block: SharedBlock, period_s: float) -> None:
         self._period_s = period_s
-        self._settings = settings
         self._posted = block.counters["samples"]
         self._mover = block.counters["mover"]
         samples = block.samples
@@ -117,14 +108,13 @@ class PoseStream:
             return self.state
         self._counts[playback.OVERRUN] += max(0, first - self._next)
         self._next = posted
-        self.state = _STATES[playback.play(self._period_s, self._settings.silence_s, *self._state)]
+        self.state = _STATES[playback.play(self._period_s, SILENCE_s, *self._state)]
         return self.state
 
     def _receive(self, first: int, last: int) -> None:
-        settings = self._settings
         playback.receive(
-            first, last, *self._fields, int(self._mover[0]), settings.fastest_m_s,
-            settings.fastest_rad_s, settings.silence_s, self._row, *self._state,
+            first, last, *self._fields, int(self._mover[0]), FASTEST_m_s,
+            FASTEST_rad_s, SILENCE_s, self._row, *self._state,
         )  # fmt: skip
 
     @property

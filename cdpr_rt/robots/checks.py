@@ -97,8 +97,8 @@ def _shape(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
         )
         yield Finding("axes[0].anchor_point_m", text, impossible=True)
         return
-    lengths = statics.lengths(statics.points()).reshape(-1, len(robot.axes))
-    for i, nearest in enumerate(lengths.min(axis=0)):
+    free_m = statics.free_lengths(statics.points()).reshape(-1, len(robot.axes))
+    for i, nearest in enumerate(free_m.min(axis=0)):
         if nearest < _NEAREST_m:
             text = (
                 f"the box of targets goes up to {nearest:.2g} m from the exit point of "

@@ -12,14 +12,10 @@ from numpy.typing import NDArray
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_poses
 from cdpr_rt.robots.kinematics.kinematics import PLANAR_POINT
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
-from cdpr_rt.robots.rigid_body import (
-    home_rotation,
-    in_space,
-    orientations,
-    rotation,
-)
+from cdpr_rt.robots.rigid_body import home_rotation, in_space, orientations
 from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
 
 _NEWTON_STEPS = 30
@@ -100,11 +96,19 @@ class PlatformStatics:
         return self.box.grid(*grids[len(self.platform.home_m)])
 
     def lengths(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
-        """Return the cables' lengths (..., n), eqs. (2.2), (3.2), as if there were no pulleys."""
-        p = np.asarray(position_m, float)[..., None, :]
-        anchors = np.pad(self.anchors_m, ((0, 0), (0, 3 - p.shape[-1]))) @ rotation(turn_rad).T
-        ways = p + anchors[:, : p.shape[-1]] - self.exits_m
-        return np.asarray(np.linalg.norm(ways, axis=-1))
+        """Return the cables' lengths (..., n), m, with what lies on their pulleys, eq. (3.2)."""
+        return np.asarray(self._cables(position_m, turn_rad)[..., FREE : ARC + 1, :].sum(axis=-2))
+
+    def free_lengths(self, position_m: FloatArray) -> FloatArray:
+        """Return the lengths (..., n), m, from pulley or exit point to anchor point."""
+        return self._cables(position_m, NONE_rad)[..., FREE, :]
+
+    def _cables(self, position_m: FloatArray, turn_rad: FloatArray) -> FloatArray:
+        """Return the rows of `cable_kernel` (..., 9, n)."""
+        poses, geometry = self.poses(position_m, turn_rad), self.model.kinematics.geometry
+        cables = np.empty((len(poses), CABLE_ROWS, geometry.shape[1]))
+        run_poses(geometry, poses, cables)
+        return cables.reshape(*np.shape(position_m)[:-1], *cables.shape[1:])
 
     def poses(self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad) -> FloatArray:
         """Return the poses (m, 4, 3) at all positions."""
@@ -145,17 +149,15 @@ class PlatformStatics:
         """Return the tensions (..., n) at rest that stay furthest from their bounds."""
         return self._at(position_m, 0.0, turn_rad)[1]
 
-    def least_tensions_N(
-        self, position_m: FloatArray, turn_rad: FloatArray = NONE_rad, reserve_N: float = 0.0
-    ) -> FloatArray:
+    def least_tensions_N(self, position_m: FloatArray, reserve_N: float = 0.0) -> FloatArray:
         """Return the tensions (..., n) at rest nearest to the lower bounds and a reserve above.
 
-        None is below that; nan where there are none.
+        In the orientation of home. None is below that; nan where there are none.
         """
         n, low = self.model.kinematics.n, self.low_N + reserve_N
         still = self.model.workspace(0.0)
         least, weight = self.model.least_tensions(low, np.full(n, _ANY_N)), still.wrenches[0]
-        t, matrices = np.zeros(n), still.wrench_matrices(self.poses(position_m, turn_rad))
+        t, matrices = np.zeros(n), still.wrench_matrices(self.poses(position_m))
         found = np.full((len(matrices), n), np.nan)
         for k, W in enumerate(matrices):
             if least.solve(W, weight, t) is TensionOutcome.FEASIBLE:

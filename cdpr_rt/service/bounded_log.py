@@ -50,7 +50,7 @@ class BoundedLog(logging.Filter):
             kind.more += kind.shown > _MOST
             return kind.shown <= _MOST
 
-    def tell_the_rest(self) -> None:
+    def report_suppressed(self) -> None:
         """Log how many more lines there were of the kinds whose minute is over."""
         now_s = self._clock_s()
         with self._lock:
@@ -66,4 +66,4 @@ class BoundedLog(logging.Filter):
         """Tell the rest of each minute, until cancelled."""
         while True:
             await asyncio.sleep(_WINDOW_S / 6)
-            self.tell_the_rest()
+            self.report_suppressed()

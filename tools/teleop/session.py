@@ -162,10 +162,10 @@ class TeleopSession:
 
     def _lost(self, now_s: float) -> End | None:
         """Say why the robot does not follow, where that has lasted."""
-        patience_s = _SILENCE_S if self.leading else _GREET_S
-        if now_s - self._heard_s > patience_s:
+        timeout_s = _SILENCE_S if self.leading else _GREET_S
+        if now_s - self._heard_s > timeout_s:
             hint = "" if self.stream.answered else _NEVER_ANSWERED
-            return End(f"the robot has not answered for {patience_s:g} s{hint}", failed=True)
+            return End(f"the robot has not answered for {timeout_s:g} s{hint}", failed=True)
         if self._runs():
             self._fine_s = now_s
         elif now_s - self._fine_s > (_TAKEN_AWAY_S if self.leading else _GREET_S):

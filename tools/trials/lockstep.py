@@ -32,8 +32,8 @@ from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.realtime import one_core
 from cdpr_rt.service.recordings.recording import Recorder
+from cdpr_tools.composition.loop_parts import description, loop_parts
 from cdpr_tools.composition.simulator import OwnLoadCells, OwnSimulator
-from cdpr_tools.daemon.processes.loop_process import description, loop_parts
 from cdpr_tools.errors import WorkFailedError
 from cdpr_tools.trials.evaluation.pose_log import PoseLogTail
 from cdpr_tools.trials.right import RightInBusTime

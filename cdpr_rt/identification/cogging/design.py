@@ -15,6 +15,7 @@ from cdpr_rt.jit import jit
 
 _CHUNK = 1024
 _QUICK_rad_s = 1.0
+_FOLDS = 6
 
 INERTIA, LATENCY = 0, 1
 COULOMB = 2  # forward, backward
@@ -126,12 +127,12 @@ def kinds(windows: Sequence[Windows]) -> list[FloatArray]:
     return numbered
 
 
-def folds(windows: Sequence[Windows], most: int = 6) -> list[FloatArray]:
+def folds(windows: Sequence[Windows]) -> list[FloatArray]:
     """Number the rows of each run by the turn they lie in, whole turns together."""
     numbered, offset = [], 0
     for w in windows:
         turn = np.floor(np.abs(w.centre_rad - w.centre_rad[0]) / TWO_PI).astype(int)
-        numbered.append((turn + offset) % most)
+        numbered.append((turn + offset) % _FOLDS)
         offset += int(turn.max()) + 1
     return numbered
 

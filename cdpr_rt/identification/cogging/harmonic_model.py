@@ -34,6 +34,8 @@ from cdpr_rt.identification.cogging.windows import Windows, contiguous, cut, enc
 from cdpr_rt.identification.confidence import ConfidenceInterval
 
 MAX_ORDER = 200
+_BINS = 360
+"""Of a turn, in which the rotor was seen or not."""
 _LATENCY_SD_s = 1e-3
 _LATENCY_SD_AGAIN_s = 2e-4
 _LAG_SD_rad = np.deg2rad(1.0)
@@ -284,10 +286,10 @@ def _harmonic(fitted: Fit, which: int, pole_pairs: int) -> Harmonic:
     )
 
 
-def _coverage(windows: list[Windows], bins: int = 360) -> float:
+def _coverage(windows: list[Windows]) -> float:
     """Return the share of the turn on which the rotor was seen moving with the ramp."""
-    seen = np.zeros(bins, np.bool_)
+    seen = np.zeros(_BINS, np.bool_)
     for w in windows:
         turn = w.centre_rad[w.moving] / TWO_PI
-        seen[np.floor((turn - np.floor(turn)) * bins).astype(int) % bins] = True
+        seen[np.floor((turn - np.floor(turn)) * _BINS).astype(int) % _BINS] = True
     return float(np.mean(seen))

@@ -13,6 +13,7 @@ from cdpr_rt.errors import ControlError
 
 TWO_PI = 2.0 * math.pi
 _SHORTEST_TURNS = 0.98
+_SHORTEST_S = 0.25
 
 
 class IdentificationError(ControlError):
@@ -82,7 +83,7 @@ def check_runs(runs: Sequence[SweepData]) -> None:
                 raise IdentificationError(f"run {number}: {name} holds values that are not finite")
 
 
-def stretches(runs: Sequence[SweepData], shortest_s: float = 0.25) -> list[Stretch]:
+def stretches(runs: Sequence[SweepData]) -> list[Stretch]:
     """Return all stretches of constant set-point velocity, in the order of the runs."""
     found = []
     for run in runs:
@@ -90,6 +91,6 @@ def stretches(runs: Sequence[SweepData], shortest_s: float = 0.25) -> list[Stret
         steady = np.concatenate([[False], np.abs(np.diff(v)) < 1e-9, [False]])
         edges = np.flatnonzero(np.diff(steady.astype(np.int8)))
         for start, stop in zip(edges[::2], edges[1::2] + 1, strict=True):
-            if v[start] != 0.0 and (stop - start) * period_s(run) >= shortest_s:
+            if v[start] != 0.0 and (stop - start) * period_s(run) >= _SHORTEST_S:
                 found.append(Stretch(run, int(start), int(stop), float(v[start])))
     return found

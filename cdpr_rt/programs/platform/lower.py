@@ -96,7 +96,7 @@ class LowerProgram(PlatformProgram):
         self._weight = parts.model.weight()
         self._W = np.zeros((self._weight.size, cable_m.size))
         self._there = parts.model.pose(parts.model.home)
-        self._carried = np.zeros(cable_m.size)
+        self._weight_tension_N = np.zeros(cable_m.size)
         self._high = np.minimum(parts.model.high_N, torque_Nm / np.abs(cable_m))
         self._least = np.array(control.least_N)
         self._home_s, self._down_s = _home_s(parts.platform), _down_s(parts.platform)
@@ -176,8 +176,8 @@ class LowerProgram(PlatformProgram):
         """
         self._there.array[:] = self._parts.model.poses(self._control.estimated[None])[0]
         self._parts.model.kinematics.wrench_matrix(self._there, self._W)
-        self._weight_only.solve(self._W, self._weight, self._carried)
-        torque_Nm[:] = -self._cable * np.maximum(self._carried, self._drum_tension_N)
+        self._weight_only.solve(self._W, self._weight, self._weight_tension_N)
+        torque_Nm[:] = -self._cable * np.maximum(self._weight_tension_N, self._drum_tension_N)
 
     def _pay_out(
         self, feedback: AxisFeedback, torque_Nm: FloatArray, speed_m_s: float, rate_1_s: float

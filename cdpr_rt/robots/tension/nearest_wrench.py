@@ -7,7 +7,7 @@ import math
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
 
-CARRIED = 1 << 30
+NO_LIMIT = 1 << 30
 """What `nearest_wrench` returns where nothing of the wrench is missing: no cable's number."""
 _ROUNDING = 1e-9
 """Share of the terms of a wrench that may be missing of it."""
@@ -31,7 +31,7 @@ def nearest_wrench(
     `bounds` (3, n). Where `found` `t` is taken but for what rounding has put outside its bounds,
     else it is where to begin: cables between their bounds are those that may prove free. Writes
     `missing` = -(W t + w_e) (d,). `scratch` (4, m, m), m >= n and 8, is overwritten. Returns
-    CARRIED or, where the wrench is not, the bound that limits most: moved by 1 N it would
+    NO_LIMIT where the wrench is exerted, else the bound that limits most: moved by 1 N it would
     bring A t nearest to b. i + 1 is cable i's upper one, -i - 1 its lower one, 0 none.
     """
     d, n = missing.size, t.size
@@ -45,7 +45,7 @@ def nearest_wrench(
         size += abs(scaled[k, n])
         for i in range(n):
             size += abs(scaled[k, i] * t[i])
-    limit, most = CARRIED, _ROUNDING * size
+    limit, most = NO_LIMIT, _ROUNDING * size
     if distance > most:
         limit = 0
         for i in range(n):

@@ -14,7 +14,7 @@ import numpy as np
 from cdpr_profiles.platform import TENSION_METHODS
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import ControlError
-from cdpr_rt.robots.tension.nearest_wrench import CARRIED, nearest_wrench
+from cdpr_rt.robots.tension.nearest_wrench import NO_LIMIT, nearest_wrench
 from cdpr_rt.robots.tension.null_space import null_space
 from cdpr_rt.robots.tension.tension_closed_form import closed_form
 from cdpr_rt.robots.tension.tension_polygon import CENTROID, ONE_NORM, TWO_NORM, choose
@@ -84,7 +84,7 @@ class TensionDistribution(ABC):
             raise TensionError(f"wrench_scale {self.wrench_scale}; allowed: above 0")
         self.missing = np.zeros(directions)
         """-(W t + w_e), N and Nm: what of the wrench the last tensions leave out."""
-        self._limit = CARRIED
+        self._limit = NO_LIMIT
         self._directions, self._cables, size = directions, n, max(n, 8)
         self._scaled, self._space = np.zeros((directions, n + 1)), np.zeros((n + 1, n))
         self._scratch = np.zeros((4, size, size))
@@ -109,7 +109,7 @@ class TensionDistribution(ABC):
         )  # fmt: skip
         if rank < self._directions:
             return _SINGULAR
-        if self._limit != CARRIED:
+        if self._limit != NO_LIMIT:
             return _NEAREST
         return _FEASIBLE if outcome is _NEAREST else outcome
 
@@ -119,12 +119,12 @@ class TensionDistribution(ABC):
 
         -1 where the wrench is carried, or no bound is in its way.
         """
-        return -1 if self._limit == CARRIED else abs(self._limit) - 1
+        return -1 if self._limit == NO_LIMIT else abs(self._limit) - 1
 
     @property
     def limiting_bound(self) -> int:
         """Which bound of that cable: -1 the lower one, 1 the upper one, 0 none."""
-        return 0 if self._limit == CARRIED else (self._limit > 0) - (self._limit < 0)
+        return 0 if self._limit == NO_LIMIT else (self._limit > 0) - (self._limit < 0)
 
     @abstractmethod
     def _choose(self, null_directions: int, t: FloatArray) -> TensionOutcome:

@@ -296,7 +296,7 @@ class Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen; called by `serve`."""
         await self.lifespan.startup()
-        assert sockets is not None  # by `run_until_told`
+        assert sockets is not None  # by `serve_until_stopped`
         made: Any = self.config.http_protocol_class
         given = {"config": self.config, "server_state": self.server_state}
 
@@ -326,7 +326,7 @@ class Server(uvicorn.Server):
             return True
         return self._app.anyone_may_stop and self._anonymous_stops.take("", time.monotonic())
 
-    async def run_until_told(self) -> None:
+    async def serve_until_stopped(self) -> None:
         """Serve until `should_exit` is set."""
         await self.serve(sockets=[self._listener])
 

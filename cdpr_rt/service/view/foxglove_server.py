@@ -24,7 +24,7 @@ from cdpr_rt.service.http.access_control import is_own_host
 
 MOST_VIEWERS: Final = 16
 PROTOCOL: Final = Subprotocol("foxglove.sdk.v1")
-_OPEN_S, _PATIENCE_S = 5.0, 10.0
+_OPEN_S, _TIMEOUT_S = 5.0, 10.0
 _UNREAD_BYTES: Final = 1 << 16
 _MOST_UNSENT_BYTES: Final = 1 << 18
 _MOST_RECEIVED_BYTES: Final = 1 << 16
@@ -245,7 +245,7 @@ class _Viewer(ServerConnection):
         if self.transport.get_write_buffer_size() <= _MOST_UNSENT_BYTES:
             self._kept_up_s = now_s
             return True
-        if now_s - self._kept_up_s > _PATIENCE_S:
+        if now_s - self._kept_up_s > _TIMEOUT_S:
             self.transport.abort()
         return False
 

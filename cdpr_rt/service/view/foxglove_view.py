@@ -36,12 +36,12 @@ from cdpr_rt.service.view.foxglove_server import FoxgloveServer, Topic
 
 RATE_Hz: Final = 50.0
 _AXES: Final = {
-    field.name: field.name.replace("_rad", "_deg") for field in AXIS_FIELDS if field.live
+    field.name: re.sub(r"_rad(?=_s$|$)", "_deg", field.name) for field in AXIS_FIELDS if field.live
 }
 """What the live view calls each field that it shows of an axis."""
 _SCALARS: Final = tuple(field for field in SCALAR_FIELDS if field.live)
 _TIMES: Final = {
-    field.name: field.name.replace("_s", "_ms") for field in _SCALARS if field.is_wall_time
+    field.name: re.sub(r"_s$", "_ms", field.name) for field in _SCALARS if field.is_wall_time
 }
 _NUMBERS: Final = tuple(field.name for field in _SCALARS if field.kind == "<f8" and not field.wall)
 _COUNTS: Final = tuple(field.name for field in _SCALARS if field.kind != "<f8")

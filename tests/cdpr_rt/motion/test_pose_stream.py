@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 from cdpr_rt.core.shared_block import SAMPLE, SharedBlock
-from cdpr_rt.motion.pose_stream import PoseStream, StreamSettings, StreamState
+from cdpr_rt.motion.pose_stream import PoseStream, SILENCE_s, StreamState
 
 PERIOD_S = 0.004
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -140,7 +140,7 @@ def test_silence_is_held_then_stopped_and_what_follows_begins_anew() -> None:
     assert list(changes) == order[1:]
     assert states[0] == StreamState.FRESH
     stopped_s = (np.flatnonzero(states == StreamState.STOPPED)[0] + 1) * PERIOD_S
-    assert stopped_s == pytest.approx(1.0 + StreamSettings().silence_s, abs=2 * PERIOD_S)
+    assert stopped_s == pytest.approx(1.0 + SILENCE_s, abs=2 * PERIOD_S)
     assert sender.stream.pose[0] == 1.0
     epoch = sender.stream.epoch
     poses, _ = sender.run(1.5)

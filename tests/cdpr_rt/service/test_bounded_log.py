@@ -41,7 +41,7 @@ def test_a_few_of_a_kind_are_shown_and_the_rest_is_counted(log: Log) -> None:
         log.logger.warning("slow") if k < 3 else None
     assert len(log.lines()) == 5 + 3
     log.now_s = 61.0
-    log.bounded.tell_the_rest()
+    log.bounded.report_suppressed()
     assert log.lines()[8:] == ["995 more within 60 s: refused: %s"]
     log.logger.error("refused: %s", "again")
     assert log.lines()[-1] == "refused: again"
@@ -53,5 +53,5 @@ def test_texts_without_end_are_one_kind_in_the_end(log: Log) -> None:
     shown = len(log.lines())
     assert shown < 100
     log.now_s = 61.0
-    log.bounded.tell_the_rest()
+    log.bounded.report_suppressed()
     assert log.lines()[shown:] == [f"{10_000 - shown} more within 60 s: of other kinds"]

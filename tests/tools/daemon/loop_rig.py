@@ -20,7 +20,7 @@ from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
 from cdpr_rt.runtime.right import LONGEST_S, PublishedRight
 from cdpr_rt.service.lease import Lease, LeaseError
-from cdpr_tools.daemon.processes.loop_process import loop_parts
+from cdpr_tools.composition.loop_parts import loop_parts
 
 
 class LoopRig:

@@ -13,7 +13,7 @@ from cdpr_profiles.catalogue import list_profiles
 from cdpr_rt.robots.persistence.calibration_state import mark_calibrated
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_tools.calibrate.words import geometry_note
-from cdpr_tools.daemon.processes.loop_process import description, look_at_calibration
+from cdpr_tools.composition.loop_parts import description, look_at_calibration
 from tests.profiles.test_geometry_calibration import calibration
 
 

@@ -30,7 +30,7 @@ FRAMES_AN_EXCHANGE = 2 * FRAMES
 
 _BLOCKS = 5
 _WARM_UP = 5
-_PATIENCE_S = 2.0
+_TIMEOUT_S = 2.0
 _MASK = 0x7F0
 _US = 1e-3  # of a ns
 _RESOLUTION_US = 0.01
@@ -53,7 +53,7 @@ class OwnAccess:
     def open(self) -> None:
         """Join the bus."""
         self.port = open_port(self._url, [(ANSWERED, _MASK)])
-        self.port.settimeout(_PATIENCE_S)
+        self.port.settimeout(_TIMEOUT_S)
 
     def exchange(self) -> None:
         """Send eight frames and wait for the answers; raises BusError."""
@@ -98,7 +98,7 @@ class PythonCanAccess:
         for message in self._messages:
             send(message)
         for _ in range(FRAMES):
-            if recv(_PATIENCE_S) is None:
+            if recv(_TIMEOUT_S) is None:
                 raise BusError(f"{self._interface}: no answer through python-can")
 
     def close(self) -> None:

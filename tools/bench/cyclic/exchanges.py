@@ -22,7 +22,7 @@ from cdpr_drivers.errors import BusError
 _SYNC_ID, _TPDO1, _RPDO1 = 0x080, 0x180, 0x200
 _CONTROLWORD, _TARGET_TORQUE = 0x6040, 0x6071
 _FEEDBACK = (0x6041, 0x6064, 0x6077)
-_PATIENCE_S = 2.0
+_TIMEOUT_S = 2.0
 _NOTIFIER_CYCLE_S = 0.05
 
 
@@ -112,7 +112,7 @@ class LibraryExchange:
         self._waiting = len(self._commands)
         self._complete.clear()
         self._network.sync.transmit()
-        if not self._complete.wait(_PATIENCE_S):
+        if not self._complete.wait(_TIMEOUT_S):
             raise BusError("canopen: an axis did not answer")
         for pdo, controlword, torque in self._commands:
             controlword.raw = 0
@@ -148,7 +148,7 @@ class FloorExchange:
         self._sock = sock = simbus_socket.connect(self._channel)
         simbus_socket.exchange(sock, [(identifier, 0x7FF) for identifier in self._axis_of])
         # the kernel's time-out, since Python's own would put a poll before each call
-        timeval = struct.pack("ll", math.ceil(_PATIENCE_S), 0)
+        timeval = struct.pack("ll", math.ceil(_TIMEOUT_S), 0)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
         self._send, self._recv_into = sock.send, sock.recv_into
 

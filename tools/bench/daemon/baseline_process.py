@@ -27,7 +27,7 @@ from cdpr_tools.errors import WorkFailedError
 PROGRAM = "cdpr_tools.bench.daemon.loop_baseline"
 OF_PLATFORM = "cdpr_tools.bench.daemon.pose_baseline"
 _BANDWIDTHS_HZ = (20.0, 15.0, 12.0, 8.0, 5.0)
-_PATIENCE_S = 120.0
+_TIMEOUT_S = 120.0
 _CYCLIC_TORQUE = 10
 _LIMITS = ("torque_Nm", "torque_rate_Nm_s", "speed_rad_s", "following_error_rad", "tension_max_N")
 
@@ -45,7 +45,7 @@ def measure(robot: Robot, seconds: float, speed_rad_s: float) -> dict[str, Any]:
             [sys.executable, "-P", "-m", program, json.dumps(given)],
             capture_output=True,
             text=True,
-            timeout=_PATIENCE_S + seconds,
+            timeout=_TIMEOUT_S + seconds,
             check=False,
         )
     if done.returncode != 0:

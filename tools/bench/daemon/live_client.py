@@ -15,7 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect, unix_connect
 from websockets.typing import Subprotocol
 
 _FASTEST_HZ = 50
-_PATIENCE_S = 30.0
+_TIMEOUT_S = 30.0
 _PROTOCOL = Subprotocol("foxglove.sdk.v1")
 
 
@@ -55,11 +55,11 @@ async def _take_view(view: ClientConnection) -> None:
 
 
 async def _look(control: str) -> None:
-    async with asyncio.timeout(_PATIENCE_S):
+    async with asyncio.timeout(_TIMEOUT_S):
         url = await _foxglove_url(control)
     live = unix_connect(control, f"ws://daemon/live?rate_Hz={_FASTEST_HZ}")
     async with live as figures, connect(url, subprotocols=[_PROTOCOL]) as view:
-        async with asyncio.timeout(_PATIENCE_S):
+        async with asyncio.timeout(_TIMEOUT_S):
             await figures.recv()
             while not await _follow(view):
                 pass

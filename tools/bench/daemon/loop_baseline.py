@@ -23,7 +23,7 @@ import numpy as np
 from cdpr_rt.runtime.realtime import enable_realtime, freeze_memory
 
 _NOTIFIER_CYCLE_S = 0.05
-_LATE_SHARE, _PATIENCE_SHARE = 0.1, 0.6
+_LATE_SHARE, _TIMEOUT_SHARE = 0.1, 0.6
 _WARM_UP = 200
 _ENABLE = (6, 7, 15)
 _CYCLES_A_STEP = 50
@@ -93,7 +93,7 @@ class BaselineLoop:
         self.complete.clear()
         for network in self.networks:
             network.sync.transmit()
-        return self.complete.wait(_PATIENCE_SHARE * self.period_s)
+        return self.complete.wait(_TIMEOUT_SHARE * self.period_s)
 
     def estimate(self) -> None:
         """Turn what the drives have sent into states, angles, speeds, torques and tensions."""

@@ -38,7 +38,7 @@ def processor_time_s(pid: int) -> float:
 
 LIVE_CLIENT = "cdpr_tools.bench.daemon.live_client"
 _RING_S = 60.0
-_PATIENCE_S = 60.0
+_TIMEOUT_S = 60.0
 _STOP_S = 20.0
 _RIGHT_NS = 10**9
 _TO_AND_FRO_RAD = 10.0
@@ -229,14 +229,14 @@ class BenchDaemon:
     def _await(self, state: str, program: str = "idle", *, done: bool = False) -> None:
         """Wait for this state and program in the loop's status; replies may go to the service."""
         assert self.loop is not None  # about to be entered
-        deadline = time.monotonic() + _PATIENCE_S
+        deadline = time.monotonic() + _TIMEOUT_S
         status: dict[str, Any] = {}
         refusal = ""
         while time.monotonic() < deadline and not self.loop.end:
             self._keep_right_to_move()
             status = self.block.status()
             if not status:  # it compiles its kernels, once for this machine, before it tells
-                deadline = time.monotonic() + _PATIENCE_S
+                deadline = time.monotonic() + _TIMEOUT_S
             if (status.get("state"), status.get("program")) == (state, program) and (
                 not done or status["program_progress"].get("done")
             ):

@@ -6,53 +6,34 @@ import os
 import signal
 import sys
 import time
-from dataclasses import asdict
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 from cdpr_drivers.errors import DriverError
 from cdpr_drivers.robot.bus_fit import require_fit
-from cdpr_drivers.robot.commissioned import compensation_of, load_profiles, with_commissioned
+from cdpr_drivers.robot.commissioned import with_commissioned
 from cdpr_drivers.robot.listening_machine import ListeningMachine
 from cdpr_drivers.robot.machine import RobotMachine
 from cdpr_drivers.robot.robot_buses import refuse_simulated_calibration, robot_urls
 from cdpr_profiles import Robot
-from cdpr_profiles.calibration.geometry import geometry_sha256
-from cdpr_profiles.calibration.in_force import in_force, load_calibrated
+from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
-from cdpr_profiles.platform import Platform
-from cdpr_rt.core.estimate import Estimator
-from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.shared_block import SharedBlock
-from cdpr_rt.core.supervisor import Supervisor
 from cdpr_rt.errors import ControlError
-from cdpr_rt.programs.model import model_of
-from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
 from cdpr_rt.programs.platform.paths.path_progress import paths_folder
 from cdpr_rt.programs.platform.paths.path_store import PathStore
-from cdpr_rt.programs.platform.platform_program import PlatformParts
-from cdpr_rt.programs.registry import (
-    build_programs,
-    platform_parts,
-    warm_up_programs,
-)
 from cdpr_rt.robots.checks import refuse_impossible
-from cdpr_rt.robots.persistence.calibration_state import not_calibrated_reason
-from cdpr_rt.robots.robot_arrays import described, limits_of, supervisor_limits, winches_of
+from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.runtime.control_loop.loop import ControlLoop
-from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
 from cdpr_rt.runtime.machine import Machine
-from cdpr_rt.runtime.realtime import enable_realtime, freeze_memory
-from cdpr_rt.runtime.warm_up import warm_up_supervision
+from cdpr_rt.runtime.realtime import freeze_memory
 from cdpr_rt.state_file import state_path
 from cdpr_tools.compiling import tell_of_compiling
+from cdpr_tools.composition.loop_parts import description, loop_parts
 from cdpr_tools.daemon.loop_file import POWER_OFF_SIGNAL
 from cdpr_tools.daemon.processes.child import end_with_launcher
 from cdpr_tools.daemon.settings import RunSettings
 from cdpr_tools.errors import BAD_INPUT, DONE, FAILED
-
-_OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon anew"
 
 
 def main() -> int:
@@ -125,92 +106,6 @@ def _open_paths(paths: PathStore, robot: Robot, settings: RunSettings, block: Sh
         )
     except ControlError as error:
         print(f"cdpr: paths cannot be followed: {error}", file=sys.stderr)
-
-
-def loop_parts(
-    robot: Robot, limits: Limits, block: SharedBlock, *, learns: bool = True
-) -> LoopParts:
-    """Return what the loop of `robot` runs within `limits`, compiled and ready.
-
-    `learns`: of a platform's motors that were not commissioned, it learns in motion what they do.
-    """
-    axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
-    latencies = [axis.winch.latency_s for axis in axes]
-    known = compensation_of(robot, load_profiles(robot))
-    model = model_of(axes, period_s, latencies, limits, known)
-    estimator = Estimator(n, period_s, winches_of(axes))
-    platform = platform_parts(robot, limits, model, estimator, learns=learns)
-    programs = build_programs(model, block, platform)
-    lowering = None
-    if platform is not None:
-        lowering = Lowering(LowerProgram.name, lowering_s(platform.platform))
-    names = [axis.name for axis in axes]
-    parts = LoopParts(
-        programs=programs,
-        supervisor=Supervisor(supervisor_limits(limits, robot), n, period_s, names),
-        estimator=estimator,
-        lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
-        lowering=lowering,
-        last=None if platform is None else platform.last,
-        paths=None if platform is None else platform.paths,
-        notices=tuple if platform is None else platform.notices,
-        before_power=lambda: look_at_calibration(robot, platform),
-        enable_realtime=enable_realtime,
-    )
-    warm_up_programs(programs, n, platform)
-    warm_up_supervision(estimator, parts.supervisor, n)
-    return parts
-
-
-def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
-    """Have the programs refuse targets where the geometry may not be believed."""
-    if platform is None:
-        return
-    try:
-        known = in_force(robot) == robot.calibration
-    except ProfileError as error:
-        platform.not_calibrated_reason = str(error)
-        return
-    platform.not_calibrated_reason = (
-        not_calibrated_reason(robot.profile) if known else _OTHER_CALIBRATION
-    )
-
-
-def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:
-    """Return what people and programs should know of a robot that is run."""
-    return {
-        "robot": robot.name,
-        "reference": robot.reference,
-        "period_s": robot.sync_period_s,
-        "master_heartbeat_s": robot.master_heartbeat_s,
-        "axes": [
-            {
-                "name": axis.name,
-                "bus": axis.bus,
-                "node_id": axis.node_id,
-                "winch": axis.winch.reference,
-                "motor": axis.winch.motor.model,
-                "gear_ratio": axis.winch.gear_ratio,
-                "drum_radius_m": axis.winch.drum_radius_m,
-                "cable_m_per_motor_rad": axis.winch.cable_m_per_motor_rad,
-                "commissioned": None if axis.commissioned is None else str(axis.commissioned),
-            }
-            for axis in robot.axes
-        ],
-        "limits": described(limits, len(robot.axes)),
-        "programs": list(parts.programs),
-        "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
-        "platform": None if robot.platform is None else _told(robot.platform),
-        "geometry_sha256": geometry_sha256(robot),
-        "calibration": None if robot.calibration is None else robot.calibration.summary(),
-        "notes": list(robot.notes),
-    }
-
-
-def _told(platform: Platform) -> dict[str, Any]:
-    body = None if platform.body is None else platform.body.model_dump()
-    obstacles = [box.model_dump() for box in platform.obstacles]
-    return {**asdict(platform), "body": body, "obstacles": obstacles}
 
 
 def _obey_signals(loop: ControlLoop) -> None:

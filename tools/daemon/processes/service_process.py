@@ -120,7 +120,7 @@ async def _serve(settings: RunSettings, service: Service) -> None:
         loop.add_signal_handler(number, ended.set)
     end_with_launcher(settings.launcher_pid)
     watching = asyncio.create_task(service.watch())
-    serving = [asyncio.create_task(server.run_until_told()) for server in servers]
+    serving = [asyncio.create_task(server.serve_until_stopped()) for server in servers]
     waiting = asyncio.create_task(_wait_for_end(ended, settings, service.block))
     try:
         done, _ = await asyncio.wait(
@@ -169,9 +169,9 @@ async def plan_in_process(robot: str, file: Path, wanted: dict[str, Any]) -> tup
     options = [f"--blend={wanted['blend_mm']}", f"--ignore={wanted['ignore']}"]
     if wanted["origin_mm"] is not None:
         options.append(f"--origin={wanted['origin_mm']}")
-    command = [sys.executable, "-m", "cdpr_tools.cli", "path", str(file), "--robot", robot]
+    command = [sys.executable, "-P", "-m", "cdpr_tools.cli", "path", str(file)]
     process = await asyncio.create_subprocess_exec(
-        "sh", "-c", _WITHIN, "sh", *command, "--keep", "--json", *options,
+        "sh", "-c", _WITHIN, "sh", *command, "--robot", robot, "--keep", "--json", *options,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
     )  # fmt: skip

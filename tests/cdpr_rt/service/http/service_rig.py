@@ -143,7 +143,7 @@ class Rig:
             )
             for listener, policy in policies.items()
         ]
-        serving = [asyncio.create_task(server.run_until_told()) for server in servers]
+        serving = [asyncio.create_task(server.serve_until_stopped()) for server in servers]
         watching = asyncio.create_task(service.watch())
         while not all(server.started for server in servers):
             await asyncio.sleep(0.01)

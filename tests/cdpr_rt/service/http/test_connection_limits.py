@@ -297,7 +297,7 @@ def test_no_descriptors_left_is_said_once_and_serving_goes_on(
             app, AccessPolicy(local=True), lambda: None, lambda _token: False, Tickets()
         )
         one = server.Server(access, listener, connections.FairQueue(), told.append)
-        serving = asyncio.create_task(one.run_until_told())
+        serving = asyncio.create_task(one.serve_until_stopped())
         while not one.started:
             await asyncio.sleep(0.01)
         sock.setblocking(False)

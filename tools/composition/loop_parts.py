@@ -1,0 +1,118 @@
+"""From a robot's file to its control loop: estimate, programs, limits, and what is told of them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from cdpr_drivers.robot.commissioned import compensation_of, load_profiles
+from cdpr_profiles import Robot
+from cdpr_profiles.calibration.geometry import geometry_sha256
+from cdpr_profiles.calibration.in_force import in_force
+from cdpr_profiles.errors import ProfileError
+from cdpr_profiles.platform import Platform
+from cdpr_rt.core.estimate import Estimator
+from cdpr_rt.core.limits import Limits
+from cdpr_rt.core.shared_block import SharedBlock
+from cdpr_rt.core.supervisor import Supervisor
+from cdpr_rt.programs.model import model_of
+from cdpr_rt.programs.platform.lower import LowerProgram, lowering_s
+from cdpr_rt.programs.platform.platform_program import PlatformParts
+from cdpr_rt.programs.registry import (
+    build_programs,
+    platform_parts,
+    warm_up_programs,
+)
+from cdpr_rt.robots.persistence.calibration_state import not_calibrated_reason
+from cdpr_rt.robots.robot_arrays import described, supervisor_limits, winches_of
+from cdpr_rt.runtime.control_loop.loop_parts import LoopParts, Lowering
+from cdpr_rt.runtime.realtime import enable_realtime
+from cdpr_rt.runtime.warm_up import warm_up_supervision
+
+_OTHER_CALIBRATION = "a calibration was taken over or undone; start the daemon anew"
+
+
+def loop_parts(
+    robot: Robot, limits: Limits, block: SharedBlock, *, learns: bool = True
+) -> LoopParts:
+    """Return what the loop of `robot` runs within `limits`, compiled and ready.
+
+    `learns`: of a platform's motors that were not commissioned, it learns in motion what they do.
+    """
+    axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
+    latencies = [axis.winch.latency_s for axis in axes]
+    known = compensation_of(robot, load_profiles(robot))
+    model = model_of(axes, period_s, latencies, limits, known)
+    estimator = Estimator(n, period_s, winches_of(axes))
+    platform = platform_parts(robot, limits, model, estimator, learns=learns)
+    programs = build_programs(model, block, platform)
+    lowering = None
+    if platform is not None:
+        lowering = Lowering(LowerProgram.name, lowering_s(platform.platform))
+    names = [axis.name for axis in axes]
+    parts = LoopParts(
+        programs=programs,
+        supervisor=Supervisor(supervisor_limits(limits, robot), n, period_s, names),
+        estimator=estimator,
+        lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
+        lowering=lowering,
+        last=None if platform is None else platform.last,
+        paths=None if platform is None else platform.paths,
+        notices=tuple if platform is None else platform.notices,
+        before_power=lambda: look_at_calibration(robot, platform),
+        enable_realtime=enable_realtime,
+    )
+    warm_up_programs(programs, n, platform)
+    warm_up_supervision(estimator, parts.supervisor, n)
+    return parts
+
+
+def look_at_calibration(robot: Robot, platform: PlatformParts | None) -> None:
+    """Have the programs refuse targets where the geometry may not be believed."""
+    if platform is None:
+        return
+    try:
+        known = in_force(robot) == robot.calibration
+    except ProfileError as error:
+        platform.not_calibrated_reason = str(error)
+        return
+    platform.not_calibrated_reason = (
+        not_calibrated_reason(robot.profile) if known else _OTHER_CALIBRATION
+    )
+
+
+def description(robot: Robot, limits: Limits, parts: LoopParts) -> dict[str, Any]:
+    """Return what people and programs should know of a robot that is run."""
+    return {
+        "robot": robot.name,
+        "reference": robot.reference,
+        "period_s": robot.sync_period_s,
+        "master_heartbeat_s": robot.master_heartbeat_s,
+        "axes": [
+            {
+                "name": axis.name,
+                "bus": axis.bus,
+                "node_id": axis.node_id,
+                "winch": axis.winch.reference,
+                "motor": axis.winch.motor.model,
+                "gear_ratio": axis.winch.gear_ratio,
+                "drum_radius_m": axis.winch.drum_radius_m,
+                "cable_m_per_motor_rad": axis.winch.cable_m_per_motor_rad,
+                "commissioned": None if axis.commissioned is None else str(axis.commissioned),
+            }
+            for axis in robot.axes
+        ],
+        "limits": described(limits, len(robot.axes)),
+        "programs": list(parts.programs),
+        "lowering_s": 0.0 if parts.lowering is None else parts.lowering.longest_s,
+        "platform": None if robot.platform is None else _told(robot.platform),
+        "geometry_sha256": geometry_sha256(robot),
+        "calibration": None if robot.calibration is None else robot.calibration.summary(),
+        "notes": list(robot.notes),
+    }
+
+
+def _told(platform: Platform) -> dict[str, Any]:
+    body = None if platform.body is None else platform.body.model_dump()
+    obstacles = [box.model_dump() for box in platform.obstacles]
+    return {**asdict(platform), "body": body, "obstacles": obstacles}
