@@ -1,8 +1,8 @@
 """Industrial cameras over GenICam (GigE Vision, USB3 Vision) by the library harvesters.
 
-Not tried with a camera, but with the simulated ones of the library's own producer, viky.cti. It needs
-the vendor's GenTL producer, a file that ends in .cti. Mono8 is set where the camera has it, and the
-software trigger, so that an image is taken after it is asked for.
+Not tried with a camera, but with the simulated ones of the library's own producer, viky.cti. It
+needs the vendor's GenTL producer, a file that ends in .cti. Mono8 is set where the camera has it,
+and the software trigger, so that an image is taken after it is asked for.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ _TO_GREY = {
     "RGB8": cv2.COLOR_RGB2GRAY, "BGR8": cv2.COLOR_BGR2GRAY,
     "RGBa8": cv2.COLOR_RGBA2GRAY, "BGRa8": cv2.COLOR_BGRA2GRAY,
 }  # fmt: skip
-"""By the names of the Pixel Format Naming Convention, whose Bayer formats begin with the first row's
-colours."""
+"""By the names of the Pixel Format Naming Convention; Bayer formats by the colours that the first
+row begins with."""
 
 
 class GenicamCamera(Camera):
@@ -72,7 +72,9 @@ class GenicamCamera(Camera):
                 f"camera {self.name}: the producer finds no camera; is it plugged in and powered?"
             )
         if serial and serial not in there:
-            raise CameraError(f"camera {self.name}: no camera {serial}; allowed: {', '.join(there)}")
+            raise CameraError(
+                f"camera {self.name}: no camera {serial}; allowed: {', '.join(there)}"
+            )
 
     def _use_software_trigger(self) -> bool:
         nodes = self._acquirer.remote_device.node_map

@@ -1,4 +1,4 @@
-"""Industrial cameras without one: a stand-in for harvesters, and the library's own producer if there.
+"""Industrial cameras without one: a stand-in for harvesters, and its own producer if it is there.
 
 `FakeHarvester` is written against the interface of harvesters 1.4: it has its names, nothing more.
 """
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ class FakeHarvester:
     incomplete = False
     open_fails: Exception | None = None
     triggered = True
-    called: list[str] = []
+    called: ClassVar[list[str]] = []
 
     def __init__(self) -> None:
         self.device_info_list: list[Any] = []
