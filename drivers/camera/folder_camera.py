@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from cdpr_drivers.camera.camera import Camera, CameraError, Image
 from cdpr_rt.core.clock import Clock
 
+_READ = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+"""As the sensor had it: intrinsics are of the sensor, however a telephone was held."""
+_DEPTHS = 10, 12, 14, 16
+"""Bits of a grey level that files of 16 bits are written with."""
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 
 
@@ -43,16 +49,27 @@ class FolderCamera(Camera):
         except OSError as error:
             raise CameraError(f"image {path}: {error.strerror}") from None
         try:
-            pixels = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
+            pixels = cv2.imdecode(data, _READ) if data.size else None
         except cv2.error as error:  # more pixels than the library takes
             raise CameraError(f"image {path}: cannot be decoded: {error}") from None
         if pixels is None:
             raise CameraError(f"image {path}: cannot be decoded")
-        return Image(np.asarray(pixels, np.uint8), self._clock.now_s, None, path.name)
+        levels = _eight_bits(np.asarray(pixels), f"image {path}")
+        return Image(levels, self._clock.now_s, None, path.name)
 
     def close(self) -> None:
         """See `Camera.close`."""
         self._next = len(self.files)
+
+
+def _eight_bits(pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
+    """Return grey levels of 8 bits, of 16-bit ones the upper 8 of those that are in use."""
+    if pixels.dtype == np.uint8:
+        return np.asarray(pixels, np.uint8)
+    if pixels.dtype != np.uint16:
+        raise CameraError(f"{name}: pixels of {pixels.dtype}; allowed: 8 or 16 bits")
+    bits = next(depth for depth in _DEPTHS if int(pixels.max()) < 1 << depth)
+    return (pixels >> (bits - 8)).astype(np.uint8)
 
 
 def _order(path: Path) -> list[tuple[int, str]]:

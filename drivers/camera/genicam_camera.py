@@ -1,8 +1,8 @@
 """Industrial cameras over GenICam (GigE Vision, USB3 Vision) by the library harvesters.
 
-Not tried with a camera: it is written against the library's documentation. It needs the vendor's
-GenTL producer, a file that ends in .cti. Software trigger is used where the camera has one, so that
-an image is taken after it is asked for.
+Not tried with a camera, but with the simulated ones of the library's own producer, viky.cti. It
+needs the vendor's GenTL producer, a file that ends in .cti. Mono8 is set where the camera has it,
+and the software trigger, so that an image is taken after it is asked for.
 """
 
 from __future__ import annotations
@@ -11,14 +11,24 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from harvesters.core import Harvester
+from numpy.typing import NDArray
 
 from cdpr_drivers.camera.camera import Camera, CameraError, Image, grey
 from cdpr_rt.core.clock import Clock
 
 _TIMEOUT_S = 5.0
 _NS = 1e-9
+_TO_GREY = {
+    "BayerRG8": cv2.COLOR_BayerRGGB2GRAY, "BayerGR8": cv2.COLOR_BayerGRBG2GRAY,
+    "BayerGB8": cv2.COLOR_BayerGBRG2GRAY, "BayerBG8": cv2.COLOR_BayerBGGR2GRAY,
+    "RGB8": cv2.COLOR_RGB2GRAY, "BGR8": cv2.COLOR_BGR2GRAY,
+    "RGBa8": cv2.COLOR_RGBA2GRAY, "BGRa8": cv2.COLOR_BGRA2GRAY,
+}  # fmt: skip
+"""By the names of the Pixel Format Naming Convention; Bayer formats by the colours that the first
+row begins with."""
 
 
 class GenicamCamera(Camera):
@@ -39,13 +49,32 @@ class GenicamCamera(Camera):
         try:
             self._harvester.add_file(producer)
             self._harvester.update()
+            self._require_one(serial)
             wanted = {"serial_number": serial} if serial else 0
             self._acquirer: Any = self._harvester.create(wanted)
+            with suppress(Exception):  # what it gives otherwise is told with the image
+                self._acquirer.remote_device.node_map.PixelFormat.value = "Mono8"
             self._triggered = self._use_software_trigger()
             self._acquirer.start()
+        except CameraError:
+            self._harvester.reset()
+            raise
         except Exception as error:  # each producer has errors of its own
             self._harvester.reset()
-            raise CameraError(f"camera {self.name} cannot be opened: {error}") from None
+            raise CameraError(
+                f"camera {self.name} cannot be opened: {error}; is it used by another program?"
+            ) from None
+
+    def _require_one(self, serial: str) -> None:
+        there = [str(one.serial_number) for one in self._harvester.device_info_list]
+        if not there:
+            raise CameraError(
+                f"camera {self.name}: the producer finds no camera; is it plugged in and powered?"
+            )
+        if serial and serial not in there:
+            raise CameraError(
+                f"camera {self.name}: no camera {serial}; allowed: {', '.join(there)}"
+            )
 
     def _use_software_trigger(self) -> bool:
         nodes = self._acquirer.remote_device.node_map
@@ -64,20 +93,27 @@ class GenicamCamera(Camera):
                 self._acquirer.remote_device.node_map.TriggerSoftware.execute()
             else:
                 self._acquirer.fetch(timeout=_TIMEOUT_S).queue()  # exposed before it was asked for
-            with self._acquirer.fetch(timeout=_TIMEOUT_S) as buffer:
+            buffer = self._acquirer.fetch(timeout=_TIMEOUT_S)
+            if buffer is None:
+                raise CameraError(
+                    f"camera {self.name}: an image came incomplete; is its network overloaded?"
+                )
+            with buffer:
                 component = buffer.payload.components[0]
-                shape = (component.height, component.width, -1)
-                data = np.asarray(component.data).reshape(shape)
-                pixels = data.astype(np.uint8)
-                if data.dtype != np.uint8:
-                    raise ValueError(f"pixels of {data.dtype}; set PixelFormat to Mono8")
-                stamp = buffer.timestamp_ns
+                pixels = _grey(component, f"camera {self.name}")
+                stamp = None
+                with suppress(Exception):  # some producers tell no time
+                    stamp = buffer.timestamp_ns
+        except CameraError:
+            raise
         except Exception as error:  # each producer has errors of its own
-            raise CameraError(f"camera {self.name} gives no image: {error}") from None
+            raise CameraError(
+                f"camera {self.name} gives no image: {str(error) or type(error).__name__}; is it "
+                "unplugged, or used by another program?"
+            ) from None
         self._number += 1
-        name = f"image {self._number}"
         device_s = None if stamp is None else stamp * _NS
-        return Image(grey(pixels, name), self._clock.now_s, device_s, name)
+        return Image(pixels, self._clock.now_s, device_s, f"image {self._number}")
 
     def close(self) -> None:
         """See `Camera.close`."""
@@ -85,3 +121,18 @@ class GenicamCamera(Camera):
             self._acquirer.stop()
             self._acquirer.destroy()
         self._harvester.reset()
+
+
+def _grey(component: Any, name: str) -> NDArray[np.uint8]:
+    """Return a component's grey levels (height, width), copied; raises CameraError."""
+    data = np.asarray(component.data)
+    if data.dtype != np.uint8:
+        raise CameraError(
+            f"{name}: PixelFormat {component.data_format} has {data.dtype}; allowed: Mono8, set it "
+            "with the vendor's program"
+        )
+    levels = data.reshape(component.height, component.width, -1)
+    code = _TO_GREY.get(str(component.data_format))
+    if code is None:
+        return grey(levels.copy(), name)
+    return np.asarray(cv2.cvtColor(levels.squeeze(), code), np.uint8)

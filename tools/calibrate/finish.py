@@ -16,7 +16,7 @@ from cdpr_profiles.errors import ProfileError
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.outcome import Method, Outcome, calibration_of
-from cdpr_rt.calibration.readings.camera_data import Images
+from cdpr_rt.calibration.readings.camera_data import HandEye, Images
 from cdpr_rt.calibration.readings.data import CalibrationData, load_points, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_rt.robots.checks import refuse_impossible
@@ -53,6 +53,21 @@ def identified(
     images = None if data.camera is None else Images(data.camera, data.sightings())
     method: Method = "points" if seen.measured.any() else "redundancy"
     return calibrate(robot, geometry, seen, "camera" if images else method, images)
+
+
+def with_hand_eye(data: CalibrationData, known: HandEye | None) -> CalibrationData:
+    """Return data with where the camera sits on the platform, where that is told.
+
+    Raises BadInputError where there was no camera.
+    """
+    if known is None:
+        return data
+    if data.camera is None:
+        raise BadInputError(
+            "--hand-eye: no camera has looked at these poses; allowed: leave it out"
+        )
+    camera = data.camera.model_copy(update={"hand_eye": known})
+    return data.model_copy(update={"camera": camera})
 
 
 def enough(

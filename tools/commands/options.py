@@ -153,6 +153,14 @@ ClusterOption = Annotated[
     str | None,
     typer.Option("--cluster", metavar="ADDRESS", help="A Ray cluster that does the work instead."),
 ]
+HandEyeOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--hand-eye",
+        help="Where the camera sits on the platform, as measured; else the robot's turning tells.",
+        metavar="FILE",
+    ),
+]
 OverwriteOption = Annotated[
     bool, typer.Option("--overwrite", help="Replace what is in --out already.")
 ]

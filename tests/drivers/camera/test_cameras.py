@@ -96,6 +96,34 @@ def test_an_image_that_is_none_is_named(tmp_path: Path) -> None:
         grey(np.zeros((4, 4, 2), np.uint8), "x")
 
 
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_files_of_16_bits_give_the_8_upper_ones_in_use(tmp_path: Path, bits: int) -> None:
+    pixels = np.linspace(0, (1 << bits) - 1, 80 * 64).reshape(64, 80).astype(np.uint16)
+    cv2.imwrite(str(tmp_path / "1.png"), pixels)
+    with open_camera(f"folder:{tmp_path}", LockstepClock()) as camera:
+        image = camera.grab()
+    assert image is not None and image.pixels.dtype == np.uint8
+    np.testing.assert_array_equal(image.pixels, pixels >> (bits - 8))
+
+
+def test_how_a_telephone_was_held_does_not_turn_what_its_sensor_saw(tmp_path: Path) -> None:
+    _, coded = cv2.imencode(".jpg", np.full((64, 80, 3), 90, np.uint8))
+    turned = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+    data = coded.tobytes()
+    marked = data[:2] + b"\xff\xe1" + (len(turned) + 2).to_bytes(2, "big") + turned + data[2:]
+    assert cv2.imdecode(np.frombuffer(marked, np.uint8), cv2.IMREAD_COLOR).shape[:2] == (80, 64)
+    (tmp_path / "1.jpg").write_bytes(marked)
+    cv2.imwrite(str(tmp_path / "2.png"), np.full((64, 80, 4), 90, np.uint8))  # with transparency
+    cv2.imwrite(str(tmp_path / "3.tif"), np.full((64, 80), 0.5, np.float32))
+    with open_camera(f"folder:{tmp_path}", LockstepClock()) as camera:
+        for _ in range(2):
+            image = camera.grab()
+            assert image is not None and image.pixels.shape == (64, 80)
+            assert abs(image.pixels.astype(int) - 90).max() <= 1
+        with pytest.raises(CameraError, match="pixels of float32; allowed: 8 or 16 bits"):
+            camera.grab()
+
+
 class Stream:
     """Stands for cv2.VideoCapture on a stream: five images wait, each further comes in 40 ms."""
 

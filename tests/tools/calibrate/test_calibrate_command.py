@@ -281,3 +281,35 @@ def test_markers_in_the_data_are_fitted_with_the_cables(tmp_path: Path) -> None:
     assert proof["mean_orientation_error_deg"] < 0.2
     assert "off the camera, on a map by" in done.stderr
     assert "or the places of three markers" in done.stderr
+
+
+def test_where_the_camera_sits_is_told_by_a_file(tmp_path: Path) -> None:
+    made = camera_robot(20, hand_eye_known=False).made.data
+    assert made.camera is not None and made.camera.hand_eye is None
+    made.save(tmp_path / "data.json")
+    told = tmp_path / "hand-eye.toml"
+    off_m = (0.05, 0.0, 0.0)  # told to be where it is not, and to a tenth of a millimetre
+    place = [at + off for at, off in zip(HAND_EYE_m, off_m, strict=True)]
+    told.write_text(
+        f"position_m = {place}\nrotation_deg = [180.0, 0.0, 0.0]\nposition_std_m = 1e-4\n"
+    )
+    fit = ("calibrate", "fit", "spatial-8", "--dry-run", "--json", "--data", tmp_path / "data.json")
+    found = result(cdpr_here(*fit, "--out", tmp_path / "a"))["camera"]["position_m"]
+    assert found == pytest.approx(HAND_EYE_m, abs=0.01)
+    found = result(cdpr_here(*fit, "--hand-eye", told, "--out", tmp_path / "b"))["camera"]
+    assert found["position_m"] == pytest.approx(place, abs=0.005)
+
+
+def test_a_file_of_where_the_camera_sits_is_refused_where_it_is_of_no_use(tmp_path: Path) -> None:
+    told = tmp_path / "hand-eye.toml"
+    told.write_text("position_m = [0.0, 0.0, -0.28]\nrotation_deg = [180.0, 0.0, 0.0]\n")
+    blind = data_of(made_up("spatial-8", 20, 12), tmp_path / "data.json")
+    fit = cdpr_here("calibrate", "fit", "spatial-8", "--data", blind, "--hand-eye", told)
+    assert fit.returncode == 2 and "--hand-eye: no camera has looked" in fit.stderr
+    run = ("calibrate", "run", "spatial-8", "--out", tmp_path / "run", "--hand-eye", told)
+    scanned = cdpr_here(*run, "--scanner")
+    assert scanned.returncode == 2 and "--hand-eye: is of a camera" in scanned.stderr
+    told.write_text("position_mm = [0.0, 0.0, -280.0]\n")
+    done = cdpr_here(*run)
+    assert done.returncode == 2 and "hand-eye.toml: position_mm" in done.stderr
+    assert "Traceback" not in done.stderr and not (tmp_path / "run").exists()

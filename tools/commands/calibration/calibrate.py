@@ -12,6 +12,7 @@ from cdpr_profiles.calibration.in_force import undo as take_back
 from cdpr_tools.commands.calibration.calibrate_read import read
 from cdpr_tools.commands.options import (
     ClusterOption,
+    HandEyeOption,
     JsonOption,
     OverwriteOption,
     PngOption,
@@ -24,6 +25,7 @@ from cdpr_tools.output import Output
 
 if TYPE_CHECKING:
     from cdpr_rt.calibration.estimation.parameters import CableGeometry
+    from cdpr_rt.calibration.readings.camera_data import HandEye
     from cdpr_tools.calibrate.measuring.run import Source
 
 app = typer.Typer(
@@ -77,6 +79,7 @@ def fit_data(
         typer.Option(help="Folder of a run, or readings as its data.json.", metavar="FOLDER|FILE"),
     ],
     points: _Points = None,
+    hand_eye: HandEyeOption = None,
     identify: _Identify = None,
     known_mm: _KnownMm = None,
     out_dir: Annotated[Path | None, typer.Option("--out", help="Folder for the result.")] = None,
@@ -92,7 +95,7 @@ def fit_data(
     takes nothing over then either.
     """
     from cdpr_rt.calibration.readings.data import load_data  # noqa: PLC0415
-    from cdpr_tools.calibrate.finish import finish  # noqa: PLC0415  # slow to load
+    from cdpr_tools.calibrate.finish import finish, with_hand_eye  # noqa: PLC0415  # slow to load
     from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
 
     out = Output(as_json)
@@ -101,8 +104,9 @@ def fit_data(
     if data.is_dir():
         judge = runs.judge_of_folder(profile, data)
         data /= runs.DATA
+    read_before = with_hand_eye(load_data(data), _hand_eye(hand_eye))
     finish(
-        *(out, profile, load_data(data), points, _geometry(profile, identify, known_mm)),
+        *(out, profile, read_before, points, _geometry(profile, identify, known_mm)),
         *(data, out_dir or data.parent, dry_run, adopt, judge),
     )
 
@@ -140,6 +144,7 @@ def run(
         Path | None,
         typer.Option(help="Sizes of the sheets, known places; else as ordered.", metavar="FILE"),
     ] = None,
+    hand_eye: HandEyeOption = None,
     seed: SeedOption = 1,
     identify: _Identify = None,
     known_mm: _KnownMm = None,
@@ -165,12 +170,13 @@ def run(
     with out.stage("looking at the robot's file"):
         from cdpr_rt.calibration.readings.data import load_points  # noqa: PLC0415
         from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
-        from cdpr_tools.calibrate.finish import enough, finish  # noqa: PLC0415
+        from cdpr_tools.calibrate.finish import enough, finish, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
 
         profile = load_robot(robot)
         refuse_impossible(profile)
         geometry = _geometry(profile, identify, known_mm)
+        known = _hand_eye(hand_eye)
         if points is not None:
             load_points(points)
 
@@ -190,6 +196,8 @@ def run(
     else:
         _require_new(folder, runs.DATA, overwrite)
         source = _source(profile, [name for name, asked in given.items() if asked])
+        if known is not None and source != "camera":
+            raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
         settings = runs.RunSettings(
             robot=profile.profile,
             plant=None if plant is None else str(plant.resolve()),
@@ -204,6 +212,7 @@ def run(
             setup = camera_setup(out, plant, intrinsics, markers)
         kept = runs.Kept.new(folder, profile, setup)
         settings.save(folder)
+    kept.data = with_hand_eye(kept.data, known)
     if source == "points" and points is None:
         raise BadInputError("--points: the run that goes on was begun with it; allowed: the file")
     data = runs.measure(out, profile, settings, kept, enough(out, profile, points, geometry))
@@ -350,6 +359,12 @@ def _ablation(
         tables = ablations.ablation(robot, draws, seed, cluster, advance)
     out.say(*ablations.lines(tables))
     out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, **tables})
+
+
+def _hand_eye(path: Path | None) -> HandEye | None:
+    from cdpr_rt.calibration.readings.camera_data import HandEye  # noqa: PLC0415  # slow to load
+
+    return None if path is None else HandEye.load_file(path)
 
 
 def _geometry(robot: Robot, identify: str | None, known_mm: float | None) -> CableGeometry:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cdpr_profiles.devices.camera import CameraIntrinsics
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.markers.images.dictionaries import opencv_dictionary
 from cdpr_rt.errors import ControlError, InvalidRequestError
 
 _LEAST_CORNERS, _LEAST_VIEWS, _ENOUGH_VIEWS = 8, 5, 15
@@ -43,19 +44,18 @@ class Board:
 
     def made(self) -> Any:
         """Return OpenCV's; raises InvalidRequestError."""
-        number = getattr(cv2.aruco, f"DICT_{self.dictionary}", None)
-        if number is None or not 0.0 < self.marker_m < self.square_m:
+        dictionary = opencv_dictionary(self.dictionary)
+        if not 0.0 < self.marker_m < self.square_m:
             raise InvalidRequestError(
-                f"board with dictionary {self.dictionary}, markers of "
-                f"{1e3 * self.marker_m:g} mm in squares of {1e3 * self.square_m:g} mm; "
-                "allowed: OpenCV's names, smaller markers"
+                f"board with markers of {1e3 * self.marker_m:g} mm in squares of "
+                f"{1e3 * self.square_m:g} mm; allowed: smaller markers"
             )
         try:
             return cv2.aruco.CharucoBoard(
                 (self.columns, self.rows),
                 self.square_m,
                 self.marker_m,
-                cv2.aruco.getPredefinedDictionary(number),
+                dictionary,
             )
         except cv2.error:
             raise InvalidRequestError(

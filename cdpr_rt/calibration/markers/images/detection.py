@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.markers.images.dictionaries import opencv_dictionary
 from cdpr_rt.calibration.markers.images.edge_fit import fit_corners
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.errors import InvalidRequestError
 
 _DARK, _FLAT = 30.0, 12.0
 """Grey levels: the brightest of an image, and its contrast, below which nothing can be seen."""
@@ -27,10 +27,7 @@ class MarkerDetector:
 
     def __init__(self, dictionary: str) -> None:
         """Raise InvalidRequestError for a dictionary that OpenCV does not have."""
-        number = getattr(cv2.aruco, f"DICT_{dictionary}", None)
-        if number is None:
-            raise InvalidRequestError(f"dictionary {dictionary!r}; allowed: those of OpenCV")
-        self._dictionary: Any = cv2.aruco.getPredefinedDictionary(number)
+        self._dictionary: Any = opencv_dictionary(dictionary)
         self._squares = self._dictionary.markerSize + 2
         self._detector: Any = cv2.aruco.ArucoDetector(
             self._dictionary, cv2.aruco.DetectorParameters()

@@ -113,3 +113,11 @@ def test_intrinsics_of_a_board_are_the_true_ones_within_what_they_say() -> None:
         fit_intrinsics([("a", np.full((384, 480), 90, np.uint8))], Board())
     with pytest.raises(InvalidRequestError, match="images differ in size"):
         fit_intrinsics([images[0], ("b", images[1][1][1:])], Board())
+
+
+@pytest.mark.parametrize("name", ["DICT_6X6_250", "6x6_250", "nonsense"])
+def test_a_set_of_markers_that_opencv_lacks_is_told_with_what_is_meant(name: str) -> None:
+    said = "did you mean '6X6_250'" if "6" in name else "allowed: 4X4_50, 4X4_100"
+    for made in (lambda: MarkerDetector(name), Board(dictionary=name).made):
+        with pytest.raises(InvalidRequestError, match=said):
+            made()
