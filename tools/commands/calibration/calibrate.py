@@ -124,11 +124,11 @@ def run(
     ] = False,
     points: _Points = None,
     poses: Annotated[
-        int | None,
+        str | None,
         typer.Option(
-            min=15,
-            max=1000,
-            help="Poses to go to; else up to 100, while more bring something.",
+            metavar="N|FILE",
+            help="How many poses, home among them, or a list as `cdpr poses` writes it; else up to "
+            "100, while more bring something.",
         ),
     ] = None,
     plant: _Plant = None,
@@ -167,10 +167,12 @@ def run(
         from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import enough, finish  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
+        from cdpr_tools.calibrate.measuring.places import poses_wanted  # noqa: PLC0415
 
         profile = load_robot(robot)
         refuse_impossible(profile)
         geometry = _geometry(profile, identify, known_mm)
+        count, listed = poses_wanted(profile, poses)
         if points is not None:
             load_points(points)
 
@@ -185,7 +187,7 @@ def run(
     if resume:
         settings = runs.RunSettings.load(folder)
         source = settings.source
-        settings = settings.model_copy(update={"poses": poses or settings.poses})
+        settings = settings.going_on(count, listed)
         kept = runs.Kept.of_before(folder, profile)
     else:
         _require_new(folder, runs.DATA, overwrite)
@@ -194,8 +196,9 @@ def run(
             robot=profile.profile,
             plant=None if plant is None else str(plant.resolve()),
             source=source,
-            poses=poses,
+            poses=count,
             seed=seed,
+            places=listed,
         )
         setup = None
         if source == "camera":
