@@ -180,6 +180,11 @@ class Outcome:
                 f"{self.verified.reference} (by the robot's file: {self.before.mean_mm:.2f} and "
                 f"{self.before.worst_mm:.2f})"
             )
+        if math.isfinite(self.verified.scale.factor):
+            lines.append(
+                f"distances between them are {self.verified.scale.text} times those that lengths "
+                f"tell (1 sigma; by the robot's file: {self.before.scale.text})"
+            )
         if self.verified.turn_errors_rad.size:
             lines.append(
                 f"orientations there: mean {self.verified.mean_deg:.2f} deg off (before: "
@@ -226,14 +231,17 @@ class Outcome:
             "verification": {
                 "poses": self.verified.poses,
                 "readings_left_out": self.verified_left_out,
-                "mean_position_error_mm": _number(self.verified.mean_mm),
-                "worst_position_error_mm": _number(self.verified.worst_mm),
-                "mean_position_error_before_mm": _number(self.before.mean_mm),
-                "mean_orientation_error_deg": _number(self.verified.mean_deg),
-                "mean_orientation_error_before_deg": _number(self.before.mean_deg),
+                "mean_position_error_mm": number_or_none(self.verified.mean_mm),
+                "worst_position_error_mm": number_or_none(self.verified.worst_mm),
+                "mean_position_error_before_mm": number_or_none(self.before.mean_mm),
+                "mean_orientation_error_deg": number_or_none(self.verified.mean_deg),
+                "mean_orientation_error_before_deg": number_or_none(self.before.mean_deg),
+                "scale_factor": number_or_none(self.verified.scale.factor),
+                "scale_factor_std": number_or_none(self.verified.scale.std),
+                "scale_factor_before": number_or_none(self.before.scale.factor),
                 "reference": self.verified.kind,
                 "by": self.verified.reference,
-                "birge_ratio": _number(self.birge_ratio),
+                "birge_ratio": number_or_none(self.birge_ratio),
                 "length_residual_mm": 1e3 * self.verified.residual_m,
                 "length_residual_before_mm": 1e3 * self.before.residual_m,
             },
@@ -241,7 +249,8 @@ class Outcome:
         }
 
 
-def _number(value: float) -> float | None:
+def number_or_none(value: float) -> float | None:
+    """Return a number for JSON, which has no nan."""
     return value if math.isfinite(value) else None
 
 
@@ -290,8 +299,8 @@ def calibration_of(
         exit_std_m=tuple(std[:, exits].max(axis=1).tolist()),
         predicted_3_sigma_mm=outcome.predicted_3_sigma_mm,
         verified_poses=verified.poses,
-        verified_mean_mm=_number(verified.mean_mm),
-        verified_worst_mm=_number(verified.worst_mm),
+        verified_mean_mm=number_or_none(verified.mean_mm),
+        verified_worst_mm=number_or_none(verified.worst_mm),
         raw_data=raw_data,
     )
 

@@ -88,6 +88,8 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     proof = told["verification"]
     assert proof["reference"] == "points"
     assert proof["mean_position_error_mm"] < 0.6 * proof["mean_position_error_before_mm"]
+    assert abs(proof["scale_factor"] - 1.0) < 4.0 * proof["scale_factor_std"] < 0.01
+    assert "distances between them are " in done.stderr
     assert len(told["parameters"]) == 8 * 5 + 1
     assert matplotlib.image.imread(told["picture"]).std() > 0.01
     robot = load_robot("spatial-8")
@@ -165,7 +167,7 @@ def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> N
     assert "measure the platform at three poses" in done.stderr
     assert "measure one distance" in done.stderr
     residuals = told["verification"]
-    assert residuals["reference"] == "none"
+    assert residuals["reference"] == "none" and residuals["scale_factor"] is None
     assert residuals["length_residual_mm"] < residuals["length_residual_before_mm"]
 
 
