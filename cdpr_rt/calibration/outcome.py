@@ -71,10 +71,8 @@ class Outcome:
 
     @property
     def worse(self) -> bool:
-        """Whether poses that the fit had not seen are told no better than by the robot's file."""
-        if self.verified.errors_m.size:
-            return self.verified.mean_mm > self.before.mean_mm
-        return self.verified.residual_m > self.before.residual_m
+        """Whether poses that the fit had not seen are told worse, and not by noise alone."""
+        return self.verified.worse_than(self.before)
 
     @property
     def good(self) -> bool:
@@ -110,8 +108,8 @@ class Outcome:
             )
         if self.worse and (self.change.significant or self.adopt):
             told.append(
-                "poses that the fit had not seen are told no better than by the robot's file: take "
-                "more poses, further apart"
+                "poses that the fit had not seen are told worse than by the robot's file, and not "
+                "by noise alone: take more poses, further apart"
             )
         if self.method == "camera" and self.verified.kind == "none":
             told.append(

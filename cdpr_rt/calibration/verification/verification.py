@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.stats import t as student
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.camera_model import CameraModel
@@ -18,6 +20,8 @@ from cdpr_rt.calibration.readings.observations import Observations
 _LEAST_MARKERS = 2
 """That an image must show for a pose: the tilt of one alone is not known well."""
 _LEAST_POSES = 3
+_SURE = 0.975
+"""How seldom chance alone may make poses told worse: one in forty, some two standard errors."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,8 @@ class Verification:
     """Of the rotations, where those were measured, (M, 3)."""
     residual_m: float
     """Root mean square of what lengths contradict each other by."""
+    squares_m2: FloatArray
+    """Sum of the squares of that at each pose, (N,)."""
     by_camera: bool = False
     """Whether the camera measured the poses, on a map of the images of other poses alone."""
 
@@ -109,6 +115,23 @@ class Verification:
         """Of distances measured between the poses, by those that lengths tell."""
         return Scale.of(self.told_m, self.told_m - self.errors_m)
 
+    def worse_than(self, before: Verification) -> bool:
+        """Return whether these poses are told worse than `before`, by more than noise explains.
+
+        Of distances d_j less those before the mean is beyond t_0.975 of its standard error
+        (Student's paired test): what the measurement errs by is in both. Without measured poses
+        of the squares of what lengths contradict each other by.
+        """
+        if self.errors_m.size:
+            more = self._distance() - before._distance()
+        else:
+            more = self.squares_m2 - before.squares_m2
+        count, mean = len(more), float(more.mean())
+        if count < 2:
+            return mean > 0.0
+        error = float(more.std(ddof=1)) / math.sqrt(count)
+        return mean > float(student.ppf(_SURE, count - 1)) * error
+
     def _distance(self) -> FloatArray:
         return np.asarray(np.linalg.norm(self.errors_m, axis=1))
 
@@ -126,18 +149,21 @@ def verify(
     told = seen.without_jumps(jumps_m)
     there = locate(geometry, told)
     off = there.length_residual_m * length_std_m(geometry, told)
-    rms = float(np.sqrt((off**2).sum() / max(int(seen.used.sum()), 1)))
+    squares = np.asarray((off**2).sum(axis=1))
+    rms = float(np.sqrt(squares.sum() / max(int(seen.used.sum()), 1)))
     k = geometry.coordinates
     if camera is not None and not seen.measured.any():
         seen = replace(seen, start=there.poses)
         errors, told_m, turns = _beside_camera(geometry, camera, seen)
-        return Verification(seen.poses, errors[:, :k], told_m[:, :k], turns, rms, by_camera=True)
+        return Verification(
+            seen.poses, errors[:, :k], told_m[:, :k], turns, rms, squares, by_camera=True
+        )
     p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
     errors = np.where(np.isfinite(seen.position_std_m), p - seen.position_m, np.nan)[:, :k]
     measured = np.isfinite(errors).all(axis=1)
     turned = np.isfinite(seen.rotation_std_rad).all(axis=1)
     turns = logarithms(there.poses[turned, 1:] @ np.swapaxes(seen.rotation[turned], 1, 2))
-    return Verification(seen.poses, errors[measured], p[measured, :k], turns, rms)
+    return Verification(seen.poses, errors[measured], p[measured, :k], turns, rms, squares)
 
 
 def _beside_camera(

@@ -16,6 +16,7 @@ from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
+from cdpr_rt.calibration.verification.verification import Verification
 from cdpr_rt.robots.calibration_state import mark_not_calibrated, not_calibrated_reason
 from cdpr_tools.calibrate.made_readings import HAND_EYE_m
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
@@ -143,16 +144,29 @@ def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_pa
     assert result(asked)["in_force"]["version"] == 1 and result(asked)["not_taken_over"] is None
 
 
-def test_what_tells_poses_not_used_worse_is_not_taken_over_even_when_asked(tmp_path: Path) -> None:
+def test_what_tells_poses_not_used_worse_is_not_taken_over_even_when_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Verification, "worse_than", lambda *_: True)
     words = hardly_off(tmp_path, 2, 0.0)
     done = cdpr_here(*words)
     assert done.returncode == 0 and not result(done)["change"]["significant"]
     assert "poses not used are told worse" in result(done)["not_taken_over"]
     asked = cdpr_here(*words, "--adopt")
     assert asked.returncode == 1, asked.stderr
-    assert "NOT GOOD: poses that the fit had not seen are told no better" in asked.stderr
+    assert "NOT GOOD: poses that the fit had not seen are told worse than by" in asked.stderr
     assert result(asked)["in_force"] is None and result(asked)["not_taken_over"]
     assert calibrated(load_robot("spatial-8")).calibration is None
+
+
+def test_a_right_file_s_calibration_that_noise_alone_tells_worse_is_adopted_when_asked(
+    tmp_path: Path,
+) -> None:
+    asked = cdpr_here(*hardly_off(tmp_path, 2, 0.0), "--adopt")
+    assert asked.returncode == 0, asked.stderr
+    proof = result(asked)["verification"]
+    assert proof["mean_position_error_mm"] > proof["mean_position_error_before_mm"]
+    assert result(asked)["in_force"]["version"] == 1
 
 
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
