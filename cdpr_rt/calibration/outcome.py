@@ -19,6 +19,7 @@ from cdpr_rt.calibration.camera.camera_faults import UNDECIDED
 from cdpr_rt.calibration.estimation.faults import Fault
 from cdpr_rt.calibration.estimation.fit import Fit
 from cdpr_rt.calibration.estimation.parameters import DRUM
+from cdpr_rt.calibration.markers.coverage import Coverage, listed
 from cdpr_rt.calibration.verification.held_out import Unused
 from cdpr_rt.calibration.verification.more_poses import MORE
 from cdpr_rt.calibration.verification.verdict import (
@@ -68,6 +69,8 @@ class Outcome:
     """How many times as large errors at measured points not used are as predicted; nan without."""
     adopt: bool = False
     """Whether it is to be taken over even where its changes are not significant."""
+    cover: Coverage | None = None
+    """How the images hang together; None without any."""
 
     @property
     def worse(self) -> bool:
@@ -116,7 +119,19 @@ class Outcome:
                 "no three of the poses not used show two markers of the map, so nothing verifies "
                 "it: take more poses, or lay more sheets"
             )
-        return told + self._impossible()
+        return told + self._islands() + self._impossible()
+
+    def _islands(self) -> list[str]:
+        """Return which markers no image connects with the others, as the thesis' 3.7.3 looks for.
+
+        The map leaves them out, and poses of which only they were seen have no image then.
+        """
+        if self.cover is None or not self.cover.apart:
+            return []
+        return [
+            f"markers fall into {1 + len(self.cover.apart)} islands that no image connects: the "
+            f"map leaves out all that are not with {listed(self.cover.islands[0])}"
+        ]
 
     def insignificance(self) -> str | None:
         """Return why nothing is to be changed though nothing is wrong; None where it is."""
@@ -166,6 +181,7 @@ class Outcome:
                 + (": good" if enough else f", {wanted:.2f} mm wanted: {self.advice()}")
             )
         lines += self.proof()
+        lines += [] if self.cover is None else self.cover.lines()
         return lines + [f"not known: {one.what}; {one.advice}" for one in self.open_directions]
 
     def proof(self) -> list[str]:
@@ -244,6 +260,7 @@ class Outcome:
                 "length_residual_before_mm": 1e3 * self.before.residual_m,
             },
             "camera": camera_table(self.found),
+            "coverage": None if self.cover is None else self.cover.told(),
         }
 
 

@@ -290,6 +290,7 @@ def test_markers_in_the_data_are_fitted_with_the_cables(tmp_path: Path) -> None:
     told = result(done)
     assert told["camera"]["position_m"] == pytest.approx(HAND_EYE_m, abs=0.01)
     assert len(told["camera"]["markers"]) == 12
+    assert told["coverage"]["share_seen"] is None and len(told["coverage"]["islands"]) == 1
     proof = told["verification"]
     assert proof["reference"] == "camera"
     assert proof["by"].startswith("the camera, on a map by the images")

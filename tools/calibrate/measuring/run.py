@@ -347,10 +347,7 @@ class _Measuring:
         data = self._kept.data
         if data.camera is not None:
             cover = coverage(data.sightings(), data.camera.sheets.placed)
-            texts = list(cover.advice)
-            if cover.share_seen is not None:
-                texts.insert(0, f"{cover.share_seen:.0%} of the markers seen")
-            for text in texts:
+            for text in cover.lines():
                 self._out.note(f"after {len(data.poses)} poses: {text}")
             if not any(len(island) > 1 for island in cover.islands):
                 raise WorkFailedError("no image shows two markers together: put them closer")

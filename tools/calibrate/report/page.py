@@ -163,6 +163,8 @@ class _Report:
                 "camera was.",
             ),
         ]
+        if self._outcome.cover is not None:
+            lines += [paragraph(f"{text}.") for text in self._outcome.cover.lines()]
         return [*lines, *self._image()]
 
     def _image(self) -> list[str]:

@@ -106,6 +106,7 @@ def test_the_report_is_one_file_with_its_pictures(
     for line in (*outcome.proof(), *(fault.text for fault in outcome.faults)):
         assert text.count(escape(line)) == 1, line
     assert known.scanner.scale.text in text and outcome.verified.scale.text in text
+    assert outcome.cover is not None and "12 markers seen." in text
     assert "true error" in text and "cable 8 exit point z" in text
     write_report(page, outcome, robot.made.data, None, [], tmp_path / "nowhere")
     assert page.read_text().count("<figure>") == 3
