@@ -15,10 +15,15 @@ from cdpr_here import cdpr_here
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
-from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
+from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading, load_data
 from cdpr_rt.calibration.verification.verification import Verification
 from cdpr_rt.robots.calibration_state import mark_not_calibrated, not_calibrated_reason
+from cdpr_tools.calibrate.finish import enough
 from cdpr_tools.calibrate.made_readings import HAND_EYE_m
+from cdpr_tools.commands.calibration.calibrate import _source
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
 
@@ -199,6 +204,22 @@ def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
     faults = result(done)["faults"]
     assert [(f["kind"], f["cable"], f["pose"]) for f in faults] == [("jump", 7, 21)]
     assert "cable 7 is -15" in done.stderr
+
+
+def test_points_of_poses_that_come_later_do_not_end_a_run(tmp_path: Path) -> None:
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
+    data = load_data(data_of(what, tmp_path / "data.json"))
+    points, robot = points_of(what, tmp_path / "p.csv"), load_robot("spatial-8")
+    asked = enough(Output(True), robot, points, CableGeometry.of(robot))
+    asked(data.model_copy(update={"poses": data.poses[:30]}))
+
+
+def test_points_are_taken_besides_a_camera() -> None:
+    robot = load_robot("spatial-8")
+    assert _source(robot, ["camera", "points"]) == "camera"
+    assert _source(robot, ["points"]) == "points"
+    with pytest.raises(BadInputError, match="or --camera with --points"):
+        _source(robot, ["camera", "scanner", "points"])
 
 
 @pytest.mark.parametrize(

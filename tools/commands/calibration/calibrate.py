@@ -221,8 +221,12 @@ def _source(robot: Robot, asked: list[Source]) -> Source:
     """Return what a run is to use besides lengths and tensions; raises BadInputError."""
     if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
         return "camera"
+    if asked == ["camera", "points"]:
+        asked = ["camera"]  # points are taken besides
     if len(asked) != 1:
-        raise BadInputError("give one of --camera, --redundancy, --scanner and --points")
+        raise BadInputError(
+            "give one of --camera, --redundancy, --scanner and --points, or --camera with --points"
+        )
     if asked[0] == "camera" and robot.platform is not None and len(robot.platform.controlled) < 6:
         raise BadInputError(
             f"--camera: {robot.profile} does not turn its platform about two axes, which is what "
