@@ -15,6 +15,7 @@ from cdpr_rt.calibration.estimation.faults import Fault, fit_without_faults, par
 from cdpr_rt.calibration.estimation.fit import Fit
 from cdpr_rt.calibration.estimation.noise import fit_with_noise_seen
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.markers.coverage import coverage
 from cdpr_rt.calibration.markers.map_fit import MapFit
 from cdpr_rt.calibration.outcome import LEAST_POINTS, Method, Outcome
 from cdpr_rt.calibration.readings.camera_data import Images
@@ -66,10 +67,13 @@ def calibrate(
         larger * _three_sigma_mm(one, known_room) for one in (found, with_more_poses(found))
     )
     change = change_of(found, _grid(found.geometry), not known_room, larger)
+    cover = None
+    if images is not None:
+        cover = coverage(images.sightings, images.setup.sheets.placed)
     return Outcome(
         robot, found, method, all_of_it.faults, open_directions(found),
         unused.verified(), unused.before(geometry), int((~unused.seen.used).sum()),
-        sigma_mm, with_more_mm, known_room, unused, change, birge,
+        sigma_mm, with_more_mm, known_room, unused, change, birge, cover=cover,
     )  # fmt: skip
 
 

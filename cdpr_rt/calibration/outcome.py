@@ -19,6 +19,7 @@ from cdpr_rt.calibration.camera.camera_faults import UNDECIDED
 from cdpr_rt.calibration.estimation.faults import Fault
 from cdpr_rt.calibration.estimation.fit import Fit
 from cdpr_rt.calibration.estimation.parameters import DRUM
+from cdpr_rt.calibration.markers.coverage import Coverage, listed
 from cdpr_rt.calibration.verification.held_out import Unused
 from cdpr_rt.calibration.verification.more_poses import MORE
 from cdpr_rt.calibration.verification.verdict import (
@@ -68,13 +69,13 @@ class Outcome:
     """How many times as large errors at measured points not used are as predicted; nan without."""
     adopt: bool = False
     """Whether it is to be taken over even where its changes are not significant."""
+    cover: Coverage | None = None
+    """How the images hang together; None without any."""
 
     @property
     def worse(self) -> bool:
-        """Whether poses that the fit had not seen are told no better than by the robot's file."""
-        if self.verified.errors_m.size:
-            return self.verified.mean_mm > self.before.mean_mm
-        return self.verified.residual_m > self.before.residual_m
+        """Whether poses that the fit had not seen are told worse, and not by noise alone."""
+        return self.verified.worse_than(self.before)
 
     @property
     def good(self) -> bool:
@@ -110,15 +111,27 @@ class Outcome:
             )
         if self.worse and (self.change.significant or self.adopt):
             told.append(
-                "poses that the fit had not seen are told no better than by the robot's file: take "
-                "more poses, further apart"
+                "poses that the fit had not seen are told worse than by the robot's file, and not "
+                "by noise alone: take more poses, further apart"
             )
         if self.method == "camera" and self.verified.kind == "none":
             told.append(
                 "no three of the poses not used show two markers of the map, so nothing verifies "
                 "it: take more poses, or lay more sheets"
             )
-        return told + self._impossible()
+        return told + self._islands() + self._impossible()
+
+    def _islands(self) -> list[str]:
+        """Return which markers no image connects with the others, as the thesis' 3.7.3 looks for.
+
+        The map leaves them out, and poses of which only they were seen have no image then.
+        """
+        if self.cover is None or not self.cover.apart:
+            return []
+        return [
+            f"markers fall into {1 + len(self.cover.apart)} islands that no image connects: the "
+            f"map leaves out all that are not with {listed(self.cover.islands[0])}"
+        ]
 
     def insignificance(self) -> str | None:
         """Return why nothing is to be changed though nothing is wrong; None where it is."""
@@ -168,6 +181,7 @@ class Outcome:
                 + (": good" if enough else f", {wanted:.2f} mm wanted: {self.advice()}")
             )
         lines += self.proof()
+        lines += [] if self.cover is None else self.cover.lines()
         return lines + [f"not known: {one.what}; {one.advice}" for one in self.open_directions]
 
     def proof(self) -> list[str]:
@@ -179,6 +193,11 @@ class Outcome:
                 f"{self.verified.mean_mm:.2f} mm, worst {self.verified.worst_mm:.2f} mm off "
                 f"{self.verified.reference} (by the robot's file: {self.before.mean_mm:.2f} and "
                 f"{self.before.worst_mm:.2f})"
+            )
+        if math.isfinite(self.verified.scale.factor):
+            lines.append(
+                f"distances between them are {self.verified.scale.text} times those that lengths "
+                f"tell (1 sigma; by the robot's file: {self.before.scale.text})"
             )
         if self.verified.turn_errors_rad.size:
             lines.append(
@@ -226,22 +245,27 @@ class Outcome:
             "verification": {
                 "poses": self.verified.poses,
                 "readings_left_out": self.verified_left_out,
-                "mean_position_error_mm": _number(self.verified.mean_mm),
-                "worst_position_error_mm": _number(self.verified.worst_mm),
-                "mean_position_error_before_mm": _number(self.before.mean_mm),
-                "mean_orientation_error_deg": _number(self.verified.mean_deg),
-                "mean_orientation_error_before_deg": _number(self.before.mean_deg),
+                "mean_position_error_mm": number_or_none(self.verified.mean_mm),
+                "worst_position_error_mm": number_or_none(self.verified.worst_mm),
+                "mean_position_error_before_mm": number_or_none(self.before.mean_mm),
+                "mean_orientation_error_deg": number_or_none(self.verified.mean_deg),
+                "mean_orientation_error_before_deg": number_or_none(self.before.mean_deg),
+                "scale_factor": number_or_none(self.verified.scale.factor),
+                "scale_factor_std": number_or_none(self.verified.scale.std),
+                "scale_factor_before": number_or_none(self.before.scale.factor),
                 "reference": self.verified.kind,
                 "by": self.verified.reference,
-                "birge_ratio": _number(self.birge_ratio),
+                "birge_ratio": number_or_none(self.birge_ratio),
                 "length_residual_mm": 1e3 * self.verified.residual_m,
                 "length_residual_before_mm": 1e3 * self.before.residual_m,
             },
             "camera": camera_table(self.found),
+            "coverage": None if self.cover is None else self.cover.told(),
         }
 
 
-def _number(value: float) -> float | None:
+def number_or_none(value: float) -> float | None:
+    """Return a number for JSON, which has no nan."""
     return value if math.isfinite(value) else None
 
 
@@ -290,8 +314,8 @@ def calibration_of(
         exit_std_m=tuple(std[:, exits].max(axis=1).tolist()),
         predicted_3_sigma_mm=outcome.predicted_3_sigma_mm,
         verified_poses=verified.poses,
-        verified_mean_mm=_number(verified.mean_mm),
-        verified_worst_mm=_number(verified.worst_mm),
+        verified_mean_mm=number_or_none(verified.mean_mm),
+        verified_worst_mm=number_or_none(verified.worst_mm),
         raw_data=raw_data,
     )
 

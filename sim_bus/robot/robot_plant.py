@@ -131,7 +131,7 @@ class VariationPlant(Profile):
 class ScannerPlant(Profile):
     """What measures the platform's pose from outside, where there is such a device."""
 
-    position_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.001
+    position_sigma_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.002
     """Standard deviation of each coordinate."""
     rotation_sigma_rad: Annotated[float, Field(ge=0.0, le=0.1)] = 0.002
     """Of each component of the rotation vector by which it errs."""

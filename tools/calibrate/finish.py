@@ -41,13 +41,21 @@ Judge = Callable[[Outcome], "Judged"]
 
 
 def identified(
-    robot: Robot, data: CalibrationData, points: Path | None, geometry: CableGeometry
+    robot: Robot,
+    data: CalibrationData,
+    points: Path | None,
+    geometry: CableGeometry,
+    so_far: bool = False,
 ) -> Outcome:
-    """Return what data and measured points tell; raises InvalidRequestError, ProfileError."""
+    """Return what data and measured points tell; `so_far` leaves points of later poses aside.
+
+    Raises InvalidRequestError, ProfileError.
+    """
     seen = data.observations(robot, geometry.model)
     if points is not None:
         try:
-            seen = with_points(seen, load_points(points), geometry.coordinates)
+            there = [one for one in load_points(points) if not so_far or one.pose < seen.poses]
+            seen = with_points(seen, there, geometry.coordinates)
         except InvalidRequestError as error:
             raise BadInputError(f"--points {points}: {error}") from None
     images = None if data.camera is None else Images(data.camera, data.sightings())
@@ -80,7 +88,7 @@ def enough(
         if len(data.poses) < _LEAST_JUDGED:
             return None
         try:
-            outcome = identified(robot, data, points, geometry)
+            outcome = identified(robot, data, points, geometry, so_far=True)
         except ControlError:  # what is missing so far is said at the end if it still is
             return None
         for fault in outcome.faults:

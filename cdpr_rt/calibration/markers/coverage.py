@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -41,6 +42,27 @@ class Coverage:
     def connected(self) -> bool:
         """Whether there is one island."""
         return len(self.islands) == 1
+
+    @property
+    def apart(self) -> list[tuple[int, ...]]:
+        """Islands besides the largest; without a marker that was seen once or twice, and alone."""
+        return [one for one in self.islands[1:] if len(one) > 1 or one[0] not in self.seldom]
+
+    def lines(self) -> list[str]:
+        """Return in words what share was seen, and what to do."""
+        share = self.share_seen
+        many = len(self.ids) if share is None else f"{share:.0%} of the"
+        return [f"{many} markers seen", *self.advice]
+
+    def told(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {
+            "share_seen": self.share_seen,
+            "islands": [list(island) for island in self.islands],
+            "unseen": list(self.unseen),
+            "seldom": list(self.seldom),
+            "advice": list(self.advice),
+        }
 
 
 def coverage(sightings: Sequence[Sighting], placed: Sequence[int] = ()) -> Coverage:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.stats import t as student
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.camera.camera_model import CameraModel
@@ -18,6 +20,43 @@ from cdpr_rt.calibration.readings.observations import Observations
 _LEAST_MARKERS = 2
 """That an image must show for a pose: the tilt of one alone is not known well."""
 _LEAST_POSES = 3
+_SURE = 0.975
+"""How seldom chance alone may make poses told worse: one in forty, some two standard errors."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How many times as large distances between poses are as those that lengths tell."""
+
+    factor: float
+    std: float
+    """By leaving out one pose after the other (jackknife); both nan for less than three poses."""
+
+    @classmethod
+    def of(cls, told_m: FloatArray, measured_m: FloatArray) -> Scale:
+        """Return the ratio of measured (M, k) to told (M, k) distances, all pairs together.
+
+        s^2 = sum |q_i - q_j|^2 / sum |p_i - p_j|^2; section 3.8 of the thesis looks at the scale.
+        """
+        count = len(told_m)
+        if count < _LEAST_POSES or not np.ptp(told_m, axis=0).any():
+            return cls(float("nan"), float("nan"))
+        factor = _ratio(told_m, measured_m)
+        less = np.array(
+            [_ratio(*(np.delete(p, j, axis=0) for p in (told_m, measured_m))) for j in range(count)]
+        )
+        return cls(factor, float(np.sqrt((count - 1) * less.var())))
+
+    @property
+    def text(self) -> str:
+        """Factor and standard deviation for people."""
+        return f"{self.factor:.5f} ± {self.std:.5f}"
+
+
+def _ratio(told_m: FloatArray, measured_m: FloatArray) -> float:
+    # sums over pairs are those about the mean
+    squares = [float(((p - p.mean(axis=0)) ** 2).sum()) for p in (measured_m, told_m)]
+    return float(np.sqrt(squares[0] / max(squares[1], 1e-12)))
 
 
 @dataclass(frozen=True)
@@ -27,10 +66,14 @@ class Verification:
     poses: int
     errors_m: FloatArray
     """Positions by lengths less those measured, (M, k)."""
+    told_m: FloatArray
+    """Positions by lengths, (M, k)."""
     turn_errors_rad: FloatArray
     """Of the rotations, where those were measured, (M, 3)."""
     residual_m: float
     """Root mean square of what lengths contradict each other by."""
+    squares_m2: FloatArray
+    """Sum of the squares of that at each pose, (N,)."""
     by_camera: bool = False
     """Whether the camera measured the poses, on a map of the images of other poses alone."""
 
@@ -67,6 +110,28 @@ class Verification:
         turned = np.linalg.norm(self.turn_errors_rad, axis=1)
         return float(np.degrees(turned.mean())) if turned.size else float("nan")
 
+    @property
+    def scale(self) -> Scale:
+        """Of distances measured between the poses, by those that lengths tell."""
+        return Scale.of(self.told_m, self.told_m - self.errors_m)
+
+    def worse_than(self, before: Verification) -> bool:
+        """Return whether these poses are told worse than `before`, by more than noise explains.
+
+        Of distances d_j less those before the mean is beyond t_0.975 of its standard error
+        (Student's paired test): what the measurement errs by is in both. Without measured poses
+        of the squares of what lengths contradict each other by.
+        """
+        if self.errors_m.size:
+            more = self._distance() - before._distance()
+        else:
+            more = self.squares_m2 - before.squares_m2
+        count, mean = len(more), float(more.mean())
+        if count < 2:
+            return mean > 0.0
+        error = float(more.std(ddof=1)) / math.sqrt(count)
+        return mean > float(student.ppf(_SURE, count - 1)) * error
+
     def _distance(self) -> FloatArray:
         return np.asarray(np.linalg.norm(self.errors_m, axis=1))
 
@@ -84,33 +149,40 @@ def verify(
     told = seen.without_jumps(jumps_m)
     there = locate(geometry, told)
     off = there.length_residual_m * length_std_m(geometry, told)
-    rms = float(np.sqrt((off**2).sum() / max(int(seen.used.sum()), 1)))
+    squares = np.asarray((off**2).sum(axis=1))
+    rms = float(np.sqrt(squares.sum() / max(int(seen.used.sum()), 1)))
     k = geometry.coordinates
     if camera is not None and not seen.measured.any():
-        errors, turns = _beside_camera(geometry, camera, replace(seen, start=there.poses))
-        return Verification(seen.poses, errors[:, :k], turns, rms, by_camera=True)
+        seen = replace(seen, start=there.poses)
+        errors, told_m, turns = _beside_camera(geometry, camera, seen)
+        return Verification(
+            seen.poses, errors[:, :k], told_m[:, :k], turns, rms, squares, by_camera=True
+        )
     p = there.poses[:, 0] + there.poses[:, 1:] @ seen.target_m
     errors = np.where(np.isfinite(seen.position_std_m), p - seen.position_m, np.nan)[:, :k]
     measured = np.isfinite(errors).all(axis=1)
     turned = np.isfinite(seen.rotation_std_rad).all(axis=1)
     turns = logarithms(there.poses[turned, 1:] @ np.swapaxes(seen.rotation[turned], 1, 2))
-    return Verification(seen.poses, errors[measured], turns, rms)
+    return Verification(seen.poses, errors[measured], p[measured, :k], turns, rms, squares)
 
 
 def _beside_camera(
     geometry: CableGeometry, camera: CameraModel, seen: Observations
-) -> tuple[FloatArray, FloatArray]:
-    """Return errors of positions (M, 3) and rotations (M, 3) of `seen.start`, where it saw."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return errors of positions, positions, and errors of rotations of `seen.start`, (M, 3).
+
+    At the poses at which the camera saw enough.
+    """
     markers = seen.markers
     shown = np.zeros(seen.poses, int)
     if markers is not None:
         shown = np.bincount(markers.image, minlength=seen.poses)
     index = np.flatnonzero(shown >= _LEAST_MARKERS)
     if len(index) < _LEAST_POSES:
-        return np.zeros((0, 3)), np.zeros((0, 3))
+        return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3))
     there = locate_by_camera(geometry, camera, seen.some(index))
     p, Q = seen.start[index, 0], seen.start[index, 1:]
-    return p - there[:, 0], logarithms(Q @ np.swapaxes(there[:, 1:], 1, 2))
+    return p - there[:, 0], p, logarithms(Q @ np.swapaxes(there[:, 1:], 1, 2))
 
 
 def locate_by_camera(

@@ -99,7 +99,7 @@ class Reach:
             shares, why = self.shares(ends)
             gone = np.where(why == WHOLE, 1.0, share * shares)
             there = self.start + gone[:, None] * (ends - self.start)
-            inside = self._is_target(there)
+            inside = self.are_targets(there)
             drawn, found = drawn + len(ends), found + int(inside.sum())
             outside += len(ends) - int(inside.sum())
             cut += np.bincount(why, minlength=3)
@@ -117,7 +117,8 @@ class Reach:
             positions[:, k:] = turns * rng.uniform(0.0, 1.0, (m, 1)) ** (1.0 / (d - k))
         return positions
 
-    def _is_target(self, positions: FloatArray) -> BoolArray:
+    def are_targets(self, positions: FloatArray) -> BoolArray:
+        """Return which of the positions (m, d) are in the box of targets, and not on the stand."""
         platform, k = self.model.platform, self.model.positions
         low, high = np.array(platform.workspace_min_m), np.array(platform.workspace_max_m)
         inside = (positions[:, :k] >= low) & (positions[:, :k] <= high)

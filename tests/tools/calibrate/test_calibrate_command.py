@@ -15,9 +15,15 @@ from cdpr_here import cdpr_here
 from cdpr_profiles import load_robot
 from cdpr_profiles.calibration.geometry import geometry_sha256
 from cdpr_profiles.calibration.in_force import calibrated
-from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
+from cdpr_rt.calibration.estimation.parameters import CableGeometry
+from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading, load_data
+from cdpr_rt.calibration.verification.verification import Verification
 from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated, not_calibrated_reason
+from cdpr_tools.calibrate.finish import enough
 from cdpr_tools.calibrate.made_readings import HAND_EYE_m
+from cdpr_tools.commands.calibration.calibrate import _source
+from cdpr_tools.errors import BadInputError
+from cdpr_tools.output import Output
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
 from tests.cdpr_rt.calibration.made_up import MadeUp, made_up
 
@@ -88,6 +94,8 @@ def test_points_of_a_person_calibrate_and_are_taken_over_shown_and_undone(tmp_pa
     proof = told["verification"]
     assert proof["reference"] == "points"
     assert proof["mean_position_error_mm"] < 0.6 * proof["mean_position_error_before_mm"]
+    assert abs(proof["scale_factor"] - 1.0) < 4.0 * proof["scale_factor_std"] < 0.01
+    assert "distances between them are " in done.stderr
     assert len(told["parameters"]) == 8 * 5 + 1
     assert matplotlib.image.imread(told["picture"]).std() > 0.01
     robot = load_robot("spatial-8")
@@ -141,16 +149,29 @@ def test_what_changes_nothing_significantly_is_taken_over_only_when_asked(tmp_pa
     assert result(asked)["in_force"]["version"] == 1 and result(asked)["not_taken_over"] is None
 
 
-def test_what_tells_poses_not_used_worse_is_not_taken_over_even_when_asked(tmp_path: Path) -> None:
+def test_what_tells_poses_not_used_worse_is_not_taken_over_even_when_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Verification, "worse_than", lambda *_: True)
     words = hardly_off(tmp_path, 2, 0.0)
     done = cdpr_here(*words)
     assert done.returncode == 0 and not result(done)["change"]["significant"]
     assert "poses not used are told worse" in result(done)["not_taken_over"]
     asked = cdpr_here(*words, "--adopt")
     assert asked.returncode == 1, asked.stderr
-    assert "NOT GOOD: poses that the fit had not seen are told no better" in asked.stderr
+    assert "NOT GOOD: poses that the fit had not seen are told worse than by" in asked.stderr
     assert result(asked)["in_force"] is None and result(asked)["not_taken_over"]
     assert calibrated(load_robot("spatial-8")).calibration is None
+
+
+def test_a_right_file_s_calibration_that_noise_alone_tells_worse_is_adopted_when_asked(
+    tmp_path: Path,
+) -> None:
+    asked = cdpr_here(*hardly_off(tmp_path, 2, 0.0), "--adopt")
+    assert asked.returncode == 0, asked.stderr
+    proof = result(asked)["verification"]
+    assert proof["mean_position_error_mm"] > proof["mean_position_error_before_mm"]
+    assert result(asked)["in_force"]["version"] == 1
 
 
 def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> None:
@@ -165,7 +186,7 @@ def test_redundancy_says_that_the_frame_is_that_of_the_file(tmp_path: Path) -> N
     assert "measure the platform at three poses" in done.stderr
     assert "measure one distance" in done.stderr
     residuals = told["verification"]
-    assert residuals["reference"] == "none"
+    assert residuals["reference"] == "none" and residuals["scale_factor"] is None
     assert residuals["length_residual_mm"] < residuals["length_residual_before_mm"]
 
 
@@ -183,6 +204,22 @@ def test_a_slipped_encoder_is_told_and_survived(tmp_path: Path) -> None:
     faults = result(done)["faults"]
     assert [(f["kind"], f["cable"], f["pose"]) for f in faults] == [("jump", 7, 21)]
     assert "cable 7 is -15" in done.stderr
+
+
+def test_points_of_poses_that_come_later_do_not_end_a_run(tmp_path: Path) -> None:
+    what = made_up("spatial-8", 45, 12, noise_m=2e-4, home_first=True)
+    data = load_data(data_of(what, tmp_path / "data.json"))
+    points, robot = points_of(what, tmp_path / "p.csv"), load_robot("spatial-8")
+    asked = enough(Output(True), robot, points, CableGeometry.of(robot))
+    asked(data.model_copy(update={"poses": data.poses[:30]}))
+
+
+def test_points_are_taken_besides_a_camera() -> None:
+    robot = load_robot("spatial-8")
+    assert _source(robot, ["camera", "points"]) == "camera"
+    assert _source(robot, ["points"]) == "points"
+    with pytest.raises(BadInputError, match="or --camera with --points"):
+        _source(robot, ["camera", "scanner", "points"])
 
 
 @pytest.mark.parametrize(
@@ -274,6 +311,7 @@ def test_markers_in_the_data_are_fitted_with_the_cables(tmp_path: Path) -> None:
     told = result(done)
     assert told["camera"]["position_m"] == pytest.approx(HAND_EYE_m, abs=0.01)
     assert len(told["camera"]["markers"]) == 12
+    assert told["coverage"]["share_seen"] is None and len(told["coverage"]["islands"]) == 1
     proof = told["verification"]
     assert proof["reference"] == "camera"
     assert proof["by"].startswith("the camera, on a map by the images")

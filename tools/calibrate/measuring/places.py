@@ -1,30 +1,37 @@
-"""Where a calibration takes the platform: poses that tell most, in batches, with short ways."""
+"""Where a calibration takes the platform: poses that tell most or are listed, in batches."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.calibration.verification.held_out import LEAST_POSES
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.platform_model import platform_model_of
+from cdpr_rt.motion.path.description import PathError
+from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.reach.reachable import SHARE, Reach
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.poses.choice import Choose, choose
+from cdpr_tools.robots.poses.choice import Choose, choose, read_poses
 
+MOST_POSES = 1000
 BATCH = 10
 """Poses after which is looked what they tell."""
+_ROUNDED_rad = 1e-5
+Listed = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
 class Places:
-    """Places (m, d) in the order in which they tell most, and that from which all are reached."""
+    """Places (m, d) in the order in which they tell most, and that from which they are reached."""
 
     middle: FloatArray
-    """(d,); the ways from here to all places, and back, are known to be free and held."""
+    """(d,); the ways from here to chosen places, and back, are known to be free and held."""
     chosen: FloatArray
 
     def batches(self) -> Iterator[FloatArray]:
@@ -46,13 +53,72 @@ def chosen_places(robot: Robot, count: int, seed: int, by: Choose = Choose.INFOR
 
     Raises BadInputError for a robot of which hardly a place is reached.
     """
+    reach = _from_middle(robot)
+    try:
+        chosen = choose(reach, count, seed, by, None, SHARE)
+    except GeometryError as error:
+        raise BadInputError(f"{robot.path}: {error}") from None
+    return Places(reach.start, chosen.positions)
+
+
+def listed_places(robot: Robot, listed: FloatArray) -> Places:
+    """Return places (m, d) that a list has named; raises BadInputError as `chosen_places` does."""
+    return Places(_from_middle(robot).start, listed)
+
+
+def _from_middle(robot: Robot) -> Reach:
     model = platform_model_of(robot)
     platform, k = model.platform, model.positions
     middle = np.array(model.home, float)
     middle[:k] = (np.array(platform.workspace_min_m) + np.array(platform.workspace_max_m)) / 2.0
     middle[k:] = 0.0
     try:
-        chosen = choose(Reach(model, middle), count, seed, by, None, SHARE)
+        return Reach(model, middle)
     except GeometryError as error:
         raise BadInputError(f"{robot.path}: {error}") from None
-    return Places(middle, chosen.positions)
+
+
+def poses_wanted(robot: Robot, text: str | None) -> tuple[int | None, Listed | None]:
+    """Return how many poses `--poses` asks for, home among them, and the places (m, d) it lists.
+
+    None where it leaves that open. Raises BadInputError, PathError, ProfileError.
+    """
+    if text is None:
+        return None, None
+    if text.removeprefix("-").isdecimal():
+        if not LEAST_POSES <= int(text) <= MOST_POSES:
+            raise BadInputError(
+                f"--poses {text}: allowed: {LEAST_POSES} to {MOST_POSES}, or a file"
+            )
+        return int(text), None
+    listed = _listed(robot, Path(text))
+    return 1 + len(listed), tuple(tuple(place) for place in listed.tolist())
+
+
+def _listed(robot: Robot, path: Path) -> FloatArray:
+    """Return the places (m, d) of a list of poses, all of which the robot can go to."""
+    reach = _from_middle(robot)
+    told = read_poses(path, reach.model)
+    places = told.points
+    if not LEAST_POSES - 1 <= len(places) < MOST_POSES:
+        allowed = f"{LEAST_POSES - 1} to {MOST_POSES - 1}, home is read besides"
+        raise BadInputError(f"--poses {path}: {len(places)} poses; allowed: {allowed}")
+    for place, line, inside in zip(places, told.lines, reach.are_targets(places), strict=True):
+        if why_not := _why_not(reach.model, place, bool(inside)):
+            raise PathError(path, line, why_not)
+    return places
+
+
+def _why_not(model: PlatformModel, place: FloatArray, inside: bool) -> str:
+    """Return why a robot cannot stand at a place (d,), empty where it can."""
+    k, platform = model.positions, model.platform
+    at = f"pose at {', '.join(f'{x:.3f}' for x in place[:k])} m"
+    if not inside:
+        low, high = list(platform.workspace_min_m), list(platform.workspace_max_m)
+        return f"{at}: outside the workspace; allowed: {low} to {high}, above its stand"
+    if (angle := float(np.linalg.norm(place[k:]))) > model.angle_rad + _ROUNDED_rad:
+        most = f"{math.degrees(model.angle_rad):.1f} deg (workspace_angle_rad)"
+        return f"{at}: turned by {math.degrees(angle):.1f} deg; allowed: up to {most}"
+    pose = model.pose(place)
+    why_not = model.workspace().infeasibility(pose) or model.interference.contact(pose.array)
+    return f"{at}: {why_not}" if why_not else ""

@@ -21,7 +21,7 @@ from cdpr_profiles.reading.reader import Profile, read_json_model
 from cdpr_rt.calibration.markers.coverage import coverage
 from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings.camera_data import CameraSetup
-from cdpr_rt.calibration.readings.data import CalibrationData, load_data
+from cdpr_rt.calibration.readings.data import CalibrationData, Numbers, load_data
 from cdpr_rt.calibration.verification.held_out import held_out
 from cdpr_rt.core.clock import Clock
 from cdpr_rt.errors import ControlError
@@ -32,7 +32,7 @@ from cdpr_rt.procedures.calibration.measure_poses import (
     read_pose,
 )
 from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
-from cdpr_tools.calibrate.measuring.places import Places, chosen_places
+from cdpr_tools.calibrate.measuring.places import Listed, Places, chosen_places, listed_places
 from cdpr_tools.calibrate.measuring.rig import RigOperator, StoppedError, simulated_rig
 from cdpr_tools.calibrate.report.judged import Judged, judged
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -63,10 +63,21 @@ class RunSettings(Profile):
     poses: int | None = Field(ge=1)
     """None: as many as bring something."""
     seed: int = Field(ge=0)
+    places: tuple[Numbers, ...] | None = None
+    """(m, d), where a list has named them: these and home are all."""
 
     def save(self, folder: Path) -> None:
         """Write them into the folder of the run; raises ProfileError."""
         write_text(folder / SETTINGS, self.model_dump_json(indent=1) + "\n")
+
+    def going_on(self, poses: int | None, places: Listed | None) -> RunSettings:
+        """Return them with as many poses, or a list; raises BadInputError for one of the other."""
+        if poses is None:
+            return self
+        if (places is None) != (self.places is None):
+            kind = "a list of poses" if self.places is not None else "no list of poses"
+            raise BadInputError(f"--poses: allowed: as the run that goes on was begun, with {kind}")
+        return self.model_copy(update={"poses": poses, "places": places})
 
     @classmethod
     def load(cls, folder: Path) -> RunSettings:
@@ -125,6 +136,14 @@ class Kept:
         # killed between the two files: what was read without the other is not known to belong
         return cls(folder, data.model_copy(update={"poses": data.poses[: len(outside)]}), outside)
 
+    def done(self) -> set[tuple[float, ...]]:
+        """Return the targets (d,) that were read, or tried in vain."""
+        return {reading.target for reading in self.data.poses} | set(self.data.tried)
+
+    def not_gone_to(self, places: Listed | None) -> Listed | None:
+        """Return those of listed places (m, d) to which nothing has gone yet; None of no list."""
+        return None if places is None else tuple(one for one in places if one not in self.done())
+
     def keep(self, measured: Measured, restarts: tuple[int, ...], outside: OutsidePose) -> None:
         """Write what there is now, with another pose; raises ProfileError."""
         self.outside.append(outside)
@@ -150,11 +169,16 @@ def measure(
     What is read is kept whatever ends it, and the error says how to go on. Raises what the robot
     and its camera do, WorkFailedError where somebody stops it.
     """
-    wanted = settings.poses or _MOST_POSES
+    wanted, listed = settings.poses or _MOST_POSES, kept.not_gone_to(settings.places)
+    if listed is not None:  # home is read at each start
+        wanted = len(kept.data.poses) + len(listed) + bool(listed)
     if len(kept.data.poses) >= wanted:
         return kept.data
-    with out.stage("choosing poses"):
-        places = chosen_places(robot, wanted + _SPARE, settings.seed)
+    if listed is not None:
+        places = listed_places(robot, np.array(listed))
+    else:
+        with out.stage("choosing poses"):
+            places = chosen_places(robot, wanted + _SPARE, settings.seed)
     plant = None if settings.plant is None else Path(settings.plant)
 
     def camera(url: str, clock: Clock) -> PoseCamera:
@@ -290,7 +314,7 @@ class _Measuring:
 
     def _go(self, robot: Robot, places: Places, enough: Enough) -> None:
         operator, measured = self._operator, self._measured
-        done = {reading.target for reading in measured.readings} | set(measured.tried)
+        done = self._kept.done()
         try:
             measured.add(read_pose(operator, operator.tighten()))
         except PoseRefusedError as error:
@@ -323,10 +347,7 @@ class _Measuring:
         data = self._kept.data
         if data.camera is not None:
             cover = coverage(data.sightings(), data.camera.sheets.placed)
-            texts = list(cover.advice)
-            if cover.share_seen is not None:
-                texts.insert(0, f"{cover.share_seen:.0%} of the markers seen")
-            for text in texts:
+            for text in cover.lines():
                 self._out.note(f"after {len(data.poses)} poses: {text}")
             if not any(len(island) > 1 for island in cover.islands):
                 raise WorkFailedError("no image shows two markers together: put them closer")

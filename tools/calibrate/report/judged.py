@@ -16,8 +16,8 @@ from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.estimation.fit import Fit, locate
 from cdpr_rt.calibration.estimation.parameters import DRUM, OFFSET, CableGeometry
 from cdpr_rt.calibration.markers.marker_map import best_fit
-from cdpr_rt.calibration.outcome import Outcome
-from cdpr_rt.calibration.verification.verification import relative_errors
+from cdpr_rt.calibration.outcome import Outcome, number_or_none
+from cdpr_rt.calibration.verification.verification import Scale, relative_errors
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.calibrate.measuring.outside import OutsidePoses
 from cdpr_tools.commands.sim.sim_robot import TrueGeometry, true_geometry
@@ -31,13 +31,16 @@ class PoseErrors:
     """(M, 3)"""
     turn_rad: FloatArray
     """(M, 3)"""
+    scale: Scale
+    """Of distances between these poses, by those that lengths tell."""
 
     @classmethod
     def from_first(cls, poses: FloatArray, others: FloatArray) -> PoseErrors:
         """Return those of poses (M + 1, 4, 3) as they are seen from the first."""
-        return cls(*relative_errors(poses, others))
+        scale = Scale.of(poses[1:, 0], others[1:, 0])
+        return cls(*relative_errors(poses, others), scale)
 
-    def told(self) -> dict[str, float]:
+    def told(self) -> dict[str, Any]:
         """Return them for JSON."""
         far_mm = 1e3 * np.linalg.norm(self.position_m, axis=1)
         turned_deg = np.degrees(np.linalg.norm(self.turn_rad, axis=1))
@@ -47,6 +50,8 @@ class PoseErrors:
             "worst_position_error_mm": float(far_mm.max()),
             "mean_orientation_error_deg": float(turned_deg.mean()),
             "worst_orientation_error_deg": float(turned_deg.max()),
+            "scale_factor": number_or_none(self.scale.factor),
+            "scale_factor_std": number_or_none(self.scale.std),
         }
 
 
@@ -86,6 +91,7 @@ class Judged:
             "mean_position_error_before_mm": before["mean_position_error_mm"],
             "worst_position_error_before_mm": before["worst_position_error_mm"],
             "mean_orientation_error_before_deg": before["mean_orientation_error_deg"],
+            "scale_factor_before": before["scale_factor"],
             "in_marker_frame": frame,
         }
 
@@ -105,7 +111,8 @@ class Judged:
                     f"poses not used against {what}: mean {told['mean_position_error_mm']:.2f} mm "
                     f"and {told['mean_orientation_error_deg']:.3f} deg, worst "
                     f"{told['worst_position_error_mm']:.2f} mm and "
-                    f"{told['worst_orientation_error_deg']:.3f} deg"
+                    f"{told['worst_orientation_error_deg']:.3f} deg; distances between them are "
+                    f"{errors.scale.text} times those by lengths"
                 )
         far_mm, turned_deg = 1e3 * self.scanner_alone[0], np.degrees(self.scanner_alone[1])
         lines.insert(

@@ -163,6 +163,8 @@ class _Report:
                 "camera was.",
             ),
         ]
+        if self._outcome.cover is not None:
+            lines += [paragraph(f"{text}.") for text in self._outcome.cover.lines()]
         return [*lines, *self._image()]
 
     def _image(self) -> list[str]:
@@ -200,9 +202,13 @@ def _errors_table(judged: Judged) -> str:
         told = errors.told()
         keys = ("position_error_mm", "orientation_error_deg")
         cells = [number(told[f"{kind}_{key}"]) for key in keys for kind in ("mean", "worst")]
-        rows.append([escape(name), *cells])
-    head = ["against", "position, mean (mm)", "worst", "orientation, mean (deg)", "worst"]
-    return table(head, rows, "Poses that the fit has not used, told by lengths alone.")
+        rows.append([escape(name), *cells, errors.scale.text])
+    head = ["against", "position, mean (mm)", "worst", "orientation, mean (deg)", "worst", "scale"]
+    caption = (
+        "Poses that the fit has not used, told by lengths alone. Scale: how many times as large "
+        "distances between them are as those by lengths, ± 1 sigma."
+    )
+    return table(head, rows, caption)
 
 
 def _value(row: dict[str, object], key: str) -> float:

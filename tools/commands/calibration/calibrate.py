@@ -128,11 +128,11 @@ def run(
     ] = False,
     points: _Points = None,
     poses: Annotated[
-        int | None,
+        str | None,
         typer.Option(
-            min=15,
-            max=1000,
-            help="Poses to go to; else up to 100, while more bring something.",
+            metavar="N|FILE",
+            help="How many poses, home among them, or a list as `cdpr poses` writes it; else up to "
+            "100, while more bring something.",
         ),
     ] = None,
     plant: _Plant = None,
@@ -172,11 +172,13 @@ def run(
         from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import enough, finish, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
+        from cdpr_tools.calibrate.measuring.places import poses_wanted  # noqa: PLC0415
 
         profile = load_robot(robot)
         refuse_impossible(profile)
         geometry = _geometry(profile, identify, known_mm)
         known = _hand_eye(hand_eye)
+        count, listed = poses_wanted(profile, poses)
         if points is not None:
             load_points(points)
 
@@ -191,7 +193,7 @@ def run(
     if resume:
         settings = runs.RunSettings.load(folder)
         source = settings.source
-        settings = settings.model_copy(update={"poses": poses or settings.poses})
+        settings = settings.going_on(count, listed)
         kept = runs.Kept.of_before(folder, profile)
     else:
         _require_new(folder, runs.DATA, overwrite)
@@ -202,8 +204,9 @@ def run(
             robot=profile.profile,
             plant=None if plant is None else str(plant.resolve()),
             source=source,
-            poses=poses,
+            poses=count,
             seed=seed,
+            places=listed,
         )
         setup = None
         if source == "camera":
@@ -227,8 +230,12 @@ def _source(robot: Robot, asked: list[Source]) -> Source:
     """Return what a run is to use besides lengths and tensions; raises BadInputError."""
     if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
         return "camera"
+    if asked == ["camera", "points"]:
+        asked = ["camera"]  # points are taken besides
     if len(asked) != 1:
-        raise BadInputError("give one of --camera, --redundancy, --scanner and --points")
+        raise BadInputError(
+            "give one of --camera, --redundancy, --scanner and --points, or --camera with --points"
+        )
     if asked[0] == "camera" and robot.platform is not None and len(robot.platform.controlled) < 6:
         raise BadInputError(
             f"--camera: {robot.profile} does not turn its platform about two axes, which is what "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.pose_choice import (
     cable_geometry,
@@ -16,6 +18,9 @@ from cdpr_rt.calibration.pose_choice import (
     predicted_deviation_m,
     spread,
 )
+from cdpr_rt.motion.path.description import Coordinates, PathDescription
+from cdpr_rt.motion.path.reading import MOST_BYTES
+from cdpr_rt.motion.path.way_points import read_csv_points, read_toml_points
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.reach.reachable import Reach, Reached
 from cdpr_tools.errors import BadInputError, os_error_as
@@ -92,8 +97,7 @@ def write_poses(path: Path, positions: FloatArray, names: Sequence[str], lengths
     Raises BadInputError where it cannot be written.
     """
     if path.suffix == ".csv":
-        units = ["m"] * lengths + ["rad"] * (len(names) - lengths)
-        lines = [",".join(f"{name}_{unit}" for name, unit in zip(names, units, strict=True))]
+        lines = [",".join(_columns(names, lengths))]
         lines += [",".join(f"{x:.6f}" for x in position) for position in positions]
     else:
         lines = []
@@ -104,6 +108,30 @@ def write_poses(path: Path, positions: FloatArray, names: Sequence[str], lengths
             lines.append("")
     with os_error_as(BadInputError, str(path)):
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def read_poses(path: Path, model: PlatformModel) -> PathDescription:
+    """Return the positions (m, d) of a list of poses, each with its line; as `write_poses` has it.
+
+    Raises BadInputError, PathError, ProfileError.
+    """
+    if path.suffix not in KINDS:
+        raise BadInputError(f"{path}: allowed: NAME.csv or NAME.toml, as `cdpr poses` writes them")
+    coordinates = Coordinates(model.platform.controlled, model.home)
+    if path.suffix == ".toml":
+        return read_toml_points(path, coordinates)
+    text = read_text(path, MOST_BYTES)
+    head = next(csv.reader(text.splitlines()[:1]), [])
+    named = {cell.strip().rpartition("_")[0] for cell in head}
+    if missing := [name for name in coordinates.names if name not in named]:
+        allowed = f"the columns {','.join(_columns(coordinates.names, coordinates.positions))}"
+        raise BadInputError(f"{path}: line 1: column {missing[0]} is missing; allowed: {allowed}")
+    return read_csv_points(text, str(path), coordinates)
+
+
+def _columns(names: Sequence[str], lengths: int) -> list[str]:
+    units = ["m"] * lengths + ["rad"] * (len(names) - lengths)
+    return [f"{name}_{unit}" for name, unit in zip(names, units, strict=True)]
 
 
 def _listed(values: FloatArray) -> str:

@@ -180,13 +180,33 @@ def test_what_tells_unused_poses_worse_is_not_taken_over_only_because_it_is_aske
     )
     asked = replace(outcome, adopt=True)
     assert not outcome.change.significant and outcome.good
-    for share, worse in ((1.1, True), (0.9, False)):
-        errors_m = share * outcome.before.errors_m
+    before = outcome.before.errors_m
+    other_way = 1.05 * before[::-1]  # the mean is larger, but not what is larger at most poses
+    for errors_m, worse in ((1.1 * before, True), (0.9 * before, False), (other_way, False)):
         told = replace(asked, verified=replace(asked.verified, errors_m=errors_m))
         assert told.worse == worse and told.good != worse
-        said = "NOT GOOD: poses that the fit had not seen are told no better"
+        said = "NOT GOOD: poses that the fit had not seen are told worse"
         assert any(said in line for line in told.verdict()) == worse
         assert replace(told, adopt=False).good  # not significant, which it says
+
+
+@pytest.mark.parametrize("measured_too", [True, False])
+def test_a_right_file_is_seldom_told_worse_by_noise_and_a_wrong_one_is(measured_too: bool) -> None:
+    robot, told, swapped = load_robot("planar-3" if measured_too else "planar-4"), 0, 0
+    for exit_m in (0.0, 0.004):
+        for seed in range(6):
+            what = made_up(
+                *(robot.profile, 45, seed), exit_m=exit_m, drum=0.0, elongation=0.0, offset_m=0.0,
+                noise_m=3e-4, home_first=True,
+            )  # fmt: skip
+            seen = measured(what, 1e-3, 2e-3, seed + 50) if measured_too else what.seen
+            outcome = calibrate(robot, what.file, seen, "points" if measured_too else "redundancy")
+            if exit_m == 0.0:
+                told += outcome.worse
+            else:  # the file in the place of what was calibrated
+                assert not outcome.worse
+                swapped += outcome.before.worse_than(outcome.verified)
+    assert told <= 1 and swapped >= 5
 
 
 def test_a_slip_next_to_a_pose_held_out_counts_on_neither_side_there() -> None:

@@ -243,7 +243,7 @@ def _cut_off(view: LiveView) -> bool:
 
 
 def test_a_viewer_that_never_reads_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(foxglove_server, "_PATIENCE_S", 0.2)
+    monkeypatch.setattr(foxglove_server, "_TIMEOUT_S", 0.2)
     monkeypatch.setattr(foxglove_server, "_MOST_UNSENT_BYTES", 4096)
     block = block_with_clock()
     with running(block) as view, repeating(block, made_rows(100, 1)), _joined(view):

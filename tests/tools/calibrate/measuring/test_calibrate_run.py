@@ -31,6 +31,7 @@ from cdpr_rt.procedures.calibration.measure_poses import (
 )
 from cdpr_tools.calibrate.measuring import run
 from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
+from cdpr_tools.calibrate.measuring.places import chosen_places
 from cdpr_tools.calibrate.measuring.rig import StoppedError
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
@@ -169,6 +170,25 @@ def test_what_was_read_is_kept_and_the_rest_is_read_later(
     assert len(OutsidePoses.load_file(tmp_path / run.OUTSIDE).poses) == 15
     assert len(made) == 2
     assert go_on(tmp_path, settings()) == data and len(made) == 2
+
+
+def test_a_list_of_poses_is_gone_to_wholly_also_after_a_run_that_ended(
+    tmp_path: Path, rigs: Callable[..., list[Rig]]
+) -> None:
+    rigs((7, StoppedError()))
+    listed = tuple(map(tuple, chosen_places(ROBOT, 16, 9).chosen.tolist()))
+    wanted = settings(17).model_copy(update={"places": listed})
+    with pytest.raises(WorkFailedError):
+        begin(tmp_path, wanted)
+    wanted.save(tmp_path)
+    again = run.RunSettings.load(tmp_path)
+    assert again == wanted == again.going_on(None, None)
+    data = go_on(tmp_path, again)
+    home = data.poses[0].target
+    assert {reading.target for reading in data.poses} == {home, *listed}
+    assert len(data.poses) == 18 and go_on(tmp_path, again) == data
+    with pytest.raises(BadInputError, match="was begun, with a list of poses"):
+        again.going_on(30, None)
 
 
 def test_a_kill_between_two_files_loses_one_pose_and_no_more(

@@ -77,6 +77,8 @@ def test_errors_are_those_of_poses_held_out_beside_scanner_and_truth(
     # the scanner's own error at the pose and at the first one is on top
     assert 1.0 < proof["of_which_scanner_mm"] < 1.6
     assert abs(proof["mean_position_error_mm"] - truth["mean_position_error_mm"]) < 2.0
+    assert abs(proof["scale_factor"] - 1.0) < 4.0 * proof["scale_factor_std"] < 0.02
+    assert all("distances between them are" in line for line in known.lines() if "mean" in line)
     frame = proof["in_marker_frame"]
     # one sheet of 150 mm whose corners stand 0.3 mm off its plane tilts its frame by 0.3 / 75:
     # 6 mm from 1.5 m away, one standard deviation
@@ -103,6 +105,8 @@ def test_the_report_is_one_file_with_its_pictures(
     assert "put it back &lt;there&gt;" in text
     for line in (*outcome.proof(), *(fault.text for fault in outcome.faults)):
         assert text.count(escape(line)) == 1, line
+    assert known.scanner.scale.text in text and outcome.verified.scale.text in text
+    assert outcome.cover is not None and "12 markers seen." in text
     assert "true error" in text and "cable 8 exit point z" in text
     write_report(page, outcome, robot.made.data, None, [], tmp_path / "nowhere")
     assert page.read_text().count("<figure>") == 3
