@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,21 +12,34 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_profiles import load_robot
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.calibration.error_model import Errors, Noise, predicted_errors, simulated_errors
+from cdpr_rt.calibration.error_model import (
+    Errors,
+    Noise,
+    predicted_errors,
+    predicted_spread,
+    simulated_errors,
+)
 from cdpr_rt.robots.platform_model import platform_model_of
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.jobs import cores, runner
-from cdpr_tools.report.style import BACKWARD, FORWARD, canvas, legend_above, legend_beside_title
 
 COUNTS: Final = (6, 10, 20, 50, 100, 150, 200, 300, 400)
-SHARES: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
-"""Of the bounds of table 3.1."""
+SHARES: Final = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Of the bounds of table 3.1, or of `BIASES`."""
+PAIR_SHARES: Final = (0.33, 0.67, 1.0)
 BOUNDS: Final = {
     "length": Noise(length_m=2.8e-3),
     "position": Noise(position_m=2.0e-3),
     "rotation": Noise(rotation_rad=math.radians(0.4)),
 }
 """Table 3.1: noise at which the thesis' model was 20 % off."""
+BIASES: Final = {**BOUNDS, "rotation": Noise(rotation_rad=math.radians(2.0))}
+"""Section 3.5.3 has 2 deg as the bound of a bias in rotation, and none of the others."""
+PAIRS: Final = {
+    "C.1, C.2": ("position", "length"),
+    "C.3, C.4": ("position", "rotation"),
+    "C.5, C.6": ("length", "rotation"),
+}
 THESIS_mm: Final = {"length": (13.0, 20.0), "position": (5.3, 9.2), "rotation": (2.5, 4.2)}
 FIGURES: Final = {
     "3.7": Noise(length_m=3e-3),
@@ -35,20 +47,27 @@ FIGURES: Final = {
 }
 _POSES, _TURN_rad = 100, math.radians(30.0)
 _TRIES = 400
+_DIRECTION: Final = (1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0)
+"""Of a bias of position and rotation: any, and the same throughout."""
+_NONE_m: Final = 1e-9
+"""Errors below that are of the arithmetic alone."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One point of a curve: so much noise at so many poses."""
+    """One point of a curve: so much noise, or bias, at so many poses."""
 
     name: str
+    figure: str
     noise: Noise
-    poses: int
-    share: float = 1.0
+    poses: int = _POSES
+    share: float | None = None
+    """Of what is in `BOUNDS` or `BIASES`."""
+    bias: bool = False
 
 
 @dataclass(frozen=True)
-class _Trials:
+class Trials:
     """Trials of one case; `poses` are those of which each draws its own."""
 
     case: Case
@@ -61,13 +80,17 @@ class _Trials:
     def run(self) -> tuple[Errors, Errors]:
         """Return errors by the model and by trial, the means over other choices of poses too."""
         rng = np.random.default_rng(self.seed)
+        cables, count = len(self.exits_m), self.case.poses
+        same = np.tile([*[1.0] * cables, *_DIRECTION, *_DIRECTION], (count, 1))
         model, trial = [], []
         for _ in range(self.draws):
-            chosen = self.poses[rng.choice(len(self.poses), self.case.poses, replace=False)]
+            chosen = self.poses[rng.choice(len(self.poses), count, replace=False)]
             known = self.exits_m, self.anchors_m, chosen, self.case.noise
-            model.append(predicted_errors(*known))
-            trial.append(simulated_errors(*known, 1, rng))
-        return _mean(model), _mean(trial)
+            unit = same if self.case.bias else rng.normal(size=(count, cables + 6))
+            told = predicted_errors(*known, unit) if self.case.bias else predicted_spread(*known)
+            model.append(told)
+            trial.append(simulated_errors(*known, unit))
+        return Errors.of(np.array(model)), Errors.of(np.array(trial))
 
 
 def held_poses(robot: str, count: int, seed: int) -> FloatArray:
@@ -93,18 +116,25 @@ def held_poses(robot: str, count: int, seed: int) -> FloatArray:
 
 def cases() -> list[Case]:
     """Return all cases of the study."""
-    noisy = [
-        Case(name, bound.scaled(share), _POSES, share)
-        for name, bound in BOUNDS.items()
+    names = list(BOUNDS)
+    biased = [
+        Case(f"{name} bias", f"B.{k}", BIASES[name].scaled(share), share=share, bias=True)
+        for k, name in enumerate(names, 1)
         for share in SHARES
     ]
-    counted = [Case(name, noise, n) for name, noise in FIGURES.items() for n in COUNTS]
-    return noisy + counted
-
-
-def _mean(errors: list[Errors]) -> Errors:
-    squares = np.array([(one.exit_m**2, one.offset_m**2) for one in errors]).mean(axis=0)
-    return Errors(*np.sqrt(squares).tolist())
+    noisy = [
+        Case(name, f"B.{k}", BOUNDS[name].scaled(share), share=share)
+        for k, name in enumerate(names, 4)
+        for share in SHARES
+    ]
+    paired = [
+        Case(f"{one} and {other}", figure, BOUNDS[one].scaled(x) + BOUNDS[other].scaled(y))
+        for figure, (one, other) in PAIRS.items()
+        for x in PAIR_SHARES
+        for y in PAIR_SHARES
+    ]
+    counted = [Case(name, name, noise, n) for name, noise in FIGURES.items() for n in COUNTS]
+    return noisy + counted + biased + paired
 
 
 def study(
@@ -120,88 +150,99 @@ def study(
     assert platform is not None  # see `held_poses`
     geometry = np.array(platform.exit_points_m), np.array(platform.anchor_points_m)
     seeds = np.random.SeedSequence(seed).generate_state(len(every)).tolist()
-    jobs = [_Trials(case, *geometry, poses, draws, seeds[k]) for k, case in enumerate(every)]
+    jobs = [Trials(case, *geometry, poses, draws, seeds[k]) for k, case in enumerate(every)]
     rows = []
     with runner(cores(), cluster) as run:
         for case, errors in zip(every, run(jobs), strict=True):
-            rows.append(_row(case, *errors))
+            rows.append(case_row(case, *errors))
             advance(float(len(rows)))
     return rows
 
 
-def _row(case: Case, model: Errors, trial: Errors) -> dict[str, Any]:
+def case_row(case: Case, model: Errors, trial: Errors) -> dict[str, Any]:
+    """Return the figures of one case, for JSON."""
+    off_exit, off_offset = _off(trial.exit_m, model.exit_m), _off(trial.offset_m, model.offset_m)
+    offs = [off for off in (off_exit, off_offset) if off is not None]
     return {
         "name": case.name,
+        "figure": case.figure,
         "poses": case.poses,
         "share": case.share,
+        "length_mm": 1e3 * case.noise.length_m,
+        "position_mm": 1e3 * case.noise.position_m,
+        "rotation_deg": math.degrees(case.noise.rotation_rad),
         "exit_mm": 1e3 * trial.exit_m,
         "offset_mm": 1e3 * trial.offset_m,
         "predicted_exit_mm": 1e3 * model.exit_m,
         "predicted_offset_mm": 1e3 * model.offset_m,
-        "ratio": trial.ratio,
-        "off": max(trial.exit_m / model.exit_m, trial.offset_m / model.offset_m, key=_distance)
-        - 1.0,
+        "ratio": trial.offset_m / trial.exit_m if len(offs) == 2 else None,
+        "off_exit": off_exit,
+        "off_offset": off_offset,
+        "off": max(offs, key=abs),
     }
 
 
-def _distance(ratio: float) -> float:
-    return abs(ratio - 1.0)
+def _off(trial_m: float, model_m: float) -> float | None:
+    """Return how far a trial is above the model, relative; None where both are nothing."""
+    return trial_m / model_m - 1.0 if model_m > _NONE_m else None
+
+
+def plateaus(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return, for figures 3.7 and 3.8, what no number of poses takes away, and where it begins.
+
+    Trials have e(n)^2 = s(n)^2 + f^2, with the model's s(n), which goes on falling as 1/sqrt(n),
+    and a floor f by the squares that (3.40) leaves out. f^2 is the mean of e^2 - s^2, weighted by
+    1/s^4. The plateau begins at the n where s(n) = f: no number of poses takes off more than
+    1 - 1/sqrt(2) of the error there. A model that is 20 % off at 100 poses, as the thesis' is at
+    2.8 mm, has it at 100/(1.2^2 - 1) = 227, and at the 3 mm of figure 3.7 at 198.
+    """
+    found = []
+    for name in FIGURES:
+        own = [row for row in rows if row["name"] == name]
+        told: dict[str, Any] = {"figure": name}
+        for key in ("exit", "offset"):
+            model = np.array([row[f"predicted_{key}_mm"] for row in own]) ** 2
+            trial = np.array([row[f"{key}_mm"] for row in own]) ** 2
+            floor = max(float(np.average(trial - model, weights=model**-2)), 0.0)
+            told[f"floor_{key}_mm"] = math.sqrt(floor)
+            told[f"{key}_poses"] = own[-1]["poses"] * float(model[-1]) / floor if floor else None
+        found.append(told)
+    return found
 
 
 def lines(rows: list[dict[str, Any]]) -> list[str]:
     """Return table 3.1 and the figures' content for people."""
-    told = ["noise at 100 poses, one standard deviation, beside the thesis' table 3.1:"]
-    told.append(f"{'':10}{'noise':>10}{'e(a) mm':>16}{'e(rho_0) mm':>18}{'ratio':>8}{'model':>9}")
-    for row in rows:
-        if row["name"] not in BOUNDS:
-            continue
-        bound = BOUNDS[row["name"]].scaled(row["share"])
-        thesis = THESIS_mm[row["name"]] if row["share"] == 1.0 else None
-        one, two = (f" ({x:g})" for x in thesis) if thesis else ("", "")
-        exits, offsets = f"{row['exit_mm']:.2f}{one}", f"{row['offset_mm']:.2f}{two}"
+    told = []
+    for title, figures in (
+        ("noise at 100 poses (sigma), beside the thesis' table 3.1:", ("B.4", "B.5", "B.6")),
+        ("the same bias at all of 100 poses, figures B.1 to B.3:", ("B.1", "B.2", "B.3")),
+        ("noise of two kinds at 100 poses, figures C.1 to C.6:", tuple(PAIRS)),
+        *((f"errors by the number of poses, figure {name}:", (name,)) for name in FIGURES),
+    ):
+        told.append(f"{title:64}{'e(a) mm':>14}{'e(rho_0) mm':>14}{'ratio':>7}{'model':>9}")
+        told += [*(_line(row) for row in rows if row["figure"] in figures), ""]
+    for one in plateaus(rows):
         told.append(
-            f"{row['name']:10}{_shown(bound):>10}{exits:>16}{offsets:>18}{row['ratio']:8.2f}"
-            f"{100 * row['off']:+8.1f} %"
+            f"figure {one['figure']}: of e(a) {one['floor_exit_mm']:.2f} mm, of e(rho_0) "
+            f"{one['floor_offset_mm']:.2f} mm stay at any number of poses; noise makes as much at "
+            f"{_count(one['exit_poses'])} and {_count(one['offset_poses'])} poses"
         )
-    for name in FIGURES:
-        told += ["", f"errors by the number of poses, figure {name}:"]
-        told += [
-            f"{row['poses']:10d}{row['exit_mm']:26.2f}{row['offset_mm']:18.2f}{row['ratio']:8.2f}"
-            f"{100 * row['off']:+8.1f} %"
-            for row in rows
-            if row["name"] == name
-        ]
     return told
 
 
-def _shown(noise: Noise) -> str:
-    if noise.rotation_rad:
-        return f"{math.degrees(noise.rotation_rad):.3g} deg"
-    return f"{1e3 * (noise.length_m + noise.position_m):.3g} mm"
+def _line(row: dict[str, Any]) -> str:
+    noise = [f"{key} {row[f'{key}_mm']:.3g} mm" for key in BOUNDS if row.get(f"{key}_mm")]
+    noise += [f"rotation {row['rotation_deg']:.3g} deg"] if row["rotation_deg"] else []
+    counted = f"{row['poses']:6d} poses: " if row["figure"] in FIGURES else ""
+    thesis = THESIS_mm.get(row["name"]) if row["share"] == 1.0 else None
+    one, two = (f" ({x:g})" for x in thesis) if thesis else ("", "")
+    exits, offsets = f"{row['exit_mm']:.2f}{one}", f"{row['offset_mm']:.2f}{two}"
+    ratio = "" if row["ratio"] is None else f"{row['ratio']:.2f}"
+    return (
+        f"{counted + ', '.join(noise):64}{exits:>14}{offsets:>14}{ratio:>7}"
+        f"{100 * row['off']:+7.1f} %"
+    )
 
 
-def draw(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write the picture as PNG: errors by the number of poses, the model's by the noise."""
-    figure, axes = canvas(1, 3, height=3.1)
-    for ax, name in zip(axes, FIGURES, strict=False):
-        own = [row for row in rows if row["name"] == name]
-        n = [row["poses"] for row in own]
-        ends = (("exit", FORWARD, "exit points a"), ("offset", BACKWARD, "initial lengths"))
-        for key, colour, label in ends:
-            first = ax is axes[0]
-            ax.plot(n, [row[f"{key}_mm"] for row in own], "o", ms=4, color=colour,
-                    label=f"{label}, trial" if first else None)  # fmt: skip
-            ax.plot(n, [row[f"predicted_{key}_mm"] for row in own], color=colour,
-                    label="by the model" if first else None)  # fmt: skip
-        ax.set(xscale="log", yscale="log", xlabel="poses", ylabel="RMS error (mm)")
-        ax.set_title(f"as figure {name}")
-    last = axes[2]
-    for name, mark in zip(BOUNDS, "os^", strict=True):
-        own = [row for row in rows if row["name"] == name]
-        last.plot([row["share"] for row in own], [100 * row["off"] for row in own], mark + "-",
-                  ms=4, label=name)  # fmt: skip
-    last.set(xscale="log", xlabel="noise / that of table 3.1", ylabel="trial over model (%)")
-    last.axhspan(-10, 10, color="#888888", alpha=0.12)
-    legend_beside_title(last)
-    legend_above(figure, axes[0])
-    figure.savefig(path, format="png")
+def _count(poses: float | None) -> str:
+    return "no" if poses is None else f"{poses:.0f}"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import combinations
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,6 +23,8 @@ _OFF = 3.0
 _LOOSE_SIZE, _LOOSE_DRUM, _LOOSE_FOCAL = 0.1, 0.05, 0.05
 _LOOSE_LENS = (20.0, 20.0, 0.1, 0.1, 0.005, 0.005, 0.1)
 """Standard deviations, of the lens in px and of k1, k2, p1, p2, k3, of what is set free."""
+_COUNTS: Final[dict[FaultKind, int]] = {"size": 1, "drum": 0, "lens": 9}
+"""Causes, and how many numbers each sets free; 0 for one of each cable."""
 _SURE = 9.0
 """By how much one explanation has to fit better than others, in the sum of squares."""
 
@@ -42,7 +45,7 @@ def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit,
     """Return the fit that is to be believed, and what was told wrong: sheets, drums or the lens.
 
     Where one of them is far off what was known of it, cables and camera contradict each other.
-    Each is set free in turn, with the others as they were told, and sheets together with drums.
+    Each is set free in turn, with the others as they were told, and then each two together.
     The one that fits best explains it; exit points by tape, places of markers that are known, and
     measured points count. Where two explain it alike it is not known which, and the fit stays as
     it was.
@@ -51,19 +54,13 @@ def told_right(geometry: CableGeometry, found: Fit, first: MapFit) -> tuple[Fit,
     assert camera is not None
     if not _contradiction(geometry, found, first):
         return found, []
-    seen = replace(found.seen, start=found.poses)
-    loose = replace(geometry, knowledge=replace(geometry.knowledge, drum=_LOOSE_DRUM))
-    lens_std = np.array([*_LOOSE_FOCAL * camera.lens[:2], *_LOOSE_LENS])
-    sized, opened = _with(camera, size_std=_LOOSE_SIZE), _with(camera, lens_std=lens_std)
-    tried = [
-        _Cause(("size",), 1, fit(geometry, seen, start=found.geometry, camera=sized)),
-        _Cause(("drum",), geometry.n, fit(loose, seen, start=found.geometry, camera=camera)),
-        _Cause(("lens",), 9, fit(geometry, seen, start=found.geometry, camera=opened)),
-    ]
-    both = fit(loose, seen, start=found.geometry, camera=sized)
-    tried.append(_Cause(("size", "drum"), 1 + geometry.n, both))
-    if tried[-1].score > min(one.score for one in tried[:2]) - _SURE:
-        tried.pop()  # one of them explains it as well
+    tried = [_tried(geometry, found, (kind,)) for kind in _COUNTS]
+    alone = {one.kinds[0]: one.score for one in tried}
+    for pair in combinations(_COUNTS, 2):
+        both = _tried(geometry, found, pair)
+        # else one of them explains it as well
+        if both.score <= min(alone[kind] for kind in pair) - _SURE:
+            tried.append(both)
     tried.sort(key=lambda one: one.score)
     best = tried[0]
     if found.total_cost < best.score + _SURE:
@@ -90,6 +87,24 @@ class _Cause:
     def score(self) -> float:
         """The sum of squares, and two for each number that is free (Akaike)."""
         return self.fit.total_cost + 2 * self.count
+
+
+def _tried(geometry: CableGeometry, found: Fit, kinds: tuple[FaultKind, ...]) -> _Cause:
+    """Return an explanation: the fit with what it is about set free."""
+    camera = found.camera
+    assert camera is not None
+    seen = replace(found.seen, start=found.poses)
+    known: dict[str, Any] = {}
+    if "size" in kinds:
+        known["size_std"] = _LOOSE_SIZE
+    if "lens" in kinds:
+        known["lens_std"] = np.array([*_LOOSE_FOCAL * camera.lens[:2], *_LOOSE_LENS])
+    if "drum" in kinds:
+        geometry = replace(geometry, knowledge=replace(geometry.knowledge, drum=_LOOSE_DRUM))
+    count = sum(_COUNTS[kind] or geometry.n for kind in kinds)
+    return _Cause(
+        kinds, count, fit(geometry, seen, start=found.geometry, camera=_with(camera, **known))
+    )
 
 
 def _believed(geometry: CableGeometry, best: _Cause) -> tuple[Fit, list[Fault]]:

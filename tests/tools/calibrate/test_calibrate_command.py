@@ -21,6 +21,7 @@ from cdpr_rt.calibration.verification.verification import Verification
 from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated, not_calibrated_reason
 from cdpr_tools.calibrate.finish import enough
 from cdpr_tools.calibrate.made_readings import HAND_EYE_m
+from cdpr_tools.calibrate.study import PAIRS
 from cdpr_tools.commands.calibration.calibrate import _source
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
@@ -262,18 +263,22 @@ def test_bad_data_and_requests_are_refused(tmp_path: Path) -> None:
     assert kind.returncode == 2 and "colour" in kind.stderr
 
 
-def test_the_study_has_the_ratio_and_the_table(tmp_path: Path) -> None:
+def test_the_study_has_each_figure_and_the_ratio(tmp_path: Path) -> None:
     picture = tmp_path / "study.png"
-    done = cdpr_here("calibrate", "study", "--draws", "12", "--png", picture, "--json")
+    done = cdpr_here("calibrate", "study", "--draws", "4", "--png", picture, "--json")
     assert done.returncode == 0, done.stderr
     rows = result(done)["cases"]
-    small = [row for row in rows if row["share"] <= 0.5]
-    assert len(small) == 12
+    figures = {row["figure"] for row in rows}
+    assert figures == {"3.7", "3.8", *(f"B.{k}" for k in range(1, 7)), *PAIRS}
     # sqrt(3), less what the directions to an exit point differ
-    assert all(1.4 < row["ratio"] < 1.75 for row in small)
-    assert np.mean([row["off"] for row in small]) == pytest.approx(0.0, abs=0.1)
+    assert all(1.4 < row["ratio"] < 1.75 for row in rows if "bias" not in row["name"])
+    # a bias of lengths is all in initial lengths, one of the position all in exit points
+    assert all(row["off_exit"] is None for row in rows if row["figure"] == "B.1")
+    assert all(row["off_offset"] is None for row in rows if row["figure"] == "B.2")
+    assert all(abs(row["off"]) < 1e-6 for row in rows if row["figure"] in ("B.1", "B.2"))
     assert "table 3.1" in done.stderr and "figure 3.7" in done.stderr
-    assert matplotlib.image.imread(picture).std() > 0.01
+    for end in ("", "-B", "-C"):
+        assert matplotlib.image.imread(tmp_path / f"study{end}.png").std() > 0.01
 
 
 @pytest.mark.parametrize("more", [(), ("--ablation",)])

@@ -117,7 +117,9 @@ def run(
     camera: Annotated[
         bool,
         typer.Option(
-            "--camera", help="With the camera on the platform; so without any of these in space."
+            "--camera",
+            help="With the camera on the platform; so without any of these where it has six "
+            "directions.",
         ),
     ] = False,
     redundancy: Annotated[
@@ -330,8 +332,9 @@ def study(
 ) -> None:
     """Tell how errors of measurement become errors of the geometry: by a model and by trial.
 
-    Table 3.1 and figures 3.7 and 3.8 of the thesis for a robot of ours, on all cores or a
-    cluster. With --ablation: what made the thesis' 31 mm, and what each improvement takes off.
+    Table 3.1 and figures 3.7, 3.8, B.1 to B.6 and C.1 to C.6 of the thesis for a robot of ours,
+    on all cores or a cluster; --png draws NAME.png, NAME-B.png and NAME-C.png. With --ablation:
+    what made the thesis' 31 mm, and what each improvement takes off.
     """
     with told_on_a_terminal():
         from cdpr_tools.calibrate import study as studies  # noqa: PLC0415  # slow to load
@@ -345,9 +348,14 @@ def study(
         rows = studies.study(robot, draws, seed, cluster, advance)
     out.say(*studies.lines(rows))
     if png is not None:
+        from cdpr_tools.calibrate.study_pictures import draw  # noqa: PLC0415  # slow to load
+
         with os_error_as(BadInputError, f"--png {png}: cannot be written"):
-            studies.draw(png, rows)
-    out.result({"ok": True, "robot": robot, "draws": draws, "seed": seed, "cases": rows})
+            draw(png, rows)
+    out.result({
+        "ok": True, "robot": robot, "draws": draws, "seed": seed, "cases": rows,
+        "plateaus": studies.plateaus(rows),
+    })  # fmt: skip
 
 
 def _ablation(

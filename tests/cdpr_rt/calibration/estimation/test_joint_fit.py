@@ -317,3 +317,25 @@ def test_what_no_pose_held_out_verifies_is_not_taken_over() -> None:
     done = outcome_of(what, what.seen, replace(what.images, sightings=blind))
     assert done.told()["verification"]["reference"] == "none"
     assert any("nothing verifies it" in text for text in done.objections())
+
+
+@pytest.mark.parametrize(("size", "drum"), [(1.04, 0.0), (1.0, 0.02)])
+def test_a_lens_and_sheets_or_drums_that_are_wrong_together_are_told_apart(
+    size: float, drum: float
+) -> None:
+    what = plain(20)
+    given = what.images.setup
+    focal_px = tuple(1.03 * f for f in given.intrinsics.focal_px)
+    setup = given.model_copy(
+        update={
+            "sheets": given.sheets.model_copy(update={"size_m": 0.15 * size}),
+            "intrinsics": given.intrinsics.model_copy(update={"focal_px": focal_px}),
+        }
+    )
+    home = what.seen.length_m[0]
+    lengths = home + (what.seen.length_m - home) / (1.0 + drum)
+    done = outcome_of(what, replace(what.seen, length_m=lengths), replace(what.images, setup=setup))
+    sizes = {one.kind: one.size for one in done.faults if one.kind in ("size", "drum", "lens")}
+    other = {"drum": drum} if drum else {"size": 1.0 / size - 1.0}
+    assert sizes == pytest.approx({**other, "lens": 1.0 / 1.03 - 1.0}, abs=0.005)
+    assert off_mm(what, done.found.poses) < 3.5

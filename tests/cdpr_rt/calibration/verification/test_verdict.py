@@ -9,7 +9,6 @@ import pytest
 
 from cdpr_profiles import load_robot
 from cdpr_rt.calibration.calibrate import calibrate
-from cdpr_rt.calibration.error_model import Noise, predicted_errors, simulated_errors
 from cdpr_rt.calibration.estimation.faults import fit_without_faults
 from cdpr_rt.calibration.estimation.fit import fit
 from cdpr_rt.calibration.outcome import calibration_of
@@ -234,17 +233,3 @@ def test_contradictory_measurements_are_not_good() -> None:
     )
     assert not outcome.good
     assert "NOT GOOD" in "\n".join(outcome.verdict())
-
-
-@pytest.mark.parametrize(
-    "noise", [Noise(length_m=5e-4), Noise(position_m=5e-4), Noise(rotation_rad=1e-3)]
-)
-def test_the_error_model_is_that_of_trials(noise: Noise) -> None:
-    what = made_up("spatial-8", 60, 2)
-    poses = np.array([pose.array for pose in what.poses])
-    kernel = what.file.kernel_geometry()
-    geometry = kernel[:3].T, kernel[3:6].T
-    told = predicted_errors(*geometry, poses, noise)
-    tried = simulated_errors(*geometry, poses, noise, 120, np.random.default_rng(3))
-    assert tried.exit_m == pytest.approx(told.exit_m, rel=0.1)
-    assert tried.offset_m == pytest.approx(told.offset_m, rel=0.1)
