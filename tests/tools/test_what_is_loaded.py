@@ -55,3 +55,16 @@ def test_kernels_do_not_load_scipys_linear_algebra_nor_spoil_it(module: str) -> 
     loaded = _loaded(f"import {module}; {call}")
     assert "scipy.linalg" not in loaded
     assert "scipy.linalg.cython_blas" in _loaded(f"import {module}, scipy.optimize")
+
+
+@pytest.mark.parametrize(
+    "module", ["bus", "cogging", "commission", "profiles", "sim.sim", "tension"]
+)
+def test_what_commissions_and_simulates_does_without_the_packages_of_the_daemon(
+    module: str,
+) -> None:
+    absent = "'fastapi httpx mcap pyarrow starlette uvicorn websockets zstandard'.split()"
+    _loaded(
+        f"import sys; sys.modules.update(dict.fromkeys({absent}))\n"
+        f"import cdpr_tools.commands.{module}"
+    )

@@ -20,8 +20,6 @@ from cdpr_rt.procedures.commissioning.evaluation import METHODS, compare
 from cdpr_rt.procedures.commissioning.identified import identify, store_profile, validation_name
 from cdpr_rt.procedures.commissioning.procedure import DEFAULT_BANDWIDTH_HZ, Commissioning, Plan
 from cdpr_rt.procedures.commissioning.results import assemble, identification, read_run
-from cdpr_tools.client.axis_sweep import AxisSweep, SweptAxis, write_passes
-from cdpr_tools.client.client import open_daemon
 from cdpr_tools.commands.commission import prepare
 from cdpr_tools.commands.options import (
     IndexOption,
@@ -99,6 +97,10 @@ def sweep_axis(
     Its programs turn the motor and its recording holds the data; the other axes hold. Ctrl-C stops
     the motor, and its drives have no power afterwards, however the command ends.
     """
+    # what commissions a winch alone does without the packages of the daemon
+    from cdpr_tools.client.axis_sweep import AxisSweep, SweptAxis, write_passes  # noqa: PLC0415
+    from cdpr_tools.client.client import open_daemon  # noqa: PLC0415
+
     out = Output(as_json)
     with open_daemon(robot, socket, None, None) as daemon:
         swept = SweptAxis.of(daemon, axis, load_robot(daemon.get("/description")["reference"]))
