@@ -15,7 +15,9 @@ from cdpr_rt.core.clock import Clock
 
 _READ = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 """As the sensor had it: intrinsics are of the sensor, however a telephone was held."""
-_DEPTHS = 10, 12, 14, 16
+_DEPTHS = 8, 10, 12, 14, 16
+_SINGLE = 99.99
+"""Percentile of an image's levels: single pixels that are defective tell no depth."""
 """Bits of a grey level that files of 16 bits are written with."""
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm")
 
@@ -68,8 +70,9 @@ def _eight_bits(pixels: NDArray[Any], name: str) -> NDArray[np.uint8]:
         return np.asarray(pixels, np.uint8)
     if pixels.dtype != np.uint16:
         raise CameraError(f"{name}: pixels of {pixels.dtype}; allowed: 8 or 16 bits")
-    bits = next(depth for depth in _DEPTHS if int(pixels.max()) < 1 << depth)
-    return (pixels >> (bits - 8)).astype(np.uint8)
+    top = int(np.percentile(pixels, _SINGLE))
+    bits = next(depth for depth in _DEPTHS if top < 1 << depth)
+    return np.asarray(np.minimum(pixels >> (bits - 8), 255), np.uint8)
 
 
 def _order(path: Path) -> list[tuple[int, str]]:

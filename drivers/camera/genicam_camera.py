@@ -92,7 +92,9 @@ class GenicamCamera(Camera):
             if self._triggered:
                 self._acquirer.remote_device.node_map.TriggerSoftware.execute()
             else:
-                self._acquirer.fetch(timeout=_TIMEOUT_S).queue()  # exposed before it was asked for
+                exposed_before = self._acquirer.fetch(timeout=_TIMEOUT_S)
+                if exposed_before is not None:
+                    exposed_before.queue()
             buffer = self._acquirer.fetch(timeout=_TIMEOUT_S)
             if buffer is None:
                 raise CameraError(
@@ -125,14 +127,13 @@ class GenicamCamera(Camera):
 
 def _grey(component: Any, name: str) -> NDArray[np.uint8]:
     """Return a component's grey levels (height, width), copied; raises CameraError."""
-    data = np.asarray(component.data)
-    if data.dtype != np.uint8:
+    data, kind = np.asarray(component.data), str(component.data_format)
+    if data.dtype != np.uint8 or kind not in {"Mono8", *_TO_GREY}:
         raise CameraError(
-            f"{name}: PixelFormat {component.data_format} has {data.dtype}; allowed: Mono8, set it "
-            "with the vendor's program"
+            f"{name}: PixelFormat {kind} of {data.dtype}; allowed: Mono8 ({', '.join(_TO_GREY)}), "
+            "set it with the vendor's program"
         )
     levels = data.reshape(component.height, component.width, -1)
-    code = _TO_GREY.get(str(component.data_format))
-    if code is None:
+    if kind == "Mono8":
         return grey(levels.copy(), name)
-    return np.asarray(cv2.cvtColor(levels.squeeze(), code), np.uint8)
+    return np.asarray(cv2.cvtColor(levels.squeeze(), _TO_GREY[kind]), np.uint8)

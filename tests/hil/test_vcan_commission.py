@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 from cdpr_here import cdpr_here
-from patient_drive import write_patient_drive
+from tolerant_drive import write_tolerant_drive
 
 pytestmark = pytest.mark.vcan
 
 WINCH = """
 name = "Winch on a virtual CAN, six milliseconds a cycle"
 motor = "MPP0923D"
-drive = "patient"
+drive = "tolerant"
 cable = "dyneema-4.8mm"
 gear_ratio = 4.0
 drum_radius_m = 0.104
@@ -48,7 +48,7 @@ def test_a_motor_is_measured_over_socketcan(tmp_path: Path) -> None:
     """Compensation, which no bus changes, is judged where cycles cost less."""
     winch, out = tmp_path / "winch.toml", tmp_path / "out"
     winch.write_text(WINCH)
-    write_patient_drive(tmp_path)
+    write_tolerant_drive(tmp_path)
     with simulated_drive(winch):
         bus = "socketcan:vcan0?lockstep=true"
         arguments = ["cogging", "sweep", str(winch), "--bus", bus, "--out", str(out), "--yes"]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from daemon_rig import RealDaemon, write_robot
-from patient_drive import NAME, write_patient_drive
+from tolerant_drive import NAME, write_tolerant_drive
 
 import cdpr_profiles
 
@@ -35,7 +35,7 @@ def robot(tmp_path: Path) -> Path:
     path.write_text("master_heartbeat_s = 6.0\n" + text)
     winch = (Path(cdpr_profiles.__file__).parent / "winches" / f"{shipped}.toml").read_text()
     (tmp_path / "winch.toml").write_text(winch.replace('"generic-cia402"', f'"{NAME}"'))
-    write_patient_drive(tmp_path)
+    write_tolerant_drive(tmp_path)
     return path
 
 

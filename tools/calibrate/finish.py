@@ -117,8 +117,8 @@ def finish(
 ) -> None:
     """Identify, tell, report, and take over what is good; `source` is the file of the data.
 
-    What changes nothing significantly is taken over only to `adopt`, and only where it tells poses
-    not used better than the robot's file does.
+    What changes nothing significantly is taken over only to `adopt`, and not where it tells poses
+    not used worse than the robot's file does, by more than noise.
 
     Raises typer.Exit with status 1 where nothing was taken over because it is not good.
     """

@@ -13,7 +13,7 @@ from cdpr_rt.calibration.camera.camera_model import CameraModel
 from cdpr_rt.calibration.estimation.faults import Fault, FaultKind, parameter_faults
 from cdpr_rt.calibration.estimation.fit import Fit, fit
 from cdpr_rt.calibration.estimation.parameters import DRUM, CableGeometry
-from cdpr_rt.calibration.markers.map_fit import MapFit, island_faults, misfits, warnings
+from cdpr_rt.calibration.markers.map_fit import MapFit, misfits, warnings
 from cdpr_rt.calibration.markers.sighting import Sighting
 
 UNDECIDED = "undecided: "
@@ -36,8 +36,7 @@ def map_faults(found: MapFit, sightings: Sequence[Sighting]) -> list[Fault]:
         for j, one in enumerate(sightings)
         if one.problem is not None
     ]
-    texts = [*island_faults(found.coverage), *misfits(found.bundle)]
-    texts += warnings(sightings, found.dropped)
+    texts = [*misfits(found.bundle), *warnings(sightings, found.dropped)]
     return faults + [Fault("marker", -1, -1, 0.0, text) for text in texts]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,11 +19,14 @@ from cdpr_rt.calibration.markers.geometry.rotations import angles, exponentials
 from cdpr_rt.calibration.markers.map_fit import MapFit, aligned, fit_map, known_places
 from cdpr_rt.calibration.markers.marker_map import MarkerMap
 from cdpr_rt.calibration.markers.sighting import Sighting
-from cdpr_rt.calibration.readings.camera_data import CameraSetup
+from cdpr_rt.calibration.readings.camera_data import CameraSetup, HandEye
 from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.errors import InvalidRequestError
 
 _UNKNOWN_STD = (0.5, 0.5, 0.5, 1.0, 1.0, 1.0)
 """Of a camera's place on the platform of which nothing is told, m and rad."""
+_LIKELY_deg, _LIKELY_SIGMAS = 15.0, 6.0
+"""Of the camera's rotation: a robot's file lets its platform's turns be told only roughly."""
 _ROOM_m, _ROOM_rad = 0.2, 0.15
 """A layout of known markers that lies no further off than this by the robot's file is in its room.
 """
@@ -97,7 +101,26 @@ def _places(
         turn = turned_camera(platform[there, 1:], cameras.rotation)
         return rigid_places(platform[there], cameras, turn, None)
     turn = exponentials(np.array(rotation_vector_rad(told.rotation_deg)))[0]
+    _require_likely(turn, platform[there, 1:], cameras.rotation, told)
     return rigid_places(platform[there], cameras, turn, np.array(told.position_m))
+
+
+def _require_likely(
+    turn: FloatArray, platform: FloatArray, camera: FloatArray, told: HandEye
+) -> None:
+    """Raise InvalidRequestError where the platform's turns tell another rotation of the camera."""
+    try:
+        seen = turned_camera(platform, camera)
+    except InvalidRequestError:  # it hardly turns: only what was told is known
+        return
+    off_deg = math.degrees(angles(seen.T @ turn))
+    most_deg = max(_LIKELY_deg, _LIKELY_SIGMAS * told.rotation_std_deg)
+    if off_deg > most_deg:
+        raise InvalidRequestError(
+            f"hand_eye.rotation_deg: value {list(told.rotation_deg)}: the platform's turns tell "
+            f"another, {off_deg:.0f} deg off; allowed: up to {most_deg:.0f} deg; without it the "
+            "turns alone tell how the camera sits"
+        )
 
 
 def _is_small(room: Rigid, map_: MarkerMap) -> bool:

@@ -36,6 +36,8 @@ class Coverage:
     """Seen in fewer than three images."""
     useless: tuple[str, ...]
     """Images with fewer than two markers, by name."""
+    placed: tuple[int, ...]
+    """All that were laid out, where their ids are known."""
     advice: tuple[str, ...]
 
     @property
@@ -45,8 +47,12 @@ class Coverage:
 
     @property
     def apart(self) -> list[tuple[int, ...]]:
-        """Islands besides the largest; without a marker that was seen once or twice, and alone."""
-        return [one for one in self.islands[1:] if len(one) > 1 or one[0] not in self.seldom]
+        """Islands besides the largest, without those that may be none.
+
+        Such as were seen in one image or two, and of ids that were not laid out.
+        """
+        seldom, placed = set(self.seldom), set(self.placed or self.ids)
+        return [one for one in self.islands[1:] if set(one) & placed - seldom]
 
     def lines(self) -> list[str]:
         """Return in words what share was seen, and what to do."""
@@ -78,7 +84,7 @@ def coverage(sightings: Sequence[Sighting], placed: Sequence[int] = ()) -> Cover
     )
     share = 1.0 - len(unseen) / len(placed) if placed else None
     return Coverage(
-        *(len(sightings), ids, islands, share, unseen, seldom, useless),
+        *(len(sightings), ids, islands, share, unseen, seldom, useless, tuple(placed)),
         tuple(_advice(islands, unseen, seldom, useless, len(sightings))),
     )
 

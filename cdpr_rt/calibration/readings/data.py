@@ -186,7 +186,10 @@ def load_points(path: Path) -> list[MeasuredPoint]:
 
     Coordinates may be left empty; sigma_mm is 2 where it is. Raises ProfileError.
     """
-    rows = list(csv.reader(io.StringIO(read_text(path, _MOST_BYTES))))
+    try:
+        rows = list(csv.reader(io.StringIO(read_text(path, _MOST_BYTES))))
+    except csv.Error as error:
+        raise ProfileError(path, "", f"is no CSV: {error}") from None
     rows = [row for row in rows if row and not row[0].lstrip().startswith("#")]
     if not rows or [name.strip() for name in rows[0]] not in (
         [c for c in _COLUMNS if c not in left]

@@ -21,7 +21,7 @@ from cdpr_rt.calibration.markers.map_fit import MapFit
 from cdpr_rt.calibration.readings.camera_data import CameraSetup, Images
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.calibration.verification.verdict import predicted_std
-from cdpr_rt.calibration.verification.verification import Verification, verify
+from cdpr_rt.calibration.verification.verification import Verification, verifies, verify
 
 _EACH = 5
 """One pose in so many is kept from the fit and verifies it."""
@@ -100,7 +100,7 @@ class Unused:
         room are those that go best with this geometry at the poses used.
         """
         reference = self.reference
-        if reference is None or self.seen.measured.any():
+        if reference is None or verifies(self.seen):
             return verify(geometry, jumps_m, self.seen)
         used = self.part.seen.unmeasured().without_jumps(jumps_m)
         still = replace(geometry, identified=())

@@ -22,6 +22,8 @@ _LEAST_MARKERS = 2
 _LEAST_POSES = 3
 _SURE = 0.975
 """How seldom chance alone may make poses told worse: one in forty, some two standard errors."""
+_GROSS = 2.0
+"""So many times the error before is worse, whatever part of it chance has."""
 
 
 @dataclass(frozen=True)
@@ -119,18 +121,25 @@ class Verification:
         """Return whether these poses are told worse than `before`, by more than noise explains.
 
         Of distances d_j less those before the mean is beyond t_0.975 of its standard error
-        (Student's paired test): what the measurement errs by is in both. Without measured poses
-        of the squares of what lengths contradict each other by.
+        (Student's paired test): what the measurement errs by is in both. Or, since a few poses
+        that are far off make that error large, the root mean square is above twice that before.
+        Without measured poses of what lengths contradict each other by.
         """
         if self.errors_m.size:
+            now, then = self._distance() ** 2, before._distance() ** 2
             more = self._distance() - before._distance()
         else:
-            more = self.squares_m2 - before.squares_m2
-        count, mean = len(more), float(more.mean())
+            now, then = self.squares_m2, before.squares_m2
+            more = now - then
+        count = len(more)
+        if not count:
+            return False
+        if not float(now.mean()) <= _GROSS**2 * float(then.mean()):
+            return True
         if count < 2:
-            return mean > 0.0
+            return False
         error = float(more.std(ddof=1)) / math.sqrt(count)
-        return mean > float(student.ppf(_SURE, count - 1)) * error
+        return float(more.mean()) > float(student.ppf(_SURE, count - 1)) * error
 
     def _distance(self) -> FloatArray:
         return np.asarray(np.linalg.norm(self.errors_m, axis=1))
@@ -152,7 +161,7 @@ def verify(
     squares = np.asarray((off**2).sum(axis=1))
     rms = float(np.sqrt(squares.sum() / max(int(seen.used.sum()), 1)))
     k = geometry.coordinates
-    if camera is not None and not seen.measured.any():
+    if camera is not None and not verifies(seen):
         seen = replace(seen, start=there.poses)
         errors, told_m, turns = _beside_camera(geometry, camera, seen)
         return Verification(
@@ -164,6 +173,12 @@ def verify(
     turned = np.isfinite(seen.rotation_std_rad).all(axis=1)
     turns = logarithms(there.poses[turned, 1:] @ np.swapaxes(seen.rotation[turned], 1, 2))
     return Verification(seen.poses, errors[measured], p[measured, :k], turns, rms, squares)
+
+
+def verifies(seen: Observations) -> bool:
+    """Return whether enough poses were measured, in space, for a reference of their own."""
+    k = seen.position_m.shape[1]
+    return int((np.isfinite(seen.position_std_m).sum(axis=1) == k).sum()) >= _LEAST_POSES
 
 
 def _beside_camera(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from pydantic import Field
@@ -27,6 +28,8 @@ _UNITS: Final = {
     "m": ("m", 1.0), "mm": ("m", 1e-3), "rad": ("rad", 1.0), "deg": ("rad", math.radians(1.0)),
 }  # fmt: skip
 _SPEEDS: Final = {"speed_m_s": 1.0, "speed_mm_s": 1e-3}
+_BOM: Final = "\ufeff"
+"""With which spreadsheets begin a text in UTF-8."""
 _BLENDS: Final = {"blend_m": 1.0, "blend_mm": 1e-3}
 _Speed = Annotated[float, Field(gt=0, le=100)]
 _Blend = Annotated[float, Field(ge=0, le=10)]
@@ -83,26 +86,33 @@ def _require_count(path: Path, key: str, values: tuple[float, ...], count: int) 
         raise ProfileError(path, key, f"{len(values)} numbers; allowed: {count} for this robot")
 
 
-def read_csv_points(text: str, source: str, coordinates: Coordinates) -> PathDescription:
+def read_csv_points(
+    text: str, source: str, coordinates: Coordinates, *, all_columns: bool = False
+) -> PathDescription:
     """Return the path through the rows of a CSV file, whose first line names its columns.
 
     Columns are coordinates with their unit (x_m or x_mm, rx_rad or rx_deg, ...), speed_m_s,
-    blend_m, dwell_s, wait (0 or 1). An empty cell is as in the row before. Raises PathError.
+    blend_m, dwell_s, wait (0 or 1). An empty cell is as in the row before, as is a
+    coordinate without a column, unless `all_columns` are to be there. Raises PathError.
     """
     if not text.endswith("\n"):
         last = text.count("\n") + 1
         raise PathError(source, last, "does not end with a line end: was it cut short?")
-    rows = csv.reader(text.split("\n"))
+    rows = csv.reader(text.removeprefix(_BOM).split("\n"))
     columns: list[tuple[str, float]] = []
     found: PathDescription | None = None
     d, k = len(coordinates.names), coordinates.positions
     kept = dict.fromkeys(coordinates.names[k:], 0.0) | {"speed": math.inf, "blend": 0.0}
-    for row in rows:
-        line = rows.line_num
+    for line, row in _rows(rows, source):
         if not any(cell.strip() for cell in row) or row[0].lstrip().startswith("#"):
             continue
         if not columns:
             columns = [_column(source, line, cell.strip(), coordinates) for cell in row]
+            named = {what for what, _ in columns}
+            if all_columns and (left := [one for one in coordinates.names if one not in named]):
+                allowed = ", ".join(coordinates.names)
+                problem = f"column {left[0]} is missing; allowed: {allowed}, with their unit each"
+                raise PathError(source, line, problem)
             continue
         kept |= {"dwell": 0.0, "wait": 0.0}
         kept |= _cells(source, line, row, columns)
@@ -117,6 +127,15 @@ def read_csv_points(text: str, source: str, coordinates: Coordinates) -> PathDes
     if found is None or not found.moves:
         raise PathError(source, 0, "holds less than two way points")
     return found
+
+
+def _rows(rows: Any, source: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield rows with their lines; raises PathError for what is no CSV."""
+    try:
+        for row in rows:
+            yield rows.line_num, row
+    except csv.Error as error:
+        raise PathError(source, rows.line_num, str(error)) from None
 
 
 def _column(source: str, line: int, name: str, coordinates: Coordinates) -> tuple[str, float]:

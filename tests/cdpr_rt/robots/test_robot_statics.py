@@ -16,6 +16,7 @@ from scipy.optimize import linprog
 from cdpr_profiles import ProfileError, Robot, load_robot
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_rt.robots.checks import findings, refuse_impossible
+from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import RESERVE, platform_model
 from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of
@@ -79,6 +80,23 @@ def test_what_can_be_held_is_what_the_controller_distributes(x: float, y: float)
     if reserve > 1e-6:
         least = statics.least_tensions_N(p)
         assert (least >= LOW - 1e-6).all() and least.sum() <= t.sum() + 1e-6
+
+
+@pytest.mark.parametrize("name", ["planar-3", "spatial-8"])
+def test_lengths_that_are_checked_are_those_of_the_loop_with_pulleys_too(name: str) -> None:
+    robot = load_robot(name)
+    assert robot.platform is not None
+    radii = tuple(0.02 + 0.01 * i for i in range(len(robot.axes)))
+    platform = dataclasses.replace(robot.platform, pulley_radius_m=radii)
+    with_pulleys = statics_of(dataclasses.replace(robot, platform=platform))
+    home = np.array(platform.home_m)
+    places = np.stack([home, home + 0.05])
+    kinematics = with_pulleys.model.kinematics
+    poses = [Pose(p[0], p[1:]) for p in with_pulleys.poses(places)]
+    expected = [kinematics.lengths(pose) for pose in poses]
+    np.testing.assert_allclose(with_pulleys.lengths(places), expected, atol=1e-12)
+    wound = with_pulleys.lengths(places) - with_pulleys.free_lengths(places)
+    assert (wound >= 0.0).all() and (wound > 1e-3).any(axis=1).all()
 
 
 def test_in_motion_the_worst_direction_counts_and_arrays_keep_their_shape() -> None:

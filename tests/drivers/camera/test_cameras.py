@@ -96,14 +96,19 @@ def test_an_image_that_is_none_is_named(tmp_path: Path) -> None:
         grey(np.zeros((4, 4, 2), np.uint8), "x")
 
 
-@pytest.mark.parametrize("bits", [10, 12, 16])
+@pytest.mark.parametrize("bits", [8, 10, 12, 16])
 def test_files_of_16_bits_give_the_8_upper_ones_in_use(tmp_path: Path, bits: int) -> None:
     pixels = np.linspace(0, (1 << bits) - 1, 80 * 64).reshape(64, 80).astype(np.uint16)
-    cv2.imwrite(str(tmp_path / "1.png"), pixels)
+    cv2.imwrite(str(tmp_path / "1.png"), np.tile(pixels, (4, 4)))
+    defective = np.tile(pixels, (4, 4))
+    defective[100, 100] = 65535
+    cv2.imwrite(str(tmp_path / "2.png"), defective)
+    expected = np.tile(pixels >> (bits - 8), (4, 4)).astype(int)
     with open_camera(f"folder:{tmp_path}", LockstepClock()) as camera:
-        image = camera.grab()
-    assert image is not None and image.pixels.dtype == np.uint8
-    np.testing.assert_array_equal(image.pixels, pixels >> (bits - 8))
+        image, other = camera.grab(), camera.grab()
+    assert image is not None and image.pixels.dtype == np.uint8 and other is not None
+    np.testing.assert_array_equal(image.pixels, expected)
+    assert (other.pixels != expected).sum() <= 1 and other.pixels[100, 100] == 255
 
 
 def test_how_a_telephone_was_held_does_not_turn_what_its_sensor_saw(tmp_path: Path) -> None:

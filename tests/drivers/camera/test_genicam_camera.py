@@ -191,9 +191,10 @@ def test_a_camera_that_cannot_be_opened_is_told_and_the_producer_let_go(
         ({"fails": TimeoutError()}, "no image: TimeoutError; is it unplugged"),
         ({"fails": RuntimeError("device lost")}, "no image: device lost; is it unplugged"),
         ({"incomplete": True}, "came incomplete; is its network overloaded"),
+        ({"data_format": "YCbCr8"}, "PixelFormat YCbCr8 of uint8; allowed: Mono8"),
         (
             {"pixels": np.zeros((6, 8), np.uint16), "data_format": "Mono12"},
-            "PixelFormat Mono12 has uint16; allowed: Mono8",
+            "PixelFormat Mono12 of uint16; allowed: Mono8",
         ),
     ],
 )
@@ -205,6 +206,17 @@ def test_an_image_that_does_not_come_is_told(
             setattr(harvester, key, value)
         with pytest.raises(CameraError, match=said):
             camera.grab()
+
+
+def test_an_incomplete_image_of_before_is_told_no_less(
+    tmp_path: Path, harvester: type[FakeHarvester]
+) -> None:
+    harvester.triggered, harvester.incomplete = False, True
+    with (
+        opened(tmp_path) as camera,
+        pytest.raises(CameraError, match="came incomplete; is its network overloaded"),
+    ):
+        camera.grab()
 
 
 def test_a_producer_that_is_no_file_is_told(harvester: type[FakeHarvester]) -> None:

@@ -21,8 +21,8 @@ from cdpr_rt.calibration.verification.verification import Verification
 from cdpr_rt.robots.persistence.calibration_state import mark_not_calibrated, not_calibrated_reason
 from cdpr_tools.calibrate.finish import enough
 from cdpr_tools.calibrate.made_readings import HAND_EYE_m
+from cdpr_tools.calibrate.measuring.begin import source_of
 from cdpr_tools.calibrate.study import PAIRS
-from cdpr_tools.commands.calibration.calibrate import _source
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output
 from tests.cdpr_rt.calibration.camera_robot import camera_robot
@@ -217,10 +217,10 @@ def test_points_of_poses_that_come_later_do_not_end_a_run(tmp_path: Path) -> Non
 
 def test_points_are_taken_besides_a_camera() -> None:
     robot = load_robot("spatial-8")
-    assert _source(robot, ["camera", "points"]) == "camera"
-    assert _source(robot, ["points"]) == "points"
+    assert source_of(robot, ["camera", "points"]) == "camera"
+    assert source_of(robot, ["points"]) == "points"
     with pytest.raises(BadInputError, match="or --camera with --points"):
-        _source(robot, ["camera", "scanner", "points"])
+        source_of(robot, ["camera", "scanner", "points"])
 
 
 @pytest.mark.parametrize(

@@ -10,19 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_profiles import Robot
+from cdpr_profiles.errors import brief
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.verification.held_out import LEAST_POSES
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.motion.path.description import PathError
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
+from cdpr_rt.robots.reach.reach_kernel import CONTACT, WHOLE
 from cdpr_rt.robots.reach.reachable import SHARE, Reach
 from cdpr_tools.errors import BadInputError
-from cdpr_tools.robots.poses.choice import Choose, choose, read_poses
+from cdpr_tools.robots.poses.choice import KINDS, Choose, choose, read_poses
 
 MOST_POSES = 1000
 BATCH = 10
 """Poses after which is looked what they tell."""
 _ROUNDED_rad = 1e-5
+_DIGITS = 6
 Listed = tuple[tuple[float, ...], ...]
 
 
@@ -85,12 +88,13 @@ def poses_wanted(robot: Robot, text: str | None) -> tuple[int | None, Listed | N
     """
     if text is None:
         return None, None
+    allowed = f"allowed: {LEAST_POSES} to {MOST_POSES}, or NAME.csv or NAME.toml with a list"
     if text.removeprefix("-").isdecimal():
-        if not LEAST_POSES <= int(text) <= MOST_POSES:
-            raise BadInputError(
-                f"--poses {text}: allowed: {LEAST_POSES} to {MOST_POSES}, or a file"
-            )
+        if len(text) > _DIGITS or not LEAST_POSES <= int(text) <= MOST_POSES:
+            raise BadInputError(f"--poses {brief(text)}: {allowed}")
         return int(text), None
+    if Path(text).suffix not in KINDS:
+        raise BadInputError(f"--poses {brief(text)}: {allowed}")
     listed = _listed(robot, Path(text))
     return 1 + len(listed), tuple(tuple(place) for place in listed.tolist())
 
@@ -103,16 +107,26 @@ def _listed(robot: Robot, path: Path) -> FloatArray:
     if not LEAST_POSES - 1 <= len(places) < MOST_POSES:
         allowed = f"{LEAST_POSES - 1} to {MOST_POSES - 1}, home is read besides"
         raise BadInputError(f"--poses {path}: {len(places)} poses; allowed: {allowed}")
+    seen: set[tuple[float, ...]] = set()
     for place, line, inside in zip(places, told.lines, reach.are_targets(places), strict=True):
         if why_not := _why_not(reach.model, place, bool(inside)):
             raise PathError(path, line, why_not)
+        if tuple(place) in seen:
+            raise PathError(path, line, "is there before; allowed: each pose once")
+        seen.add(tuple(place))
+    for share, why, line in zip(*reach.shares(places), told.lines, strict=True):
+        if why != WHOLE:
+            what = "touches something" if why == CONTACT else "cannot be held"
+            middle = ", ".join(f"{x:.3f}" for x in reach.start[: reach.model.positions])
+            text = f"the straight way from the middle, {middle} m, {what} after {share:.0%} of it"
+            raise PathError(path, line, text)
     return places
 
 
 def _why_not(model: PlatformModel, place: FloatArray, inside: bool) -> str:
     """Return why a robot cannot stand at a place (d,), empty where it can."""
     k, platform = model.positions, model.platform
-    at = f"pose at {', '.join(f'{x:.3f}' for x in place[:k])} m"
+    at = f"pose at {', '.join(f'{x:.6g}' for x in place[:k])} m"
     if not inside:
         low, high = list(platform.workspace_min_m), list(platform.workspace_max_m)
         return f"{at}: outside the workspace; allowed: {low} to {high}, above its stand"

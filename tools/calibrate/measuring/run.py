@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from cdpr_drivers.errors import DriverError
 from cdpr_profiles import Robot
@@ -65,6 +65,15 @@ class RunSettings(Profile):
     seed: int = Field(ge=0)
     places: tuple[Numbers, ...] | None = None
     """(m, d), where a list has named them: these and home are all."""
+    points: str | None = None
+    """File of measured positions, which a run that goes on reads again."""
+
+    @field_validator("places")
+    @classmethod
+    def _alike(cls, places: tuple[Numbers, ...] | None) -> tuple[Numbers, ...] | None:
+        if places is not None and len(set(map(len, places))) > 1:
+            raise ValueError("as many numbers in each")
+        return places
 
     def save(self, folder: Path) -> None:
         """Write them into the folder of the run; raises ProfileError."""

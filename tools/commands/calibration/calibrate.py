@@ -26,7 +26,6 @@ from cdpr_tools.output import Output
 if TYPE_CHECKING:
     from cdpr_rt.calibration.estimation.parameters import CableGeometry
     from cdpr_rt.calibration.readings.camera_data import HandEye
-    from cdpr_tools.calibrate.measuring.run import Source
 
 app = typer.Typer(
     name="calibrate",
@@ -170,10 +169,10 @@ def run(
     """
     out = Output(as_json)
     with out.stage("looking at the robot's file"):
-        from cdpr_rt.calibration.readings.data import load_points  # noqa: PLC0415
         from cdpr_rt.robots.checks import refuse_impossible  # noqa: PLC0415
         from cdpr_tools.calibrate.finish import enough, finish, with_hand_eye  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring import run as runs  # noqa: PLC0415  # slow to load
+        from cdpr_tools.calibrate.measuring.begin import check_points, source_of  # noqa: PLC0415
         from cdpr_tools.calibrate.measuring.places import poses_wanted  # noqa: PLC0415
 
         profile = load_robot(robot)
@@ -182,7 +181,7 @@ def run(
         known = _hand_eye(hand_eye)
         count, listed = poses_wanted(profile, poses)
         if points is not None:
-            load_points(points)
+            check_points(points, None if resume else count)
 
     given: dict[runs.Source, bool] = {
         "camera": camera,
@@ -196,10 +195,15 @@ def run(
         settings = runs.RunSettings.load(folder)
         source = settings.source
         settings = settings.going_on(count, listed)
+        if points is not None:
+            settings = settings.model_copy(update={"points": str(points.resolve())})
+        elif settings.points is not None:
+            points = Path(settings.points)
+            check_points(points, None)
         kept = runs.Kept.of_before(folder, profile)
     else:
         _require_new(folder, runs.DATA, overwrite)
-        source = _source(profile, [name for name, asked in given.items() if asked])
+        source = source_of(profile, [name for name, asked in given.items() if asked])
         if known is not None and source != "camera":
             raise BadInputError("--hand-eye: is of a camera; allowed: with --camera")
         settings = runs.RunSettings(
@@ -209,6 +213,7 @@ def run(
             poses=count,
             seed=seed,
             places=listed,
+            points=None if points is None else str(points.resolve()),
         )
         setup = None
         if source == "camera":
@@ -216,34 +221,14 @@ def run(
 
             setup = camera_setup(out, plant, intrinsics, markers)
         kept = runs.Kept.new(folder, profile, setup)
-        settings.save(folder)
+    settings.save(folder)
     kept.data = with_hand_eye(kept.data, known)
-    if source == "points" and points is None:
-        raise BadInputError("--points: the run that goes on was begun with it; allowed: the file")
     data = runs.measure(out, profile, settings, kept, enough(out, profile, points, geometry))
     judge = runs.judge_of(profile, settings, folder)
     finish(
         *(out, profile, data, points, geometry),
         *(folder / runs.DATA, folder, dry_run, adopt, judge),
     )
-
-
-def _source(robot: Robot, asked: list[Source]) -> Source:
-    """Return what a run is to use besides lengths and tensions; raises BadInputError."""
-    if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
-        return "camera"
-    if asked == ["camera", "points"]:
-        asked = ["camera"]  # points are taken besides
-    if len(asked) != 1:
-        raise BadInputError(
-            "give one of --camera, --redundancy, --scanner and --points, or --camera with --points"
-        )
-    if asked[0] == "camera" and robot.platform is not None and len(robot.platform.controlled) < 6:
-        raise BadInputError(
-            f"--camera: {robot.profile} does not turn its platform about two axes, which is what "
-            "tells where the camera sits on it; allowed: --scanner, --points, --redundancy"
-        )
-    return asked[0]
 
 
 def _require_new(folder: Path, name: str, overwrite: bool) -> None:

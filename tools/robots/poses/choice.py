@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -121,12 +120,7 @@ def read_poses(path: Path, model: PlatformModel) -> PathDescription:
     if path.suffix == ".toml":
         return read_toml_points(path, coordinates)
     text = read_text(path, MOST_BYTES)
-    head = next(csv.reader(text.splitlines()[:1]), [])
-    named = {cell.strip().rpartition("_")[0] for cell in head}
-    if missing := [name for name in coordinates.names if name not in named]:
-        allowed = f"the columns {','.join(_columns(coordinates.names, coordinates.positions))}"
-        raise BadInputError(f"{path}: line 1: column {missing[0]} is missing; allowed: {allowed}")
-    return read_csv_points(text, str(path), coordinates)
+    return read_csv_points(text, str(path), coordinates, all_columns=True)
 
 
 def _columns(names: Sequence[str], lengths: int) -> list[str]:

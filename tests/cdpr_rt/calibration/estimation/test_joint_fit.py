@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.camera.camera_model import CameraModel
+from cdpr_rt.calibration.camera.camera_start import camera_start
 from cdpr_rt.calibration.camera.corner_terms import corner_normals, corner_residuals, corner_terms
 from cdpr_rt.calibration.camera.hand_eye import turned_camera
 from cdpr_rt.calibration.estimation.fit import fit, moved
@@ -21,7 +22,11 @@ from cdpr_rt.calibration.outcome import Outcome
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.calibration.verification.held_out import held_out
-from cdpr_rt.calibration.verification.verification import locate_by_camera, relative_errors
+from cdpr_rt.calibration.verification.verification import (
+    locate_by_camera,
+    relative_errors,
+    verifies,
+)
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_tools.calibrate.made_readings import Errors, HAND_EYE_m
 from tests.cdpr_rt.calibration.camera_robot import FEW, CameraRobot, camera_robot
@@ -231,6 +236,27 @@ def test_a_camera_on_a_platform_that_does_not_turn_has_to_be_told_where_it_is() 
     turns = Rotation.from_rotvec(np.outer(np.linspace(0.0, 0.3, 8), (0.0, 0.0, 1.0))).as_matrix()
     with pytest.raises(InvalidRequestError, match="hand_eye"):
         turned_camera(turns, turns)
+
+
+def test_a_camera_that_sits_otherwise_than_told_is_refused() -> None:
+    what = plain(15)
+    setup = what.images.setup
+    assert setup.hand_eye is not None
+    wrong = setup.hand_eye.model_copy(update={"rotation_deg": (0.0, 0.0, 0.0)})
+    setup = setup.model_copy(update={"hand_eye": wrong})
+    with pytest.raises(InvalidRequestError, match=r"hand_eye\.rotation_deg: .* 1[78][0-9] deg off"):
+        camera_start(what.geometry, what.seen, setup, what.images.sightings)
+
+
+def test_measured_points_verify_where_three_poses_have_all_of_theirs() -> None:
+    seen = plain(15).seen.some(np.arange(5))
+    for std_m, enough in (
+        (np.full((5, 3), np.nan), False),
+        (np.array([[1e-3, 1e-3, np.nan]] * 5), False),
+        (np.array([[1e-3] * 3] * 2 + [[np.nan] * 3] * 3), False),
+        (np.array([[1e-3] * 3] * 3 + [[np.nan] * 3] * 2), True),
+    ):
+        assert verifies(replace(seen, position_std_m=std_m)) == enough
 
 
 def test_slipped_encoders_and_bad_markers_are_named_and_survived() -> None:

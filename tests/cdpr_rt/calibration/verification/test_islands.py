@@ -29,15 +29,17 @@ def test_islands_make_a_calibration_not_good(apart: bool) -> None:
     assert ("NOT GOOD: markers fall into 2 islands that no image connects" in said) == apart
     assert ("together with the others: take one that shows" in said) == apart
     assert len(outcome.told()["coverage"]["islands"]) == 1 + apart
+    assert any("islands" in one for one in outcome.objections()) == apart
     assert not (outcome.good and apart)
 
 
-def test_a_marker_seen_once_and_alone_is_no_island() -> None:
+def test_markers_seen_once_and_those_of_others_are_no_islands() -> None:
     def image(name: str, *markers: int) -> Sighting:
         return Sighting(name, dict.fromkeys(markers))  # type: ignore[arg-type]
 
     found = coverage([image("a", 1, 2), image("b", 2, 3), image("c", 7)], placed=[1, 2, 3, 7, 8])
     assert found.islands == ((1, 2, 3), (7,)) and not found.apart
     assert found.lines()[0] == "80% of the markers seen"
-    often = coverage([image("a", 1, 2), *(image(f"{k}", 7) for k in range(3))])
-    assert often.apart == [(7,)]
+    others = [image("b", 11, 12), *(image(f"{k}", 7) for k in range(3))]
+    assert coverage([image("a", 1, 2), *others]).apart == [(7,)]
+    assert not coverage([image("a", 1, 2), *others], placed=[1, 2]).apart  # somebody else's

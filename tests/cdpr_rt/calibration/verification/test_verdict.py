@@ -181,8 +181,14 @@ def test_what_tells_unused_poses_worse_is_not_taken_over_only_because_it_is_aske
     assert not outcome.change.significant and outcome.good
     before = outcome.before.errors_m
     other_way = 1.05 * before[::-1]  # the mean is larger, but not what is larger at most poses
-    for errors_m, worse in ((1.1 * before, True), (0.9 * before, False), (other_way, False)):
-        told = replace(asked, verified=replace(asked.verified, errors_m=errors_m))
+    gross = before.copy()
+    gross[2] *= 40.0  # so far off that the mean is no surer
+    for errors_m, worse in (
+        *((1.1 * before, True), (0.9 * before, False), (other_way, False)),
+        *((gross, True), (before[:1], False), (3.0 * before[:1], True)),
+    ):
+        then = replace(asked.before, errors_m=before[: len(errors_m)])
+        told = replace(asked, verified=replace(asked.verified, errors_m=errors_m), before=then)
         assert told.worse == worse and told.good != worse
         said = "NOT GOOD: poses that the fit had not seen are told worse"
         assert any(said in line for line in told.verdict()) == worse

@@ -10,6 +10,7 @@ import pytest
 from cdpr_profiles import load_robot
 from cdpr_rt.errors import InvalidRequestError
 from cdpr_rt.robots.platform_model import platform_model_of
+from cdpr_rt.robots.reach.reach_kernel import CONTACT
 from cdpr_rt.robots.reach.reachable import Reach
 from cdpr_tools.calibrate.measuring.places import listed_places, poses_wanted
 from cdpr_tools.errors import BadInputError
@@ -39,22 +40,27 @@ def test_a_list_is_gone_to_wholly_and_home_besides(tmp_path: Path, name: str) ->
 def test_a_number_is_how_many() -> None:
     assert poses_wanted(ROBOT, None) == (None, None)
     assert poses_wanted(ROBOT, "15") == (15, None)
-    for text in ("14", "1001", "-20"):
-        with pytest.raises(BadInputError, match=f"--poses {text}: allowed: 15 to 1000, or a file"):
+    for text in ("14", "1001", "-20", "1.5", "", "9" * 5000):
+        allowed = r".*: allowed: 15 to 1000, or NAME\.csv or NAME\.toml"
+        with pytest.raises(BadInputError, match=f"--poses {text[:20]}{allowed}"):
             poses_wanted(ROBOT, text)
-    with pytest.raises(BadInputError, match=r"1\.5: allowed: NAME\.csv or NAME\.toml"):
-        poses_wanted(ROBOT, "1.5")
 
 
 @pytest.mark.parametrize(
     ("line", "cell", "text", "named"),
     [
-        (2, 0, "9.0", r"poses\.csv:3: pose at 9\.000, .* outside the workspace; allowed: \[-0\.5"),
+        (2, 0, "9.0", r"poses\.csv:3: pose at 9, .* outside the workspace; allowed: \[-0\.5"),
         (2, 5, "0.5", r"poses\.csv:3: .*: turned by .* deg; allowed: up to 15\.0 deg"),
         (2, 1, "much", r"poses\.csv:3: y: value 'much': no number"),
         (2, 5, None, r"poses\.csv:3: 5 cells; allowed: 6"),
-        (0, 5, None, r"column rz is missing; allowed: the columns x_m,.*,rz_rad"),
-        (0, 0, "q_m", r"column x is missing"),
+        (
+            0,
+            5,
+            None,
+            r"poses\.csv:1: column rz is missing; allowed: x, .*, rz, with",
+        ),
+        (0, 0, "q_m", r"poses\.csv:1: .*'q_m'"),
+        (2, 1, "1" * 200_000, r"poses\.csv:3: field larger than"),
     ],
 )
 def test_lists_that_cannot_be_gone_to_are_refused(
@@ -72,4 +78,32 @@ def test_lists_that_cannot_be_gone_to_are_refused(
 def test_a_list_of_too_few_poses_is_refused(tmp_path: Path) -> None:
     listed(tmp_path / "poses.csv", 13)
     with pytest.raises(BadInputError, match="13 poses; allowed: 14 to 999, home is read besides"):
+        poses_wanted(ROBOT, str(tmp_path / "poses.csv"))
+
+
+def test_a_spreadsheets_mark_and_comments_come_before_the_columns(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    places = listed(path)
+    path.write_text("\ufeff# drawn by hand\n\n" + path.read_text(), encoding="utf-8")
+    assert np.array(poses_wanted(ROBOT, str(path))[1]) == pytest.approx(places, abs=1e-6)
+
+
+def test_a_pose_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    listed(path)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines, lines[5]]) + "\n")
+    with pytest.raises(InvalidRequestError, match=r"poses\.csv:22: is there before"):
+        poses_wanted(ROBOT, str(path))
+
+
+def test_a_way_that_touches_something_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed(tmp_path / "poses.csv")
+    shares, why = np.ones(20), np.zeros(20, int)
+    shares[3], why[3] = 0.4, CONTACT
+    monkeypatch.setattr(Reach, "shares", lambda *_: (shares, why))
+    said = r"poses\.csv:5: the straight way from the middle, .* m, touches something after 40%"
+    with pytest.raises(InvalidRequestError, match=said):
         poses_wanted(ROBOT, str(tmp_path / "poses.csv"))

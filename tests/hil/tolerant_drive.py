@@ -6,10 +6,10 @@ from pathlib import Path
 
 import cdpr_profiles
 
-NAME = "patient"
+NAME = "tolerant"
 
 
-def write_patient_drive(folder: Path) -> None:
+def write_tolerant_drive(folder: Path) -> None:
     """Write the shipped drive that lets itself and its master be held up for seconds."""
     shipped = Path(cdpr_profiles.__file__).parent / "drives" / "generic-cia402.toml"
     text = shipped.read_text()
