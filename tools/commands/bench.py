@@ -82,7 +82,7 @@ def control(
     turns, from the same angles; both have to come to the same torques.
     """
     with raised_as(BadInputError, GeometryError):
-        _run("control", as_json, name=robot, cycles=cycles)
+        _run("control.measure", as_json, name=robot, cycles=cycles)
 
 
 @app.command()
