@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import re
+import signal
 import sys
 from typing import Annotated, Any, NoReturn
 
@@ -194,6 +196,9 @@ def main() -> None:
         if end.code == _INTERRUPTED:
             _end("interrupted", FAILED)
         raise
+    finally:
+        # all is done or told: a Ctrl-C while the interpreter ends would end in its traceback
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     sys.exit(DONE)
 
 

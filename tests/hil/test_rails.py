@@ -100,8 +100,8 @@ class Rails:
         """The truth, and not what a command tells."""
         if kind == "cia402":
             return self.rail.state().motor_rad * M_PER_RAD
-        low = self._modbus().read_holding_registers(104, count=2, device_id=1).registers
-        return (low[0] << 16 | low[1]) * 1e-5
+        high, low = self._registers(104, 2)
+        return (high << 16 | low) * 1e-5
 
     def speed_at_braking(self) -> float:
         """Wait for the brake of the CiA 402 rail; return the last speed before it closed."""
@@ -116,8 +116,7 @@ class Rails:
         """Whether the rail stands without power on an applied brake."""
         if kind == "cia402":
             return not self.rail.brake_released and not self.rail.state().power_on
-        status = self._modbus().read_holding_registers(111, count=1, device_id=1).registers[0]
-        return not status & 0b10011
+        return not self._registers(111, 1)[0] & 0b10011
 
     def wear_brake(self, kind: str) -> None:
         if kind == "cia402":
@@ -126,7 +125,8 @@ class Rails:
             self.break_modbus(RailFault.BRAKE_WORN)
 
     def break_modbus(self, fault: RailFault) -> None:
-        self._modbus().write_register(1, int(fault), device_id=PANEL)
+        with self._modbus() as panel:
+            panel.write_register(1, int(fault), device_id=PANEL)
 
     def calibration(self) -> dict[str, Any]:
         held: dict[str, Any] = json.loads(self._state_file().read_text())
@@ -144,6 +144,13 @@ class Rails:
 
     def _state_file(self) -> Path:
         return self.home / "cdpr-rt" / "calibration.spatial-8.json"
+
+    def _registers(self, address: int, count: int) -> list[int]:
+        with self._modbus() as drive:  # or its connections stay, hundreds while a move is awaited
+            found: list[int] = drive.read_holding_registers(
+                address, count=count, device_id=1
+            ).registers
+        return found
 
     def _modbus(self) -> ModbusTcpClient:
         return ModbusTcpClient("127.0.0.1", port=self.modbus_port, timeout=5)

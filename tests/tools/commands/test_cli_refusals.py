@@ -155,6 +155,18 @@ def test_ctrl_c_while_a_command_is_loaded_is_no_traceback() -> None:
     assert json.loads(told.stdout)["error"] == "interrupted"
 
 
+def test_ctrl_c_while_the_interpreter_ends_is_no_traceback() -> None:
+    code = (
+        "import atexit, os, signal, sys; from cdpr_tools import cli;"
+        "atexit.register(os.kill, os.getpid(), signal.SIGINT);"
+        "sys.argv = ['cdpr', '--version']; cli.main()"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (told.returncode, told.stderr) == (0, "")
+
+
 def test_the_version_is_that_of_the_package() -> None:
     told = cdpr_here("--version")
     assert (told.returncode, told.stdout) == (0, f"cdpr {version('cdpr-rt')}\n")
