@@ -16,7 +16,10 @@ FURTHEST_m = 1000.0
 
 def _in_metres(value: float) -> float:
     if abs(value) > FURTHEST_m:
-        raise ValueError(f"value {value:g}; allowed: -{FURTHEST_m:g} to {FURTHEST_m:g}, in metres")
+        raise ValueError(
+            f"value {value:g}; allowed: -{FURTHEST_m:g} to {FURTHEST_m:g}, in metres (were "
+            f"millimetres written? In metres: {0.001 * value:g})"
+        )
     return value
 
 

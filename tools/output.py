@@ -148,10 +148,11 @@ class Advance:
         elapsed_s = time.monotonic() - self._begun_s
         if not self.total:
             return f"{self.what}: for {elapsed_s:.0f} s now"
-        share = self.done / self.total
+        # a file that is still written to grows beyond what it was
+        share = min(self.done / self.total, 1.0)
         if share < _TOLD_FROM:
             return f"{self.what}: 0 %"
-        left_s = elapsed_s * (1.0 / min(share, 1.0) - 1.0)
+        left_s = elapsed_s * (1.0 / share - 1.0)
         left = f"{left_s:.0f} s" if left_s < 100.0 else f"{left_s / 60.0:.0f} min"
         return f"{self.what}: {100.0 * share:.0f} %, about {left} left"
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from shlex import quote
 from typing import Any, Final
 
 import httpx
@@ -277,7 +278,10 @@ def axis_values(texts: list[str], axes: list[dict[str, Any]], unit: str) -> dict
         if not equals and len(names) == 1:
             name = names[0]
         if name not in names:
-            raise BadInputError(f"{text}: allowed: AXIS={unit} with axis {', '.join(names)}")
+            raise BadInputError(
+                f"{text}: allowed: AXIS={unit} with axis {', '.join(names)}, such as "
+                f"{quote(f'{names[0]}=20')}"
+            )
         if names.index(name) in values:
             raise BadInputError(f"{text}: {name} is there twice")
         try:

@@ -174,9 +174,11 @@ def deviations(time_s: FloatArray, curves: Mapping[str, FloatArray], what: Devia
         whole.plot(x, y, color=COLOURS[method], label=LABELS[method], lw=0.9)
         faint = 1.0 if method == "better" else 0.6
         near.plot(x, y, color=COLOURS[method], lw=0.7, alpha=faint)
+    # with an edge, so that it is seen where it is thinner than a line
     near.axhspan(
-        -what.floor, what.floor, color=COLOURS["floor"], alpha=0.25, lw=0, label=what.floor_label
-    )
+        *(-what.floor, what.floor), color=COLOURS["floor"], alpha=0.35, lw=1.2, zorder=3.0,
+        label=f"{what.floor_label}: {what.floor:.1g}",
+    )  # fmt: skip
     limit = 1.6 * max(float(np.abs(curves["better"]).max()), 1.2 * what.floor)
     near.set(ylim=(-limit, limit), xlabel="time (s)", title="the same, enlarged")
     whole.set_xlim(0.0, time_s[-1])

@@ -48,11 +48,14 @@ def answers_of(path: Path, given: Mapping[str, str], ask: Ask) -> Answers:
     nowhere = (0.0,) * kind.size
     last = [q.key for q in places(kind, nowhere, nowhere, proposed_stand)]
     known = [first.key, *(q.key for q in asked), *last]
-    for key in given:
-        if key not in known:
-            near = closest(key, known)
-            hint = f"did you mean {near!r}?" if near else f"allowed: {', '.join(known)}"
-            raise BadInputError(f"--set {key}: no such question; {hint}")
+    unknown = [key for key in given if key not in known]
+    if unknown:
+        near = closest(unknown[0], known) if len(unknown) == 1 else None
+        hint = f"did you mean {near!r}? " if near else ""
+        raise BadInputError(
+            f"--set {', '.join(unknown)}: no such question; {hint}"
+            f"allowed for {kind.name}: {', '.join(known)}"
+        )
     for question in asked:
         answers[question.key] = _answer(question, answers, given, ask)
     for question in places(kind, *proposed_box(answers), proposed_stand):

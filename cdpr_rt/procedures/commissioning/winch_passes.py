@@ -92,10 +92,10 @@ class Measurement:
         meta["latency_s"] = session.winch.latency_s
         total = sum(one.duration_s() for one in passes)
         recorded = []
-        share = min(self._done_s / self._planned_s, 1.0)
         label = spoken_name(name)
+        begin, end = (min(s / self._planned_s, 1.0) for s in (self._done_s, self._done_s + total))
         if math.isfinite(self._planned_s):
-            label += f" (so far {100.0 * share:.0f} % of all)"
+            label += f" ({100.0 * begin:.0f} to {100.0 * end:.0f} % of all)"
         self._done_s += total
         with self._out.progress(label, total) as advance:
             done = 0.0

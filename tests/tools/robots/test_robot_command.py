@@ -326,6 +326,17 @@ def test_questions_nobody_answers_write_nothing(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr and not path.exists()
 
 
+def test_all_wrong_keys_are_named_with_those_of_the_kind(tmp_path: Path) -> None:
+    given = {"kind": "planar-4", "width_m": "3", "height": "2"}
+    with pytest.raises(BadInputError) as caught:
+        answers_of(tmp_path / "mine.toml", given, usual)
+    text = str(caught.value)
+    assert text.startswith("--set width_m, height: no such question; allowed for planar-4: kind, ")
+    page = (Path(__file__).parents[3] / "docs" / "describing-your-robot.md").read_text()
+    for key in text.rpartition(": ")[2].split(", "):
+        assert f"`{key}`" in page or re.fullmatch(r"(exit|anchor)_[234]_m", key), key
+
+
 @pytest.mark.parametrize(
     ("key", "value", "problem"),
     [

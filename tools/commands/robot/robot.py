@@ -81,7 +81,12 @@ def new(
     path: Annotated[Path, typer.Argument(help="The file to write, NAME.toml.", metavar="FILE")],
     answers: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Answer in advance; may be repeated."),
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Answer in advance, such as frame_m='3 2'; may be repeated. A wrong key is "
+            "answered with all keys.",
+        ),
     ] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Use the defaults for all other questions.")
