@@ -12,6 +12,7 @@ from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
+from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.rigid_body import in_space, is_point
@@ -56,6 +57,7 @@ def findings(robot: Robot) -> list[Finding]:
         if statics.turns:
             found += _turning(statics)
         found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
+        found += [*_contact(statics), *_beside_the_body(robot.platform)]
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -121,7 +123,8 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     moving_N = np.array([statics.margin_N(points, platform.acceleration_m_s2, t) for t in turns])
     taken = float(np.mean(moving_N >= statics.model.reserve_N))
     if taken < 1.0:
-        text = f"in {100 * taken:.0f} % of the box targets are taken; "
+        # 99.9 % is not all
+        text = f"in {math.floor(100 * taken)} % of the box targets are taken; "
         smaller = statics.largest_box(statics.box) if platform.is_planar else None
         if smaller is not None:
             text += f"in all of {_point(smaller.low_m)} to {_point(smaller.high_m)} m they would be"
@@ -192,7 +195,9 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     for times in _TIMES:
         if helps(replace(platform, mass_kg=times * mass_kg), low_N):
             return f"a platform of {times * mass_kg:.3g} kg and more is possible there"
-    return "only a place further inside the exit points helps"
+    turned = len(platform.controlled) > len(platform.home_m)
+    others = ", or other anchor points, which turn it both ways about each axis"
+    return f"only a place further inside the exit points helps{others if turned else ''}"
 
 
 def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
@@ -337,9 +342,46 @@ def _lengths(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             yield Finding(f"limits.{key}", text, impossible=True)
 
 
+def _contact(statics: PlatformStatics) -> Iterator[Finding]:
+    """Look where in its box cables, platform or obstacles touch, turned as targets may be too."""
+    points, interference = statics.points(), statics.model.interference
+    found = [interference.clearances(statics.poses(points, turn)) for turn in statics.orientations]
+    clearance_m, pairs = (np.array(part) for part in zip(*found, strict=True))
+    touching = clearance_m < interference.clearance_m
+    if not touching.any():
+        return
+    k, i = np.unravel_index(clearance_m.argmin(), clearance_m.shape)
+    turn_rad = statics.orientations[k]
+    turned = f", turned {_turn(turn_rad)}," if turn_rad.any() else ""
+    things = in_words(interference.things(int(pairs[k, i])), float(clearance_m[k, i]))
+    text = (
+        f"value {interference.clearance_m:g}; in {math.ceil(100 * touching.any(axis=0).mean())} % "
+        f"of the box something is nearer, and no move goes there: at "
+        f"{_point(points.reshape(-1, points.shape[-1])[i])} m{turned} {things}"
+    )
+    yield Finding("platform.clearance_m", text, impossible=bool(touching[0].all()))
+
+
+def _beside_the_body(platform: Platform) -> Iterator[Finding]:
+    """Look for cables that are made fast off the box that the platform is said to be."""
+    if platform.body is None:
+        return
+    anchors = np.array(platform.anchor_points_m)
+    on_body = np.clip(anchors, platform.body.min_m, platform.body.max_m)
+    beside_m = np.linalg.norm(anchors - on_body, axis=1)
+    i = int(beside_m.argmax())
+    if beside_m[i] > platform.clearance_m:
+        text = (
+            f"{beside_m[i]:.3g} m beside platform.body; what is between them is not looked at for "
+            "contact: a body that reaches to its anchor points helps"
+        )
+        yield Finding(f"axes[{i}].anchor_point_m", text, impossible=False)
+
+
 def _turn(turn_rad: FloatArray) -> str:
     angle = float(np.linalg.norm(turn_rad))
-    axis = ", ".join(f"{value:.2g}" for value in turn_rad / angle)
+    # + 0: a rounded -0 is shown as 0
+    axis = ", ".join(f"{value:.2g}" for value in np.round(turn_rad / angle, 2) + 0.0)
     return f"by {math.degrees(angle):.0f} deg about ({axis})"
 
 
