@@ -30,6 +30,8 @@ _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
 _SLOW_Hz = 0.5
 """Of a loop's mode: it takes 2.3 s to come within 2 % of where it goes."""
+_RUBS_SHARE = 0.06
+"""Of a motor's rated torque: what friction and cogging of a servo winch together may take up."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
@@ -57,7 +59,7 @@ def findings(robot: Robot) -> list[Finding]:
         if statics.turns:
             found += _turning(statics)
         found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
-        found += [*_contact(statics), *_beside_the_body(robot.platform)]
+        found += [*_contact(statics), *_beside_the_body(robot.platform), *_rubbing(robot, statics)]
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -250,6 +252,18 @@ def _motors(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
         yield Finding("platform.speed_m_s", text, impossible=True)
 
 
+def _rubbing(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    winches, kept_N = [axis.winch for axis in robot.axes], statics.model.reserve_N
+    rated_N = max(w.motor.rated_torque_Nm / abs(w.cable_m_per_motor_rad) for w in winches)
+    if 0.0 < kept_N < _RUBS_SHARE * rated_N:
+        text = (
+            f"tensions keep {kept_N:.2g} N from their bounds for the control, friction and cogging "
+            f"of such winches may take up {_RUBS_SHARE * rated_N:.2g} N: it sticks, and runs over "
+            "its targets; smaller winches, or a mass for tensions mid of their bounds, help"
+        )
+        yield Finding("platform.mass_kg", text, impossible=False)
+
+
 def _turning(statics: PlatformStatics) -> Iterator[Finding]:
     home = np.array(statics.platform.home_m)
     places = np.concatenate([home[None], statics.points().reshape(-1, 2)])
@@ -343,23 +357,18 @@ def _lengths(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
 
 
 def _contact(statics: PlatformStatics) -> Iterator[Finding]:
-    """Look where in its box cables, platform or obstacles touch, turned as targets may be too."""
+    """Look where in its box cables, platform or obstacles touch, at home's orientation."""
     points, interference = statics.points(), statics.model.interference
-    found = [interference.clearances(statics.poses(points, turn)) for turn in statics.orientations]
-    clearance_m, pairs = (np.array(part) for part in zip(*found, strict=True))
-    touching = clearance_m < interference.clearance_m
-    if not touching.any():
-        return
-    k, i = np.unravel_index(clearance_m.argmin(), clearance_m.shape)
-    turn_rad = statics.orientations[k]
-    turned = f", turned {_turn(turn_rad)}," if turn_rad.any() else ""
-    things = in_words(interference.things(int(pairs[k, i])), float(clearance_m[k, i]))
-    text = (
-        f"value {interference.clearance_m:g}; in {math.ceil(100 * touching.any(axis=0).mean())} % "
-        f"of the box something is nearer, and no move goes there: at "
-        f"{_point(points.reshape(-1, points.shape[-1])[i])} m{turned} {things}"
-    )
-    yield Finding("platform.clearance_m", text, impossible=bool(touching[0].all()))
+    clearances_m, pairs = interference.clearances(statics.poses(points))
+    touching, i = clearances_m < interference.clearance_m, int(clearances_m.argmin())
+    if touching.any():
+        things = in_words(interference.things(int(pairs[i])), float(clearances_m[i]))
+        text = (
+            f"value {interference.clearance_m:g}; in {math.ceil(100 * touching.mean())} % of the "
+            "box something is nearer, and no move goes there: at "
+            f"{_point(points.reshape(-1, points.shape[-1])[i])} m {things}"
+        )
+        yield Finding("platform.clearance_m", text, impossible=bool(touching.all()))
 
 
 def _beside_the_body(platform: Platform) -> Iterator[Finding]:

@@ -162,7 +162,10 @@ def _orientation_lines(platform: Platform) -> list[str]:
 
 def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
     """Return a line for each cable on how far the platform swings when it breaks, at the worst."""
-    lines = ["if a cable breaks, the platform comes to rest on the others (the worst corner):"]
+    lines = [
+        "if a cable breaks and the other winches stand still, the platform comes to rest on the "
+        "others (the worst corner):"
+    ]
     for axis in axes:
         broken = axis["broken"]
         line = (

@@ -256,8 +256,10 @@ BODY = "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.1, 0.1, 0.3] }"
 
 
 def test_cables_that_touch_within_the_box_are_told_with_the_place(tmp_path: Path) -> None:
-    # cable 1 ends a little above cable 5, and crosses it
-    text = SPATIAL.replace("[0.1, -0.1, 0.3]", "[-0.1, 0.1, 0.2]", 1)
+    # cables of one corner of the frame, from below to the top and from above to the bottom, cross
+    text = SPATIAL.replace("[0.1, -0.1, 0.3]", "[-0.1, -0.1, 0.3]", 1)
+    text = text.replace("[-0.1, 0.1, -0.3]", "[-0.1, -0.1, -0.3]", 1)
+    text = text.replace("[-2.0873, -1.7254, 2.9602]", "[-1.8133, -2.1594, 2.9602]", 1)
     told = findings_of(tmp_path, text)["platform.clearance_m"]
     assert re.match(
         r"value 0\.01; in \d+ % of the box something is nearer.* at \(.*\) m.* cable", told
@@ -279,6 +281,13 @@ def test_a_cable_that_is_made_fast_beside_the_body_is_told(tmp_path: Path) -> No
     narrow = BODY.replace("max_m = [0.1,", "max_m = [0.05,")
     told = findings_of(tmp_path, SPATIAL.replace(BODY, narrow))
     assert "0.05 m beside platform.body" in told["axes[0].anchor_point_m"]
+
+
+def test_winches_that_rub_by_more_than_is_kept_for_control_are_told(tmp_path: Path) -> None:
+    # of the 115 N that such a motor is rated for
+    told = findings(robot_of(tmp_path, ("max_N = 150", "max_N = 60")))
+    about = [f for f in told if f.key == "platform.mass_kg"]
+    assert about and "may take up 6.9 N" in about[0].text and not about[0].impossible
 
 
 def test_what_no_place_mends_is_not_laid_to_the_place(tmp_path: Path) -> None:
