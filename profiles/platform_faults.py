@@ -144,14 +144,16 @@ def _direction_faults(
     """Yield faults of controlled directions, against the cables and what angles need."""
     size, n = len(file.home_m), len(anchors)
     known = DIRECTIONS[size]
-    controlled = file.controlled or controlled_by_default(anchors)
-    if set(controlled) - set(known) or not set(known[:size]) <= set(controlled):
+    given = controlled_by_default(anchors) if file.controlled is None else file.controlled
+    controlled = set(given)
+    twice = len(controlled) < len(given)
+    if twice or controlled - set(known) or not set(known[:size]) <= controlled:
         positions, angles = ", ".join(known[:size]), ", ".join(known[size:])
-        problem = f"value {list(controlled)}; allowed: {positions}, and any of {angles}"
+        problem = f"value {list(given)}; allowed: {positions}, and any of {angles}, each once"
         yield "platform.controlled", problem
         return
     if len(controlled) > n:
-        problem = f"{n}; allowed: {len(controlled)} and more to control {', '.join(controlled)}"
+        problem = f"{n}; allowed: {len(controlled)} and more to control {', '.join(given)}"
         if size == 3 and len(controlled) == 6:
             problem += ", or all anchor points alike: a point in space takes 3"
         yield "axes", problem

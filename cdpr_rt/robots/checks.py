@@ -12,6 +12,7 @@ from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
+from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform.loop_design import designed_loop
 from cdpr_rt.robots.platform_model import platform_model
 from cdpr_rt.robots.rigid_body import in_space, is_point
@@ -29,6 +30,8 @@ _NEAREST_m = 0.1
 """An anchor point closer than this to an exit point is about to be pulled into it."""
 _SLOW_Hz = 0.5
 """Of a loop's mode: it takes 2.3 s to come within 2 % of where it goes."""
+_RUBS_SHARE = 0.06
+"""Of a motor's rated torque: what friction and cogging of a servo winch together may take up."""
 _FAR_TURNED_deg, _TIPPED_deg = 10.0, 4.0
 _WIDE_ARMS = 0.5
 """Anchor points further apart than this share of the exit points are probably not in metres."""
@@ -56,6 +59,7 @@ def findings(robot: Robot) -> list[Finding]:
         if statics.turns:
             found += _turning(statics)
         found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
+        found += [*_contact(statics), *_beside_the_body(robot.platform), *_rubbing(robot, statics)]
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
@@ -121,7 +125,8 @@ def _tensions(statics: PlatformStatics) -> Iterator[Finding]:
     moving_N = np.array([statics.margin_N(points, platform.acceleration_m_s2, t) for t in turns])
     taken = float(np.mean(moving_N >= statics.model.reserve_N))
     if taken < 1.0:
-        text = f"in {100 * taken:.0f} % of the box targets are taken; "
+        # 99.9 % is not all
+        text = f"in {math.floor(100 * taken)} % of the box targets are taken; "
         smaller = statics.largest_box(statics.box) if platform.is_planar else None
         if smaller is not None:
             text += f"in all of {_point(smaller.low_m)} to {_point(smaller.high_m)} m they would be"
@@ -192,7 +197,9 @@ def _what_helps(statics: PlatformStatics, position_m: FloatArray, turn_rad: Floa
     for times in _TIMES:
         if helps(replace(platform, mass_kg=times * mass_kg), low_N):
             return f"a platform of {times * mass_kg:.3g} kg and more is possible there"
-    return "only a place further inside the exit points helps"
+    turned = len(platform.controlled) > len(platform.home_m)
+    others = ", or other anchor points, which turn it both ways about each axis"
+    return f"only a place further inside the exit points helps{others if turned else ''}"
 
 
 def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
@@ -243,6 +250,18 @@ def _motors(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             "limit of its speed"
         )
         yield Finding("platform.speed_m_s", text, impossible=True)
+
+
+def _rubbing(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
+    winches, kept_N = [axis.winch for axis in robot.axes], statics.model.reserve_N
+    rated_N = max(w.motor.rated_torque_Nm / abs(w.cable_m_per_motor_rad) for w in winches)
+    if 0.0 < kept_N < _RUBS_SHARE * rated_N:
+        text = (
+            f"tensions keep {kept_N:.2g} N from their bounds for the control, friction and cogging "
+            f"of such winches may take up {_RUBS_SHARE * rated_N:.2g} N: it sticks, and runs over "
+            "its targets; smaller winches, or a mass for tensions mid of their bounds, help"
+        )
+        yield Finding("platform.mass_kg", text, impossible=False)
 
 
 def _turning(statics: PlatformStatics) -> Iterator[Finding]:
@@ -337,9 +356,41 @@ def _lengths(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
             yield Finding(f"limits.{key}", text, impossible=True)
 
 
+def _contact(statics: PlatformStatics) -> Iterator[Finding]:
+    """Look where in its box cables, platform or obstacles touch, at home's orientation."""
+    points, interference = statics.points(), statics.model.interference
+    clearances_m, pairs = interference.clearances(statics.poses(points))
+    touching, i = clearances_m < interference.clearance_m, int(clearances_m.argmin())
+    if touching.any():
+        things = in_words(interference.things(int(pairs[i])), float(clearances_m[i]))
+        text = (
+            f"value {interference.clearance_m:g}; in {math.ceil(100 * touching.mean())} % of the "
+            "box something is nearer, and no move goes there: at "
+            f"{_point(points.reshape(-1, points.shape[-1])[i])} m {things}"
+        )
+        yield Finding("platform.clearance_m", text, impossible=bool(touching.all()))
+
+
+def _beside_the_body(platform: Platform) -> Iterator[Finding]:
+    """Look for cables that are made fast off the box that the platform is said to be."""
+    if platform.body is None:
+        return
+    anchors = np.array(platform.anchor_points_m)
+    on_body = np.clip(anchors, platform.body.min_m, platform.body.max_m)
+    beside_m = np.linalg.norm(anchors - on_body, axis=1)
+    i = int(beside_m.argmax())
+    if beside_m[i] > platform.clearance_m:
+        text = (
+            f"{beside_m[i]:.3g} m beside platform.body; what is between them is not looked at for "
+            "contact: a body that reaches to its anchor points helps"
+        )
+        yield Finding(f"axes[{i}].anchor_point_m", text, impossible=False)
+
+
 def _turn(turn_rad: FloatArray) -> str:
     angle = float(np.linalg.norm(turn_rad))
-    axis = ", ".join(f"{value:.2g}" for value in turn_rad / angle)
+    # + 0: a rounded -0 is shown as 0
+    axis = ", ".join(f"{value:.2g}" for value in np.round(turn_rad / angle, 2) + 0.0)
     return f"by {math.degrees(angle):.0f} deg about ({axis})"
 
 

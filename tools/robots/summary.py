@@ -17,6 +17,7 @@ from cdpr_rt.robots.free_rotation import SWINGS_m, free_rotation
 from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, designed_loop
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
+from cdpr_rt.robots.rigid_body import is_point
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import statics_of, view_of
 
@@ -79,7 +80,7 @@ def _of_tensions(
         "lowest_resonance_Hz": float(lowest_resonance_Hz(robot, points).min()),
     }
     of_all["loop"] = _of_loop(robot, statics.model)
-    if statics.turns:
+    if statics.turns and not is_point(platform):
         of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
         of_all["free_rotation"] = _of_free_rotation(statics.model)
     return of_all
@@ -161,7 +162,10 @@ def _orientation_lines(platform: Platform) -> list[str]:
 
 def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
     """Return a line for each cable on how far the platform swings when it breaks, at the worst."""
-    lines = ["if a cable breaks, the platform comes to rest on the others (the worst corner):"]
+    lines = [
+        "if a cable breaks and the other winches stand still, the platform comes to rest on the "
+        "others (the worst corner):"
+    ]
     for axis in axes:
         broken = axis["broken"]
         line = (
@@ -174,12 +178,13 @@ def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def _tension_lines(figures: dict[str, Any]) -> list[str]:
-    held, taken = 100.0 * figures["held_share"], 100.0 * figures["target_share"]
+    # 99.9 % is not all
+    held, taken = (math.floor(100.0 * figures[key]) for key in ("held_share", "target_share"))
     reserve, kept = figures["reserve_in_motion_N"], figures["kept_for_control_N"]
     least = "" if reserve is None or reserve < 0.0 else f" ({reserve:.0f} N at the worst place)"
     lines = [
-        f"tensions   hold the platform in {held:.0f} % of the box; targets are accepted in "
-        f"{taken:.0f} % of it,",
+        f"tensions   hold the platform in {held} % of the box; targets are accepted in "
+        f"{taken} % of it,",
         f"           where tensions in motion keep the {kept:.0f} N of the control from their "
         f"limits{least}",
     ]
@@ -233,7 +238,7 @@ def _table(axes: Sequence[dict[str, Any]]) -> list[str]:
         row += f"{_point(axis['anchor_point_m'], 3):>{b}}"
         cable = "{:.2f} to {:.2f}".format(*axis["cable_m"])
         tension = "{:g} to {:g}".format(*axis["tension_N"])
-        torque = f"{axis['torque_at_most_Nm']:.1f} of {axis['torque_limit_Nm']:g}"
+        torque = f"{axis['torque_at_most_Nm']:.3g} of {axis['torque_limit_Nm']:g}"
         rows.append(row + f"{cable:>16}{tension:>14}{torque:>16}")
     return rows
 

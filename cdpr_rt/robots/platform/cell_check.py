@@ -61,9 +61,8 @@ def compare(
     """Take in one cycle; return which cell is off the furthest, -1 where none is told apart.
 
     `asked` (n,) are the tensions asked for, as late as readings are, `correction` (n,) what is
-    added to them, or more where what was learnt of a motor leaves less room. Of `found` (2, n),
-    written, are a and SIGMAS σ_a of each cell; `difference` (n,) and `balance` (d,) are z - τ and
-    W z + w, low-passed.
+    added to them. Of `found` (2, n), written, are a and SIGMAS σ_a of each cell; `difference` (n,)
+    and `balance` (d,) are z - τ and W z + w, low-passed.
     """
     d, n = W.shape
     share, square, whole = period_s / (_LOWPASS_S + period_s), 0.0, True

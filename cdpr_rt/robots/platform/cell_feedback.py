@@ -38,12 +38,14 @@ def follow(
     lagging: FloatArray,
     correction: FloatArray,
     torque: FloatArray,
+    applied: FloatArray,
     asked: FloatArray,
 ) -> bool:
     """Bring corrections (n,), N, up to date with a cycle, and write their torques (n,), Nm.
 
     They stay within a share of the reserve, and return to 0 while there is no reading; the torques
-    together with those that were `learnt` (n,) within a larger one. Returns whether there is any.
+    together with those that were `learnt` (n,) within a larger one. What that leaves of the
+    corrections is `applied` (n,), N, written. Returns whether there is any reading.
     """
     read, most_N = False, SHARE * reserve_N
     for i in range(asked.size):
@@ -57,6 +59,7 @@ def follow(
         together = TOGETHER_SHARE * reserve_N * abs(m_per_rad[i])
         both = learnt[i] - m_per_rad[i] * correction[i]
         torque[i] = min(max(both, -together), together) - learnt[i]
+        applied[i] = -torque[i] / m_per_rad[i]
     return read
 
 
@@ -84,13 +87,13 @@ class CellFeedback:
         n = m_per_rad.size
         self.torque_Nm = np.zeros(n)
         """What is added for it, (n,)."""
-        self._lagging, self._correction = np.zeros((2, n))
+        self._lagging, self._correction, applied = np.zeros((3, n))
         self._follow = bound(
             follow, period_s, reserve_N, measured_N, measured, m_per_rad, learnt_Nm, self._lagging,
-            self._correction, self.torque_Nm, then=(np.zeros(n),),
+            self._correction, self.torque_Nm, applied, then=(np.zeros(n),),
         )  # fmt: skip
         self.check = check
-        check.bind(measured_N, measured, self._lagging, self._correction, W, wrench)
+        check.bind(measured_N, measured, self._lagging, applied, W, wrench)
 
     def restart(self, asked_N: FloatArray) -> None:
         """Begin anew, with tensions asked for (n,)."""

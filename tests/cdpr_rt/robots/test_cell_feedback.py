@@ -98,3 +98,12 @@ def test_a_stuck_cell_and_what_was_learnt_wrongly_do_not_add_up(sign: float) -> 
     cables.learnt_Nm[:] *= -1.0  # as friction does where the motion turns round
     cables.run(PERIOD_S, stuck_N=50.0 + sign * 900.0)
     assert cables.true_N == pytest.approx(50.0 + sign * (most_N - 1.25 * MOST_N))
+
+
+def test_a_cell_is_held_against_the_correction_that_is_applied() -> None:
+    cables = Cables()
+    cables.missing_N = np.zeros(3)
+    cables.learnt_Nm[:] = CABLE_m * (TOGETHER_SHARE * RESERVE_N - 0.25 * MOST_N)
+    cables.run(16.0, stuck_N=950.0)
+    # a quarter of the correction is left beside what was learnt
+    assert f"shows {900.0 + 0.25 * MOST_N:.0f} N more" in cables.feedback.check.trouble

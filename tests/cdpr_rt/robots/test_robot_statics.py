@@ -251,6 +251,52 @@ def test_a_turned_platform_that_meets_its_stand_is_told(tmp_path: Path) -> None:
     assert "from 0.68 m upward" in told
 
 
+SPATIAL = (SHIPPED / "robots" / "spatial-8.toml").read_text()
+BODY = "body = { min_m = [-0.1, -0.1, -0.3], max_m = [0.1, 0.1, 0.3] }"
+
+
+def test_cables_that_touch_within_the_box_are_told_with_the_place(tmp_path: Path) -> None:
+    # cables of one corner of the frame, from below to the top and from above to the bottom, cross
+    text = SPATIAL.replace("[0.1, -0.1, 0.3]", "[-0.1, -0.1, 0.3]", 1)
+    text = text.replace("[-0.1, 0.1, -0.3]", "[-0.1, -0.1, -0.3]", 1)
+    text = text.replace("[-2.0873, -1.7254, 2.9602]", "[-1.8133, -2.1594, 2.9602]", 1)
+    told = findings_of(tmp_path, text)["platform.clearance_m"]
+    assert re.match(
+        r"value 0\.01; in \d+ % of the box something is nearer.* at \(.*\) m.* cable", told
+    )
+    assert "platform.clearance_m" not in findings_of(tmp_path, SPATIAL)
+
+
+def test_a_body_that_no_cable_passes_is_impossible(tmp_path: Path) -> None:
+    path = tmp_path / "wide.toml"
+    wide = "body = { min_m = [-2.5, -2.5, -0.3], max_m = [2.5, 2.5, 0.3] }"
+    path.write_text(SPATIAL.replace(BODY, wide))
+    with pytest.raises(
+        ProfileError, match=r"clearance_m: value 0\.01; in 100 % of the box .*touch"
+    ):
+        refuse_impossible(load_robot(path))
+
+
+def test_a_cable_that_is_made_fast_beside_the_body_is_told(tmp_path: Path) -> None:
+    narrow = BODY.replace("max_m = [0.1,", "max_m = [0.05,")
+    told = findings_of(tmp_path, SPATIAL.replace(BODY, narrow))
+    assert "0.05 m beside platform.body" in told["axes[0].anchor_point_m"]
+
+
+def test_winches_that_rub_by_more_than_is_kept_for_control_are_told(tmp_path: Path) -> None:
+    # of the 115 N that such a motor is rated for
+    told = findings(robot_of(tmp_path, ("max_N = 150", "max_N = 60")))
+    about = [f for f in told if f.key == "platform.mass_kg"]
+    assert about and "may take up 6.9 N" in about[0].text and not about[0].impossible
+
+
+def test_what_no_place_mends_is_not_laid_to_the_place(tmp_path: Path) -> None:
+    # all upper cables to the lower end, all lower ones to the upper: none turns it about z
+    text = re.sub(r"(anchor_point_m = )\[.*, .*, (.*)\]", r"\1[0.1, 0.0, \2]", SPATIAL)
+    told = findings_of(tmp_path, text)["platform.home_m"]
+    assert "or other anchor points" in told or "all anchor points" in told
+
+
 def test_turning_takes_part_in_the_speed_of_the_cables(tmp_path: Path) -> None:
     text = SUSPENDED.replace("angular_speed_rad_s = 0.25", "angular_speed_rad_s = 0.6")
     assert "platform.speed_m_s" in findings_of(tmp_path, text)

@@ -1,0 +1,28 @@
+"""What is said of a robot in figures, where the figure could mislead."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from cdpr_profiles import load_robot
+from cdpr_profiles.reading.places import SHIPPED
+from cdpr_tools.robots.summary import figures, lines
+
+
+def test_a_point_in_a_plane_is_not_said_to_turn(tmp_path: Path) -> None:
+    text = (SHIPPED / "robots" / "planar-3.toml").read_text()
+    path = tmp_path / "point.toml"
+    path.write_text(re.sub(r"anchor_point_m = .*", "anchor_point_m = [0.0, 0.0]", text))
+    robot = load_robot(path)
+    assert robot.platform is not None
+    told = figures(robot, robot.platform)
+    assert "turns_at_most_rad" not in told
+    assert not any("turns" in line for line in lines(robot, robot.platform, told))
+
+
+def test_a_share_that_is_nearly_all_is_not_said_to_be_all() -> None:
+    robot = load_robot("planar-3")
+    assert robot.platform is not None
+    told = figures(robot, robot.platform) | {"target_share": 0.997}
+    assert any("accepted in 99 % of it" in line for line in lines(robot, robot.platform, told))
