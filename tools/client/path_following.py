@@ -10,11 +10,12 @@ from typing import Any, Final
 
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_rt.motion.path.reading import require_kind
-from cdpr_tools.client.client import Daemon, HeldRight, await_start, remedy
+from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_tools.client.client import Daemon, HeldRight, await_start
 from cdpr_tools.client.motion import RENEW_S, TELL_S, ended_text, finish
+from cdpr_tools.client.refusals import RefusedError, in_typed_words
 from cdpr_tools.client.status_text import (
     GO_ON,
-    in_millimetres,
     left_text,
     percent_text,
     place_text,
@@ -105,8 +106,8 @@ def require_held(status: dict[str, Any]) -> None:
     """Raise WorkFailedError where a path could not be followed: before it is planned for that."""
     state = str(status["state"])
     if state != "active":
-        refusal = f"path: not in state {state}; allowed in active"
-        raise WorkFailedError(refusal + remedy(refusal, state))
+        states = {"state": state, "allowed": ["active"]}
+        raise RefusedError(Refusal(RefusalCode.NOT_IN_STATE, "path", arguments=states))
     if (status.get("program_progress") or {}).get("tight") is False:
         raise WorkFailedError("path: the cables are not tight; `cdpr tighten` first")
 
@@ -114,10 +115,9 @@ def require_held(status: dict[str, Any]) -> None:
 def _run(daemon: Daemon, out: Output, wanted: dict[str, Any], **figures: Any) -> None:
     ended: dict[str, Any] | None = None
     with stop_on_signals() as stop_requested, daemon.control() as control:
-        try:
+        typed = "--back" if "back_m" in wanted else "--resume"
+        with in_typed_words("path", typed, allowed="--run with a path's FILE"):
             control.post("/program", {"program": "path", "wanted": wanted})
-        except (BadInputError, WorkFailedError) as error:
-            raise type(error)(_as_typed(str(error))) from None
         watch = _Watch(control, out)
         while ended is None and not watch.paused and not stop_requested():
             time.sleep(RENEW_S)
@@ -163,7 +163,7 @@ class _Watch:
             self.paused = f"{left_text(path)}, paused by {why}; {GO_ON}, {BACK}"
             return None
         if progress.get("trouble") and progress.get("done") != 1.0:
-            raise WorkFailedError(f"path: {in_millimetres(progress['trouble'])}")
+            raise WorkFailedError(f"path: {progress['trouble']}")
         over = progress.get("done") == 1.0 and path.get("time_s") == path.get("duration_s")
         if path and not over:
             self._tell(progress, path)
@@ -181,18 +181,6 @@ class _Watch:
             on_it = path["stage"] == "path"
             self._out.note(progress_text(path) if on_it else place_text(progress))
         self._stage, self._told_s = stage, now_s
-
-
-def _as_typed(refusal: str) -> str:
-    """Return a refusal of the program in the words of the command line."""
-    words = {
-        "path: resume: ": "--resume: ",
-        "path: back_m: ": "--back: ",
-        "allowed: plan": "allowed: --run with a path's FILE",
-    }
-    for key, typed in words.items():
-        refusal = refusal.replace(key, typed)
-    return in_millimetres(refusal)
 
 
 def progress_text(path: dict[str, Any]) -> str:
