@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
 
+_SHOWN = 60
+
 
 class RefusalCode(StrEnum):
     """What is in a command's way; in brackets the arguments beside what was asked for."""
@@ -69,7 +71,7 @@ class Refusal:
         index = self.arguments.get("index")
         place = "" if index is None else f"[{index}]"
         return ", ".join(
-            key if value is True else f"{key}{place}: value {value!r}"
+            key if value is True else f"{key}{place}: value {shown(value)}"
             for key, value in self.asked.items()
         )
 
@@ -86,6 +88,12 @@ class Refusal:
         except (TypeError, KeyError, ValueError, AttributeError):
             return None
         return refusal
+
+
+def shown(value: Any) -> str:
+    """Return a value as it is told, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 
 def refusal_of(error: Exception) -> Refusal | None:

@@ -10,9 +10,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.programs.base import ProgramError
-from cdpr_rt.refusal import Refusal, RefusalCode
-
-_SHOWN = 60
+from cdpr_rt.refusal import Refusal, RefusalCode, shown
 
 
 class CommandArguments:
@@ -24,7 +22,7 @@ class CommandArguments:
         for key in arguments:
             if key not in allowed:
                 words = ", ".join(allowed) if allowed else "none: it takes no set-point"
-                raise ProgramError(f"{program}: key {_show(key)}; allowed: {words}")
+                raise ProgramError(f"{program}: key {shown(key)}; allowed: {words}")
 
     def __contains__(self, key: str) -> bool:
         return key in self._arguments
@@ -78,9 +76,4 @@ class CommandArguments:
         return float(value)
 
     def _refused(self, key: str, value: Any, allowed: str) -> ProgramError:
-        return ProgramError(f"{self._program}: {key}: value {_show(value)}; allowed: {allowed}")
-
-
-def _show(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
+        return ProgramError(f"{self._program}: {key}: value {shown(value)}; allowed: {allowed}")
