@@ -52,8 +52,8 @@ def follow(opened: Opened, out: Output, file: Path, options: PathOptions, feed: 
             f"{file.name}: {planned['length_m']:.3f} m in {time_text(planned['duration_s'])}, "
             f"{planned['gain']:.1f} times as fast as at one speed throughout"
         )
-        wanted = {"plan": planned["plan"], "feed": feed}
-        _run(daemon, out, wanted, planned_s=planned["duration_s"])
+        arguments = {"plan": planned["plan"], "feed": feed}
+        _run(daemon, out, arguments, planned_s=planned["duration_s"])
 
 
 def plain_name(file: Path) -> str:
@@ -67,10 +67,10 @@ def take_up(opened: Opened, out: Output, back_mm: float | None, feed: float) -> 
     """Go on with the path that was left, or step back along it."""
     with opened as daemon:
         _require_platform(daemon, out)
-        wanted: dict[str, Any] = {"resume": True, "feed": feed}
+        arguments: dict[str, Any] = {"resume": True, "feed": feed}
         if back_mm is not None:
-            wanted = {"back_m": 1e-3 * back_mm, "feed": feed}
-        _run(daemon, out, wanted)
+            arguments = {"back_m": 1e-3 * back_mm, "feed": feed}
+        _run(daemon, out, arguments)
 
 
 def _planned(daemon: Daemon, body: dict[str, Any]) -> dict[str, Any]:
@@ -112,12 +112,12 @@ def require_held(status: dict[str, Any]) -> None:
         raise WorkFailedError("path: the cables are not tight; `cdpr tighten` first")
 
 
-def _run(daemon: Daemon, out: Output, wanted: dict[str, Any], **figures: Any) -> None:
+def _run(daemon: Daemon, out: Output, arguments: dict[str, Any], **figures: Any) -> None:
     ended: dict[str, Any] | None = None
     with stop_on_signals() as stop_requested, daemon.control() as control:
-        typed = "--back" if "back_m" in wanted else "--resume"
+        typed = "--back" if "back_m" in arguments else "--resume"
         with in_typed_words("path", typed, allowed="--run with a path's FILE"):
-            control.post("/program", {"program": "path", "wanted": wanted})
+            control.post("/program", {"program": "path", "wanted": arguments})
         watch = _Watch(control, out)
         while ended is None and not watch.paused and not stop_requested():
             time.sleep(RENEW_S)

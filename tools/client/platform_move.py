@@ -42,7 +42,7 @@ class PlatformMove:
         words += [f"--rotate {self.rotate}"] if self.rotate is not None else []
         return " ".join(words)
 
-    def wanted(self, daemon: Daemon) -> dict[str, Any]:
+    def arguments(self, daemon: Daemon) -> dict[str, Any]:
         """Return what the program `pose` is to do; raises BadInputError."""
         platform = daemon.get("/description").get("platform")
         if platform is None:
@@ -62,16 +62,16 @@ class PlatformMove:
             to, rotate = self._from_here(daemon, platform, to, rotate, turns)
         elif self.frame is not Frame.ROOM:
             raise BadInputError(f"--frame {self.frame}: allowed: together with --relative")
-        wanted: dict[str, Any] = {}
+        arguments: dict[str, Any] = {}
         if to is not None:
             self._check_box(to, names, platform)
-            wanted["position_m"] = to
+            arguments["position_m"] = to
         if rotate is not None:
             self._check_angle(rotate, platform)
-            wanted["rotation_rad"] = rotate
+            arguments["rotation_rad"] = rotate
         if self.speed is not None:
-            wanted["speed_m_s"] = self._checked_speed(self.speed, platform)
-        return wanted
+            arguments["speed_m_s"] = self._checked_speed(self.speed, platform)
+        return arguments
 
     def _from_here(
         self,

@@ -287,9 +287,9 @@ class CommandDispatcher:
         """Return the number of the grant that the command names, which must be the current one."""
         number = command.get("right")
         right = number if type(number) is int else 0
-        missing = self._engine.right.refusal(right)
-        if missing:
-            raise RefusedError(f"{what}: {missing}")
+        why_not = self._engine.right.refusal(right)
+        if why_not:
+            raise RefusedError(f"{what}: {why_not}")
         return right
 
     def _refuse_read_only(self, what: str) -> None:

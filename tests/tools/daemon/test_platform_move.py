@@ -96,7 +96,7 @@ def wanted(
     frame: Frame = Frame.ROOM,
     speed: float | None = None,
 ) -> dict[str, Any]:
-    return PlatformMove(to, rotate, relative, frame, speed).wanted(told)  # type: ignore[arg-type]
+    return PlatformMove(to, rotate, relative, frame, speed).arguments(told)  # type: ignore[arg-type]
 
 
 def test_millimetres_and_degrees_become_si() -> None:

@@ -51,18 +51,18 @@ def jog(
     factor = 1e-3 if cable else math.radians(1.0)
     values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
     key = "cable_velocity_m_s" if cable else "velocity_rad_s"
-    wanted = {key: values, "timeout_s": _DEADMAN_S, "duration_s": seconds}
+    arguments = {key: values, "timeout_s": _DEADMAN_S, "duration_s": seconds}
     notes = ProgressNotes(out)
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
         with in_typed_words("jog", axes=_names(daemon)):
-            control.post("/program", {"program": "jog", "wanted": wanted})
+            control.post("/program", {"program": "jog", "wanted": arguments})
         while not stop_requested():
             time.sleep(RENEW_S)
             progress = require_program(daemon, "jog").get("program_progress", {})
             notes("jog", progress)
             if is_done(progress):
                 break
-            control.post("/set", {"wanted": wanted})
+            control.post("/set", {"wanted": arguments})
         control.hold()
     finish(daemon, out, stop_requested())
 
@@ -117,15 +117,15 @@ def move(
 
 
 def _move_platform(daemon: Daemon, out: Output, move: PlatformMove) -> None:
-    _run_to_end(daemon, out, "pose", move.wanted(daemon), move.typed)
+    _run_to_end(daemon, out, "pose", move.arguments(daemon), move.typed)
 
 
 def _run_to_end(
-    daemon: Daemon, out: Output, program: str, wanted: dict[str, Any], typed: str = ""
+    daemon: Daemon, out: Output, program: str, arguments: dict[str, Any], typed: str = ""
 ) -> None:
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
         with in_typed_words("move", typed, _names(daemon)):
-            control.post("/program", {"program": program, "wanted": wanted})
+            control.post("/program", {"program": program, "wanted": arguments})
         ended = await_end(control, program, stop_requested, math.inf, out)
         control.hold()
     finish(daemon, out, stop_requested(), ended, arrived=ended is not None)
@@ -151,12 +151,12 @@ def _to_angles(
     n, goals = _given(daemon, axes, "mm" if cable else "deg")
     factor = 1e-3 if cable else math.radians(1.0)
     key = "cable_m" if cable else "distance_rad" if relative else "position_rad"
-    wanted: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         key: [factor * goals[axis] if axis in goals else None for axis in range(n)]
     }
     if speed is not None:
-        wanted["speed_rad_s"] = math.radians(speed)
-    return wanted
+        arguments["speed_rad_s"] = math.radians(speed)
+    return arguments
 
 
 @app.command()
@@ -180,9 +180,9 @@ def controller(
 
     `hold` and `idle` run on when the command has ended.
     """
-    wanted, ended = key_values(values or []), None
+    arguments, ended = key_values(values or []), None
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
-        control.post("/program", {"program": name, "wanted": wanted})
+        control.post("/program", {"program": name, "wanted": arguments})
         if name not in _STANDING:
             ended = await_end(control, name, stop_requested, seconds or math.inf, out)
             control.hold()
@@ -222,10 +222,10 @@ def tighten(
     ] = None,
 ) -> None:
     """Take up the slack of a platform's cables and learn where it is; it is held then."""
-    wanted = {} if source is None else {"from": source.value}
+    arguments = {} if source is None else {"from": source.value}
     typed = "tighten" if source is None else f"tighten --from {source.value}"
     with in_typed_words("tighten", typed, option="--from "):
-        _carry_out(daemon, out, "tighten", wanted)
+        _carry_out(daemon, out, "tighten", arguments)
 
 
 @app.command()
@@ -239,10 +239,10 @@ def lower(
     ] = False,
 ) -> None:
     """Let the platform down onto its stand; the power stays on, the cables are loose."""
-    wanted = {"blind": True} if blind else {}
+    arguments = {"blind": True} if blind else {}
     tight = (daemon.get("/status").get("program_progress") or {}).get("tight")
     where = "let down blind" if blind else "on its stand" if tight else "where it is"
-    _carry_out(daemon, out, "lower", wanted, f"{where}, cables loose, power on")
+    _carry_out(daemon, out, "lower", arguments, f"{where}, cables loose, power on")
 
 
 @app.command()
@@ -274,12 +274,12 @@ def _require_platform(daemon: Daemon, what: str) -> None:
 
 
 def _carry_out(
-    daemon: Daemon, out: Output, program: str, wanted: dict[str, Any], where: str = ""
+    daemon: Daemon, out: Output, program: str, arguments: dict[str, Any], where: str = ""
 ) -> None:
     """Have a program run to its end, then hold; `where` are the words for its end."""
     _require_platform(daemon, program)
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
-        control.post("/program", {"program": program, "wanted": wanted})
+        control.post("/program", {"program": program, "wanted": arguments})
         ended = await_end(control, program, stop_requested, math.inf, out)
         control.hold()
     finish(daemon, out, stop_requested(), ended, where)

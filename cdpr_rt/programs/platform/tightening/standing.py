@@ -41,6 +41,8 @@ def source_refusal(parts: PlatformParts, source: str, asked: Mapping[str, Any]) 
     Where the platform was let go, or fell, somebody has to have `asked` for it by name.
     """
     last = parts.last
+    if asked and parts.tight:
+        return bad_source(asked, "the cables are tight already; lower it first")
     if last.fallen and not asked:
         elsewhere, allowed = (_FALLEN_ELSEWHERE, ("lengths",)) if parts.known else ("", ())
         return bad_source(asked, _FALLEN + elsewhere, "home", *allowed)
@@ -53,10 +55,10 @@ def source_refusal(parts: PlatformParts, source: str, asked: Mapping[str, Any]) 
         return bad_source(asked, "the cables' lengths are not known", "home")
     if source == "last" and last.lengths is None:
         return bad_source(asked, f"no lengths of the last stop: {last.why}")
+    why = ""
     if source == "home" and parts.known and not parts.tight:
         why = why_not_to_wind_in(parts, parts.estimator.estimate.cable_length_m)
-        return bad_source(asked, why) if why else None
-    return None
+    return bad_source(asked, why) if why else None
 
 
 def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:

@@ -171,10 +171,6 @@ class TightenProgram(PlatformProgram):
 
     def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
         CommandArguments(self.name, arguments, ("from",))
-        if arguments and self._parts.tight:
-            raise ProgramError(
-                bad_source(arguments, "the cables are tight already; lower it first")
-            )
         source = arguments.get("from", self._default_source())
         if source not in _SOURCES:
             allowed = ", ".join(_SOURCES)
@@ -401,8 +397,6 @@ class TightenProgram(PlatformProgram):
         """Return which index contradicts the lengths of the last stop, or an empty text."""
         if self._last is None:
             return ""
-        length_m, allowed_m = (
-            self._parts.estimator.estimate.cable_length_m,
-            self._parts.lengths_allowed_m,
-        )
+        parts = self._parts
+        length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
         return index_disagreement(self._last, length_m, self._feedback, self._cable, allowed_m)
