@@ -1,6 +1,8 @@
-"""Types of the arrays over axes, cables and directions."""
+"""Types of the arrays over axes, cables and directions, and their root mean square."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,3 +11,11 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 WordArray = NDArray[np.uint16]
+
+
+def rms(values: FloatArray) -> float:
+    """Return sqrt(Σ|v|²/m), the root mean square of m numbers (m,) or lengths of vectors (m, d).
+
+    It is nan where there are none.
+    """
+    return math.sqrt(float(np.square(values).sum()) / len(values)) if len(values) else math.nan

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import mmap
 import os
+import platform
 import struct
 import time
 from collections.abc import Callable, Sequence
@@ -22,6 +23,8 @@ _T = TypeVar("_T")
 _HEADER = struct.Struct("<8sIII")
 _MAGIC = b"cdprPHB2"
 _MAX_AXES = 256
+# other processors let a reader see a sequence number before what it counts
+_IN_ORDER = ("x86_64", "i686", "i386")
 # each 8 bytes: the drive's own part first, behind its sequence number, then what others write
 _SEQUENCE, _TIME, _TENSION, _ANGLE, _SPEED, _POWER_ON, _COUNT = range(7)
 _POWER_FROM, _POWER_UNTIL, _BRAKE_FROM, _BRAKE_UNTIL, _MASS = range(7, 12)
@@ -95,7 +98,7 @@ class BoardAxis:
     """One axis of a board. The drive calls `publish`; other devices call the setters; all may read.
 
     Every field has one writer. Reads of the drive's part are consistent: they are repeated while a
-    write is under way (a sequence lock; it relies on stores becoming visible in order, as on x86).
+    write is under way (a sequence lock; it relies on stores becoming visible in order: `attach`).
     """
 
     def __init__(self, words: memoryview[int], numbers: memoryview[float]) -> None:
@@ -259,7 +262,15 @@ class PhysicsBoard:
 
     @classmethod
     def attach(cls, path: str | Path) -> Self:
-        """Open a board that a simulator made. Raises BusSetupError."""
+        """Open a board that a simulator made. Raises BusSetupError.
+
+        Also on a processor that may show another process stores out of order.
+        """
+        if (machine := platform.machine()) not in _IN_ORDER:
+            raise BusSetupError(
+                f"{path}: this machine's processor is {machine}; allowed for devices that share a "
+                f"physics board, which has no lock: {', '.join(_IN_ORDER)}"
+            )
         path = Path(path)
         try:
             with path.open("r+b") as file:

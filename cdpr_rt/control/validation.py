@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, rms
 from cdpr_rt.control.pid import PidGains
 from cdpr_rt.control.tuning import loop_response
 from cdpr_rt.errors import ControlError
@@ -73,7 +73,7 @@ def evaluate(
     velocity = low_pass_velocity(angle_rad, period_s)
     effort = effort_Nm[chosen]
     return Metrics(
-        rms_position_error_deg=math.degrees(float(np.sqrt(np.mean(error**2)))),
+        rms_position_error_deg=math.degrees(rms(error)),
         peak_pid_effort_Nm=float(np.max(np.abs(effort - effort.mean()))),
         peak_velocity_error_deg_s=math.degrees(
             float(np.max(np.abs((velocity - setpoint_velocity_rad_s)[chosen])))

@@ -10,8 +10,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.programs.base import ProgramError
-
-_SHOWN = 60
+from cdpr_rt.refusal import Refusal, RefusalCode, shown
 
 
 class CommandArguments:
@@ -23,7 +22,7 @@ class CommandArguments:
         for key in arguments:
             if key not in allowed:
                 words = ", ".join(allowed) if allowed else "none: it takes no set-point"
-                raise ProgramError(f"{program}: key {_show(key)}; allowed: {words}")
+                raise ProgramError(f"{program}: key {shown(key)}; allowed: {words}")
 
     def __contains__(self, key: str) -> bool:
         return key in self._arguments
@@ -39,7 +38,7 @@ class CommandArguments:
     def number(self, key: str, low: float, high: float, default: float) -> float:
         """Return a number from `low` to `high`, the default where none was given."""
         value = self._arguments.get(key, default)
-        return self._checked(key, value, low, high)
+        return self._checked(key, None, value, low, high)
 
     def whole(self, key: str, low: int, high: int, default: int) -> int:
         """Return a whole number from `low` to `high`, the default where none was given."""
@@ -63,21 +62,18 @@ class CommandArguments:
         for i, entry in enumerate(value):
             if entry is not None or not optional:
                 high = float(limit[i])
-                numbers[i] = self._checked(f"{key}[{i}]", entry, -high, high)
+                numbers[i] = self._checked(key, i, entry, -high, high)
         return numbers
 
-    def _checked(self, key: str, value: Any, low: float, high: float) -> float:
-        allowed = f"a number from {low:g} to {high:g}"
+    def _checked(self, key: str, index: int | None, value: Any, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._refused(key, value, allowed)
+            entry = key if index is None else f"{key}[{index}]"
+            raise self._refused(entry, value, f"a number from {low:g} to {high:g}")
         if not low <= value <= high:  # nan is refused by this, too
-            raise self._refused(key, value, allowed)
+            bounds = {"index": index, "low": low, "high": high}
+            code = RefusalCode.OUT_OF_RANGE
+            raise ProgramError(Refusal(code, self._program, {key: value}, bounds))
         return float(value)
 
     def _refused(self, key: str, value: Any, allowed: str) -> ProgramError:
-        return ProgramError(f"{self._program}: {key}: value {_show(value)}; allowed: {allowed}")
-
-
-def _show(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
+        return ProgramError(f"{self._program}: {key}: value {shown(value)}; allowed: {allowed}")

@@ -45,6 +45,8 @@ class Reply:
     ok: bool
     text: str
     state: str
+    refusal: dict[str, Any] | None = None
+    """Why it was refused, as `Refusal.as_json`, None where there are only words."""
 
 
 class LoopLink:
@@ -202,7 +204,7 @@ class LoopLink:
             future = self._pending.get(int(reply.get("to", 0)))
             if future is not None and not future.done():
                 text, state = str(reply.get("text", "")), str(reply.get("state", ""))
-                future.set_result(Reply(bool(reply.get("ok")), text, state))
+                future.set_result(Reply(bool(reply.get("ok")), text, state, reply.get("refusal")))
 
     def _look(self) -> None:
         dead = self.dead

@@ -221,7 +221,7 @@ class SdoClient:
             return None
         frame = self._answers.popleft()
         code = frames.abort_code(frame)
-        if code is not None and frame[1:4] in (self._multiplexer, bytes(3)):
+        if code is not None and frames.aborts(frame, self._multiplexer):
             raise SdoAbortError(code)
         return frame
 

@@ -49,7 +49,13 @@ def answers(frame: bytes, what: bytes, *kinds: int) -> bool:
 
 def is_segment(frame: bytes, kind: int, toggle: int) -> bool:
     """Return whether a frame is (0) or confirms (1) the segment of this toggle bit."""
-    return frame[0] >> 5 == kind and frame[0] >> _TOGGLE_BIT & 1 == toggle
+    return len(frame) == _LENGTH and frame[0] >> 5 == kind and frame[0] >> _TOGGLE_BIT & 1 == toggle
+
+
+def aborts(frame: bytes, what: bytes) -> bool:
+    """Return whether a frame ends the transfer of this multiplexer's object, or names none."""
+    known = len(frame) == _LENGTH and frame[0] == _ABORT
+    return known and frame[1:4] in (what, bytes(len(what)))
 
 
 def abort_code(frame: bytes) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import platform
 from pathlib import Path
 
 import pytest
@@ -77,3 +78,16 @@ def test_what_is_no_board_is_refused(tmp_path: Path) -> None:
         pytest.raises(IndexError, match="axis 1"),
     ):
         board.axis(1)
+
+
+def test_a_processor_that_shows_stores_out_of_order_shares_no_board(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with PhysicsBoard.create(tmp_path / "board", 1):
+        monkeypatch.setattr(platform, "machine", lambda: "aarch64")
+        with pytest.raises(
+            BusSetupError, match=r"board: .* processor is aarch64; allowed .*x86_64"
+        ):
+            PhysicsBoard.attach(tmp_path / "board")
+        monkeypatch.setattr(platform, "machine", lambda: "x86_64")
+        PhysicsBoard.attach(tmp_path / "board").close()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets
+from cdpr_rt.arrays import rms
 from cdpr_rt.calibration.markers.images.detection import MarkerDetector
 from cdpr_rt.calibration.markers.map_fit import MapFit, fit_map
 from cdpr_rt.calibration.markers.marker_map import MarkerMap, best_fit, difference
@@ -48,11 +49,12 @@ def measure(count: int, seed: int, out: Output) -> dict[str, Any]:
         fit = fit_map(sightings, intrinsics, sheets, reference)
         done = time.process_time()
         reference = fit.map.reference
+        told_m = fit.bundle.shape_sigma_m
         results[name] = {
             "detection_s": round(seen - start, 2),
             "fit_s": round(done - seen, 2),
             "corner_sigma_px": round(fit.bundle.sigma_px, 4),
-            "told_mm": round(1e3 * _rms(fit.bundle.shape_sigma_m), 3),
+            "told_mm": round(1e3 * rms(told_m[np.isfinite(told_m).all(axis=1)]), 3),
             **_errors(fit, camera),
         }
     ours = results["ours"]
@@ -100,10 +102,6 @@ def _opencv(images: _Images) -> list[Sighting]:
     return found
 
 
-def _rms(vectors: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.nanmean((vectors**2).sum(axis=1))))
-
-
 def _middle(sheet: Sheet) -> NDArray[np.float64]:
     """Return the middle of a marker's corners, which are off its paper's where it bends."""
     height = 0.5 * sheet.bend_1_m * (_SIZE_m / 2.0) ** 2
@@ -137,5 +135,5 @@ def _errors(fit: MapFit, camera: SimCamera) -> dict[str, float]:
         "markers": len(there),
         "xy_max_mm": round(1e3 * float(along[..., :2].max()), 3),
         "z_max_mm": round(1e3 * float(along[..., 2].max()), 3),
-        "shape_rms_mm": round(1e3 * _rms(left), 3),
+        "shape_rms_mm": round(1e3 * rms(left), 3),
     }

@@ -17,6 +17,7 @@ SETTLE_S = 0.15
 """For how long a second node may still answer what a first one has answered."""
 
 Object = tuple[int, int]
+_NO_OBJECT = bytes(3)
 FIRST: Object = (0x1000, 0)
 ALWAYS: tuple[Object, ...] = (
     (0x1018, 1),
@@ -86,7 +87,7 @@ class NodeReader:
         self._dialogue = self._read_objects()
         self._deadline: float | None = None
         self._asked: Object | None = None
-        """Whose answer is waited for."""
+        """Whose answer, or next segment, is waited for."""
         self._toggle: int | None = None
         """Of the segment that is waited for; None while no value comes in segments."""
         self._requests: dict[Object, int] = {}
@@ -130,7 +131,6 @@ class NodeReader:
             self._asked = what
             self._requests[what] = self._requests.get(what, 0) + 1
             answer = yield _Request(frames.upload_request(*what), _TIMEOUT_S)
-            self._asked = None
             if answer is None:
                 continue
             self.found.answers = True
@@ -158,23 +158,23 @@ class NodeReader:
             if last:
                 self.found.objects[what] = bytes(value)
                 return
+        self._asked = None
         yield _Request(frames.abort_request(*what, TIMED_OUT), 0.0)
 
     # -- whose answers come
 
     def _is_awaited(self, data: bytes) -> bool:
         """Return whether an answer is the one waited for; note one without a request."""
-        if data[0] >> 5 == 0:
+        if any(frames.is_segment(data, 0, toggle) for toggle in (0, 1)):
             if self._toggle is not None and frames.is_segment(data, 0, self._toggle):
                 return True
             self.found.repeated.add("segments")
             return False
-        what: Object = (data[1] | data[2] << 8, data[3])
-        refused = frames.abort_code(data) is not None
-        if refused and self._toggle is not None:
-            return True
-        if what not in self._requests or (data[0] >> 5 != frames.UPLOAD and not refused):
+        what = self._object_of(data)
+        if what is None:
             return False
+        if self._toggle is not None and frames.abort_code(data) is not None:
+            return what == self._asked
         answers = self._answers.setdefault(what, [])
         answers.append(data)
         if len(answers) > self._requests[what]:
@@ -183,3 +183,13 @@ class NodeReader:
             if len(set(answers)) > 1:
                 self.found.differing.add(name)
         return what == self._asked and self._toggle is None
+
+    def _object_of(self, data: bytes) -> Object | None:
+        """Return the object that was asked for, to which this is the first answer or an abort."""
+        if frames.aborts(data, _NO_OBJECT):
+            return self._asked
+        for what in self._requests:
+            named = frames.multiplexer(*what)
+            if frames.answers(data, named, frames.UPLOAD) or frames.aborts(data, named):
+                return what
+        return None

@@ -17,6 +17,8 @@ import httpx
 from cdpr_profiles.errors import ProfileError, brief
 from cdpr_profiles.reading.bounded_input import parse_json
 from cdpr_profiles.reading.places import reference
+from cdpr_rt.refusal import Refusal
+from cdpr_tools.client.refusals import RefusedError
 from cdpr_tools.client.status_text import DEAD, death_text
 from cdpr_tools.daemon.loop_file import launcher_runs
 from cdpr_tools.daemon.paths import (
@@ -35,13 +37,6 @@ _BAD_INPUT: Final = frozenset({400, 401, 403, 404, 405, 413, 422})
 _LEASE_S = 2.0
 _STOPS: Final = frozenset({"/hold", "/disable", "/shutdown"})
 _STOP_TRIES, _STOP_AGAIN_S = 50, 0.02
-# what to do in a state in which a command was refused
-_REMEDIES: Final = {
-    "unconfigured": "`cdpr status` says why, `cdpr check` tries again",
-    "inactive": "`cdpr status` says why, `cdpr check` tries again",
-    "ready": "`cdpr enable` gives power",
-    "fault": "`cdpr status` says why, `cdpr ack` acknowledges it",
-}
 
 
 class NoDaemonError(WorkFailedError):
@@ -133,7 +128,9 @@ class Daemon:
             raise BadInputError(message)
         if answer.get("state") == DEAD:
             raise WorkFailedError(death_text(self.get("/status")))
-        raise WorkFailedError(message + remedy(message, str(answer.get("state"))))
+        if (refusal := Refusal.from_json(answer.get("refusal"))) is not None:
+            raise RefusedError(refusal)
+        raise WorkFailedError(message)
 
 
 def _user() -> str:
@@ -141,15 +138,6 @@ def _user() -> str:
         return getpass.getuser()
     except (KeyError, OSError):  # a user without a name, as in a container
         return f"#{os.getuid()}"
-
-
-def remedy(message: str, state: str) -> str:
-    """Return the remedy to be appended to a refusal in this state, "" where there is none."""
-    if "not in state" not in message or state not in _REMEDIES:
-        return ""
-    if state == "ready" and not message.endswith("allowed in active"):
-        return ""
-    return f"; {_REMEDIES[state]}"
 
 
 class HeldRight:

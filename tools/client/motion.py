@@ -11,7 +11,6 @@ from cdpr_tools.client.client import Daemon, HeldRight
 from cdpr_tools.client.status_text import (
     DEAD,
     death_text,
-    in_millimetres,
     place_text,
     platform_text,
     stage_text,
@@ -65,7 +64,7 @@ def await_end(
         progress: dict[str, Any]
         progress = require_program(control.daemon, name).get("program_progress", {})
         if progress.get("trouble") and progress.get("done") != 1.0:
-            raise WorkFailedError(f"{name}: {in_millimetres(progress['trouble'])}")
+            raise WorkFailedError(f"{name}: {progress['trouble']}")
         notes(name, progress)
         if is_done(progress):
             return progress
@@ -93,7 +92,7 @@ class ProgressNotes:
         if stage and stage != self._stage:
             self._out.note(f"{stage} ...")
             self._next_s = time.monotonic() + TELL_S
-        held_back = in_millimetres(progress.get("held_back") or "")
+        held_back = progress.get("held_back") or ""
         if held_back and not self._held_back:
             self._out.note(held_back)
         self._stage, self._held_back = stage, held_back
@@ -143,7 +142,7 @@ def finish(
         out.say(*_where(status, where if ended and not stopped else ""))
     if trouble := (ended or {}).get("trouble"):
         figures["trouble"] = trouble
-        out.say(in_millimetres(str(trouble)))
+        out.say(str(trouble))
     if status["state"] != "active":
         raise WorkFailedError(f"{ended_text(daemon, status)} ({status['state']})")
     if status.get("reacting", "none") != "none":

@@ -10,11 +10,12 @@ from typing import Any, Final
 
 from cdpr_profiles.reading.bounded_input import read_text
 from cdpr_rt.motion.path.reading import require_kind
-from cdpr_tools.client.client import Daemon, HeldRight, await_start, remedy
+from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_tools.client.client import Daemon, HeldRight, await_start
 from cdpr_tools.client.motion import RENEW_S, TELL_S, ended_text, finish
+from cdpr_tools.client.refusals import RefusedError, in_typed_words
 from cdpr_tools.client.status_text import (
     GO_ON,
-    in_millimetres,
     left_text,
     percent_text,
     place_text,
@@ -51,8 +52,8 @@ def follow(opened: Opened, out: Output, file: Path, options: PathOptions, feed: 
             f"{file.name}: {planned['length_m']:.3f} m in {time_text(planned['duration_s'])}, "
             f"{planned['gain']:.1f} times as fast as at one speed throughout"
         )
-        wanted = {"plan": planned["plan"], "feed": feed}
-        _run(daemon, out, wanted, planned_s=planned["duration_s"])
+        arguments = {"plan": planned["plan"], "feed": feed}
+        _run(daemon, out, arguments, planned_s=planned["duration_s"])
 
 
 def plain_name(file: Path) -> str:
@@ -66,10 +67,10 @@ def take_up(opened: Opened, out: Output, back_mm: float | None, feed: float) -> 
     """Go on with the path that was left, or step back along it."""
     with opened as daemon:
         _require_platform(daemon, out)
-        wanted: dict[str, Any] = {"resume": True, "feed": feed}
+        arguments: dict[str, Any] = {"resume": True, "feed": feed}
         if back_mm is not None:
-            wanted = {"back_m": 1e-3 * back_mm, "feed": feed}
-        _run(daemon, out, wanted)
+            arguments = {"back_m": 1e-3 * back_mm, "feed": feed}
+        _run(daemon, out, arguments)
 
 
 def _planned(daemon: Daemon, body: dict[str, Any]) -> dict[str, Any]:
@@ -105,19 +106,18 @@ def require_held(status: dict[str, Any]) -> None:
     """Raise WorkFailedError where a path could not be followed: before it is planned for that."""
     state = str(status["state"])
     if state != "active":
-        refusal = f"path: not in state {state}; allowed in active"
-        raise WorkFailedError(refusal + remedy(refusal, state))
+        states = {"state": state, "allowed": ["active"]}
+        raise RefusedError(Refusal(RefusalCode.NOT_IN_STATE, "path", arguments=states))
     if (status.get("program_progress") or {}).get("tight") is False:
         raise WorkFailedError("path: the cables are not tight; `cdpr tighten` first")
 
 
-def _run(daemon: Daemon, out: Output, wanted: dict[str, Any], **figures: Any) -> None:
+def _run(daemon: Daemon, out: Output, arguments: dict[str, Any], **figures: Any) -> None:
     ended: dict[str, Any] | None = None
     with stop_on_signals() as stop_requested, daemon.control() as control:
-        try:
-            control.post("/program", {"program": "path", "wanted": wanted})
-        except (BadInputError, WorkFailedError) as error:
-            raise type(error)(_as_typed(str(error))) from None
+        typed = "--back" if "back_m" in arguments else "--resume"
+        with in_typed_words("path", typed, allowed="--run with a path's FILE"):
+            control.post("/program", {"program": "path", "wanted": arguments})
         watch = _Watch(control, out)
         while ended is None and not watch.paused and not stop_requested():
             time.sleep(RENEW_S)
@@ -163,7 +163,7 @@ class _Watch:
             self.paused = f"{left_text(path)}, paused by {why}; {GO_ON}, {BACK}"
             return None
         if progress.get("trouble") and progress.get("done") != 1.0:
-            raise WorkFailedError(f"path: {in_millimetres(progress['trouble'])}")
+            raise WorkFailedError(f"path: {progress['trouble']}")
         over = progress.get("done") == 1.0 and path.get("time_s") == path.get("duration_s")
         if path and not over:
             self._tell(progress, path)
@@ -181,18 +181,6 @@ class _Watch:
             on_it = path["stage"] == "path"
             self._out.note(progress_text(path) if on_it else place_text(progress))
         self._stage, self._told_s = stage, now_s
-
-
-def _as_typed(refusal: str) -> str:
-    """Return a refusal of the program in the words of the command line."""
-    words = {
-        "path: resume: ": "--resume: ",
-        "path: back_m: ": "--back: ",
-        "allowed: plan": "allowed: --run with a path's FILE",
-    }
-    for key, typed in words.items():
-        refusal = refusal.replace(key, typed)
-    return in_millimetres(refusal)
 
 
 def progress_text(path: dict[str, Any]) -> str:

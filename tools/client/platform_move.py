@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
 
 from cdpr_tools.client.client import Daemon
-from cdpr_tools.client.status_text import in_millimetres
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.number_options import numbers
 
@@ -18,9 +16,6 @@ _COORDINATES: Final = {2: ("x", "y"), 3: ("x", "y", "z")}
 _ANGLES: Final = {"angle": 2, "rx": 0, "ry": 1, "rz": 2}
 """About which of the room's axes the platform turns, by the name in its robot's file."""
 _ROUNDING: Final = 1e-9
-_REFUSED: Final = re.compile(
-    r"pose: (?:(?:position_m|rotation_rad): value \[[^\]]*\](?:, (?=rotation_rad))?)+"
-)
 
 
 class Frame(StrEnum):
@@ -47,7 +42,7 @@ class PlatformMove:
         words += [f"--rotate {self.rotate}"] if self.rotate is not None else []
         return " ".join(words)
 
-    def wanted(self, daemon: Daemon) -> dict[str, Any]:
+    def arguments(self, daemon: Daemon) -> dict[str, Any]:
         """Return what the program `pose` is to do; raises BadInputError."""
         platform = daemon.get("/description").get("platform")
         if platform is None:
@@ -67,21 +62,16 @@ class PlatformMove:
             to, rotate = self._from_here(daemon, platform, to, rotate, turns)
         elif self.frame is not Frame.ROOM:
             raise BadInputError(f"--frame {self.frame}: allowed: together with --relative")
-        wanted: dict[str, Any] = {}
+        arguments: dict[str, Any] = {}
         if to is not None:
             self._check_box(to, names, platform)
-            wanted["position_m"] = to
+            arguments["position_m"] = to
         if rotate is not None:
             self._check_angle(rotate, platform)
-            wanted["rotation_rad"] = rotate
+            arguments["rotation_rad"] = rotate
         if self.speed is not None:
-            wanted["speed_m_s"] = self._checked_speed(self.speed, platform)
-        return wanted
-
-    def refusal(self, message: str) -> str:
-        """Return a refusal by the daemon in the words that were typed."""
-        refused = _REFUSED.sub(self.typed, message)
-        return in_millimetres(re.sub(r"^pose(?=: )", "move", refused))
+            arguments["speed_m_s"] = self._checked_speed(self.speed, platform)
+        return arguments
 
     def _from_here(
         self,
@@ -158,9 +148,3 @@ def _in_space(values: Sequence[float], about: Sequence[int]) -> list[float]:
     for axis, value in zip(about, values, strict=False):
         vector[axis] = value
     return vector
-
-
-def resume_refusal(message: str) -> str:
-    """Return a refusal of the daemon to go on to a target that was left, as `cdpr resume` says."""
-    message = message.replace("pose: resume: ", "resume: ").replace("position_m", "cdpr move --to")
-    return in_millimetres(message)

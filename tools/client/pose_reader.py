@@ -37,8 +37,8 @@ class DaemonReader:
 
     def place(self) -> FloatArray:
         """Return where the platform is, (d,)."""
-        told = self._status()["program_progress"]
-        return np.array([*told["position_m"], *told.get("rotation_rad", ())])
+        progress = self._status()["program_progress"]
+        return np.array([*progress["position_m"], *progress.get("rotation_rad", ())])
 
     def stay(self, seconds: float) -> None:
         """Let bus time pass."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -34,8 +33,6 @@ def death_text(status: dict[str, Any]) -> str:
 
 GO_ON = "`cdpr path --resume` goes on"
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
-_PLACE = re.compile(r"\bat ((?:-?\d+\.\d+, )+-?\d+\.\d+) m\b")
-_TURN = re.compile(r"\bturned by ((?:-?\d+\.\d+(?:, )?)+) rad\b")
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",
     ("tighten", "pull"): "pulling the cables tight",
@@ -126,7 +123,7 @@ def platform_text(status: dict[str, Any]) -> str:
     if stage := stage_text(status.get("program", ""), progress):
         words.append(stage)
     found = (progress.get(key) for key in ("missing", "held_back", "trouble"))
-    words += [in_millimetres(text) for text in found if text]
+    words += [text for text in found if text]
     return "; ".join(words)
 
 
@@ -190,18 +187,6 @@ def tightness_text(status: dict[str, Any]) -> str:
     if tight is None or status["state"] != "active":
         return ""
     return "held by its cables" if tight else "cables loose, power on"
-
-
-def in_millimetres(text: str) -> str:
-    """Return a text of the loop with the places and rotations in it in mm and deg."""
-    text = _PLACE.sub(lambda found: f"at {_converted(found[1], 1e3, 1)} mm", text)
-    return _TURN.sub(
-        lambda found: f"turned by {_converted(found[1], math.degrees(1.0), 1)} deg", text
-    )
-
-
-def _converted(numbers: str, factor: float, digits: int) -> str:
-    return _listed(map(float, numbers.split(", ")), factor, digits)
 
 
 def _listed(values: Iterable[float], factor: float, digits: int) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from cdpr_rt.arrays import BoolArray, FloatArray
+from cdpr_rt.arrays import BoolArray, FloatArray, rms
 from cdpr_rt.control.validation import low_pass_velocity
 from cdpr_rt.identification import HarmonicResult, ThesisResult
 from cdpr_rt.identification.cogging.thesis import DEGREE, GRID, WINDOW_deg
@@ -88,7 +88,7 @@ def read_residual_effort(paths: Sequence[Path], orders: int) -> ResidualEffort:
         forward=tuple(forward),
         effort_Nm=effort,
         amplitudes_Nm=np.abs(np.fft.rfft(effort, axis=1))[:, 1 : orders + 1] * 2.0 / _BINS,
-        rms_Nm=float(np.sqrt(np.mean(effort**2))),
+        rms_Nm=rms(effort.ravel()),
         repeating_rms_Nm=math.sqrt(max(0.0, float(np.mean(products)))) if products else None,
     )
 
@@ -161,7 +161,7 @@ def table_errors(thesis: ThesisResult, better: HarmonicResult) -> tuple[TableErr
             TableError(
                 peak_Nm=float(np.abs(error[worst])),
                 peak_deg=worst * 360.0 / samples,
-                rms_Nm=float(np.sqrt(np.mean(error**2))),
+                rms_Nm=rms(error),
                 gain=abs(ratio),
                 behind_deg=-sign * math.degrees(math.atan2(ratio.imag, ratio.real)) / order,
             )

@@ -70,6 +70,11 @@ class Kind:
         return len(self.platform.controlled) > self.size
 
     @property
+    def turns_freely(self) -> bool:
+        """Whether its platform has angles, and its cables control none of them."""
+        return not self.turns and not self.is_point
+
+    @property
     def sides(self) -> str:
         """What the numbers of a frame's size are."""
         return "width, height" if self.size == 2 else "width, depth, height"

@@ -214,11 +214,11 @@ def _exit(i: int, kind: Kind) -> Question:
 
 
 def _side(kind: Kind) -> Question:
-    if kind.name == "planar-3":
+    if kind.turns_freely:
         text = "Side of the triangle on which the cables end (m; 0 if all end in one point)"
     else:
         text = "Greatest distance of two anchor points on the platform (m)"
-    least = 0.0 if kind.name == "planar-3" else 0.01
+    least = 0.0 if kind.turns_freely else 0.01
 
     def default(answers: Answers) -> str:
         """Return the shipped robot's, as much larger or smaller as the frame is."""
@@ -251,7 +251,7 @@ def _anchor(i: int, kind: Kind) -> Question:
         f"anchor_{i + 1}_m",
         f"Cable {i + 1} ends on the platform at: {names} from its middle (m)",
         _point(kind.size),
-        facing if kind.name == "planar-3" else scaled,
+        facing if kind.turns_freely else scaled,
     )
 
 
@@ -259,7 +259,7 @@ def axis_names(answers: Answers) -> list[str]:
     """Return what to call the axes, after where their cables leave."""
     kind = answers["kind"]
     exits = [answers[f"exit_{i + 1}_m"] for i in range(kind.cables)]
-    if kind.name == "planar-3":
+    if kind.turns_freely:
         (x0, y0), (x1, y1), (_, y2) = exits
         if x0 < x1 and y2 < min(y0, y1):
             return [axis.name for axis in kind.robot.axes]

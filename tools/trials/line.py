@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, rms
 from cdpr_tools.trials.directions import Directions
 from cdpr_tools.trials.evaluation.figures import Figure
 from cdpr_tools.trials.evaluation.recorded import Recorded
@@ -115,7 +115,7 @@ def rms_mm(recorded: Recorded, less_mean: bool = False) -> tuple[float, float]:
 def _rms(errors: list[FloatArray], less_mean: bool = False) -> float:
     if less_mean:
         errors = [one - one.mean(axis=0) for one in errors]
-    return float(np.sqrt(np.mean(np.sum(np.concatenate(errors) ** 2, axis=1))))
+    return rms(np.concatenate(errors))
 
 
 def judge(parts: dict[str, Recorded], speed_m_s: float) -> list[Figure]:

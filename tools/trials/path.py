@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial import KDTree
 
 from cdpr_profiles import Robot
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.motion.path.gcode import GcodeSettings, read_gcode
 from cdpr_rt.motion.path.pieces import pieces_of
 from cdpr_rt.procedures.path.planning import PathPlan, PathPlanner
@@ -171,9 +171,9 @@ def judge(recorded: Recorded, robot: Robot, speed_m_s: float) -> list[Figure]:
         Figure("taken_s", "duration of the set-point's motion", errors.taken_s, "s"),
         Figure("late_share", "difference of both, share", late, "", LATE),
         Figure("top_speed_m_s", "fastest, true", float(speed.max()), "m/s"),
-        Figure("path_mm", "RMS distance from the planned path", _rms(errors.off_mm), "mm", RMS_mm),
+        Figure("path_mm", "RMS distance from the planned path", rms(errors.off_mm), "mm", RMS_mm),
         Figure("path_worst_mm", "worst distance from it", float(errors.off_mm.max()), "mm"),
-        Figure("lag_mm", "RMS distance from the set-point", _rms(errors.lag_mm), "mm"),
+        Figure("lag_mm", "RMS distance from the set-point", rms(errors.lag_mm), "mm"),
         Figure(
             "corner_mm", "planned path's farthest from the file's, in corners",
             float(errors.corner_mm.max()), "mm", BLEND_mm,
@@ -183,7 +183,3 @@ def judge(recorded: Recorded, robot: Robot, speed_m_s: float) -> list[Figure]:
             float(errors.setpoint_off_mm.max()), "mm",
         ),
     ]  # fmt: skip
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

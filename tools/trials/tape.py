@@ -14,7 +14,7 @@ import numpy as np
 
 from cdpr_profiles import Robot
 from cdpr_profiles.reading.bounded_input import read_toml
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import rms
 from cdpr_tools.trials.directions import platform_of
 from cdpr_tools.trials.evaluation.figures import Figure
 from cdpr_tools.trials.evaluation.recorded import Recorded
@@ -78,7 +78,7 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
         Figure("poses", text, len(marks), "", 1 if cut_short else POSES, True),
         Figure("minutes", "bus time", float(recorded.time_s[-1]) / 60.0, "min"),
         *held_figures(recorded, robot),
-        Figure("off_rms_mm", "RMS distance from a pose", 1e3 * _rms(off), "mm"),
+        Figure("off_rms_mm", "RMS distance from a pose", 1e3 * rms(off) if len(off) else 0.0, "mm"),
         Figure("off_mm", "worst distance from a pose", 1e3 * float(off.max(initial=0)), "mm"),
     ]
     if directions.turns:
@@ -87,7 +87,3 @@ def judge(recorded: Recorded, robot: Robot) -> list[Figure]:
         angle = float(np.degrees(np.linalg.norm(turned, axis=1).max(initial=0.0)))
         figures.append(Figure("orientation_off_deg", "worst angle from a pose", angle, "deg"))
     return figures
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt((values**2).sum() / max(len(values), 1)))

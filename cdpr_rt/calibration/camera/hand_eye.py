@@ -21,7 +21,6 @@ from cdpr_rt.errors import InvalidRequestError
 
 _LEAST_TURN_rad = 0.02
 _ROUNDS = 5
-_LEAST_SPREAD = 1e-3
 
 
 @dataclass(frozen=True)

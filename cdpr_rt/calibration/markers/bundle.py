@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.sparse import diags_array
 
-from cdpr_rt.arrays import FloatArray, IntArray
+from cdpr_rt.arrays import FloatArray, IntArray, rms
 from cdpr_rt.calibration.markers.geometry.rotations import cross_matrices
 from cdpr_rt.calibration.markers.reprojection import (
     LENS_PARAMETERS,
@@ -64,17 +64,7 @@ class Bundle:
     @property
     def rms_px(self) -> float:
         """Root of the mean square distance of corners that fit."""
-        used = self.weight > 0.5
-        return float(np.sqrt(np.mean(self.off_px[used] ** 2))) if used.any() else float("nan")
-
-    def marker_covariance(self, number: int) -> FloatArray:
-        """Return the covariance (6, 6) of a marker's position and rotation, m and rad."""
-        start = 6 * (len(self.estimate.map.names) + number)
-        return self.covariance[start : start + 6, start : start + 6]
-
-    def camera_covariance(self, number: int) -> FloatArray:
-        """Return the covariance (6, 6) of the camera's pose in an image, m and rad."""
-        return self.covariance[6 * number : 6 * number + 6, 6 * number : 6 * number + 6]
+        return rms(self.off_px[self.weight > 0.5])
 
     @property
     def marker_sigma_m(self) -> FloatArray:

@@ -60,8 +60,6 @@ class LensSuspicion:
     wrong: bool
     focal_change: float
     """Relative, that the images ask for."""
-    focal_sigma: float
-    """Relative; large where the images cannot tell."""
     rms_px: float
     """With the lens that fits best."""
     lens: FloatArray
@@ -246,7 +244,7 @@ def lens_suspicion(bundle: Bundle, seen: SeenMarkers, fixed: tuple[int, ...]) ->
     try:
         free = adjust(Estimate(bundle.estimate.map, given), seen, fixed, free_lens=True)
     except ControlError:
-        return LensSuspicion(False, 0.0, float("inf"), bundle.rms_px, given)
+        return LensSuspicion(False, 0.0, bundle.rms_px, given)
     change = free.estimate.lens - given
     covariance = free.covariance[-9:, -9:]
     weighed = float(change @ np.linalg.pinv(covariance, hermitian=True) @ change)
@@ -255,4 +253,4 @@ def lens_suspicion(bundle: Bundle, seen: SeenMarkers, fixed: tuple[int, ...]) ->
     better = free.sigma_px < _LENS_GAIN * bundle.sigma_px
     telling = abs(focal) > max(_LENS_OFF, _LENS_SIGMAS * sigma)
     wrong = weighed > chi2.isf(_CHANCE, 9) and (better or telling)
-    return LensSuspicion(wrong, focal, sigma, free.rms_px, free.estimate.lens)
+    return LensSuspicion(wrong, focal, free.rms_px, free.estimate.lens)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_profiles.devices.camera import CameraIntrinsics, MarkerSheets, rotation_vector_rad
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.calibration.markers.bundle import Bundle, adjust
 from cdpr_rt.calibration.markers.coverage import Coverage, coverage, listed
 from cdpr_rt.calibration.markers.diagnosis import LensSuspicion, Suspect, lens_suspicion, suspects
@@ -273,7 +273,7 @@ def _notes(
 
 def _typical_mm(sigma_m: FloatArray) -> float:
     """Return the root of the mean square of the lengths of deviations (m, 3)."""
-    return 1e3 * float(np.sqrt(np.nanmean((sigma_m**2).sum(axis=1))))
+    return 1e3 * rms(sigma_m[np.isfinite(sigma_m).all(axis=1)])
 
 
 def verdict(fit: MapFit) -> str:

@@ -21,7 +21,5 @@ class Sighting:
     """Ids whose edges are hidden or blurred."""
     mirrored: tuple[int, ...] = ()
     """Ids that only a mirror image of it shows."""
-    edge_width_px: float = float("nan")
-    """Median over the markers, of their widest edges."""
     problem: str | None = None
     """What is wrong with the image as a whole, in words."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.control.compensation import FrictionFeedforward
 from cdpr_rt.identification.cogging import design
 from cdpr_rt.identification.cogging.design import Equations, Layout
@@ -256,7 +256,7 @@ def _result(
         coverage=_coverage(windows),
         cogging_trend_1_s=fitted.cogging_trend_1_s,
         excluded_fraction=lost / rows,
-        residual_rms_Nm=float(np.sqrt(np.mean(fitted.residual_Nm**2))),
+        residual_rms_Nm=rms(fitted.residual_Nm),
         held_out_error_Nm=choice.error_Nm,
     )
 

@@ -19,6 +19,7 @@ from cdpr_rt.programs.bumpless_transfer import BumplessTransfer
 from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
 from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.programs.program_base import CommandedProgram
+from cdpr_rt.refusal import Refusal, RefusalCode
 from cdpr_rt.robots.free_rotation import SWINGS_m
 from cdpr_rt.robots.interface import PlatformControl
 from cdpr_rt.robots.kinematics.pose_setpoint import pose_of_coordinates, write_quaternion
@@ -222,9 +223,10 @@ class PlatformProgram(CommandedProgram):
     def _require_pose(self) -> None:
         """Raise ProgramError where the platform is not to be moved to a pose."""
         if self._parts.not_calibrated_reason:
-            raise ProgramError(f"{self.name}: {self._parts.not_calibrated_reason}")
+            why = {"why": self._parts.not_calibrated_reason}
+            raise ProgramError(Refusal(RefusalCode.NOT_CALIBRATED, self.name, arguments=why))
         if not self._parts.tight:
-            raise ProgramError(f"{self.name}: the cables are not tight; run tighten first")
+            raise ProgramError(Refusal(RefusalCode.NOT_TIGHT, self.name))
 
     @property
     def pose(self) -> FloatArray | None:

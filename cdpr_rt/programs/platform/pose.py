@@ -23,6 +23,8 @@ from cdpr_rt.programs.platform.platform_program import (
     distance_m,
     synchronise,
 )
+from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_rt.robots.kinematics.pose import place_text
 
 _SLOWEST_m_s = 1e-4
 _DEADBAND_m = 5e-5
@@ -123,9 +125,7 @@ class PoseProgram(PlatformProgram):
         why_not = self._control.infeasibility(position)
         if not why_not:
             return ""
-        k = self._k
-        turned = f" turned by {_listed(position[k:])} rad" if position[k:].any() else ""
-        return f"at {_listed(position[:k])} m{turned}: {why_not}"
+        return f"{place_text(position, self._k)}: {why_not}"
 
     # -- commands
 
@@ -148,10 +148,10 @@ class PoseProgram(PlatformProgram):
         aim = self._aim
         if what == "resume":
             if aim is None:
-                raise ProgramError("pose: resume: no target has been left; allowed: position_m")
-            why_not = self._control.way_infeasibility(aim)
-            if why_not:
-                raise ProgramError(f"pose: resume: on the way, {why_not}")
+                left = {"left": "target", "allowed": "position_m"}
+                code = RefusalCode.NOTHING_LEFT
+                raise ProgramError(Refusal(code, self.name, {"resume": True}, left))
+            self._require_way(aim, {"resume": True})
         return what, aim, speed
 
     def _position(self, keys: CommandArguments) -> FloatArray:
@@ -159,23 +159,27 @@ class PoseProgram(PlatformProgram):
         k, control, wanted = self._k, self._control, np.zeros(self._target.size)
         acceleration = self._parts.acceleration
         stopping_position(control.position, control.velocity, acceleration, wanted)
-        asked = []
+        asked = {}
         if "position_m" in keys:
             wanted[:k] = self._checked_position(keys)
-            asked.append(f"position_m: value {wanted[:k].tolist()}")
+            asked["position_m"] = wanted[:k].tolist()
         if "rotation_rad" in keys:
             wanted[k:] = self._checked_rotation(keys)
-            asked.append(f"rotation_rad: value {wanted[k:].tolist()}")
+            asked["rotation_rad"] = wanted[k:].tolist()
         else:
             turned, most = float(np.linalg.norm(wanted[k:])), self._parts.model.angle_rad
             wanted[k:] *= 1.0 if turned <= most else most / turned
         why_not = control.infeasibility(wanted)
         if why_not:
-            raise ProgramError(f"pose: {', '.join(asked)}: {why_not}")
-        why_not = control.way_infeasibility(wanted)
-        if why_not:
-            raise ProgramError(f"pose: {', '.join(asked)}: on the way, {why_not}")
+            raise ProgramError(_not_feasible(asked, why_not))
+        self._require_way(wanted, asked)
         return wanted
+
+    def _require_way(self, position: FloatArray, asked: Mapping[str, Any]) -> None:
+        """Raise ProgramError where the straight way to a position (d,) is not feasible."""
+        why_not = self._control.way_infeasibility(position)
+        if why_not:
+            raise ProgramError(_not_feasible(asked, f"on the way, {why_not}"))
 
     def _checked_position(self, keys: CommandArguments) -> FloatArray:
         position = keys.axes("position_m", np.full(self._k, _ANYWHERE_m), each="a coordinate")
@@ -340,5 +344,5 @@ class PoseProgram(PlatformProgram):
         stopping_position(control.position, control.velocity, self._slowing, self._rest)
 
 
-def _listed(values: FloatArray) -> str:
-    return ", ".join(f"{value:.3f}" for value in values)
+def _not_feasible(asked: Mapping[str, Any], why: str) -> Refusal:
+    return Refusal(RefusalCode.NOT_FEASIBLE, "pose", asked, {"why": why})

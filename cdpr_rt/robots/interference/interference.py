@@ -22,6 +22,7 @@ from cdpr_rt.robots.interference.contact_kernel import (
 from cdpr_rt.robots.interference.nearing_kernel import nears
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, CABLE_ROWS, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
+from cdpr_rt.robots.kinematics.pose import place_text
 
 _PARTS: Final = 16
 """In which a short way is looked at."""
@@ -46,15 +47,10 @@ class Contact:
     """Whether they do come so near, or only could not be proved to stay clear."""
 
     def __str__(self) -> str:
-        place, turned = (
-            ", ".join(f"{x:.3f}" for x in part)
-            for part in (self.position[: self.coordinates], self.position[self.coordinates :])
-        )
-        about = f" turned by {turned} rad" if self.position[self.coordinates :].any() else ""
         text = in_words(self.things, self.distance_m)
         if not self.known:
             text += ", and cannot be proved in time to stay clear; go another way or in parts"
-        return f"at {place} m{about}: {text}"
+        return f"{place_text(self.position, self.coordinates)}: {text}"
 
 
 class Interference:

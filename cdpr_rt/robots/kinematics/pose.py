@@ -107,3 +107,15 @@ class Pose:
         x[:3] = self.p - other.p
         logarithm(self.Q @ other.Q.T, x[3:])
         return x
+
+
+def place_text(position: FloatArray, coordinates: int) -> str:
+    """Return in words where a platform is, in mm and deg, by `position` (d,).
+
+    These are so many coordinates, in m, then a rotation vector, in rad.
+    """
+    text = f"at {', '.join(f'{1e3 * x:z.1f}' for x in position[:coordinates])} mm"
+    turned = position[coordinates:]
+    if not turned.any():
+        return text
+    return f"{text} turned by {', '.join(f'{math.degrees(x):z.1f}' for x in turned)} deg"

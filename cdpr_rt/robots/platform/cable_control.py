@@ -21,7 +21,7 @@ from cdpr_rt.robots.free_rotation import rotation_of
 from cdpr_rt.robots.kinematics import pose_setpoint
 from cdpr_rt.robots.kinematics import pose_tracking as tracking
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_cables
-from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.kinematics.pose import Pose, place_text
 from cdpr_rt.robots.platform import loop_kernel as loop
 from cdpr_rt.robots.platform.body_kernel import body_of
 from cdpr_rt.robots.platform.cell_feedback import CellFeedback
@@ -393,8 +393,8 @@ class CableControl:
             contact = self._interference.first_contact(np.array([begin, position]), _MOST_LOOKS)
             return "" if contact is None else str(contact)
         there, why = obstacle
-        place = ", ".join(f"{x:.3f}" for x in there.p[: self.model.positions])
-        return f"at {place} m {why}"
+        k = self.model.positions
+        return f"{place_text(there.p[:k], k)}: {why}"
 
     def _turn_to(self, position: FloatArray) -> None:
         home, scratch = self._home.array, self._scratch

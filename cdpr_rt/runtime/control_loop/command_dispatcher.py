@@ -16,6 +16,7 @@ from cdpr_rt.core.states import LoopState, Reaction, Transition
 from cdpr_rt.core.task import Task
 from cdpr_rt.errors import ControlError
 from cdpr_rt.programs.base import Program
+from cdpr_rt.refusal import Refusal, refusal_of
 from cdpr_rt.runtime.control_loop.engine import HOLD, Engine
 from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
 from cdpr_rt.runtime.control_loop.transition_runner import Steps, TransitionRunner
@@ -113,7 +114,7 @@ class CommandDispatcher:
                 raise RefusedError(f"{do}: given up: a stop was asked for after it")
             steps = handler(command)
         except ControlError as error:
-            answer(str(error))
+            answer(refusal_of(error) or str(error))
             return
         except Exception as error:  # whatever a command holds: the loop goes on
             answer(f"{do}: {type(error).__name__}: {error}")
@@ -153,7 +154,8 @@ class CommandDispatcher:
             put_off.task.result()
         except Exception as error:  # of a file, whatever it holds: the loop goes on
             mistake = "" if isinstance(error, ControlError) else f"{type(error).__name__}: "
-            self._reply(_number(put_off.command), f"{mistake}{error}")
+            said = refusal_of(error) or f"{mistake}{error}"
+            self._reply(_number(put_off.command), said)
             return
         self._dispatch(put_off.command)
 
@@ -162,10 +164,12 @@ class CommandDispatcher:
         self._engine.machine.clock.cancel(put_off.task)
         self._reply(_number(put_off.command), f"given up: {why}")
 
-    def _reply(self, number: int, error: str) -> None:
-        state = self._life.state.label
-        for most in (_MOST_TEXT, _SHORT_TEXT):  # letters may take a dozen bytes each
-            reply = {"to": number, "ok": not error, "text": error[:most], "state": state}
+    def _reply(self, number: int, error: Refusal | str) -> None:
+        state, text = self._life.state.label, str(error)
+        refusal = {"refusal": error.as_json()} if isinstance(error, Refusal) else {}
+        # letters may take a dozen bytes each
+        for most, more in ((_MOST_TEXT, refusal), (_MOST_TEXT, {}), (_SHORT_TEXT, {})):
+            reply = {"to": number, "ok": not text, "text": text[:most], "state": state, **more}
             try:
                 self._engine.block.post_reply(reply)
                 return
@@ -237,8 +241,9 @@ class CommandDispatcher:
 
     def _lengths(self, command: Command) -> None:
         device = self._engine.machine.device
-        if device is None or self._life.state not in (LoopState.READY, LoopState.ACTIVE):
-            raise RefusedError(f"lengths: not in state {self._life.state.label}")
+        allowed = (LoopState.READY, LoopState.ACTIVE)
+        if device is None or self._life.state not in allowed:
+            raise self._life.not_in_state("lengths", *allowed)
         self._right("lengths", command)
         if not device.feedback.valid.all():
             raise RefusedError("lengths: not every axis answers")
@@ -276,17 +281,15 @@ class CommandDispatcher:
             return
         if self._life.state is LoopState.ACTIVE:
             raise RefusedError(f"{what}: another command is being carried out")
-        raise RefusedError(
-            f"{what}: not in state {self._life.state.label}; allowed in {LoopState.ACTIVE.label}"
-        )
+        raise self._life.not_in_state(what, LoopState.ACTIVE)
 
     def _right(self, what: str, command: Command) -> int:
         """Return the number of the grant that the command names, which must be the current one."""
         number = command.get("right")
         right = number if type(number) is int else 0
-        missing = self._engine.right.refusal(right)
-        if missing:
-            raise RefusedError(f"{what}: {missing}")
+        why_not = self._engine.right.refusal(right)
+        if why_not:
+            raise RefusedError(f"{what}: {why_not}")
         return right
 
     def _refuse_read_only(self, what: str) -> None:

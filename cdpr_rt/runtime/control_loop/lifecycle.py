@@ -8,6 +8,7 @@ from typing import Any
 
 from cdpr_rt.core.states import ALLOWED, LoopState, Transition
 from cdpr_rt.errors import ControlError
+from cdpr_rt.refusal import Refusal, RefusalCode
 
 _MOST_CHARACTERS = 2000
 
@@ -32,10 +33,12 @@ class Lifecycle:
         """Raise RefusedError where `transition` is not allowed in the present state."""
         allowed = ALLOWED[transition]
         if self.state not in allowed:
-            states = " or ".join(state.label for state in allowed)
-            raise RefusedError(
-                f"{transition.name.lower()}: not in state {self.state.label}; allowed in {states}"
-            )
+            raise self.not_in_state(transition.name.lower(), *allowed)
+
+    def not_in_state(self, command: str, *allowed: LoopState) -> RefusedError:
+        """Return the refusal of a command that is only allowed in other states."""
+        states = {"state": self.state.label, "allowed": [state.label for state in allowed]}
+        return RefusedError(Refusal(RefusalCode.NOT_IN_STATE, command, arguments=states))
 
     def enter(self, state: LoopState) -> None:
         """Go to `state`."""

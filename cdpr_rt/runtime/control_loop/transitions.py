@@ -205,9 +205,9 @@ class Transitions:
             yield
         if self.first_program == HOLD:
             return
-        missing = engine.right.refusal(right)
-        if missing:
-            life.set_reason(f"{program}: {missing}; held")
+        why_not = engine.right.refusal(right)
+        if why_not:
+            life.set_reason(f"{program}: {why_not}; held")
             raise RefusedError(life.reason)
         engine.switch(program, arguments, right)
 

@@ -117,7 +117,8 @@ def _add_errors(app: FastAPI, service: Service) -> None:
     async def refused(_: Request, error: Exception) -> Response:
         assert isinstance(error, _LoopRefusedError)
         reply = error.reply
-        return _error(HTTPStatus.CONFLICT, reply.text or "refused", state=reply.state)
+        why = {"refusal": reply.refusal} if reply.refusal else {}
+        return _error(HTTPStatus.CONFLICT, reply.text or "refused", state=reply.state, **why)
 
     async def invalid(_: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
@@ -139,10 +140,10 @@ def _add_errors(app: FastAPI, service: Service) -> None:
 
 
 def _error(
-    status: int, text: str, headers: Mapping[str, str] | None = None, state: str | None = None
+    status: int, text: str, headers: Mapping[str, str] | None = None, /, **of_loop: Any
 ) -> Response:
     readable = text.encode("utf-8", "backslashreplace").decode()  # it may repeat what was sent
-    body = {"error": readable, "state": state}
+    body = {"error": readable, "state": None, **of_loop}
     return JSONResponse(body, status, headers)
 
 

@@ -15,6 +15,7 @@ from starlette.websockets import WebSocketDisconnect
 from cdpr_rt.errors import ControlError
 from cdpr_rt.service.http import models
 from cdpr_rt.service.lease import LeaseError
+from cdpr_rt.service.link import Reply
 from cdpr_rt.service.service import Service
 
 BUSY, REFUSED, SILENT, UNFIT = 1013, 4409, 4408, 1008
@@ -124,20 +125,25 @@ class ControlSocket:
 
     async def _carry_out(self, order: Order) -> None:
         try:
-            state, said = await self._do(order)
+            state, refused = await self._do(order)
         except ValidationError as error:
             await self._refuse(order.id, _first_of(error))
         except ControlError as error:
             await self._refuse(order.id, str(error))
         else:
-            await self._reply(id=order.id, ok=not said, error=said or None, state=state)
+            if refused is None:
+                await self._reply(id=order.id, ok=True, error=None, state=state)
+            else:
+                why: dict[str, Any] = {"error": refused.text or "refused", "state": state}
+                why |= {"refusal": refused.refusal} if refused.refusal else {}
+                await self._reply(id=order.id, ok=False, **why)
 
-    async def _do(self, order: Order) -> tuple[str, str]:
-        """Return the loop's state, and why it refused or ""."""
+    async def _do(self, order: Order) -> tuple[str, Reply | None]:
+        """Return the loop's state, and its refusal where it refused."""
         service, client, token = self._service, self._client, self._token
         if order.do == "renew":
             service.lease.renew(token)
-            return service.link.state(), ""
+            return service.link.state(), None
         if order.do == "hold":
             with suppress(LeaseError):  # who has lost the right meanwhile may stop all the same
                 service.lease.renew(token)
@@ -150,7 +156,7 @@ class ControlSocket:
             change = _SET.validate_python({"wanted": order.wanted})
             wanted = {"wanted": change.wanted}
             reply = await service.command_with_right("set", client, token, _is_here, **wanted)
-        return reply.state, "" if reply.ok else reply.text or "refused"
+        return reply.state, None if reply.ok else reply
 
     async def _refuse(self, number: int | None, why: str) -> None:
         await self._reply(id=number, ok=False, error=why)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
 
+from cdpr_rt.refusal import RefusalCode
 from cdpr_rt.runtime.right import LONGEST_S
 from cdpr_rt.service.lease import SHORTEST_S
 
@@ -143,12 +144,26 @@ class _Answer(BaseModel):
     model_config = ConfigDict(extra="allow")
 
 
+class Refusal(_Answer):
+    """Why the loop has refused a command, for programs."""
+
+    code: RefusalCode
+    command: str
+    """The command, or the program that it was for."""
+    asked: dict[str, Any]
+    """The refused keys of `wanted` and their values."""
+    arguments: dict[str, Any]
+    """What goes with the code, such as `low` and `high`."""
+
+
 class Error(_Answer):
     """Why something was refused or failed."""
 
     error: str
     state: str | None = None
     """The loop's state, where it was the loop that refused or where no loop takes commands."""
+    refusal: Refusal | None = None
+    """The loop's reason, where it has a code."""
 
 
 class Done(_Answer):

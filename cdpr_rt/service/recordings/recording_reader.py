@@ -230,14 +230,3 @@ def _columns(
         array = values.to_numpy(zero_copy_only=False)
         columns[name] = array.reshape(len(rows), -1) if widths[name] else array
     return columns
-
-
-def read_columns(paths: list[Path], fields: Collection[str] | None = None) -> Columns:
-    """Return the rows of several files, one after the other, as whole columns.
-
-    Raises RecordingError.
-    """
-    parts = [columns for path in paths for columns in RecordingReader(path).cycles(fields)]
-    if not parts:
-        raise RecordingError(f"{paths[0]}: holds no cycles")
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

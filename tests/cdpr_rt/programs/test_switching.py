@@ -104,8 +104,11 @@ def test_no_step_in_velocity_whatever_the_stream_does(
     assert np.ptp(rig.array("position")[held][:, 0]) > 1.0
 
 
-@pytest.mark.parametrize("first", ["idle", "hold", "jog", "sweep", "pid", "follow"])
-@pytest.mark.parametrize("second", ["idle", "hold", "jog", "sweep", "pid", "follow"])
+NAMES = tuple(ProgramRig().programs)
+
+
+@pytest.mark.parametrize("first", NAMES)
+@pytest.mark.parametrize("second", NAMES)
 def test_the_next_program_begins_with_the_torque_of_the_last(first: str, second: str) -> None:
     wanted = {
         "jog": {"velocity_rad_s": [5.0] * N},
@@ -122,8 +125,8 @@ def test_the_next_program_begins_with_the_torque_of_the_last(first: str, second:
     rig.switch(second, wanted.get(second))
     rig.cycle()
     unchanged.cycle()
-    shared = {"hold", "jog", "pid", "follow"}
-    if first in shared and second in shared:
+    shared = rig.programs["hold"].controller
+    if all(rig.programs[name].controller is shared for name in (first, second)):
         # the same loop goes on: what differs is the first cycle's share of a new motion, and the
         # friction known of the last axis
         gains = rig.model.gains[0]

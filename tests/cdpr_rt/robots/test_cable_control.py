@@ -178,7 +178,7 @@ def test_an_obstacle_in_the_way_is_told() -> None:
     model = platform_model_of(replace(robot, platform=blocked))
     control = CableControl(model, robot.axes, np.full(8, 6.0), PERIOD_S)
     told = control.way_infeasibility(np.array([-0.05, 0.1, 1.81, 0.0, 0.0, 0.0]))
-    assert "at -0.050, 0.100, 1.810 m: platform and obstacle 1 come within 10 mm" in told
+    assert "at -50.0, 100.0, 1810.0 mm: platform and obstacle 1 come within 10 mm" in told
     assert not control.way_infeasibility(np.array([-0.05, 0.1, 1.7, 0.0, 0.0, 0.0]))
 
 

@@ -22,6 +22,7 @@ from cdpr_rt.core.cycle_row import Row
 from cdpr_rt.core.states import LoopState
 from cdpr_rt.programs.idle import IdleProgram
 from cdpr_rt.programs.model import model_of
+from cdpr_rt.refusal import Refusal
 from cdpr_rt.robots.robot_arrays import limits_of
 from tests.drivers.bus_log import BusLog, logged
 from tests.tools.daemon.loop_rig import LoopRig, opened
@@ -336,13 +337,34 @@ def test_nothing_that_is_posted_crashes_the_loop_or_gives_power(ready: LoopRig) 
         for order in orders:
             what = {key: value for key, value in order.items() if key != "do"}
             answer = ready.command(order.get("do"), **what)
-            assert set(answer) == {"to", "ok", "text", "state", "number"}
+            refusal = set() if answer["ok"] else {"refusal"}
+            assert set(answer) - refusal == {"to", "ok", "text", "state", "number"}
             if order.get("do") == "enable" and answer["ok"]:
                 ready.obeyed("disable")
             assert not ready.loop.engine.driving
         assert State.OPERATION_ENABLED not in drive_states(ready.run(0.02))
 
     post()
+
+
+def test_a_refusal_says_by_a_code_and_figures_what_is_in_the_way(ready: LoopRig) -> None:
+    answer = ready.command("program", program="jog", wanted=JOG)
+    assert answer["text"] == "jog: not in state ready; allowed in active"
+    assert answer["refusal"] == {
+        "code": "not_in_state",
+        "command": "jog",
+        "asked": {},
+        "arguments": {"state": "ready", "allowed": ["active"]},
+    }
+    ready.obeyed("enable")
+    answer = ready.command("program", program="jog", wanted={"velocity_rad_s": [0.0, 1e6]})
+    refusal = answer["refusal"]
+    assert refusal["code"] == "out_of_range" and refusal["asked"] == {"velocity_rad_s": 1e6}
+    assert refusal["arguments"]["index"] == 1
+    assert 0.0 < refusal["arguments"]["high"] == -refusal["arguments"]["low"] < 1e6
+    assert str(Refusal.from_json(refusal)) == answer["text"]
+    answer = ready.command("program", program="jog", wanted={"velocity_rad_s": [0.0]})
+    assert not answer["ok"] and "refusal" not in answer
 
 
 def test_a_command_that_is_no_command_is_left_aside(ready: LoopRig) -> None:

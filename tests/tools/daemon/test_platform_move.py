@@ -14,7 +14,9 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from cdpr_tools.client.platform_move import Frame, PlatformMove, resume_refusal
+from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_tools.client.platform_move import Frame, PlatformMove
+from cdpr_tools.client.refusals import RefusedError
 from cdpr_tools.client.status_text import platform_text
 from cdpr_tools.commands.daemon import daemon_motion, with_daemon
 from cdpr_tools.errors import BadInputError, CommandError, WorkFailedError
@@ -45,7 +47,10 @@ class Told:
     """A daemon as far as `cdpr move` asks it."""
 
     def __init__(
-        self, platform: dict[str, Any], progress: dict[str, Any] | None = None, refusal: str = ""
+        self,
+        platform: dict[str, Any],
+        progress: dict[str, Any] | None = None,
+        refusal: Refusal | None = None,
     ) -> None:
         self.platform, self.progress, self.refusal = platform, progress or {}, refusal
         self.posted: list[dict[str, Any]] = []
@@ -76,7 +81,7 @@ class Told:
 
     def post(self, _path: str, body: dict[str, Any]) -> None:
         if self.refusal:
-            raise WorkFailedError(self.refusal)
+            raise RefusedError(self.refusal)
         self.posted.append(body)
 
     def renew(self) -> None: ...
@@ -91,7 +96,7 @@ def wanted(
     frame: Frame = Frame.ROOM,
     speed: float | None = None,
 ) -> dict[str, Any]:
-    return PlatformMove(to, rotate, relative, frame, speed).wanted(told)  # type: ignore[arg-type]
+    return PlatformMove(to, rotate, relative, frame, speed).arguments(told)  # type: ignore[arg-type]
 
 
 def test_millimetres_and_degrees_become_si() -> None:
@@ -160,44 +165,13 @@ def test_where_a_relative_motion_leads_is_told() -> None:
         wanted(Told(ROOM, HERE), "1000 0 0", relative=True)
 
 
-@pytest.mark.parametrize(
-    ("message", "told"),
-    [
-        (
-            "pose: position_m: value [0.3, 2.0]: cable 1 would need 170.0 N, 20 to 150 N allowed",
-            "--to 300 2000: cable 1 would need 170.0 N, 20 to 150 N allowed",
-        ),
-        (
-            "pose: position_m: value [0.3, 2.0], rotation_rad: value [0.1]: on the way, at "
-            "0.250, -1.500 m turned by 0.100 rad: cable 1",
-            "--to 300 2000: on the way, at 250.0, -1500.0 mm turned by 5.7 deg: cable 1",
-        ),
-        (
-            "pose: the cables are not tight; run tighten first",
-            "move: the cables are not tight; run tighten first",
-        ),
-    ],
-)
-def test_a_refusal_by_the_daemon_is_told_in_the_units_that_were_typed(
-    message: str, told: str
-) -> None:
-    assert PlatformMove("300 2000", None, False, Frame.ROOM, None).refusal(message) == told
-
-
-def test_a_refusal_to_go_on_is_told_as_that_of_resume() -> None:
-    told = resume_refusal("pose: resume: no target has been left; allowed: position_m")
-    assert told == "resume: no target has been left; allowed: cdpr move --to"
-    told = resume_refusal("pose: resume: on the way, at 0.250, -1.500 m: cable 1")
-    assert told == "resume: on the way, at 250.0, -1500.0 mm: cable 1"
-
-
 def test_the_status_tells_where_a_platform_is_and_how_it_is_turned() -> None:
     progress = {
         "position_m": [0.1, 0.2, 0.3],
         "rotation_rad": [0.0, 0.0, math.radians(5.0)],
         "target_m": [0.0, 0.0, 0.0],
         "target_rotation_rad": [0.0, 0.0, 0.0],
-        "trouble": "no way on, at 0.500, 1.000, 2.000 m: cable 1",
+        "trouble": "no way on, at 500.0, 1000.0, 2000.0 mm: cable 1",
     }
     assert platform_text({"program_progress": progress}) == (
         "platform at 100.0, 200.0, 300.0 mm, turned by 0.00, 0.00, 5.00 deg; "
@@ -266,7 +240,9 @@ def test_mistakes_end_with_a_message(
 
 
 def test_the_daemon_s_refusal_names_what_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = Told(ROOM, HERE, "pose: position_m: value [0.0, 0.0, 0.7]: cable 1 would need 9 N")
+    why = {"why": "cable 1 would need 9 N"}
+    asked = {"position_m": [0.0, 0.0, 0.7]}
+    told = Told(ROOM, HERE, Refusal(RefusalCode.NOT_FEASIBLE, "pose", asked, why))
     result = typed(monkeypatch, told, "--to", "0", "0", "700")
     assert isinstance(result.exception, WorkFailedError)
     assert str(result.exception) == "--to 0 0 700: cable 1 would need 9 N"
@@ -282,11 +258,11 @@ def test_what_holds_a_platform_back_is_told_once_while_it_does(
     assert "50 mm behind" in result.output and "51 mm" not in result.output
 
 
-def test_a_way_that_is_blocked_ends_it_with_the_reason_in_millimetres(
+def test_a_way_that_is_blocked_ends_it_with_the_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     told = Told(ROOM, HERE)
-    told.ways = [{}, {"trouble": "no way on, at 0.100, 0.000, 0.700 m: cable 1 would need 9 N"}]
+    told.ways = [{}, {"trouble": "no way on, at 100.0, 0.0, 700.0 mm: cable 1 would need 9 N"}]
     result = typed(monkeypatch, told, "--to", "0", "0", "700")
     assert isinstance(result.exception, WorkFailedError)
     assert "no way on, at 100.0, 0.0, 700.0 mm: cable 1" in str(result.exception)

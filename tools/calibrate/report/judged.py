@@ -20,7 +20,7 @@ from cdpr_rt.calibration.outcome import Outcome, number_or_none
 from cdpr_rt.calibration.verification.verification import Scale, relative_errors
 from cdpr_sim_bus.robot.robot_plant import RobotPlant
 from cdpr_tools.calibrate.measuring.outside import OutsidePoses
-from cdpr_tools.commands.sim.sim_robot import TrueGeometry, true_geometry
+from cdpr_tools.composition.robot_physics import TrueGeometry, true_geometry
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 import time
-from collections.abc import Callable, Sequence
 from enum import StrEnum
-from functools import partial
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any
 
 import typer
 
@@ -21,9 +18,10 @@ from cdpr_tools.client.motion import (
     is_done,
     require_program,
 )
-from cdpr_tools.client.platform_move import Frame, PlatformMove, resume_refusal
+from cdpr_tools.client.platform_move import Frame, PlatformMove
+from cdpr_tools.client.refusals import in_typed_words
 from cdpr_tools.commands.daemon.with_daemon import with_daemon
-from cdpr_tools.errors import BadInputError, WorkFailedError
+from cdpr_tools.errors import BadInputError
 from cdpr_tools.number_options import numbers_command
 from cdpr_tools.output import Output
 from cdpr_tools.signals import HELD, stop_on_signals
@@ -53,18 +51,18 @@ def jog(
     factor = 1e-3 if cable else math.radians(1.0)
     values = [factor * speeds.get(axis, 0.0) for axis in range(n)]
     key = "cable_velocity_m_s" if cable else "velocity_rad_s"
-    wanted = {key: values, "timeout_s": _DEADMAN_S, "duration_s": seconds}
+    arguments = {key: values, "timeout_s": _DEADMAN_S, "duration_s": seconds}
     notes = ProgressNotes(out)
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
-        begin = partial(control.post, "/program", {"program": "jog", "wanted": wanted})
-        in_typed_words(begin, _names(daemon))
+        with in_typed_words("jog", axes=_names(daemon)):
+            control.post("/program", {"program": "jog", "wanted": arguments})
         while not stop_requested():
             time.sleep(RENEW_S)
             progress = require_program(daemon, "jog").get("program_progress", {})
             notes("jog", progress)
             if is_done(progress):
                 break
-            control.post("/set", {"wanted": wanted})
+            control.post("/set", {"wanted": arguments})
         control.hold()
     finish(daemon, out, stop_requested())
 
@@ -119,18 +117,15 @@ def move(
 
 
 def _move_platform(daemon: Daemon, out: Output, move: PlatformMove) -> None:
-    """Have the platform go there; what is refused is told in the words that were typed."""
-    wanted = move.wanted(daemon)
-    try:
-        _run_to_end(daemon, out, "pose", wanted)
-    except (BadInputError, WorkFailedError) as error:
-        raise type(error)(move.refusal(str(error))) from None
+    _run_to_end(daemon, out, "pose", move.arguments(daemon), move.typed)
 
 
-def _run_to_end(daemon: Daemon, out: Output, program: str, wanted: dict[str, Any]) -> None:
+def _run_to_end(
+    daemon: Daemon, out: Output, program: str, arguments: dict[str, Any], typed: str = ""
+) -> None:
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
-        begin = partial(control.post, "/program", {"program": program, "wanted": wanted})
-        in_typed_words(begin, _names(daemon))
+        with in_typed_words("move", typed, _names(daemon)):
+            control.post("/program", {"program": program, "wanted": arguments})
         ended = await_end(control, program, stop_requested, math.inf, out)
         control.hold()
     finish(daemon, out, stop_requested(), ended, arrived=ended is not None)
@@ -156,12 +151,12 @@ def _to_angles(
     n, goals = _given(daemon, axes, "mm" if cable else "deg")
     factor = 1e-3 if cable else math.radians(1.0)
     key = "cable_m" if cable else "distance_rad" if relative else "position_rad"
-    wanted: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         key: [factor * goals[axis] if axis in goals else None for axis in range(n)]
     }
     if speed is not None:
-        wanted["speed_rad_s"] = math.radians(speed)
-    return wanted
+        arguments["speed_rad_s"] = math.radians(speed)
+    return arguments
 
 
 @app.command()
@@ -185,9 +180,9 @@ def controller(
 
     `hold` and `idle` run on when the command has ended.
     """
-    wanted, ended = key_values(values or []), None
+    arguments, ended = key_values(values or []), None
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
-        control.post("/program", {"program": name, "wanted": wanted})
+        control.post("/program", {"program": name, "wanted": arguments})
         if name not in _STANDING:
             ended = await_end(control, name, stop_requested, seconds or math.inf, out)
             control.hold()
@@ -202,46 +197,6 @@ def _given(daemon: Daemon, texts: list[str], unit: str) -> tuple[int, dict[int, 
         if not math.isfinite(value):
             raise BadInputError(f"{axes[axis]['name']}={value:g}: allowed: a finite number")
     return len(axes), values
-
-
-_T = TypeVar("_T")
-_DEG, _MM = math.degrees(1.0), 1e3
-_KEYS: Final = {
-    "velocity_rad_s": (_DEG, "deg/s", ""),
-    "cable_velocity_m_s": (_MM, "mm/s", ""),
-    "position_rad": (_DEG, "deg", ""),
-    "distance_rad": (_DEG, "deg", ""),
-    "cable_m": (_MM, "mm", ""),
-    "speed_rad_s": (_DEG, "deg/s", "--speed"),
-    "duration_s": (1.0, "s", "--seconds"),
-}
-"""By the key of a program: factor and unit of the command line, and the option, if it is one."""
-_REFUSED: Final = re.compile(
-    r"\w+: (?P<key>\w+)(?:\[(?P<axis>\d+)\])?: value (?P<value>\S+); "
-    r"allowed: a number from (?P<low>\S+) to (?P<high>\S+)"
-)
-
-
-def typed_refusal(message: str, names: Sequence[str]) -> str:
-    """Return a refusal with the name of the axis, or the option, and what is allowed as typed."""
-    found = _REFUSED.fullmatch(message)
-    if found is None or found["key"] not in _KEYS:
-        return message
-    factor, unit, option = _KEYS[found["key"]]
-    value, low, high = (factor * float(found[name]) for name in ("value", "low", "high"))
-    typed = f"{option} " if found["axis"] is None else f"{names[int(found['axis'])]}="
-    return f"{typed}{value:.6g}: allowed: {low:.4g} to {high:.4g} {unit}"
-
-
-def in_typed_words(do: Callable[[], _T], names: Sequence[str]) -> _T:
-    """Return what `do` does; its refusal is raised as bad input, in the words that were typed."""
-    try:
-        return do()
-    except (BadInputError, WorkFailedError) as error:
-        refusal = typed_refusal(str(error), names)
-        if refusal == str(error):
-            raise
-        raise BadInputError(refusal) from None
 
 
 class Source(StrEnum):
@@ -267,13 +222,10 @@ def tighten(
     ] = None,
 ) -> None:
     """Take up the slack of a platform's cables and learn where it is; it is held then."""
-    wanted = {} if source is None else {"from": source.value}
+    arguments = {} if source is None else {"from": source.value}
     typed = "tighten" if source is None else f"tighten --from {source.value}"
-    try:
-        _carry_out(daemon, out, "tighten", wanted)
-    except (BadInputError, WorkFailedError) as error:
-        told = str(error).replace("tighten: from:", f"{typed}:")
-        raise type(error)(re.sub(r"\bfrom: (?=[a-z])", "--from ", told)) from None
+    with in_typed_words("tighten", typed, option="--from "):
+        _carry_out(daemon, out, "tighten", arguments)
 
 
 @app.command()
@@ -287,10 +239,10 @@ def lower(
     ] = False,
 ) -> None:
     """Let the platform down onto its stand; the power stays on, the cables are loose."""
-    wanted = {"blind": True} if blind else {}
+    arguments = {"blind": True} if blind else {}
     tight = (daemon.get("/status").get("program_progress") or {}).get("tight")
     where = "let down blind" if blind else "on its stand" if tight else "where it is"
-    _carry_out(daemon, out, "lower", wanted, f"{where}, cables loose, power on")
+    _carry_out(daemon, out, "lower", arguments, f"{where}, cables loose, power on")
 
 
 @app.command()
@@ -311,10 +263,8 @@ def resume(daemon: Daemon, out: Output) -> None:
 
         go_on(daemon, out)
         return
-    try:
+    with in_typed_words("resume", allowed="cdpr move --to"):
         _carry_out(daemon, out, "pose", {"resume": True})
-    except (BadInputError, WorkFailedError) as error:
-        raise type(error)(resume_refusal(str(error))) from None
 
 
 def _require_platform(daemon: Daemon, what: str) -> None:
@@ -324,12 +274,12 @@ def _require_platform(daemon: Daemon, what: str) -> None:
 
 
 def _carry_out(
-    daemon: Daemon, out: Output, program: str, wanted: dict[str, Any], where: str = ""
+    daemon: Daemon, out: Output, program: str, arguments: dict[str, Any], where: str = ""
 ) -> None:
     """Have a program run to its end, then hold; `where` are the words for its end."""
     _require_platform(daemon, program)
     with stop_on_signals(HELD) as stop_requested, daemon.control() as control:
-        control.post("/program", {"program": program, "wanted": wanted})
+        control.post("/program", {"program": program, "wanted": arguments})
         ended = await_end(control, program, stop_requested, math.inf, out)
         control.hold()
     finish(daemon, out, stop_requested(), ended, where)

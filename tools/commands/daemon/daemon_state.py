@@ -116,13 +116,13 @@ def _next(status: dict[str, Any]) -> list[str]:
 
 def _booted(daemon: Daemon, out: Output) -> dict[str, Any]:
     """Return the status once the drives have booted, or why they have not is known."""
-    deadline, told = time.monotonic() + _BOOT_S, False
+    deadline, announced = time.monotonic() + _BOOT_S, False
     while (status := daemon.get("/status"))["state"] in _BOOTING and not status["reason"]:
         if time.monotonic() > deadline:
             break
-        if not told:
+        if not announced:
             out.note("the drives are still booting ...")
-        told = True
+        announced = True
         time.sleep(_WATCH_S)
     return status
 

@@ -115,8 +115,8 @@ def _show(
         out.say(f"      {unknown.why}")
         out.say(f"      to find out: {unknown.how}")
     out.say("")
-    told = {"node_id": eds.node_id, "bitrate_bit_s": eds.bitrate_bit_s}
-    if values := ", ".join(f"{key} = {one}" for key, one in told.items() if one is not None):
+    suggested = {"node_id": eds.node_id, "bitrate_bit_s": eds.bitrate_bit_s}
+    if values := ", ".join(f"{key} = {one}" for key, one in suggested.items() if one is not None):
         out.say(f"for the winch's file: {values}")
     out.say(f"{copy}" + (": rewritten, its flaws mended" if rewritten else ": as it was"))
     out.say(f"{profile}: name it as `drive` in your winch's file")

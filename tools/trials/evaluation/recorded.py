@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cdpr_profiles import load_robot
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.service.recordings.recording_reader import Columns, RecordingReader
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.trials.directions import Directions, platform_of, rotations_of
@@ -132,7 +132,7 @@ class Recorded:
         off = (true - measured) - (true - measured).mean(axis=0)
         moved = max(float(np.sum(speed**2)), _STANDING)
         age_s = float(np.sum(speed * off)) / moved
-        rest = float(np.sqrt(np.mean((off - age_s * speed) ** 2)))
+        rest = rms((off - age_s * speed).ravel())
         uncertain_s = 0.25 * self.period_s + 5.0 * rest / np.sqrt(moved)
         old = -uncertain_s <= age_s <= _OLDEST_S + uncertain_s
         if not old or not rest < _MISFIT_rad:

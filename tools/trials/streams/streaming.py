@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.arrays import FloatArray
+from cdpr_rt.arrays import FloatArray, rms
 from cdpr_rt.motion.stream_buttons import stream_buttons
 from cdpr_tools.trials.directions import Directions
 from cdpr_tools.trials.evaluation.figures import Figure
@@ -147,7 +147,7 @@ def judge(recorded: Recorded) -> list[Figure]:
             "mm/s",
             1e3 * float(allowed[:k].min()),
         ),
-        Figure("off_rms_mm", "RMS distance from the set-point", 1e3 * _rms(off), "mm"),
+        Figure("off_rms_mm", "RMS distance from the set-point", 1e3 * rms(off), "mm"),
         Figure("off_mm", "worst distance from the set-point", 1e3 * float(off.max()), "mm"),
     ]
     if directions.angle_rad > 0.0:
@@ -156,10 +156,6 @@ def judge(recorded: Recorded) -> list[Figure]:
         limit = float(np.degrees(allowed[k:].min()))
         figures += [
             Figure("step_deg_s", text, math.degrees(step), "deg/s", limit),
-            Figure("turned_off_rms_deg", "RMS angle from the set-point", _rms(angle), "deg"),
+            Figure("turned_off_rms_deg", "RMS angle from the set-point", rms(angle), "deg"),
         ]
     return figures
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -57,7 +57,6 @@ class MarkerDetector:
             repeated,
             tuple(unsharp),
             self._mirrored(pixels, corners) if mirrors else (),
-            width,
             _sharpness_problem(pixels, len(ids), width),
         )
 

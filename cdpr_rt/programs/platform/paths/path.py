@@ -22,6 +22,7 @@ from cdpr_rt.programs.platform.platform_program import (
     along_velocity,
     synchronise,
 )
+from cdpr_rt.refusal import Refusal, RefusalCode
 
 _KEYS: Final = ("plan", "resume", "pause", "back_m", "feed")
 _SLOWEST: Final = 0.01
@@ -165,7 +166,9 @@ class PathProgram(PlatformProgram):
         """Return the plan that was left, and the time up to which it has come."""
         left = self.store.unfinished
         if left is None:
-            raise ProgramError(f"path: {what}: no path has been left; allowed: plan")
+            nothing = {"left": "path", "allowed": "plan"}
+            asked = {what: True}
+            raise ProgramError(Refusal(RefusalCode.NOTHING_LEFT, self.name, asked, nothing))
         name, time_s = left
         plan = self._plan
         if plan is None or plan.name != name:
@@ -182,7 +185,8 @@ class PathProgram(PlatformProgram):
         stopping_position(control.position, control.velocity, most, here)
         obstacle = control.infeasibility(there) or control.way_infeasibility(there, here)
         if obstacle:
-            raise ProgramError(f"path: on the way to where it begins: {obstacle}")
+            why = {"why": f"on the way to where it begins: {obstacle}"}
+            raise ProgramError(Refusal(RefusalCode.NOT_FEASIBLE, self.name, arguments=why))
 
     def _take(self, command: _Command) -> None:
         self._feed = command.feed

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.platform_program import PlatformParts, distance_m
 from cdpr_rt.programs.platform.tightening.standing_tensions import StandingTensions
+from cdpr_rt.refusal import Refusal, RefusalCode
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.workspace import G_m_s2
 
@@ -21,31 +24,41 @@ _CARRIED_SHARE = 0.8
 _FALLEN = (
     "the platform hung when the power was taken, or a drive lost: it has fallen, "
     "may have turned over, and cables may lie around it. Look at it. Where it stands at home, "
-    "upright, all cables free: say from: home"
+    "upright, all cables free: tighten from home"
 )
-_FALLEN_ELSEWHERE = "; where it stands so elsewhere: say from: lengths"
+_FALLEN_ELSEWHERE = "; where it stands so elsewhere: from lengths"
 
 
-def why_not_from(parts: PlatformParts, source: str, *, said: bool) -> str:
-    """Return why not to take the lengths from a source, an empty text for nothing.
+def bad_source(asked: Mapping[str, Any], why: str, *allowed: str) -> Refusal:
+    """Return the refusal to take the cables' lengths from where it was `asked`."""
+    arguments = {"why": why, "allowed": allowed}
+    return Refusal(RefusalCode.BAD_SOURCE, "tighten", asked, arguments)
 
-    Where the platform was let go, or fell, somebody has to have `said` where from.
+
+def source_refusal(parts: PlatformParts, source: str, asked: Mapping[str, Any]) -> Refusal | None:
+    """Return why not to take the lengths from a source, None for nothing.
+
+    Where the platform was let go, or fell, somebody has to have `asked` for it by name.
     """
     last = parts.last
-    if last.fallen and not said:
-        return _FALLEN + (_FALLEN_ELSEWHERE if parts.known else "")
-    if source == "home" and last.displaced and not said:
-        return (
-            "the platform was let go elsewhere, and where it stands is not known; stand it at "
-            "home, then say from: home"
+    if asked and parts.tight:
+        return bad_source(asked, "the cables are tight already; lower it first")
+    if last.fallen and not asked:
+        elsewhere, allowed = (_FALLEN_ELSEWHERE, ("lengths",)) if parts.known else ("", ())
+        return bad_source(asked, _FALLEN + elsewhere, "home", *allowed)
+    if source == "home" and last.displaced and not asked:
+        why = (
+            "the platform was let go elsewhere, and where it stands is not known; stand it at home"
         )
+        return bad_source(asked, why, "home")
     if source == "lengths" and not parts.known:
-        return "the cables' lengths are not known; allowed: home"
+        return bad_source(asked, "the cables' lengths are not known", "home")
     if source == "last" and last.lengths is None:
-        return f"no lengths of the last stop: {last.why}"
+        return bad_source(asked, f"no lengths of the last stop: {last.why}")
+    why = ""
     if source == "home" and parts.known and not parts.tight:
-        return why_not_to_wind_in(parts, parts.estimator.estimate.cable_length_m)
-    return ""
+        why = why_not_to_wind_in(parts, parts.estimator.estimate.cable_length_m)
+    return bad_source(asked, why) if why else None
 
 
 def why_not_to_wind_in(parts: PlatformParts, length_m: FloatArray) -> str:
@@ -154,7 +167,7 @@ def why_not_to_hold(
         return ""
     return (
         f"the platform may hang on its cables, and {why}: each cable is held as it is; lower it, "
-        "stand it at home and tighten from: home"
+        "stand it at home and tighten from home"
     )
 
 
@@ -166,7 +179,7 @@ def _turned_much(parts: PlatformParts) -> bool:
 def _not_pulled(here: FloatArray, k: int, why: str) -> str:
     return (
         f"the platform is {_place(here, k)}{why}: it is not pulled at; stand it at home, upright, "
-        "all cables free, and tighten from: home"
+        "all cables free, and tighten from home"
     )
 
 

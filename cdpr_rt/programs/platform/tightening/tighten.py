@@ -15,10 +15,11 @@ from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
 from cdpr_rt.programs.platform.tightening.index_path import index_path
 from cdpr_rt.programs.platform.tightening.standing import (
+    bad_source,
     disagreement,
     hangs,
+    source_refusal,
     why_not_at_home,
-    why_not_from,
     why_not_to_hold,
     why_not_to_pull,
     would_move,
@@ -170,17 +171,15 @@ class TightenProgram(PlatformProgram):
 
     def _parsed(self, arguments: Mapping[str, Any]) -> tuple[str, bool]:
         CommandArguments(self.name, arguments, ("from",))
-        if arguments and self._parts.tight:
-            raise ProgramError("tighten: from: the cables are tight already; lower it first")
         source = arguments.get("from", self._default_source())
         if source not in _SOURCES:
             allowed = ", ".join(_SOURCES)
             raise ProgramError(f"tighten: from: value {source!r}; allowed: {allowed}")
-        if why := why_not_from(self._parts, source, said=bool(arguments)):
-            raise ProgramError(f"tighten: from: {why}")
-        return str(source), source != "home" and self._is_to_hold(source)
+        if (refusal := source_refusal(self._parts, source, arguments)) is not None:
+            raise ProgramError(refusal)
+        return str(source), source != "home" and self._is_to_hold(source, arguments)
 
-    def _is_to_hold(self, source: str) -> bool:
+    def _is_to_hold(self, source: str, arguments: Mapping[str, Any]) -> bool:
         """Return whether the platform hangs where it is to be held; raises ProgramError.
 
         The control's estimate is of no use to others while cables may be slack: it is taken anew.
@@ -195,7 +194,7 @@ class TightenProgram(PlatformProgram):
         if length_m is None:
             return False
         if why := why_not_to_hold(parts, self._standing, length_m, now):
-            raise ProgramError(f"tighten: from: {why}")
+            raise ProgramError(bad_source(arguments, why))
         return True
 
     def _take(self, checked: tuple[str, bool]) -> None:
@@ -398,8 +397,6 @@ class TightenProgram(PlatformProgram):
         """Return which index contradicts the lengths of the last stop, or an empty text."""
         if self._last is None:
             return ""
-        length_m, allowed_m = (
-            self._parts.estimator.estimate.cable_length_m,
-            self._parts.lengths_allowed_m,
-        )
+        parts = self._parts
+        length_m, allowed_m = parts.estimator.estimate.cable_length_m, parts.lengths_allowed_m
         return index_disagreement(self._last, length_m, self._feedback, self._cable, allowed_m)

@@ -268,7 +268,7 @@ def test_a_platform_let_go_elsewhere_is_not_taken_to_stand_at_home(robot: Standi
     tighten = robot.programs["tighten"]
     tighten.check({})  # its cables' lengths tell where it is
     robot.estimator.forget_lengths()
-    with pytest.raises(ProgramError, match="stand it at home, then say from: home"):
+    with pytest.raises(ProgramError, match="stand it at home; allowed: from home"):
         tighten.check({})
     robot.switch("tighten", {"from": "home"})
     robot.until_done(20.0)
@@ -302,7 +302,7 @@ def test_holding_keeps_axes_before_and_the_platform_after(robot: Standing):
     ("wanted", "named"),
     [
         ({"from": "there"}, "from: value 'there'; allowed: home, lengths, last"),
-        ({"from": "lengths"}, "lengths are not known; allowed: home"),
+        ({"from": "lengths"}, "lengths are not known; allowed: from home"),
         ({"from": "last"}, "no lengths of the last stop: the robot has not been stopped"),
         ({"to": "home"}, "key 'to'; allowed: from"),
     ],

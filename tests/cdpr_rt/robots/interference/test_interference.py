@@ -127,8 +127,11 @@ def test_the_words_name_both_things_the_distance_and_the_place() -> None:
     found = model.interference.first_contact(np.array([model.home, there]))
     assert found is not None
     words = "cable 3 and platform come within "
-    place, turned = (", ".join(f"{x:.3f}" for x in part) for part in np.split(found.position, 2))
-    told = f"at {place} m turned by {turned} rad: {words}10 mm of each other"
+    position, rotation = np.split(found.position, 2)
+    place, turned = (
+        ", ".join(f"{x:z.1f}" for x in part) for part in (1e3 * position, np.degrees(rotation))
+    )
+    told = f"at {place} mm turned by {turned} deg: {words}10 mm of each other"
     assert str(found) == told
     further = found.position + 1e-3 * (there - model.home)
     assert model.interference.contact(model.poses(further[None])[0]).startswith(words)

@@ -28,6 +28,8 @@ from cdpr_rt.service.service import Service
 
 KEY = b"an old key that opens this daemon"
 AXES = ("left", "right")
+NOT_TIGHT = {"code": "not_tight", "command": "pose", "asked": {}, "arguments": {}}
+"""Why the loop does not run the program `pose`."""
 
 
 class MadeUpLoop:
@@ -76,6 +78,9 @@ class MadeUpLoop:
     def _obey(self, command: dict[str, Any]) -> dict[str, Any]:
         if command["do"] == "check":
             return {"ok": False, "text": "check: node 3 does not answer", "state": "inactive"}
+        if command["do"] == "program" and command["program"] == "pose":
+            text = "pose: the cables are not tight; run tighten first"
+            return {"ok": False, "text": text, "refusal": NOT_TIGHT, "state": "ready"}
         if command["do"] == "enable":
             self.publish(state="active", program=command["program"])
         return {"ok": True, "text": "", "state": str(self.status["state"])}

@@ -13,7 +13,7 @@ import pytest
 from cdpr_rt.service.streams.setpoint_stream import SetpointStream, listen_udp
 from cdpr_rt.service.streams.stream_client import StreamClient
 from cdpr_rt.service.streams.stream_packet import Standing, StreamSession
-from tests.cdpr_rt.service.http.service_rig import Rig, wait_for
+from tests.cdpr_rt.service.http.service_rig import NOT_TIGHT, Rig, wait_for
 
 
 def take(client: httpx.Client, name: str = "maria", ttl_s: float = 2.0) -> dict[str, str]:
@@ -175,8 +175,12 @@ def test_the_right_outlasts_a_command_that_takes_long_but_not_a_client_that_leav
 def test_what_the_loop_refuses_is_passed_on_with_its_state(rig: Rig) -> None:
     with rig.client() as client:
         answer = client.post("/check")
-    assert answer.status_code == 409
-    assert answer.json() == {"error": "check: node 3 does not answer", "state": "inactive"}
+        assert answer.status_code == 409
+        assert answer.json() == {"error": "check: node 3 does not answer", "state": "inactive"}
+        wanted = {"program": "pose", "wanted": {"resume": True}}
+        answer = client.post("/program", json=wanted, headers=take(client))
+    assert answer.json()["error"] == "pose: the cables are not tight; run tighten first"
+    assert answer.json()["refusal"] == NOT_TIGHT
 
 
 def test_many_who_ask_for_hold_at_once_are_one_command(

@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect, unix_connect
 
 from cdpr_rt.service.http import control_socket, websocket_routes
-from tests.cdpr_rt.service.http.service_rig import AXES, KEY, Rig, running, wait_for
+from tests.cdpr_rt.service.http.service_rig import AXES, KEY, NOT_TIGHT, Rig, running, wait_for
 
 
 @pytest.fixture(scope="module")
@@ -170,11 +170,14 @@ def test_the_connection_is_the_right_to_move(rig: Rig) -> None:
             "error": None,
             "state": "ready",
         }
+        refused = ask(connection, do="program", program="pose")
+        assert refused["ok"] is False and refused["refusal"] == NOT_TIGHT
+        assert refused["error"].startswith("pose: the cables are not tight")
         assert ask(connection, do="set", wanted={"v": [2]})["ok"] is True
         assert rig.lease_left_s > 0.0
     wait_for(lambda: rig.lease_until_s == 0.0)
-    assert [command["do"] for command in rig.loop.commands] == ["program", "set"]
-    assert rig.loop.commands[1]["client"] == "maria"
+    assert [command["do"] for command in rig.loop.commands] == ["program", "program", "set"]
+    assert rig.loop.commands[2]["client"] == "maria"
 
 
 def test_a_connection_cut_off_loses_it_at_once(rig: Rig) -> None:

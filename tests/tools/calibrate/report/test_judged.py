@@ -17,7 +17,7 @@ from cdpr_tools.calibrate.measuring.outside import OutsidePose, OutsidePoses
 from cdpr_tools.calibrate.report import judged as judging
 from cdpr_tools.calibrate.report.judged import Judged, judged
 from cdpr_tools.calibrate.report.page import write_report
-from cdpr_tools.commands.sim.sim_robot import TrueGeometry
+from cdpr_tools.composition.robot_physics import TrueGeometry
 from tests.cdpr_rt.calibration.camera_robot import CameraRobot, camera_robot
 
 SCANNER_m, SCANNER_rad = 5e-4, 5e-4

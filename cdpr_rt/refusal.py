@@ -1,0 +1,102 @@
+"""Why a command was refused: a code and its arguments for programs, words for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from typing import Any
+
+_SHOWN = 60
+
+
+class RefusalCode(StrEnum):
+    """What is in a command's way; in brackets the arguments beside what was asked for."""
+
+    NOT_IN_STATE = "not_in_state"
+    """The loop's state does not allow it (`state`, `allowed`: names of states)."""
+    OUT_OF_RANGE = "out_of_range"
+    """A number is out of its bounds (`index` in a list or None, `low`, `high`)."""
+    NOT_FEASIBLE = "not_feasible"
+    """The platform cannot be at a place, or on the way to it (`why`)."""
+    NOTHING_LEFT = "nothing_left"
+    """There is nothing to go on with (`left`: target or path, `allowed`: what to ask for)."""
+    NOT_TIGHT = "not_tight"
+    """The cables are not tight."""
+    NOT_CALIBRATED = "not_calibrated"
+    """The platform's geometry is not known well enough to move it (`why`)."""
+    BAD_SOURCE = "bad_source"
+    """Cable lengths are not to be taken from there (`why`, `allowed`: sources, perhaps none)."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a command was refused, for programs; as text for people.
+
+    An error of the loop that is raised with it, in place of a text, carries it to the reply.
+    """
+
+    code: RefusalCode
+    command: str
+    """The command, or the program that it was for."""
+    asked: Mapping[str, Any] = field(default_factory=dict)
+    """The refused keys and their values, empty where the command is refused whatever it asks."""
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        if self.code is RefusalCode.OUT_OF_RANGE:
+            return f"{self.command}: {self._keys()}; {self.reason(numbers='a number from ')}"
+        parts = (self.command, self._keys(), self.reason(option="from "))
+        return ": ".join(part for part in parts if part)
+
+    def reason(self, **others: Any) -> str:
+        """Return the words for what is in the way; `others` stand in for arguments."""
+        arguments = {"numbers": "", "unit": "", "option": "", **self.arguments, **others}
+        match self.code:
+            case RefusalCode.NOT_IN_STATE:
+                allowed = " or ".join(arguments["allowed"])
+                return f"not in state {arguments['state']}; allowed in {allowed}"
+            case RefusalCode.OUT_OF_RANGE:
+                return "allowed: {numbers}{low:g} to {high:g}{unit}".format(**arguments)
+            case RefusalCode.NOTHING_LEFT:
+                return "no {left} has been left; allowed: {allowed}".format(**arguments)
+            case RefusalCode.NOT_TIGHT:
+                return "the cables are not tight; run tighten first"
+            case RefusalCode.BAD_SOURCE if arguments["allowed"]:
+                sources = ", ".join(arguments["allowed"])
+                return f"{arguments['why']}; allowed: {arguments['option']}{sources}"
+        return str(arguments["why"])
+
+    def _keys(self) -> str:
+        index = self.arguments.get("index")
+        place = "" if index is None else f"[{index}]"
+        return ", ".join(
+            key if value is True else f"{key}{place}: value {shown(value)}"
+            for key, value in self.asked.items()
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as the daemon's answers hold it."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, value: Any) -> Refusal | None:
+        """Return what an answer holds, None where it is not a refusal as it is known here."""
+        try:
+            refusal = cls(**{**value, "code": RefusalCode(value["code"])})
+            str(refusal)
+        except (TypeError, KeyError, ValueError, AttributeError):
+            return None
+        return refusal
+
+
+def shown(value: Any) -> str:
+    """Return a value as it is told, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
+
+
+def refusal_of(error: Exception) -> Refusal | None:
+    """Return the refusal that an error of the loop carries, None where it has only words."""
+    first = error.args[0] if error.args else None
+    return first if isinstance(first, Refusal) else None

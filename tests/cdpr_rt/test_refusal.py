@@ -1,0 +1,93 @@
+"""A refusal in words, as JSON, and back."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from cdpr_rt.errors import ControlError
+from cdpr_rt.refusal import Refusal, RefusalCode, refusal_of
+
+RANGE = {"index": 1, "low": -2.0, "high": 2.0}
+STATE = {"state": "fault", "allowed": ["ready", "active"]}
+FROM = {"why": "the lengths are not known", "allowed": ["home", "last"]}
+REFUSALS = [
+    (
+        Refusal(RefusalCode.NOT_IN_STATE, "enable", arguments=STATE),
+        "enable: not in state fault; allowed in ready or active",
+    ),
+    (
+        Refusal(RefusalCode.OUT_OF_RANGE, "jog", {"velocity_rad_s": 5.0}, RANGE),
+        "jog: velocity_rad_s[1]: value 5.0; allowed: a number from -2 to 2",
+    ),
+    (
+        Refusal(RefusalCode.OUT_OF_RANGE, "path", {"feed": 5.0}, {**RANGE, "index": None}),
+        "path: feed: value 5.0; allowed: a number from -2 to 2",
+    ),
+    (
+        Refusal(RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.1, 2.0]}, {"why": "cable 1"}),
+        "pose: position_m: value [0.1, 2.0]: cable 1",
+    ),
+    (
+        Refusal(
+            RefusalCode.NOTHING_LEFT,
+            "path",
+            {"resume": True},
+            {"left": "path", "allowed": "plan"},
+        ),
+        "path: resume: no path has been left; allowed: plan",
+    ),
+    (
+        Refusal(RefusalCode.NOT_TIGHT, "pose"),
+        "pose: the cables are not tight; run tighten first",
+    ),
+    (
+        Refusal(RefusalCode.NOT_CALIBRATED, "pose", arguments={"why": "not calibrated"}),
+        "pose: not calibrated",
+    ),
+    (
+        Refusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, FROM),
+        "tighten: from: value 'lengths': the lengths are not known; allowed: from home, last",
+    ),
+    (
+        Refusal(RefusalCode.BAD_SOURCE, "tighten", {}, {**FROM, "allowed": []}),
+        "tighten: the lengths are not known",
+    ),
+]
+
+
+def test_every_code_is_among_these() -> None:
+    assert {refusal.code for refusal, _ in REFUSALS} == set(RefusalCode)
+
+
+@pytest.mark.parametrize(("refusal", "text"), REFUSALS)
+def test_it_is_told_in_words_and_survives_json(refusal: Refusal, text: str) -> None:
+    assert str(refusal) == str(ControlError(refusal)) == text
+    assert Refusal.from_json(json.loads(json.dumps(refusal.as_json()))) == refusal
+
+
+def test_an_error_carries_it_and_one_of_words_none() -> None:
+    refusal = REFUSALS[0][0]
+    assert refusal_of(ControlError(refusal)) is refusal
+    assert refusal_of(ControlError("words")) is None
+    assert refusal_of(ControlError()) is None
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        "not_tight",
+        {},
+        {"code": "of another version", "command": "jog"},
+        {"code": "not_tight"},
+        {"code": "out_of_range", "command": "jog", "asked": {"a": 1}, "arguments": {"low": 0}},
+        {"code": "out_of_range", "command": "jog", "asked": [], "arguments": RANGE},
+        {"code": "not_in_state", "command": "jog", "arguments": {"state": "a", "allowed": [1]}},
+        {"code": "not_tight", "command": "jog", "more": 1},
+    ],
+)
+def test_what_is_not_one_as_it_is_known_here_is_none(value: Any) -> None:
+    assert Refusal.from_json(value) is None

@@ -1,0 +1,116 @@
+"""How refusals of the loop are told in the words of the command line."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_tools.client.client import open_daemon
+from cdpr_tools.client.refusals import RefusedError, in_typed_words
+from cdpr_tools.errors import BadInputError, WorkFailedError
+
+WHY = {"why": "on the way, at 250.0, -1500.0 mm turned by 5.7 deg: cable 1"}
+RANGE = {"index": 1, "low": -1.0, "high": 1.0}
+
+
+def told(refusal: Refusal, *typed: Any, **words: Any) -> str:
+    with pytest.raises(RefusedError) as raised, in_typed_words(*typed, **words):
+        raise RefusedError(refusal)
+    return str(raised.value)
+
+
+def test_what_was_asked_for_is_named_as_it_was_typed() -> None:
+    refusal = Refusal(RefusalCode.NOT_FEASIBLE, "pose", {"position_m": [0.3, 2.0]}, WHY)
+    assert told(refusal, "move", "--to 300 2000") == f"--to 300 2000: {WHY['why']}"
+    refusal = Refusal(RefusalCode.NOT_TIGHT, "pose")
+    assert told(refusal, "move", "--to 300 2000").startswith("move: the cables are not tight")
+
+
+def test_what_is_allowed_is_named_as_it_is_typed() -> None:
+    nothing = {"left": "target", "allowed": "position_m"}
+    refusal = Refusal(RefusalCode.NOTHING_LEFT, "pose", {"resume": True}, nothing)
+    text = told(refusal, "resume", allowed="cdpr move --to")
+    assert text == "resume: no target has been left; allowed: cdpr move --to"
+    sources = {"why": "the cables' lengths are not known", "allowed": ["home"]}
+    refusal = Refusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, sources)
+    text = told(refusal, "tighten", "tighten --from lengths", option="--from ")
+    assert text == "tighten --from lengths: the cables' lengths are not known; allowed: --from home"
+
+
+@pytest.mark.parametrize(
+    ("asked", "index", "text"),
+    [
+        ({"velocity_rad_s": 2.0}, 1, "right=114.592: allowed: -57.3 to 57.3 deg/s"),
+        ({"cable_m": 2.0}, 0, "left=2000: allowed: -1000 to 1000 mm"),
+        ({"speed_rad_s": 2.0}, None, "--speed 114.592: allowed: -57.3 to 57.3 deg/s"),
+        ({"back_m": 2.0}, None, "--back 2000: allowed: -1000 to 1000 mm"),
+    ],
+)
+def test_a_number_out_of_its_bounds_is_bad_input_in_units_that_are_typed(
+    asked: dict[str, float], index: int | None, text: str
+) -> None:
+    refusal = Refusal(RefusalCode.OUT_OF_RANGE, "pid", asked, {**RANGE, "index": index})
+    with pytest.raises(BadInputError) as raised, in_typed_words("move", "", ("left", "right")):
+        raise RefusedError(refusal)
+    assert str(raised.value) == text
+
+
+def test_a_number_that_no_option_stands_for_is_told_as_the_loop_tells_it() -> None:
+    refusal = Refusal(RefusalCode.OUT_OF_RANGE, "path", {"feed": 2.0}, {**RANGE, "index": None})
+    assert told(refusal, "path", "--feed") == str(refusal)
+
+
+@pytest.mark.parametrize(
+    ("state", "allowed", "remedy"),
+    [
+        ("ready", ["active"], "; `cdpr enable` gives power"),
+        ("ready", ["inactive"], ""),
+        ("fault", ["ready", "active"], "; `cdpr status` says why, `cdpr ack` acknowledges it"),
+        ("shutting-down", ["active"], ""),
+    ],
+)
+def test_the_remedy_follows_from_the_state(state: str, allowed: list[str], remedy: str) -> None:
+    states = {"state": state, "allowed": allowed}
+    text = str(RefusedError(Refusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)))
+    assert text == f"jog: not in state {state}; allowed in {' or '.join(allowed)}{remedy}"
+    # words alone have none
+    assert told(Refusal(RefusalCode.NOT_CALIBRATED, "jog", {}, {"why": text}), "jog").endswith(text)
+
+
+@pytest.mark.parametrize(
+    ("refusal", "kind"),
+    [
+        (b'{"code": "not_tight", "command": "pose", "asked": {}, "arguments": {}}', RefusedError),
+        (b'{"code": "of another version", "command": "pose"}', WorkFailedError),
+        (b"null", WorkFailedError),
+    ],
+)
+def test_a_daemon_s_answer_is_raised_with_its_code(
+    tmp_path: Path, refusal: bytes, kind: type[Exception]
+) -> None:
+    body = b'{"error": "its words", "state": "ready", "refusal": %s}' % refusal
+    head = b"HTTP/1.1 409 Conflict\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body)
+
+    def serve() -> None:
+        connection, _ = served.accept()
+        with connection:
+            connection.recv(1 << 16)
+            connection.sendall(head + body)
+
+    place = tmp_path / "one.sock"
+    with socket.socket(socket.AF_UNIX) as served, open_daemon(None, place, None, None) as daemon:
+        served.bind(str(place))
+        served.listen()
+        thread = threading.Thread(target=serve)
+        thread.start()
+        with pytest.raises(WorkFailedError) as raised:
+            daemon.post("/program")
+        thread.join()
+    assert type(raised.value) is kind
+    words = "pose: the cables are not tight; run tighten first"
+    assert str(raised.value) == (words if kind is RefusedError else "its words")

@@ -1,0 +1,79 @@
+"""Refusals of a daemon's loop, and how they are told in the words and units that were typed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Final
+
+from cdpr_rt.refusal import Refusal, RefusalCode
+from cdpr_tools.errors import BadInputError, WorkFailedError
+
+_DEG, _MM = math.degrees(1.0), 1e3
+_KEYS: Final = {
+    "velocity_rad_s": (_DEG, "deg/s", ""),
+    "cable_velocity_m_s": (_MM, "mm/s", ""),
+    "position_rad": (_DEG, "deg", ""),
+    "distance_rad": (_DEG, "deg", ""),
+    "cable_m": (_MM, "mm", ""),
+    "speed_rad_s": (_DEG, "deg/s", "--speed"),
+    "duration_s": (1.0, "s", "--seconds"),
+    "back_m": (_MM, "mm", "--back"),
+}
+"""By the key of a program: factor and unit of the command line, and the option, if it is one."""
+# what to do in a state in which a command was refused
+_REMEDIES: Final = {
+    "unconfigured": "`cdpr status` says why, `cdpr check` tries again",
+    "inactive": "`cdpr status` says why, `cdpr check` tries again",
+    "ready": "`cdpr enable` gives power",
+    "fault": "`cdpr status` says why, `cdpr ack` acknowledges it",
+}
+
+
+class RefusedError(WorkFailedError):
+    """The loop has refused a command, and has said why by a code."""
+
+    def __init__(self, refusal: Refusal, text: str = "") -> None:
+        super().__init__((text or str(refusal)) + _remedy(refusal))
+        self.refusal = refusal
+
+
+def _remedy(refusal: Refusal) -> str:
+    """Return what is to be done about a refusal, to be appended to it, "" where that is unknown."""
+    if refusal.code is not RefusalCode.NOT_IN_STATE:
+        return ""
+    state, allowed = refusal.arguments["state"], list(refusal.arguments["allowed"])
+    if state not in _REMEDIES or (state == "ready" and allowed != ["active"]):
+        return ""
+    return f"; {_REMEDIES[state]}"
+
+
+@contextmanager
+def in_typed_words(
+    command: str, asked: str = "", axes: Sequence[str] = (), **words: str
+) -> Iterator[None]:
+    """Raise refusals in the block as what was typed: `command`, or the options in `asked`.
+
+    `axes` are their names, `words` stand in for arguments of the refusal. A number out of its
+    bounds is raised as BadInputError.
+    """
+    try:
+        yield
+    except RefusedError as error:
+        refusal = error.refusal
+        if refusal.code is RefusalCode.OUT_OF_RANGE:
+            if _KEYS.keys().isdisjoint(refusal.asked):
+                raise
+            raise BadInputError(_out_of_range(refusal, axes)) from None
+        typed = asked if refusal.asked and asked else command
+        raise RefusedError(refusal, f"{typed}: {refusal.reason(**words)}") from None
+
+
+def _out_of_range(refusal: Refusal, axes: Sequence[str]) -> str:
+    (key, value), index = next(iter(refusal.asked.items())), refusal.arguments["index"]
+    factor, unit, option = _KEYS[key]
+    low, high = (float(f"{factor * refusal.arguments[end]:.4g}") for end in ("low", "high"))
+    typed = f"{option} " if index is None else f"{axes[index]}="
+    allowed = refusal.reason(low=low, high=high, unit=f" {unit}")
+    return f"{typed}{factor * value:.6g}: {allowed}"
