@@ -15,6 +15,7 @@ from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles import Robot, RobotAxis
 from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_rt.control.compensation import AxisCompensation
+from cdpr_rt.core.limits import Limits
 from cdpr_rt.identification.cogging_profile import (
     CoggingProfile,
     CoggingProfileError,
@@ -88,13 +89,15 @@ def _with_paths(robot: Robot, paths: Mapping[int, Path | None]) -> Robot:
     return replace(robot, axes=tuple(axes))
 
 
-def load_profiles(robot: Robot) -> CoggingProfiles:
+def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles:
     """Return the cogging profiles that the axes name.
+
+    They are held against the torques of `limits`, those of the robot's file if left out.
 
     Raises ConfigurationError, naming axis and file, for one that cannot be read, is of another
     motor or cannot be true of it.
     """
-    found = tuple(map(_load, robot.axes, _bounds(robot)))
+    found = tuple(map(_load, robot.axes, _bounds(robot, limits or limits_of(robot))))
     lengths = {len(one.better.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
     if len(lengths) > 1:
         paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
@@ -105,8 +108,8 @@ def load_profiles(robot: Robot) -> CoggingProfiles:
     return found
 
 
-def _bounds(robot: Robot) -> list[MotorBounds]:
-    torques = np.broadcast_to(limits_of(robot).torque_Nm, (len(robot.axes),)).tolist()
+def _bounds(robot: Robot, limits: Limits) -> list[MotorBounds]:
+    torques = np.broadcast_to(limits.torque_Nm, (len(robot.axes),)).tolist()
     return [MotorBounds(axis.winch.motor, t) for axis, t in zip(robot.axes, torques, strict=True)]
 
 
