@@ -125,7 +125,7 @@ def test_a_cable_that_is_left_hangs_from_the_far_side_of_its_pulley() -> None:
 
 
 def test_pulleys_lengthen_and_turn_the_cables_that_platform_and_rotors_swing_over() -> None:
-    robot, radius_m, at = load_robot("point-4"), 0.3, (0.0, -0.5)
+    robot, radius_m, at = load_robot("point-4"), 0.5, (0.0, -0.5)
     straight = dataclasses.replace(hung(((-2.0, 0.0), (2.0, 0.0)), ((0.0, 0.0),) * 2), mass_kg=0.1)
     platform = dataclasses.replace(straight, pulley_radius_m=(radius_m,) * 2)
     pair = dataclasses.replace(robot, platform=platform, axes=robot.axes[:2])
