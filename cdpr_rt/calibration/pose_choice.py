@@ -11,6 +11,8 @@ from cdpr_rt.arrays import FloatArray, IntArray
 from cdpr_rt.calibration.estimation.parameters import CABLE_ROWS, CableGeometry, Kind, Knowledge
 from cdpr_rt.calibration.estimation.residuals import lengths_told, linearise
 from cdpr_rt.calibration.readings.observations import Observations
+from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
+from cdpr_rt.robots.kinematics.cable_kernel import run_poses
 from cdpr_rt.robots.platform_model import PlatformModel
 
 EXIT_m = OFFSET_m = 0.1
@@ -100,20 +102,23 @@ def cable_geometry(model: PlatformModel) -> CableGeometry:
     return CableGeometry(model, none, none, kinds, Knowledge(EXIT_m, OFFSET_m), start)
 
 
-def predicted_deviation_m(exits_m: FloatArray, anchors_m: FloatArray, poses: FloatArray) -> float:
-    """Return the deviation of exit points' coordinates after poses (m, 4, 3), root mean square."""
-    rows = information_rows(exits_m, anchors_m, poses)
+def predicted_deviation_m(geometry: FloatArray, poses: FloatArray) -> float:
+    """Return the deviation of exit points' coordinates after poses (m, 4, 3), root mean square.
+
+    `geometry` (10, n) is that of `cable_kernel`.
+    """
+    rows = information_rows(geometry, poses)
     before = np.diag([EXIT_m**-2] * 3 + [OFFSET_m**-2])
     covariance = np.linalg.inv(before + np.einsum("mia,mib->iab", rows, rows))
     return float(np.sqrt(np.mean(np.einsum("iaa->ia", covariance)[:, :3])))
 
 
-def information_rows(exits_m: FloatArray, anchors_m: FloatArray, poses: FloatArray) -> FloatArray:
+def information_rows(geometry: FloatArray, poses: FloatArray) -> FloatArray:
     """Return what each pose tells of each cable, (m, n, 4), over its standard deviation."""
-    arm = np.einsum("mab,ib->mia", poses[:, 1:], anchors_m)
-    u = poses[:, None, 0] + arm - exits_m
-    u /= np.linalg.norm(u, axis=2)[..., None]
-    turned = (np.cross(arm, u) ** 2).sum(axis=2)
+    cables = np.empty((len(poses), KERNEL_ROWS, geometry.shape[1]))
+    run_poses(geometry, poses, cables)
+    turned = (cables[:, 3:6] ** 2).sum(axis=1)
     variance = LENGTH_m**2 + POSITION_m**2 + turned * ROTATION_rad**2
+    u = np.swapaxes(cables[:, :3], 1, 2)
     rows = np.concatenate([u, np.ones((*u.shape[:2], 1))], axis=2)
     return np.asarray(rows / np.sqrt(variance)[..., None])

@@ -50,13 +50,16 @@ Bound = float | FloatArray
 
 @dataclass(frozen=True)
 class Limits:
-    """What the supervisor tolerates: one figure for every axis, or (n,) for each its own."""
+    """What the supervisor tolerates: one figure for every axis, or (n,) for each its own.
+
+    What is left out is not watched; the figures that robots have by default are `RobotLimits`'.
+    """
 
     torque_Nm: Bound
     """Torque is clamped to this."""
     speed_rad_s: Bound
     following_error_rad: Bound
-    missed_cycles: int = 3
+    missed_cycles: int
     """Consecutive cycles without an answer that are bridged."""
     torque_rate_Nm_s: Bound = math.inf
     cable_length_min_m: Bound = -math.inf
@@ -64,9 +67,9 @@ class Limits:
     tension_min_N: Bound = -math.inf
     tension_max_N: Bound = math.inf
     slack_N: Bound = -math.inf
-    slack_s: float = 0.1
+    slack_s: float = math.inf
     """For how long a tension may be below `tension_min_N`, and below `slack_N`."""
-    broken_within_s: float = 0.05
+    broken_within_s: float = 0.0
     """A cable that goes from `tension_min_N` to below `slack_N` faster than this has broken."""
     missed_in_window: int = 1 << 30
     window_cycles: int = 1

@@ -27,8 +27,7 @@ from cdpr_rt.programs.platform.platform_axes import PlatformHold, PlatformIdle, 
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.pose import PoseProgram
 from cdpr_rt.programs.platform.tightening.tighten import TightenProgram
-from cdpr_rt.robots.platform.cable_control import CableControl
-from cdpr_rt.robots.platform_model import platform_model_of
+from cdpr_rt.robots.selection import platform_of
 
 _WARM_UP_CYCLES = 5
 
@@ -46,10 +45,7 @@ def platform_parts(
     known = None
     if any(axis is not None for axis in model.compensation):
         known = Compensation(list(model.compensation), model.period_s)
-    of_platform = platform_model_of(robot)
-    control = CableControl(
-        of_platform, robot.axes, model.torque_Nm, model.period_s, known, learns=learns
-    )
+    of_platform, control = platform_of(robot, limits, model.torque_Nm, known, learns=learns)
     return PlatformParts(
         of_platform, control, estimator, model.period_s, known, limits.lengths_disagree_m
     )

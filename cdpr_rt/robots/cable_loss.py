@@ -10,6 +10,8 @@ from scipy.optimize import NonlinearConstraint, minimize
 
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_cables
+from cdpr_rt.robots.platform_model import cable_kinematics
 from cdpr_rt.robots.rigid_body import free_directions, home_rotation, in_space, rotation
 
 _FURTHEST_RAD = 0.9 * np.pi
@@ -43,42 +45,41 @@ def swing_of(platform: Platform, cable: int, position_m: tuple[float, ...]) -> S
     """Return where the platform comes to rest on the other cables.
 
     That is the least height of its centre of mass at which no other cable is longer than it was:
-    |a - p - Q b| <= rho, tension being what the constraint costs. Cables do not stretch, winches do
+    rho(p, Q) <= rho, tension being what the constraint costs. Cables do not stretch, winches do
     not turn, and what it passes on the way is not looked at; it swings through to about as far on
     the other side before it comes to rest.
     """
-    size = len(platform.home_m)
+    size, geometry = len(platform.home_m), cable_kinematics(platform).geometry
     start, Q0 = in_space(position_m), home_rotation(platform)
     kept = [i for i in range(len(platform.exit_points_m)) if i != cable]
-    exits = np.array([in_space(platform.exit_points_m[i]) for i in kept])
-    anchors = np.array([in_space(platform.anchor_points_m[i]) for i in kept]) @ Q0.T
-    mass_m = Q0 @ in_space(platform.centre_of_mass_m)
+    mass_m = in_space(platform.centre_of_mass_m)
     chosen = list(free_directions(platform))
     limits = [(-np.inf, np.inf) if i < 3 else (-_FURTHEST_RAD, _FURTHEST_RAD) for i in chosen]
+    cables = np.empty((CABLE_ROWS, geometry.shape[1]))
 
-    def pose(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def pose(x: FloatArray) -> FloatArray:
         moved = np.zeros(6)
         moved[chosen] = x
-        return start + moved[:3], rotation(moved[3:])
+        return np.vstack([start + moved[:3], rotation(moved[3:]) @ Q0])
 
     def height(x: FloatArray) -> float:
-        p, Q = pose(x)
-        return float((p + Q @ mass_m)[size - 1])
+        there = pose(x)
+        return float((there[0] + there[1:] @ mass_m)[size - 1])
 
-    def spare(x: FloatArray) -> FloatArray:
-        p, Q = pose(x)
-        return np.asarray(rho - np.linalg.norm(p + anchors @ Q.T - exits, axis=1))
+    def lengths(x: FloatArray) -> FloatArray:
+        run_cables(geometry, pose(x), cables)
+        return np.asarray((cables[FREE] + cables[ARC])[kept])
 
-    rho = np.linalg.norm(start + anchors - exits, axis=1)
+    rho = lengths(np.zeros(len(chosen)))
     found = minimize(
         height,
         np.zeros(len(chosen)),
         method="SLSQP",
         bounds=limits,
-        constraints=NonlinearConstraint(spare, 0.0, np.inf),
+        constraints=NonlinearConstraint(lambda x: rho - lengths(x), 0.0, np.inf),
         options={"maxiter": _STEPS, "ftol": _DONE_m},
     )
-    p, _ = pose(found.x)
+    p = pose(found.x)[0]
     turn = float(np.linalg.norm([x for i, x in zip(chosen, found.x, strict=True) if i >= 3]))
     swing_m = float(np.linalg.norm(p - start))
     return Swing(cable, tuple(position_m), swing_m, turn, tuple(p[:size].tolist()))

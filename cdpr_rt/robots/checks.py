@@ -11,6 +11,7 @@ import numpy as np
 from cdpr_profiles import ProfileError, Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.limits import Limits
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.interference.interference import in_words
 from cdpr_rt.robots.platform.loop_design import designed_loop
@@ -47,15 +48,20 @@ class Finding:
     """Whether the robot cannot work like this; else it can, less well than it seems."""
 
 
-def findings(robot: Robot) -> list[Finding]:
-    """Return what is impossible or doubtful about a robot's platform, the worst first."""
+def findings(robot: Robot, limits: Limits | None = None) -> list[Finding]:
+    """Return what is impossible or doubtful about a robot's platform, the worst first.
+
+    Its `limits` are those of its file if left out.
+    """
     if robot.platform is None:
         return []
-    statics = statics_of(robot)
+    limits = limits or limits_of(robot)
+    statics = statics_of(robot, limits)
     found = [*_cycle(robot), *_shape(robot, statics)]
     if not any(finding.impossible for finding in found):
         # with points that cannot be meant, tensions and torques only repeat it
-        found += [*_tensions(statics), *_motors(robot, statics), *_lengths(robot, statics)]
+        found += [*_tensions(statics), *_motors(robot, limits, statics)]
+        found += _lengths(robot, limits, statics)
         if statics.turns:
             found += _turning(statics)
         found += [*_loop(robot, statics), *_swinging(robot.platform), *_standing(statics)]
@@ -63,12 +69,12 @@ def findings(robot: Robot) -> list[Finding]:
     return sorted(found, key=lambda finding: not finding.impossible)
 
 
-def refuse_impossible(robot: Robot) -> list[str]:
-    """Return what is doubtful about a robot, a line each.
+def refuse_impossible(robot: Robot, limits: Limits | None = None) -> list[str]:
+    """Return what is doubtful about a robot within `limits`, as `findings`, a line each.
 
     Raises ProfileError where it is impossible: a line for each key, with what to change.
     """
-    found = findings(robot)
+    found = findings(robot, limits)
     wrong = [finding for finding in found if finding.impossible]
     if wrong:
         further = "".join(f"\n{robot.path}: {f.key}: {f.text}" for f in wrong[1:])
@@ -210,8 +216,8 @@ def standing_tensions_N(statics: PlatformStatics) -> FloatArray:
     return np.asarray(held_N.max(axis=0, initial=0.0))
 
 
-def _motors(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
-    limits, platform = limits_of(robot), statics.platform
+def _motors(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[Finding]:
+    platform = statics.platform
     arm_m = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
     allowed_Nm = np.broadcast_to(limits.torque_Nm, arm_m.shape)
     needed_Nm = statics.high_N * arm_m
@@ -342,8 +348,7 @@ def _standing(statics: PlatformStatics) -> Iterator[Finding]:
         yield Finding("platform.workspace_angle_rad", text, impossible=False)
 
 
-def _lengths(robot: Robot, statics: PlatformStatics) -> Iterator[Finding]:
-    limits = limits_of(robot)
+def _lengths(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator[Finding]:
     lengths = statics.lengths(statics.points()).reshape(-1, len(robot.axes))
     for key, needed, allowed, sign in (
         ("cable_length_min_m", lengths.min(axis=0), limits.cable_length_min_m, 1.0),

@@ -20,17 +20,13 @@ import numpy as np
 
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics import free_rotation_kernel as kernel
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.rigid_body import inertia_kg_m2
 
 SHAPING_s = 0.06
 """Over which the control averages its set-points, so that their acceleration does not step."""
-SWINGS_m = 2e-3
-"""An amplitude of anchor points that is worth a word."""
 _STEP_S = 2e-3
-_NEWTON_STEPS, _MOST_STEP_rad = 30, 0.2
 _SOLVED_EVERY = 10
 """Steps from one solution for ψ and κ to the next."""
 
@@ -131,27 +127,10 @@ def _standing(
     poses = model.poses(flat)
     for k, W in enumerate(still.wrench_matrices(poses)):
         planned.solve(W, wrenches[k], t)
-        found[k, 0] = _turn_to_rest(model.kinematics.geometry, t, poses[k], rotation)
+        found[k, 0] = kernel.turn_to_rest(model.kinematics.geometry, t, poses[k], rotation)
         if rotation[kernel.STEEPNESS] > 0.0:
             found[k, 1:] = rotation[[kernel.STIFFNESS, kernel.SWINGING, kernel.REACH]]
     return found.reshape(*position_m.shape[:-1], 4)
-
-
-@jit
-def _turn_to_rest(
-    geometry: FloatArray, tension: FloatArray, pose: FloatArray, rotation: FloatArray
-) -> float:
-    """Turn a pose to where tensions have no moment, by Newton's method; return the angle."""
-    angle = 0.0
-    for _ in range(_NEWTON_STEPS):
-        kernel.rotational_stiffness(geometry, tension, pose, rotation)
-        if rotation[kernel.STEEPNESS] <= 0.0:
-            break
-        step = rotation[kernel.MOMENT] / rotation[kernel.STEEPNESS]
-        step = min(max(step, -_MOST_STEP_rad), _MOST_STEP_rad)
-        kernel.turn(pose, step)
-        angle += step
-    return angle
 
 
 def _between(values: FloatArray, steps: int) -> FloatArray:

@@ -1,12 +1,154 @@
-"""What the controller asks of a robot, whatever its cables and directions."""
+"""What the controller asks of a robot, whatever its cables and directions.
+
+`PlatformControl` finds where the platform is and moves it; `RobotModel` says what its file allows,
+by `Kinematics`, `TensionDistribution` and `Workspace`. Programs know these alone; the parts that
+fulfil them for the robot of a file are made by `platform_of`.
+"""
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Protocol
 
+from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import BoolArray, FloatArray
 from cdpr_rt.control.base import Controller
 from cdpr_rt.core.exchange import AxisFeedback
+from cdpr_rt.robots.kinematics.pose import Pose
+
+
+class TensionOutcome(IntEnum):
+    """What the tensions of a tension distribution do."""
+
+    FEASIBLE = 0
+    """They carry the wrench within their bounds."""
+    SUBSTITUTED = 1
+    """So they do, but the method found none: they are those of minimum deviation."""
+    NEAREST = 2
+    """None within the bounds carry the wrench; these come nearest."""
+    SINGULAR = 3
+    """The cables cannot hold one direction whatever their tensions; these come nearest."""
+    REFUSED = 4
+    """An argument is not finite or of another size, or bounds are reversed: nothing is written."""
+
+
+class Kinematics(Protocol):
+    """Lengths and wrenches of n cables on a platform with d controlled directions.
+
+    The pose that belongs to lengths is found by the `PlatformControl`, cycle by cycle.
+    """
+
+    @property
+    def directions(self) -> tuple[int, ...]:
+        """Controlled components of the twist (x, y, z, about x, about y, about z), (d,)."""
+
+    def lengths(self, pose: Pose) -> FloatArray:
+        """Return the cables' lengths (n,) without tension at a pose; raises GeometryError."""
+
+    def wrench_matrix(self, pose: Pose, out: FloatArray | None = None) -> FloatArray:
+        """Return W = -J^T (d, n) at a pose, about the platform's origin; raises GeometryError."""
+
+
+class TensionDistribution(Protocol):
+    """Tensions that carry a wrench within their bounds."""
+
+    def solve(self, W: FloatArray, w_e: FloatArray, t_out: FloatArray) -> TensionOutcome:
+        """Write tensions t (n,) with W t + w_e = 0, W (d, n) and w_e (d,), into `t_out`."""
+
+
+class Workspace(Protocol):
+    """Where the platform is held; which place and why not, `PlatformControl` says in words."""
+
+    def capacity_margins(self, poses: FloatArray, least_N: float) -> FloatArray:
+        """Return how far tensions stay within their bounds at poses (m, 4, 3), (m,), N.
+
+        Below 0 where they cannot. One below `least_N` may be less still.
+        """
+
+
+class RobotModel(Protocol):
+    """What a robot's file says of its platform, as the programs compute with it.
+
+    A position (d,) has one entry for each controlled direction: the k coordinates of the origin, m,
+    the last of them upward, then the rotation vector from the orientation at home, rad.
+    """
+
+    @property
+    def platform(self) -> Platform:
+        """Mass, box of targets and tolerances, as in the file."""
+
+    @property
+    def kinematics(self) -> Kinematics:
+        """Of the platform's origin."""
+
+    @property
+    def low_N(self) -> FloatArray:
+        """Lower bounds of the tensions, (n,)."""
+
+    @property
+    def high_N(self) -> FloatArray:
+        """Upper bounds of the tensions, (n,)."""
+
+    @property
+    def left_by_torque_N(self) -> FloatArray:
+        """What of the upper bounds motors can pull with beside turning themselves, (n,)."""
+
+    @property
+    def positions(self) -> int:
+        """How many coordinates the origin has, k."""
+
+    @property
+    def size(self) -> int:
+        """How many directions are controlled, d."""
+
+    @property
+    def home(self) -> FloatArray:
+        """The position at home, (d,)."""
+
+    @property
+    def home_pose(self) -> Pose:
+        """The pose at home."""
+
+    @property
+    def speed(self) -> FloatArray:
+        """The highest speeds, (d,), in m/s and rad/s."""
+
+    @property
+    def acceleration(self) -> FloatArray:
+        """The highest accelerations, (d,), in m/s2 and rad/s2."""
+
+    @property
+    def jerk(self) -> FloatArray:
+        """The highest jerks of paths, (d,), in m/s3 and rad/s3."""
+
+    @property
+    def angle_rad(self) -> float:
+        """Largest angle from home's orientation in which targets may lie."""
+
+    @property
+    def wrench_scale(self) -> FloatArray:
+        """What of each controlled direction counts as much as 1 N, (d,): 1, for moments m."""
+
+    def weight(self) -> FloatArray:
+        """Return the wrench of gravity on the platform at home's orientation, (d,)."""
+
+    def pose(self, position: FloatArray) -> Pose:
+        """Return the pose at a position (d,) or (k,)."""
+
+    def poses(self, positions: FloatArray) -> FloatArray:
+        """Return the arrays of the poses (m, 4, 3) at positions (m, d) or (m, k)."""
+
+    def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionDistribution:
+        """Return the distribution that keeps tensions as near to the lower bounds as can be."""
+
+    def workspace(self, acceleration_m_s2: float | None = None) -> Workspace:
+        """Return where the platform is held while it is accelerated; by default as targets are."""
+
+    def contact_on_way(self, positions: FloatArray, looks: int) -> str:
+        """Return what is in contact straight from position to position (m, d), "" for nothing.
+
+        What so many `looks` at a part of the way do not prove clear counts as in contact.
+        """
 
 
 class PlatformControl(Controller, Protocol):

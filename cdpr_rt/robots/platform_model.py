@@ -11,15 +11,16 @@ import numpy as np
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.interference.interference import Interference
+from cdpr_rt.core.limits import Limits
+from cdpr_rt.robots.interference.interference import Interference, in_words
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, RADIUS
 from cdpr_rt.robots.kinematics.kinematics import PLANAR, SPATIAL, CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.kinematics.pose_setpoint import poses_of_coordinates
-from cdpr_rt.robots.rigid_body import home_rotation, in_space, inertia_kg_m2
+from cdpr_rt.robots.rigid_body import G_m_s2, home_rotation, in_space, inertia_kg_m2
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, tension_distribution
-from cdpr_rt.robots.workspace import CableWorkspace, G_m_s2, wrenches_in_motion
+from cdpr_rt.robots.workspace import CableWorkspace, wrenches_in_motion
 
 RESERVE, _MARGIN_SHARE = 0.12, 0.4
 """Share of the span of tensions that is left to what no plan knows: loops, friction, swinging. At
@@ -157,6 +158,14 @@ class PlatformModel:
             platform.is_planar,
         )
 
+    def contact_on_way(self, positions: FloatArray, looks: int) -> str:
+        """Return what is in contact straight from position to position (m, d), "" for nothing.
+
+        What so many `looks` at a part of the way do not prove clear counts as in contact.
+        """
+        contact = self.interference.first_contact(positions, looks)
+        return "" if contact is None else in_words(contact.things, contact.distance_m)
+
     def least_tensions(self, low_N: FloatArray, high_N: FloatArray) -> TensionDistribution:
         """Return the distribution that keeps tensions as near to the lower bounds as can be."""
         return tension_distribution("minimum-deviation", low_N, high_N, self.wrench_scale, low_N)
@@ -192,18 +201,8 @@ def platform_model(
     geometry that no robot has.
     """
     low, high = np.array(low_N, float), np.array(high_N, float)
-    anchors = np.array(platform.anchor_points_m)
-    kinematics, about_mass = (
-        CableKinematics(
-            np.array(platform.exit_points_m),
-            anchors - centre,
-            directions_of(platform),
-            pulley_radius_m=np.array(platform.pulley_radius_m),
-            swivel_axes=np.array([in_space(axis) for axis in platform.pulley_axes]),
-            home=_home_pose(platform),
-        )
-        for centre in (0.0, np.array(platform.centre_of_mass_m))
-    )
+    kinematics = cable_kinematics(platform)
+    about_mass = cable_kinematics(platform, np.array(platform.centre_of_mass_m))
     left = high if left_by_torque_N is None else np.array(left_by_torque_N)
     without = PlatformModel(platform, kinematics, about_mass, low, high, 0.0, left)
     box = np.array([platform.workspace_min_m, platform.workspace_max_m])
@@ -213,22 +212,40 @@ def platform_model(
     return replace(without, reserve_N=reserve_N)
 
 
-def platform_model_of(robot: Robot) -> PlatformModel:
-    """Return the model of a robot's platform, within its limits; it has to have one."""
+def cable_kinematics(platform: Platform, centre_m: FloatArray | float = 0.0) -> CableKinematics:
+    """Return the kinematics of a platform about a point of it, its origin if left out.
+
+    Raises GeometryError for a geometry that no robot has.
+    """
+    return CableKinematics(
+        np.array(platform.exit_points_m),
+        np.array(platform.anchor_points_m) - centre_m,
+        directions_of(platform),
+        pulley_radius_m=np.array(platform.pulley_radius_m),
+        swivel_axes=np.array([in_space(axis) for axis in platform.pulley_axes]),
+        home=_home_pose(platform),
+    )
+
+
+def platform_model_of(robot: Robot, limits: Limits | None = None) -> PlatformModel:
+    """Return the model of a robot's platform within `limits`, those of its file if left out.
+
+    The robot has to have a platform.
+    """
     assert robot.platform is not None
-    limits, n = limits_of(robot), len(robot.axes)
+    limits, n = limits or limits_of(robot), len(robot.axes)
     low, high = (
         np.broadcast_to(bound, (n,)).astype(float)
         for bound in (limits.tension_min_N, limits.tension_max_N)
     )
-    return platform_model(robot.platform, low, high, _left_by_torque(robot, high))
+    return platform_model(robot.platform, low, high, _left_by_torque(robot, limits, high))
 
 
-def _left_by_torque(robot: Robot, high_N: FloatArray) -> FloatArray:
+def _left_by_torque(robot: Robot, limits: Limits, high_N: FloatArray) -> FloatArray:
     """Return upper bounds (n,) of tensions: what the motors can hold beside turning themselves."""
     platform = robot.platform
     assert platform is not None  # asked for by who has one
-    torque_Nm = np.asarray(limits_of(robot).torque_Nm)
+    torque_Nm = np.asarray(limits.torque_Nm)
     per_rad = np.array([abs(axis.winch.cable_m_per_motor_rad) for axis in robot.axes])
     rotor = np.array([axis.winch.motor.rotor_inertia_kg_m2 for axis in robot.axes])
     k, d = len(platform.home_m), len(directions_of(platform))

@@ -10,6 +10,8 @@ from cdpr_profiles.platform import DIRECTIONS, Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.kinematics.pose import exponential
 
+G_m_s2 = 9.80665
+"""Standard gravity."""
 LEAST_ARM_m = 0.01
 """Anchor points nearer to the centre of mass than this are a point, which has no orientation."""
 _TWIST = {2: (0, 1, 5), 3: (0, 1, 2, 3, 4, 5)}

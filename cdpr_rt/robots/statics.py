@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.core.limits import Limits
+from cdpr_rt.robots.free_rotation import rotation_of
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_poses
+from cdpr_rt.robots.kinematics.free_rotation_kernel import STEEPNESS, turn_to_rest
 from cdpr_rt.robots.kinematics.kinematics import PLANAR_POINT
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.rigid_body import home_rotation, in_space, orientations
-from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
 
-_NEWTON_STEPS = 30
 _MARGIN = 0.1
+_LEAST_ARM_m = 1e-3
 _FINE = {2: 45, 3: 11}
 _GRIDS = {2: (25, 25), 3: (9, 9, 9)}
 _COARSE_GRIDS = {2: (15, 15), 3: (5, 5, 5)}
@@ -60,9 +63,9 @@ def view_of(platform: Platform) -> Box:
     return Box(tuple((low - margin).tolist()), tuple((high + margin).tolist()))
 
 
-def statics_of(robot: Robot) -> PlatformStatics:
-    """Return the statics of a robot that has a platform, within its limits."""
-    return PlatformStatics(platform_model_of(robot))
+def statics_of(robot: Robot, limits: Limits | None = None) -> PlatformStatics:
+    """Return the statics of a robot that has a platform, as `platform_model_of`."""
+    return PlatformStatics(platform_model_of(robot, limits))
 
 
 class PlatformStatics:
@@ -79,10 +82,8 @@ class PlatformStatics:
         platform, size = self.platform, model.positions
         self.low_N, self.high_N = model.low_N, model.high_N
         self.exits_m = np.array(platform.exit_points_m)
-        self._Q = home_rotation(platform)
-        self._mass_m = in_space(platform.centre_of_mass_m)
         anchors = np.array([in_space(b) for b in platform.anchor_points_m])
-        self.anchors_m = (anchors @ self._Q.T)[:, :size]
+        self.anchors_m = (anchors @ home_rotation(platform).T)[:, :size]
         """Anchor points (n, dimensions) from the platform's origin, along the room's axes."""
         self.box = Box(platform.workspace_min_m, platform.workspace_max_m)
         self.turns = model.kinematics.directions == PLANAR_POINT
@@ -169,18 +170,15 @@ class PlatformStatics:
 
         No cable controls its orientation: it takes the one at which the tensions have no moment.
         """
-        p, t = np.asarray(position_m, float), self.tensions_N(position_m)
-        angle, step = np.zeros(p.shape[:-1]), 1e-5
-        for _ in range(_NEWTON_STEPS):
-            moment = self._moment_Nm(p, t, angle)
-            slope = (self._moment_Nm(p, t, angle + step) - moment) / step
-            with np.errstate(divide="ignore", invalid="ignore"):
-                turned = -moment / slope
-            angle = angle + np.clip(np.where(np.isfinite(turned), turned, 0.0), -0.2, 0.2)
-        slope = (self._moment_Nm(p, t, angle + step) - self._moment_Nm(p, t, angle)) / step
-        arm = np.linalg.norm(self.anchors_m, axis=1).max()
-        stable = (slope < 0.0) | (arm < 1e-3)  # a point has no orientation
-        return np.where(stable & (np.abs(angle) < 0.5 * np.pi), angle, np.nan)
+        poses, tensions = self.poses(position_m), self.tensions_N(position_m)
+        angle, about = np.zeros(len(poses)), rotation_of(self.platform)
+        if np.linalg.norm(self.anchors_m, axis=1).max() >= _LEAST_ARM_m:  # else a point
+            geometry, n = self.model.kinematics.geometry, tensions.shape[-1]
+            for k, t in enumerate(tensions.reshape(-1, n)):
+                angle[k] = turn_to_rest(geometry, t, poses[k], about)
+                if not (about[STEEPNESS] > 0.0 and abs(angle[k]) < 0.5 * np.pi):
+                    angle[k] = np.nan
+        return angle.reshape(np.shape(position_m)[:-1])
 
     def largest_box(self, inside: Box) -> Box | None:
         """Return the largest box within `inside` that is all of targets, None where there is none.
@@ -211,20 +209,6 @@ class PlatformStatics:
         workspace = self.model.workspace(acceleration_m_s2, 0.0)
         margins, tensions = workspace.margins(self.poses(position_m, turn_rad))
         return margins.reshape(shape), tensions.reshape(*shape, -1)
-
-    def _moment_Nm(self, p: FloatArray, t: FloatArray, angle: FloatArray) -> FloatArray:
-        """Return the moment of the tensions about the centre of mass, (...)."""
-        c, s = np.cos(angle)[..., None], np.sin(angle)[..., None]
-
-        def turned(points: FloatArray) -> FloatArray:
-            x, y = points[..., 0], points[..., 1]
-            return np.stack([c * x - s * y, s * x + c * y], axis=-1)
-
-        arm = turned(self.anchors_m - (self._Q @ self._mass_m)[:2])
-        way = self.exits_m - p[..., None, :] - turned(self.anchors_m)
-        way = way / np.linalg.norm(way, axis=-1, keepdims=True)
-        turning = arm[..., 0] * way[..., 1] - arm[..., 1] * way[..., 0]
-        return np.asarray((t * turning).sum(axis=-1))
 
 
 def _slabs(

@@ -13,11 +13,11 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import bound
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.rigid_body import G_m_s2
 from cdpr_rt.robots.tension.circuit_margin import MOST_NULL_DIRECTIONS, write_circuit_margins
 from cdpr_rt.robots.tension.null_space import null_spaces
 from cdpr_rt.robots.tension.tension_qp import write_margins
 
-G_m_s2 = 9.80665
 SHARES = np.linspace(0.0, 1.0, 33)
 
 

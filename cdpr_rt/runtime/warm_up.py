@@ -33,7 +33,8 @@ def warm_up(n: int, period_s: float) -> None:
     for controller in controllers:
         leg.fill(0.0, setpoint)
         controller.update(feedback, setpoint, torque)
-    warm_up_supervision(Estimator(n, period_s), Supervisor(Limits(1.0, 1.0, 1.0), n, period_s), n)
+    supervisor = Supervisor(Limits(1.0, 1.0, 1.0, missed_cycles=0), n, period_s)
+    warm_up_supervision(Estimator(n, period_s), supervisor, n)
 
 
 def warm_up_supervision(estimator: Estimator, supervisor: Supervisor, n: int) -> None:

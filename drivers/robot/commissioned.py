@@ -15,6 +15,7 @@ from cdpr_drivers.errors import ConfigurationError
 from cdpr_profiles import Robot, RobotAxis
 from cdpr_profiles.limits.motor_bounds import MotorBounds
 from cdpr_rt.control.compensation import AxisCompensation
+from cdpr_rt.core.limits import Limits
 from cdpr_rt.identification.cogging_profile import (
     CoggingProfile,
     CoggingProfileError,
@@ -88,13 +89,15 @@ def _with_paths(robot: Robot, paths: Mapping[int, Path | None]) -> Robot:
     return replace(robot, axes=tuple(axes))
 
 
-def load_profiles(robot: Robot) -> CoggingProfiles:
+def load_profiles(robot: Robot, limits: Limits | None = None) -> CoggingProfiles:
     """Return the cogging profiles that the axes name.
+
+    They are held against the torques of `limits`, those of the robot's file if left out.
 
     Raises ConfigurationError, naming axis and file, for one that cannot be read, is of another
     motor or cannot be true of it.
     """
-    found = tuple(map(_load, robot.axes, _bounds(robot)))
+    found = tuple(map(_load, robot.axes, _bounds(robot, limits)))
     lengths = {len(one.better.table_Nm[0]): i for i, one in enumerate(found) if one is not None}
     if len(lengths) > 1:
         paths = " and ".join(f"{robot.axes[i].commissioned}" for i in lengths.values())
@@ -105,8 +108,9 @@ def load_profiles(robot: Robot) -> CoggingProfiles:
     return found
 
 
-def _bounds(robot: Robot) -> list[MotorBounds]:
-    torques = np.broadcast_to(limits_of(robot).torque_Nm, (len(robot.axes),)).tolist()
+def _bounds(robot: Robot, limits: Limits | None = None) -> list[MotorBounds]:
+    limits = limits or limits_of(robot)
+    torques = np.broadcast_to(limits.torque_Nm, (len(robot.axes),)).tolist()
     return [MotorBounds(axis.winch.motor, t) for axis, t in zip(robot.axes, torques, strict=True)]
 
 
@@ -135,10 +139,13 @@ def load_profile(path: Path, bounds: MotorBounds, whose: str = "") -> CoggingPro
 
 
 def compensation_of(
-    robot: Robot, profiles: Sequence[CoggingProfile | None]
+    robot: Robot, profiles: Sequence[CoggingProfile | None], limits: Limits | None = None
 ) -> tuple[AxisCompensation | None, ...]:
-    """Return what the control compensates of each motor: the harmonic model and its friction."""
-    pairs = zip(profiles, _bounds(robot), strict=True)
+    """Return what the control compensates of each motor: the harmonic model and its friction.
+
+    Within the torques of `limits`, those of the robot's file if left out.
+    """
+    pairs = zip(profiles, _bounds(robot, limits), strict=True)
     return tuple(None if p is None else p.better.compensation(bounds) for p, bounds in pairs)
 
 

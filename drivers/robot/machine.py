@@ -32,6 +32,7 @@ from cdpr_drivers.robot.tensions import RobotTensions
 from cdpr_profiles import Robot
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.core.cycle import Watch
+from cdpr_rt.core.limits import Limits
 from cdpr_rt.core.tension_feedback import TensionFeedback
 from cdpr_rt.errors import ControlError
 from cdpr_rt.robots.robot_arrays import limits_of
@@ -65,6 +66,7 @@ class RobotMachine:
     all buses are simulated. Tensions are measured where their sensors are at a `tension_port`.
     Simulated buses in lockstep go on as fast as they can, in `real_time` no faster than wall time.
     Axes that are not mandatory are left out where they do not boot, if they may be `optional`.
+    Its `limits` are those of its file if left out.
     """
 
     failures: tuple[type[Exception], ...] = (BusError,)
@@ -79,11 +81,14 @@ class RobotMachine:
         *,
         real_time: bool = False,
         optional: bool = False,
+        limits: Limits | None = None,
     ) -> None:
         self.robot = robot
         """Its axes are those which have booted, once they have."""
         self._optional = optional
-        self._profiles = load_profiles(robot)
+        limits = limits or limits_of(robot)
+        self._torque_Nm = np.asarray(limits.torque_Nm).tolist()
+        self._profiles = load_profiles(robot, limits)
         self._urls = robot_urls(robot, buses)
         self.clock = open_clock(self._urls.values(), real_time=real_time)
         real = not all(url.is_simulated for url in self._urls.values())
@@ -110,9 +115,8 @@ class RobotMachine:
             self._safety = self._open_safety(stack)
             self._tensions.open(stack, self.clock)
             networks = open_networks(stack, self.robot, self._urls, self.clock)
-            torque_Nm = np.asarray(limits_of(self.robot).torque_Nm).tolist()
-            booted, absent = boot_robot(stack, self.robot, networks, torque_Nm)
-            device = device_of(self.robot, networks, booted, torque_Nm)
+            booted, absent = boot_robot(stack, self.robot, networks, self._torque_Nm)
+            device = device_of(self.robot, networks, booted, self._torque_Nm)
             notices = boot_notes(self.robot, booted, absent)
             if absent:
                 self._leave_out(absent)
@@ -144,6 +148,7 @@ class RobotMachine:
             )
         present = [i for i in range(len(self.robot.axes)) if i not in absent]
         self._profiles = tuple(self._profiles[i] for i in present)
+        self._torque_Nm = [self._torque_Nm[i] for i in present]
         self.robot = replace(self.robot, axes=tuple(self.robot.axes[i] for i in present))
 
     def _seek_indices(self, device: AxisBuses) -> list[str]:

@@ -42,6 +42,7 @@ from cdpr_rt.runtime.warm_up import warm_up
 _RING_S: Final = 8.0
 _INDEX_TIMEOUT_S: Final = 30.0
 _BRIDGED_CYCLES: Final = 2
+_MISSED_CYCLES: Final = 3
 # whatever ends a motion takes the torque at once, as nothing is held up by it; a watch may brake it
 _REACTIONS: Final[Mapping[Limit, Reaction]] = {
     limit: Reaction.TORQUE_OFF
@@ -243,4 +244,6 @@ def _limits(robot: Robot, tolerance: Tolerance) -> Limits:
     rated = np.array([axis.winch.motor.rated_speed_rad_s for axis in robot.axes])
     speed = RATED_SPEED_SHARE * rated if tolerance.speed_rad_s is None else tolerance.speed_rad_s
     torque_Nm = limits_of(robot).torque_Nm
-    return Limits(torque_Nm, speed, tolerance.following_error_rad, reactions=_REACTIONS)
+    return Limits(
+        torque_Nm, speed, tolerance.following_error_rad, _MISSED_CYCLES, reactions=_REACTIONS
+    )

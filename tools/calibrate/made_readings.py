@@ -22,7 +22,7 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.calibration.markers.sighting import Sighting
 from cdpr_rt.calibration.readings.camera_data import CameraSetup, HandEye, ImageReading
 from cdpr_rt.calibration.readings.data import CalibrationData, PoseReading
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2
 
 WIDTH_px, HEIGHT_px = 1280, 1024
 LENS: Final = (1104.0, 1106.0, 645.3, 505.8, -0.112, 0.083, 4e-4, -3e-4, -0.012)

@@ -41,7 +41,7 @@ def loop_parts(
     """
     axes, n, period_s = robot.axes, len(robot.axes), robot.sync_period_s
     latencies = [axis.winch.latency_s for axis in axes]
-    known = compensation_of(robot, load_profiles(robot))
+    known = compensation_of(robot, load_profiles(robot, limits), limits)
     model = model_of(axes, period_s, latencies, limits, known)
     estimator = Estimator(n, period_s, winches_of(axes))
     platform = platform_parts(robot, limits, model, estimator, learns=learns)

@@ -13,7 +13,8 @@ from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
 from cdpr_rt.robots.cable_loss import worst_swings
-from cdpr_rt.robots.free_rotation import SWINGS_m, free_rotation
+from cdpr_rt.robots.free_rotation import free_rotation
+from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
 from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, designed_loop
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
@@ -77,7 +78,7 @@ def _of_tensions(
         "reserve_at_home_N": _finite(float(statics.margin_N(home))),
         "reserve_at_rest_N": _finite(still.min()),
         "reserve_in_motion_N": _finite(moving.min()),
-        "lowest_resonance_Hz": float(lowest_resonance_Hz(robot, points).min()),
+        "lowest_resonance_Hz": float(lowest_resonance_Hz(statics.model, robot.axes, points).min()),
     }
     of_all["loop"] = _of_loop(robot, statics.model)
     if statics.turns and not is_point(platform):

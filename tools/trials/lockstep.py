@@ -140,10 +140,10 @@ class LockstepRobot:
         stack.callback(os.close, block.fd)
         block.counters["start_monotonic_ns"] = time.monotonic_ns()
         block.counters["start_realtime_ns"] = time.time_ns()
-        self.machine = RobotMachine(robot, [bus], tension_port=port)
+        limits = limits_of(robot)
+        self.machine = RobotMachine(robot, [bus], tension_port=port, limits=limits)
         stack.callback(self.machine.clock.close)
         stack.callback(self.machine.close)
-        limits = limits_of(robot)
         parts = loop_parts(robot, limits, block, learns=self._learns)
         programs = {**parts.programs, **self._more_programs}
         # whether the user's own robot may be believed is nothing to a trial of a simulated one

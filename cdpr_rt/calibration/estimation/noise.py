@@ -17,7 +17,7 @@ from cdpr_rt.calibration.estimation.fit import Fit, fit
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_poses
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2
 
 _LEAST_ROWS = 20
 _LEAST_N, _MOST_N = 0.3, 10.0

@@ -38,8 +38,7 @@ from cdpr_rt.calibration.readings.observations import Observations
 from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ARC, AXIS, FREE, run_poses
 from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS as KERNEL_ROWS
 from cdpr_rt.robots.kinematics.cable_model import write_unstretched_lengths
-from cdpr_rt.robots.rigid_body import in_space
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2, in_space
 
 _MISSED = 0.3
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.motion.path.time_scaling import TimedPath
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.tension.tension_distribution import TensionOutcome, tension_distribution
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2
+from cdpr_rt.robots.tension.tension_distribution import tension_distribution
 from cdpr_rt.robots.wrenches.path_wrenches import InertialWrenches
 
 _MOST: Final = 20_000

@@ -20,11 +20,10 @@ from cdpr_rt.programs.platform.arrival import NEAR_SHARE, Arrival, NEAR_m
 from cdpr_rt.programs.platform.paths.path_store import PathStore
 from cdpr_rt.programs.program_base import CommandedProgram
 from cdpr_rt.refusal import Refusal, RefusalCode
-from cdpr_rt.robots.free_rotation import SWINGS_m
-from cdpr_rt.robots.interface import PlatformControl
+from cdpr_rt.robots.interface import PlatformControl, RobotModel
+from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
 from cdpr_rt.robots.kinematics.pose_setpoint import pose_of_coordinates, write_quaternion
 from cdpr_rt.robots.persistence.last_lengths import LastLengths
-from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.robot_arrays import exit_point_diagonal_m
 
 _SLOWED_m, _WAITING_m = 0.02, 0.05
@@ -72,7 +71,7 @@ class PlatformParts:
 
     def __init__(
         self,
-        model: PlatformModel,
+        model: RobotModel,
         control: PlatformControl,
         estimator: Estimator,
         period_s: float,

@@ -25,6 +25,9 @@ MASS, INERTIA, CENTRE_x, CENTRE_y, MOMENT, STEEPNESS, STIFFNESS, SWINGING, REACH
 
 DAMPING_RATIO = 0.005
 """Of the swing to the critical damping: of air and cables alone, no cable winds."""
+SWINGS_m = 2e-3
+"""An amplitude of anchor points that is worth a word."""
+_NEWTON_STEPS, _MOST_STEP_rad = 30, 0.2
 
 
 @jit
@@ -63,6 +66,26 @@ def turn(pose: FloatArray, angle: float) -> None:
     for k in range(3):
         a, b = pose[1, k], pose[2, k]
         pose[1, k], pose[2, k] = cosine * a - sine * b, sine * a + cosine * b
+
+
+@jit
+def turn_to_rest(
+    geometry: FloatArray, tension: FloatArray, pose: FloatArray, rotation: FloatArray
+) -> float:
+    """Turn a pose to where tensions (n,) have no moment, by Newton's method; return the angle.
+
+    STEEPNESS is not above 0 then where they turn the platform over.
+    """
+    angle = 0.0
+    for _ in range(_NEWTON_STEPS):
+        rotational_stiffness(geometry, tension, pose, rotation)
+        if not rotation[STEEPNESS] > 0.0:
+            break
+        step = rotation[MOMENT] / rotation[STEEPNESS]
+        step = min(max(step, -_MOST_STEP_rad), _MOST_STEP_rad)
+        turn(pose, step)
+        angle += step
+    return angle
 
 
 @jit

@@ -7,8 +7,7 @@ import numpy as np
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.rigid_body import inertia_kg_m2
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2, inertia_kg_m2
 
 MASS, CENTRE, INERTIA, GRAVITY, BODY = 0, 1, 4, 13, 16
 """Where a body's row has mass, kg; centre of mass, m, and inertia about it, kg m2, both in the

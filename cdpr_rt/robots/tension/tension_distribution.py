@@ -7,13 +7,13 @@ wrench matrix, w_e (d,) the wrench of all else on the platform.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from enum import IntEnum
 
 import numpy as np
 
 from cdpr_profiles.platform import TENSION_METHODS
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import ControlError
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.tension.nearest_wrench import NO_LIMIT, nearest_wrench
 from cdpr_rt.robots.tension.null_space import null_space
 from cdpr_rt.robots.tension.tension_closed_form import closed_form
@@ -23,21 +23,6 @@ from cdpr_rt.robots.tension.tension_qp import project
 
 class TensionError(ControlError):
     """A tension distribution no robot can have; the message names what and what is allowed."""
-
-
-class TensionOutcome(IntEnum):
-    """What the tensions of a tension distribution do."""
-
-    FEASIBLE = 0
-    """They carry the wrench within their bounds."""
-    SUBSTITUTED = 1
-    """So they do, but the method found none: they are those of minimum deviation."""
-    NEAREST = 2
-    """None within the bounds carry the wrench; these come nearest."""
-    SINGULAR = 3
-    """The cables cannot hold one direction whatever their tensions; these come nearest."""
-    REFUSED = 4
-    """An argument is not finite or of another size, or bounds are reversed: nothing is written."""
 
 
 # members of an enumeration are slow to look up

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.rigid_body import in_space, inertia_kg_m2
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2, in_space, inertia_kg_m2
 from cdpr_rt.robots.wrenches.facet_kernel import write_facets
 
 _STEP = 1e-6

@@ -16,7 +16,7 @@ from cdpr_rt.robots.kinematics.cable_model import CableModel
 from cdpr_rt.robots.kinematics.kinematics import CableKinematics
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2
 
 
 @dataclass(frozen=True)

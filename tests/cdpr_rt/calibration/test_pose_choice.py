@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 
 import numpy as np
@@ -24,8 +25,10 @@ from cdpr_rt.calibration.pose_choice import (
     predicted_deviation_m,
     spread,
 )
+from cdpr_rt.robots.kinematics.cable_kernel import RADIUS
 from cdpr_rt.robots.platform_model import PlatformModel, platform_model_of
 from cdpr_rt.robots.reach.reachable import Reach
+from tests.cdpr_rt.robots.pulley import over_a_pulley
 
 
 def candidates(count: int) -> tuple[np.ndarray, np.ndarray, PlatformModel, np.ndarray]:
@@ -104,16 +107,17 @@ def test_what_a_pose_tells_is_the_information_without_the_pose() -> None:
 
 
 def test_chosen_poses_tell_more_than_as_many_at_random() -> None:
-    exits, anchors, model, poses = candidates(400)
+    _, _, model, poses = candidates(400)
+    geometry = model.kinematics.geometry
     taken = informative(cable_geometry(model), poses, 30)
-    chosen = predicted_deviation_m(exits, anchors, poses[taken])
-    at_random = predicted_deviation_m(exits, anchors, poses[:30])
+    chosen = predicted_deviation_m(geometry, poses[taken])
+    at_random = predicted_deviation_m(geometry, poses[:30])
     assert chosen < at_random
 
 
 def test_a_pose_tells_what_measurement_would() -> None:
     # a cable, measured lengths, poses with noise: residuals' deviation is what the rows divide by
-    exits, anchors, _, poses = candidates(1)
+    exits, anchors, model, poses = candidates(1)
     rng, count = np.random.default_rng(4), 40_000
     exit_point, anchor, p, Q = exits[2], anchors[2], poses[0, 0], poses[0, 1:]
     arm = Q @ anchor
@@ -122,8 +126,32 @@ def test_a_pose_tells_what_measurement_would() -> None:
     turned = arm + np.cross(rng.normal(0.0, ROTATION_rad, (count, 3)), arm)
     seen = np.linalg.norm(moved + turned - exit_point, axis=1) - true
     seen -= rng.normal(0.0, LENGTH_m, count)
-    row = information_rows(exits, anchors, poses)[0, 2]
+    row = information_rows(model.kinematics.geometry, poses)[0, 2]
     assert 1.0 / row[3] == pytest.approx(float(seen.std()), rel=0.03)
     step = 1e-6 * np.array([0.3, -0.5, 0.2])
     change = np.linalg.norm(p + arm - exit_point - step) - true
     assert -row[:3] @ step / row[3] == pytest.approx(change, rel=1e-3)
+
+
+def test_over_a_pulley_a_pose_tells_what_its_length_does() -> None:
+    exits, anchors, model, poses = candidates(1)
+    geometry, radius_m, i = model.kinematics.geometry.copy(), 0.2, 2
+    geometry[RADIUS] = radius_m
+    (row,) = information_rows(geometry, poses)[:, i]
+    p, arm = poses[0, 0], poses[0, 1:] @ anchors[i]
+
+    def length(exit_m: np.ndarray, point_m: np.ndarray) -> float:
+        return over_a_pulley(exit_m, radius_m, point_m)[0]
+
+    h = 1e-2
+    by_exit, by_turn = np.zeros((2, 3))
+    for k, step in enumerate(h * np.eye(3)):
+        by_exit[k] = length(exits[i] + step, p + arm) - length(exits[i] - step, p + arm)
+        turned = np.cross(step, arm)
+        by_turn[k] = length(exits[i], p + arm + turned) - length(exits[i], p + arm - turned)
+    by_exit, by_turn = by_exit / (2.0 * h), by_turn / (2.0 * h)
+    std_m = math.sqrt(LENGTH_m**2 + POSITION_m**2 + (by_turn @ by_turn) * ROTATION_rad**2)
+    assert 1.0 / row[3] == pytest.approx(std_m, rel=1e-3)
+    assert row[:3] / row[3] == pytest.approx(-by_exit, abs=1e-3)
+    straight = information_rows(model.kinematics.geometry, poses)[0, i]
+    assert np.abs(straight[:3] / straight[3] + by_exit).max() > 0.02

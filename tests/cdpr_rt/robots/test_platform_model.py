@@ -12,10 +12,10 @@ from scipy.optimize import linprog
 
 from cdpr_profiles import load_robot
 from cdpr_profiles.platform import Platform
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import RESERVE, directions_of, platform_model_of
 from cdpr_rt.robots.robot_arrays import limits_of
-from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
 
 PLANAR, SUSPENDED = load_robot("planar-3"), load_robot("suspended-8")
 

@@ -16,11 +16,11 @@ from scipy.optimize import linprog
 from cdpr_profiles import ProfileError, Robot, load_robot
 from cdpr_profiles.reading.places import SHIPPED
 from cdpr_rt.robots.checks import findings, refuse_impossible
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.kinematics.pose import Pose
 from cdpr_rt.robots.platform.cable_control import CableControl
 from cdpr_rt.robots.platform_model import RESERVE, platform_model
 from cdpr_rt.robots.statics import Box, PlatformStatics, statics_of
-from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
 from cdpr_rt.robots.workspace import CableWorkspace
 
 PLANAR = (SHIPPED / "robots" / "planar-3.toml").read_text()

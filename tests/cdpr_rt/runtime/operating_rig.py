@@ -33,6 +33,7 @@ LIMITS = Limits(
     torque_Nm=1.0,
     speed_rad_s=50.0,
     following_error_rad=2.0,
+    missed_cycles=3,
     reactions=dict.fromkeys(_OFF, Reaction.TORQUE_OFF),
 )
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.tension.tension_distribution import (
     METHODS,
     TensionDistribution,
-    TensionOutcome,
     tension_distribution,
 )
 from cdpr_tools.bench.geometries import ROBOTS, CableRobot

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.tension.tension_distribution import TensionDistribution, TensionOutcome
+from cdpr_rt.robots.interface import TensionOutcome
+from cdpr_rt.robots.tension.tension_distribution import TensionDistribution
 from cdpr_tools.bench.geometries import CableRobot
 
 _POINTS = 500

@@ -43,7 +43,8 @@ def main() -> int:
     block = SharedBlock.attach(settings.block_fd)
     try:
         robot = load_calibrated(settings.robot)
-        refuse_impossible(robot)
+        limits = limits_of(robot)
+        refuse_impossible(robot, limits)
         refuse_simulated_calibration(robot, settings.buses)
         robot = with_commissioned(robot, settings.commissioned)
         require_fit(robot)
@@ -52,9 +53,9 @@ def main() -> int:
             machine = ListeningMachine(robot, settings.buses)
         else:
             machine = RobotMachine(
-                robot, settings.buses, settings.safety_io, settings.tension_port, real_time=True
-            )
-        limits = limits_of(robot)
+                robot, settings.buses, settings.safety_io, settings.tension_port, real_time=True,
+                limits=limits,
+            )  # fmt: skip
         parts = loop_parts(robot, limits, block)
     except (ProfileError, DriverError, ControlError) as error:
         print(f"cdpr: {error}", file=sys.stderr)

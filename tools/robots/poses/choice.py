@@ -70,14 +70,8 @@ def choose(
         drawn,
         float(clearances.min()),
         float(model.workspace().capacity_margins(poses).min()),
-        predicted_deviation_m(*points_of(model), poses) if model.positions == 3 else None,
+        predicted_deviation_m(model.kinematics.geometry, poses) if model.positions == 3 else None,
     )
-
-
-def points_of(model: PlatformModel) -> tuple[FloatArray, FloatArray]:
-    """Return exit and anchor points (n, 3)."""
-    geometry = model.kinematics.geometry
-    return geometry[:3].T, geometry[3:6].T
 
 
 KINDS = (".csv", ".toml")

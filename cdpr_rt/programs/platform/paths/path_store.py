@@ -26,7 +26,7 @@ from cdpr_rt.private_files import FILE_MODE, make_private_folder
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform.paths.path_progress import read_progress
 from cdpr_rt.programs.platform.paths.plan_check import first_fault
-from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.interface import RobotModel
 
 MOST_BYTES: Final = 1 << 24
 _MOST_WAITS: Final = 64
@@ -68,7 +68,7 @@ class StoredPlan:
         return min(int(np.searchsorted(self.along_m, along_m)), len(self.samples) - 1)
 
 
-def robot_key(model: PlatformModel) -> str:
+def robot_key(model: RobotModel) -> str:
     """Return a text that another robot has not, nor this one with another file or other motors."""
     bounds = (model.low_N, model.high_N, model.left_by_torque_N)
     key_text = repr((model.platform, *(bound.tolist() for bound in bounds)))
@@ -76,7 +76,7 @@ def robot_key(model: PlatformModel) -> str:
 
 
 def write_plan(
-    folder: Path, timed: TimedPath, lines: NDArray[np.int64], title: str, model: PlatformModel
+    folder: Path, timed: TimedPath, lines: NDArray[np.int64], title: str, model: RobotModel
 ) -> str:
     """Write a plan into a folder, where the newest few stay; return its name.
 
@@ -156,7 +156,7 @@ def _parsed_plan(name: str, data: bytes, d: int) -> tuple[StoredPlan, Any]:
 class PathStore:
     """The plans of one robot in a folder, and how far it has come on the last one."""
 
-    def __init__(self, model: PlatformModel) -> None:
+    def __init__(self, model: RobotModel) -> None:
         self._model = model
         self.folder: Path | None = None
         self._ready: tuple[StoredPlan, ...] = ()

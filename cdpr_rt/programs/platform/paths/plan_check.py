@@ -8,7 +8,7 @@ import numpy as np
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.programs.platform.paths import path_playback as playback
-from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.interface import RobotModel
 
 _AT_ONCE: Final = 100
 """Samples that are looked at in one go: a kernel does not let the loop's thread in meanwhile."""
@@ -17,7 +17,7 @@ _HELD_EVERY: Final = 20
 _HELD_AT_ONCE: Final = 10
 
 
-def first_fault(model: PlatformModel, samples: FloatArray, period_s: float) -> int:
+def first_fault(model: RobotModel, samples: FloatArray, period_s: float) -> int:
     """Return the first of the samples (c, 3, d) that breaks the robot's limits, -1 for none.
 
     Of place, speed and acceleration, there and between; then whether cables hold it at rest.

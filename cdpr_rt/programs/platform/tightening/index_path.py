@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
-from cdpr_rt.robots.platform_model import PlatformModel
+from cdpr_rt.robots.interface import RobotModel
 
 _TURNS = 1.05
 """What each motor must turn, with a margin over one turn."""
@@ -17,7 +17,7 @@ _STEPS = 16
 
 
 def index_path(
-    model: PlatformModel, cable_m: FloatArray, feasible: Callable[[FloatArray], bool]
+    model: RobotModel, cable_m: FloatArray, feasible: Callable[[FloatArray], bool]
 ) -> list[FloatArray]:
     """Return positions (d,) to go to one after the other from home, each motor turning once.
 

@@ -13,8 +13,7 @@ from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.platform.platform_program import PlatformParts, distance_m
 from cdpr_rt.programs.platform.tightening.standing_tensions import StandingTensions
 from cdpr_rt.refusal import Refusal, RefusalCode
-from cdpr_rt.robots.interference.interference import in_words
-from cdpr_rt.robots.workspace import G_m_s2
+from cdpr_rt.robots.rigid_body import G_m_s2
 
 _TURNED_MORE_rad = math.radians(30.0)
 """A platform may stand turned by so much more than it turns in use."""
@@ -127,10 +126,9 @@ def why_not_to_pull(parts: PlatformParts, length_m: FloatArray, feedback: AxisFe
     if why := disagreement(parts):
         return why
     here, home = np.array(control.estimated), parts.model.home
-    contact = parts.model.interference.first_contact(np.array([here, home]), _MOST_LOOKS)
-    if not _turned_much(parts) and contact is None:
+    near = parts.model.contact_on_way(np.array([here, home]), _MOST_LOOKS)
+    if not _turned_much(parts) and not near:
         return ""
-    near = "" if contact is None else in_words(contact.things, contact.distance_m)
     why = f"; on the way home from there, {near}" if near else ""
     return _not_pulled(here, k, why)
 

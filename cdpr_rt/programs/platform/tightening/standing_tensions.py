@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.robots.interface import RobotModel, TensionOutcome
 from cdpr_rt.robots.kinematics.pose import Pose
-from cdpr_rt.robots.platform_model import PlatformModel
-from cdpr_rt.robots.tension.tension_distribution import TensionOutcome
 
 OVERSHOOT = 1.5
 """Tension over pretension, for a moment: on the way back friction acts in the other direction, so
@@ -30,7 +29,7 @@ class StandingTensions:
     for by some newtons, which a platform whose weight is all but carried does not stand still for.
     """
 
-    def __init__(self, model: PlatformModel, low_N: FloatArray, most_N: FloatArray) -> None:
+    def __init__(self, model: RobotModel, low_N: FloatArray, most_N: FloatArray) -> None:
         """Take with what is planned at least, and what the motors can pull with, (n,) each."""
         self._kinematics, self._weight = model.kinematics, model.weight()
         self._most_N = most_N / OVERSHOOT

@@ -14,11 +14,11 @@ from numba.core.runtime import _nrt_python, rtsys
 from scipy.linalg import null_space
 from scipy.optimize import linprog, lsq_linear
 
+from cdpr_rt.robots.interface import TensionOutcome
 from cdpr_rt.robots.tension.tension_distribution import (
     METHODS,
     TensionDistribution,
     TensionError,
-    TensionOutcome,
     tension_distribution,
 )
 from tests.cdpr_rt.robots.tension.cable_robots import (

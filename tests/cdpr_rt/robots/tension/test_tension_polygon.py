@@ -11,7 +11,8 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, Delaunay, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 
-from cdpr_rt.robots.tension.tension_distribution import TensionOutcome, tension_distribution
+from cdpr_rt.robots.interface import TensionOutcome
+from cdpr_rt.robots.tension.tension_distribution import tension_distribution
 from tests.cdpr_rt.robots.tension.cable_robots import (
     SCALE,
     WEIGHT,
