@@ -374,7 +374,7 @@ def test_what_cannot_work_is_told_with_what_would(
     assert any(problem in found.text and found.impossible is impossible for found in about), about
     # what takes seconds to find is found once
     monkeypatch.setattr(
-        "cdpr_rt.robots.checks.findings", lambda asked: told if asked is robot else []
+        "cdpr_rt.robots.checks.findings", lambda asked, _limits: told if asked is robot else []
     )
     if impossible:
         with pytest.raises(ProfileError, match=r"mine\.toml: ") as caught:
