@@ -17,6 +17,7 @@ from cdpr_rt.calibration.estimation.noise import fit_with_noise_seen
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.markers.coverage import coverage
 from cdpr_rt.calibration.markers.map_fit import MapFit
+from cdpr_rt.calibration.markers.sighting import laid_out
 from cdpr_rt.calibration.outcome import LEAST_POINTS, Method, Outcome
 from cdpr_rt.calibration.readings.camera_data import Images
 from cdpr_rt.calibration.readings.observations import Observations
@@ -110,7 +111,7 @@ def _with_camera(
     believed = replace(geometry, knowledge=found.geometry.knowledge)
     found, weighed = fit_with_noise_seen(found, believed)
     readings = [one for one in faults if one.kind not in ("drum", "elongation")]
-    of_map = map_faults(start.map, images.sightings)
+    of_map = map_faults(start.map, laid_out(images.sightings, images.setup.sheets.placed))
     told = {(one.kind, one.cable) for one in wrong}
     others = [one for one in parameter_faults(found) if (one.kind, one.cable) not in told]
     faults = [*of_map, *readings, *wrong, *others]

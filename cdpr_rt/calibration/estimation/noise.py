@@ -20,7 +20,7 @@ from cdpr_rt.robots.kinematics.cable_kernel import CABLE_ROWS, run_poses
 from cdpr_rt.robots.rigid_body import G_m_s2
 
 _LEAST_ROWS = 20
-_LEAST_N, _MOST_N = 0.3, 10.0
+_LEAST_N = 0.3
 _WEAK, _INERT = 1e-3, 1e-9
 _ROUNDS = 3
 _BELIEVED = 1.5
@@ -116,7 +116,7 @@ def with_noise_seen(found: Fit, file: CableGeometry, told_N: float | None) -> Ca
         squares = float((soft**2 * free).mean())
     before = known.length_m**2 + squares * (known.yielding * known.tension_N) ** 2
     variance = found.variance_factor * before
-    tension_N = min(max(told_N or guess.tension_N, _LEAST_N), _MOST_N)
+    tension_N = max(told_N or guess.tension_N, _LEAST_N)
     if squares > 0.0 and yielding > 0.0:
         tension_N = max(min(tension_N, math.sqrt(variance / squares) / yielding), _LEAST_N)
     length_m = guess.length_m

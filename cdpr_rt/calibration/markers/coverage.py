@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.calibration.markers.sighting import Sighting, laid_out
 
 _FEW_IMAGES = 3
 _LISTED = 12
@@ -26,7 +26,7 @@ class Coverage:
 
     images: int
     ids: tuple[int, ...]
-    """All that were seen."""
+    """All that were seen, of those laid out where these are known."""
     islands: tuple[tuple[int, ...], ...]
     """Markers that are connected by images that show several, the largest island first."""
     share_seen: float | None
@@ -36,8 +36,6 @@ class Coverage:
     """Seen in fewer than three images."""
     useless: tuple[str, ...]
     """Images with fewer than two markers, by name."""
-    placed: tuple[int, ...]
-    """All that were laid out, where their ids are known."""
     advice: tuple[str, ...]
 
     @property
@@ -49,10 +47,9 @@ class Coverage:
     def apart(self) -> list[tuple[int, ...]]:
         """Islands besides the largest, without those that may be none.
 
-        Such as were seen in one image or two, and of ids that were not laid out.
+        Such as were seen in one image or two.
         """
-        seldom, placed = set(self.seldom), set(self.placed or self.ids)
-        return [one for one in self.islands[1:] if set(one) & placed - seldom]
+        return [one for one in self.islands[1:] if set(one) - set(self.seldom)]
 
     def lines(self) -> list[str]:
         """Return in words what share was seen, and what to do."""
@@ -73,6 +70,8 @@ class Coverage:
 
 def coverage(sightings: Sequence[Sighting], placed: Sequence[int] = ()) -> Coverage:
     """Return how sightings hang together; `placed` are all ids that were laid out, if known."""
+    read = {marker for one in sightings for marker in one.corners_px}
+    sightings = laid_out(sightings, placed)
     shown = [tuple(one.corners_px) for one in sightings]
     ids = tuple(sorted({marker for markers in shown for marker in markers}))
     islands = _islands(shown, ids)
@@ -84,8 +83,10 @@ def coverage(sightings: Sequence[Sighting], placed: Sequence[int] = ()) -> Cover
     )
     share = 1.0 - len(unseen) / len(placed) if placed else None
     return Coverage(
-        *(len(sightings), ids, islands, share, unseen, seldom, useless, tuple(placed)),
-        tuple(_advice(islands, unseen, seldom, useless, len(sightings))),
+        *(len(sightings), ids, islands, share, unseen, seldom, useless),
+        tuple(
+            _advice(islands, unseen, seldom, useless, len(sightings)) + _strange(read - set(ids))
+        ),
     )
 
 
@@ -124,6 +125,16 @@ def _advice(
             "how markers lie: put sheets closer together, or go higher"
         )
     return said
+
+
+def _strange(ids: set[int]) -> list[str]:
+    """Return what is to be said of ids that were read but not laid out."""
+    if not ids:
+        return []
+    return [
+        f"{listed(sorted(ids))} read, but not among those laid out (placed): left out; something "
+        "else that the images show reads so"
+    ]
 
 
 def listed(ids: Sequence[int]) -> str:

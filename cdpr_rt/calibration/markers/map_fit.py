@@ -19,7 +19,7 @@ from cdpr_rt.calibration.markers.graph import first_map
 from cdpr_rt.calibration.markers.marker_map import MarkerMap, best_fit
 from cdpr_rt.calibration.markers.reprojection import Estimate
 from cdpr_rt.calibration.markers.seen_markers import SeenMarkers
-from cdpr_rt.calibration.markers.sighting import Sighting
+from cdpr_rt.calibration.markers.sighting import Sighting, laid_out
 from cdpr_rt.errors import InvalidRequestError
 
 _MOST_ROUNDS = 4
@@ -82,6 +82,7 @@ def fit_map(
     InvalidRequestError where no image shows two markers, BundleError where they determine nothing.
     """
     cover = coverage(sightings, sheets.placed)
+    sightings = laid_out(sightings, sheets.placed)
     island = set(cover.islands[0]) if cover.islands else set()
     if len(island) < 2:
         raise InvalidRequestError("; ".join(["no image shows two markers together", *cover.advice]))

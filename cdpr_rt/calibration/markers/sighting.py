@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from cdpr_rt.arrays import FloatArray
 
@@ -23,3 +23,26 @@ class Sighting:
     """Ids that only a mirror image of it shows."""
     problem: str | None = None
     """What is wrong with the image as a whole, in words."""
+
+
+def laid_out(sightings: Sequence[Sighting], placed: Collection[int]) -> list[Sighting]:
+    """Return sightings without ids that are not among those laid out; as they are of none told.
+
+    A chessboard or a poster may read as a marker, as sharp as one and without a wrong bit.
+    """
+    if not placed:
+        return list(sightings)
+
+    def ours(ids: Collection[int]) -> tuple[int, ...]:
+        return tuple(marker for marker in ids if marker in placed)
+
+    return [
+        replace(
+            one,
+            corners_px={marker: one.corners_px[marker] for marker in ours(one.corners_px)},
+            repeated=ours(one.repeated),
+            unsharp=ours(one.unsharp),
+            mirrored=ours(one.mirrored),
+        )
+        for one in sightings
+    ]

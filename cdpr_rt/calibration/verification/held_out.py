@@ -70,8 +70,12 @@ class Unused:
         return self._compared(self.part.geometry, self.jumps_m)
 
     def before(self, file: CableGeometry) -> Verification:
-        """Return how the robot's file does, with what jumped as it has that."""
-        return self._compared(file, locate(file, self.part.seen).jumps_m)
+        """Return how the robot's file does.
+
+        What jumped is the readings' fault, not the file's: without it lengths alone would not tell
+        how all of them count anew from a later start.
+        """
+        return self._compared(file, self.jumps_m)
 
     def birge_ratio(self) -> float:
         """Return how many times as large errors are as predicted, against measured points.

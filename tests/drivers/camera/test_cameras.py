@@ -111,6 +111,22 @@ def test_files_of_16_bits_give_the_8_upper_ones_in_use(tmp_path: Path, bits: int
     assert (other.pixels != expected).sum() <= 1 and other.pixels[100, 100] == 255
 
 
+def test_a_dark_image_of_16_bits_stays_dark_beside_bright_ones(tmp_path: Path) -> None:
+    pixels = np.linspace(0, 4095, 80 * 64).reshape(64, 80).astype(np.uint16)
+    for name, share in (("1", 16), ("2", 1), ("4", 16)):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), pixels // share)
+    (tmp_path / "3.png").write_bytes(b"not a picture")
+    with open_camera(f"folder:{tmp_path}", LockstepClock()) as camera:
+        dark, bright = camera.grab(), camera.grab()
+        assert dark is not None and bright is not None
+        np.testing.assert_array_equal(dark.pixels, pixels // 16 // 16)
+        np.testing.assert_array_equal(bright.pixels, pixels // 16)
+        with pytest.raises(CameraError, match=r"3\.png: cannot be decoded"):
+            camera.grab()
+        last = camera.grab()
+    assert last is not None and last.pixels.max() == 15
+
+
 def test_how_a_telephone_was_held_does_not_turn_what_its_sensor_saw(tmp_path: Path) -> None:
     _, coded = cv2.imencode(".jpg", np.full((64, 80, 3), 90, np.uint8))
     turned = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"

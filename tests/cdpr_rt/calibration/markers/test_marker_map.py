@@ -142,6 +142,24 @@ def test_markers_never_seen_together_are_islands_with_advice(one: Room) -> None:
     assert fit.map.placed.sum() == 12
 
 
+def test_what_reads_as_an_id_that_was_not_laid_out_joins_no_islands(one: Room) -> None:
+    left, right = ({k for k in range(20) if (k % 5 < 3) == side} for side in (True, False))
+    shown = [
+        Sighting(sight.name, {i: c for i, c in sight.corners_px.items() if i in which})
+        for sight, which in zip(one.sightings(), [left, right] * 13, strict=False)
+    ]
+    square = np.array([(300.0, 200.0), (340.0, 202.0), (338.0, 241.0), (299.0, 240.0)])
+    for k in (6, 9):  # one on each side
+        shown[k] = Sighting(shown[k].name, {**shown[k].corners_px, 33: square}, (34,), (), (35,))
+    joined = fit_map(shown, intrinsics(), SHEETS)
+    assert difference(joined.map, one.truth).position_error_m.max() > 0.05
+    fit = fit_map(shown, intrinsics(), SHEETS.model_copy(update={"placed": tuple(range(20))}))
+    assert "2 islands" in fit.faults[0] and not fit.warnings
+    assert fit.map.placed.sum() == 12 and 33 not in fit.map.ids
+    assert difference(fit.map, one.truth).position_error_m.max() < 0.004
+    assert any("marker 33 read, but not among those laid out" in note for note in fit.notes)
+
+
 def test_without_two_markers_in_an_image_there_is_no_map() -> None:
     alone = [Sighting("a", {}), Sighting("b", {3: np.zeros((4, 2))})]
     with pytest.raises(InvalidRequestError, match="no image shows two markers"):
