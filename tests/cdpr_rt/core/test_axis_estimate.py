@@ -155,7 +155,9 @@ def test_cogging_is_not_on_the_cable_whoever_measured_the_friction(measured_Nm: 
 def test_what_accelerates_the_motor_is_not_on_the_cable() -> None:
     """A cable is cut while the motor goes on pulling: the torque alone would say 50 N still."""
     winch, estimator = Winch(1.0), Estimator(1, PERIOD_S, winches(np.array([1.0])))
-    limits = Limits(10.0, 1e4, 1e4, tension_min_N=20.0, slack_N=5.0)
+    limits = Limits(
+        10.0, 1e4, 1e4, 3, tension_min_N=20.0, slack_N=5.0, slack_s=0.1, broken_within_s=0.05
+    )
     supervisor, setpoint, torque = Supervisor(limits, 1, PERIOD_S), Setpoint(1), np.zeros(1)
     winding = DRUM_m * 50.0 + 0.02
     for _ in range(500):

@@ -49,7 +49,7 @@ def test_a_torque_that_is_no_number_is_not_passed_on():
 
 
 def test_one_figure_serves_all_axes():
-    supervisor, cycle = Supervisor(Limits(1.5, 1.0, 1.0), 2, PERIOD_S), Cycle()
+    supervisor, cycle = Supervisor(Limits(1.5, 1.0, 1.0, 3), 2, PERIOD_S), Cycle()
     cycle.torque[:] = -5.0, 5.0
     cycle.check(supervisor)
     np.testing.assert_array_equal(cycle.torque, [-1.5, 1.5])

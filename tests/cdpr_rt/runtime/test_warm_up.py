@@ -55,7 +55,7 @@ def test_the_cycle_compiles_nothing_after_it(n: int) -> None:
     pid = Pid([PidGains(1.0, 1.0, 0.1, 1e-3)] * n, limit, 1e-3, Compensation([known] * n, 1e-3))
     read = TensionFeedback(n)
     read.valid[:] = True
-    supervisor, estimator = Supervisor(Limits(3.0, 100.0, 6.0), n, 1e-3), Estimator(n, 1e-3)
+    supervisor, estimator = Supervisor(Limits(3.0, 100.0, 6.0, 3), n, 1e-3), Estimator(n, 1e-3)
     for controller in (Proportional(np.full(n, 2.0), limit), pid):
         controller.reset()
         TrapezoidalMove(rows[0], np.full(n, 0.05), 3.0, 0.5).fill(0.7, setpoint)
