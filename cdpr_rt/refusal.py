@@ -20,7 +20,7 @@ class RefusalCode(StrEnum):
     NOT_FEASIBLE = "not_feasible"
     """The platform cannot be at a place, or on the way to it (`why`)."""
     NOTHING_LEFT = "nothing_left"
-    """There is nothing to go on with (`left`: target or path, `allowed`: what to ask for)."""
+    """There is nothing to go on with (`left`: target or path, `instead`: what to ask for)."""
     NOT_TIGHT = "not_tight"
     """The cables are not tight."""
     NOT_CALIBRATED = "not_calibrated"
@@ -59,7 +59,7 @@ class Refusal:
             case RefusalCode.OUT_OF_RANGE:
                 return "allowed: {numbers}{low:g} to {high:g}{unit}".format(**arguments)
             case RefusalCode.NOTHING_LEFT:
-                return "no {left} has been left; allowed: {allowed}".format(**arguments)
+                return "no {left} has been left; allowed: {instead}".format(**arguments)
             case RefusalCode.NOT_TIGHT:
                 return "the cables are not tight; run tighten first"
             case RefusalCode.BAD_SOURCE if arguments["allowed"]:

@@ -362,24 +362,33 @@ def _lengths(robot: Robot, limits: Limits, statics: PlatformStatics) -> Iterator
 
 
 def _contact(statics: PlatformStatics) -> Iterator[Finding]:
-    """Look where in its box cables, platform or obstacles touch, at home's orientation."""
+    """Look where in its box cables, platform or obstacles touch, at home's orientation.
+
+    Impossible is what touches everywhere, whichever way it is turned.
+    """
     points, interference = statics.points(), statics.model.interference
     clearances_m, pairs = interference.clearances(statics.poses(points))
     touching, i = clearances_m < interference.clearance_m, int(clearances_m.argmin())
-    if touching.any():
-        things = in_words(interference.things(int(pairs[i])), float(clearances_m[i]))
-        text = (
-            f"value {interference.clearance_m:g}; in {math.ceil(100 * touching.mean())} % of the "
-            "box something is nearer, and no move goes there: at "
-            f"{_point(points.reshape(-1, points.shape[-1])[i])} m {things}"
-        )
-        yield Finding("platform.clearance_m", text, impossible=bool(touching.all()))
+    if not touching.any():
+        return
+    things = in_words(interference.things(int(pairs[i])), float(clearances_m[i]))
+    share = math.floor(100 * touching.mean()) or "less than 1"
+    text = (
+        f"value {interference.clearance_m:g}; in {share} % of the box, turned as at home, "
+        "something is nearer, and no move goes there: at "
+        f"{_point(points.reshape(-1, points.shape[-1])[i])} m {things}"
+    )
+    everywhere = bool(touching.all()) and all(
+        (interference.clearances(statics.poses(points, turn))[0] < interference.clearance_m).all()
+        for turn in statics.orientations
+    )
+    yield Finding("platform.clearance_m", text, impossible=everywhere)
 
 
 def _beside_the_body(platform: Platform) -> Iterator[Finding]:
     """Look for cables that are made fast off the box that the platform is said to be."""
-    if platform.body is None:
-        return
+    if platform.body is None or (platform.is_planar and not platform.obstacles):
+        return  # nothing is held against it: cables in a plane run in layers
     anchors = np.array(platform.anchor_points_m)
     on_body = np.clip(anchors, platform.body.min_m, platform.body.max_m)
     beside_m = np.linalg.norm(anchors - on_body, axis=1)

@@ -87,7 +87,8 @@ class RobotMachine:
         """Its axes are those which have booted, once they have."""
         self._optional = optional
         limits = limits or limits_of(robot)
-        self._torque_Nm = np.asarray(limits.torque_Nm).tolist()
+        self._torque_Nm = np.broadcast_to(limits.torque_Nm, (len(robot.axes),)).tolist()
+        self._missed_cycles = limits.missed_cycles
         self._profiles = load_profiles(robot, limits)
         self._urls = robot_urls(robot, buses)
         self.clock = open_clock(self._urls.values(), real_time=real_time)
@@ -124,7 +125,7 @@ class RobotMachine:
             check_drive_identities(self.robot, self._profiles, reports)
             stack.callback(device.close)
             # the supervisor judges silence before the device does
-            device.tolerate_silence(self.robot.limits.missed_cycles + 1)
+            device.tolerate_silence(self._missed_cycles + 1)
             unsought = self._seek_indices(device)
             # the collector keeps every thread waiting: it looks at what stays now, and never again
             gc.collect()

@@ -35,7 +35,7 @@ REFUSALS = [
             RefusalCode.NOTHING_LEFT,
             "path",
             {"resume": True},
-            {"left": "path", "allowed": "plan"},
+            {"left": "path", "instead": "plan"},
         ),
         "path: resume: no path has been left; allowed: plan",
     ),

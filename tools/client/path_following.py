@@ -116,7 +116,7 @@ def _run(daemon: Daemon, out: Output, arguments: dict[str, Any], **figures: Any)
     ended: dict[str, Any] | None = None
     with stop_on_signals() as stop_requested, daemon.control() as control:
         typed = "--back" if "back_m" in arguments else "--resume"
-        with in_typed_words("path", typed, allowed="--run with a path's FILE"):
+        with in_typed_words("path", typed, instead="--run with a path's FILE"):
             control.post("/program", {"program": "path", "wanted": arguments})
         watch = _Watch(control, out)
         while ended is None and not watch.paused and not stop_requested():

@@ -71,7 +71,7 @@ def in_typed_words(
 
 
 def _out_of_range(refusal: Refusal, axes: Sequence[str]) -> str:
-    (key, value), index = next(iter(refusal.asked.items())), refusal.arguments["index"]
+    (key, value), index = next(iter(refusal.asked.items())), refusal.arguments.get("index")
     factor, unit, option = _KEYS[key]
     low, high = (float(f"{factor * refusal.arguments[end]:.4g}") for end in ("low", "high"))
     typed = f"{option} " if index is None else f"{axes[index]}="

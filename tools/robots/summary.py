@@ -18,7 +18,6 @@ from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
 from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, designed_loop
 from cdpr_rt.robots.platform_model import PlatformModel
 from cdpr_rt.robots.resonance import lowest_resonance_Hz
-from cdpr_rt.robots.rigid_body import is_point
 from cdpr_rt.robots.robot_arrays import limits_of
 from cdpr_rt.robots.statics import statics_of, view_of
 
@@ -81,7 +80,7 @@ def _of_tensions(
         "lowest_resonance_Hz": float(lowest_resonance_Hz(statics.model, robot.axes, points).min()),
     }
     of_all["loop"] = _of_loop(robot, statics.model)
-    if statics.turns and not is_point(platform):
+    if statics.turns:
         of_all["turns_at_most_rad"] = _finite(np.abs(statics.angle_rad(points)).max())
         of_all["free_rotation"] = _of_free_rotation(statics.model)
     return of_all
@@ -195,8 +194,8 @@ def _tension_lines(figures: dict[str, Any]) -> list[str]:
     )
     if figures["loop"] is not None:
         lines += _loop_lines(figures["loop"])
-    if "turns_at_most_rad" in figures:
-        turns = figures["turns_at_most_rad"]
+    turns = figures.get("turns_at_most_rad", 0.0)
+    if turns != 0.0:  # as that of a point is
         turning = "turns over" if turns is None else f"turns by up to {math.degrees(turns):.1f} deg"
         lines.append(f"           it {turning} there, which no cable can prevent")
         lines += _free_rotation_lines(figures["free_rotation"])

@@ -148,7 +148,7 @@ class PoseProgram(PlatformProgram):
         aim = self._aim
         if what == "resume":
             if aim is None:
-                left = {"left": "target", "allowed": "position_m"}
+                left = {"left": "target", "instead": "position_m"}
                 code = RefusalCode.NOTHING_LEFT
                 raise ProgramError(Refusal(code, self.name, {"resume": True}, left))
             self._require_way(aim, {"resume": True})

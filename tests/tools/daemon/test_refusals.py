@@ -32,10 +32,15 @@ def test_what_was_asked_for_is_named_as_it_was_typed() -> None:
 
 
 def test_what_is_allowed_is_named_as_it_is_typed() -> None:
-    nothing = {"left": "target", "allowed": "position_m"}
+    nothing = {"left": "target", "instead": "position_m"}
     refusal = Refusal(RefusalCode.NOTHING_LEFT, "pose", {"resume": True}, nothing)
-    text = told(refusal, "resume", allowed="cdpr move --to")
+    text = told(refusal, "resume", instead="cdpr move --to")
     assert text == "resume: no target has been left; allowed: cdpr move --to"
+    # the same words beside another refusal of the same command
+    states = {"state": "ready", "allowed": ["active"]}
+    refusal = Refusal(RefusalCode.NOT_IN_STATE, "program", arguments=states)
+    text = told(refusal, "resume", instead="cdpr move --to")
+    assert text == "resume: not in state ready; allowed in active; `cdpr enable` gives power"
     sources = {"why": "the cables' lengths are not known", "allowed": ["home"]}
     refusal = Refusal(RefusalCode.BAD_SOURCE, "tighten", {"from": "lengths"}, sources)
     text = told(refusal, "tighten", "tighten --from lengths", option="--from ")

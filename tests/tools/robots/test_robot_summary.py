@@ -17,7 +17,7 @@ def test_a_point_in_a_plane_is_not_said_to_turn(tmp_path: Path) -> None:
     robot = load_robot(path)
     assert robot.platform is not None
     told = figures(robot, robot.platform)
-    assert "turns_at_most_rad" not in told
+    assert told["turns_at_most_rad"] == 0.0 and told["free_rotation"] is None
     assert not any("turns" in line for line in lines(robot, robot.platform, told))
 
 

@@ -263,7 +263,7 @@ def resume(daemon: Daemon, out: Output) -> None:
 
         go_on(daemon, out)
         return
-    with in_typed_words("resume", allowed="cdpr move --to"):
+    with in_typed_words("resume", instead="cdpr move --to"):
         _carry_out(daemon, out, "pose", {"resume": True})
 
 

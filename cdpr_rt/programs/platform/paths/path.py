@@ -166,7 +166,7 @@ class PathProgram(PlatformProgram):
         """Return the plan that was left, and the time up to which it has come."""
         left = self.store.unfinished
         if left is None:
-            nothing = {"left": "path", "allowed": "plan"}
+            nothing = {"left": "path", "instead": "plan"}
             asked = {what: True}
             raise ProgramError(Refusal(RefusalCode.NOTHING_LEFT, self.name, asked, nothing))
         name, time_s = left
