@@ -93,10 +93,10 @@ class Measurement:
         total = sum(one.duration_s() for one in passes)
         recorded = []
         label = spoken_name(name)
-        begin, end = (min(s / self._planned_s, 1.0) for s in (self._done_s, self._done_s + total))
+        begin_s, self._done_s = self._done_s, self._done_s + total
         if math.isfinite(self._planned_s):
+            begin, end = (min(s / self._planned_s, 1.0) for s in (begin_s, self._done_s))
             label += f" ({100.0 * begin:.0f} to {100.0 * end:.0f} % of all)"
-        self._done_s += total
         with self._out.progress(label, total) as advance:
             done = 0.0
             for number, one in enumerate(passes):
