@@ -111,6 +111,8 @@ def service() -> None:
         _tell_pid(folder, "service")
         os.kill(os.getpid(), signal.SIGSTOP)
     _tell_pid(folder, "service")
+    while time.process_time() < plan.get("service_works_s", 0.0):
+        pass
     end = _asked(signal.SIGTERM)
     end_with_launcher(settings.launcher_pid)
     block = SharedBlock.attach(settings.block_fd)

@@ -190,6 +190,13 @@ def test_a_service_that_hangs_before_its_first_turn_is_started_again(start: Star
     assert daemon.ends() == 0
 
 
+def test_a_service_that_works_for_long_before_its_first_turn_is_left_to_it(start: Start) -> None:
+    daemon = start({"service_works_s": 3.0, "service_start_s": 2.0})
+    assert daemon.line("ready")["ready"]["state"] == "ready"  # and nothing is told before
+    daemon.process.terminate()
+    assert daemon.ends() == 0
+
+
 def test_a_loop_that_dies_is_told_and_the_service_stays_to_say_so(start: Start) -> None:
     daemon = start(watchdog_s=0.4)
     daemon.line("ready")

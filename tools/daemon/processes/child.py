@@ -63,6 +63,7 @@ class Child:
             start_new_session=True,  # a Ctrl-C at the terminal is ours to handle, not its
         )
         self.started = time.monotonic()
+        self._used, self._used_at = 0, self.started
         self.pidfd = os.pidfd_open(self.process.pid)
 
     @property
@@ -72,6 +73,16 @@ class Child:
         if code is None:
             return ""
         return f"killed by signal {-code}" if code < 0 else f"ended with exit status {code}"
+
+    def idle_s(self) -> float:
+        """Return for how long it has not been seen to have used a processor.
+
+        On a machine that is slow or busy a process takes long for what it does, and yet does it.
+        """
+        used, now = _processor_ticks(self.process.pid), time.monotonic()
+        if used != self._used:
+            self._used, self._used_at = used, now
+        return now - self._used_at
 
     def stop(self, timeout_s: float) -> bool:
         """Terminate it and wait; return whether it ended before it had to be killed."""
@@ -92,6 +103,12 @@ class Child:
         if self.pidfd >= 0:
             os.close(self.pidfd)
             self.pidfd = -1
+
+
+def _processor_ticks(pid: int) -> int:
+    """Return the time of a processor that a process has used, in ticks of the kernel."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return int(fields[11]) + int(fields[12])  # utime and stime, proc(5)
 
 
 def move_to(pid: int, cores: set[int]) -> None:

@@ -38,7 +38,7 @@ _SERVICE_STOP_S = 10.0
 _LOOP_STALLED_S = 2.0
 # the service turns some ten times a second; a disk may hold it up
 _SERVICE_STALLED_S = 10.0
-# reading its libraries from a slow disk, on a busy machine, takes less
+# for so long it does not even go on reading its libraries, however slow the machine
 _SERVICE_START_S = 30.0
 # a service that dies at once is not started in a tight circle
 _RESTART_S = (0.1, 0.5, 2.0, 5.0)
@@ -227,7 +227,7 @@ class Launcher:
     def _watch_service_turns(self, service: Child) -> None:
         silent_s, allowed_s = self._silence_s("service_alive_ns"), _SERVICE_STALLED_S
         if not self._block.counters["service_alive_ns"][0]:  # it has not turned even once
-            silent_s, allowed_s = time.monotonic() - service.started, _SERVICE_START_S
+            silent_s, allowed_s = service.idle_s(), _SERVICE_START_S
         if silent_s > allowed_s:
             self._say(f"the service has not turned for {allowed_s:g} s and is killed")
             service.process.kill()
