@@ -333,11 +333,14 @@ class Supervisor:
             then=(0.0, False),
         )
 
-    def compare_lengths(self, disagree_m: float) -> int:
-        """Judge by how much cable lengths contradict each other; return the `Reaction` so far."""
+    def compare_lengths(self, disagree_m: float, axis: int) -> int:
+        """Judge by how much cable lengths contradict each other; return the `Reaction` so far.
+
+        `axis` is that of the cable which contradicts the others, -1 where that is not known.
+        """
         allowed = self.limits.lengths_disagree_m
         if not disagree_m <= allowed:
-            _judge(self._verdict, self._reactions, int(Limit.LENGTHS), -1, disagree_m, allowed)
+            _judge(self._verdict, self._reactions, int(Limit.LENGTHS), axis, disagree_m, allowed)
         return int(self._verdict["reaction"][0])
 
     def report(self, limit: Limit, reason: str) -> int:

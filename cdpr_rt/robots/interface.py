@@ -177,7 +177,9 @@ class PlatformControl(Controller, Protocol):
     estimated: FloatArray
     """Where the platform is, (d,)."""
     residual_m: float
-    """How far the cables' lengths are from agreeing with each other, root mean square."""
+    """How far the cables' lengths are from agreeing: their largest normalised residual."""
+    suspect: int
+    """The cable that has it, -1 where the lengths do not tell which of them is off."""
 
     @property
     def inertia_kg_m2(self) -> FloatArray:

@@ -10,9 +10,7 @@ from pathlib import Path
 
 import pytest
 from daemon_rig import RealDaemon, write_robot
-from tolerant_drive import NAME, write_tolerant_drive
-
-import cdpr_profiles
+from tolerant_drive import write_tolerant_robot
 
 pytestmark = pytest.mark.vcan
 
@@ -30,12 +28,7 @@ stale_cycles = 1000
 def robot(tmp_path: Path) -> Path:
     """Its master and drives may be held up for as long as LIMITS say, not a few cycles alone."""
     path = write_robot(tmp_path, PERIOD_S, LIMITS)
-    shipped = "winch-mpp0923d"
-    text = path.read_text().replace(f'"{shipped}"', '"winch.toml"')
-    path.write_text("master_heartbeat_s = 6.0\n" + text)
-    winch = (Path(cdpr_profiles.__file__).parent / "winches" / f"{shipped}.toml").read_text()
-    (tmp_path / "winch.toml").write_text(winch.replace('"generic-cia402"', f'"{NAME}"'))
-    write_tolerant_drive(tmp_path)
+    write_tolerant_robot(path, path.read_text())
     return path
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 import cdpr_profiles
 
 NAME = "tolerant"
+MASTER_HEARTBEAT_S = 6.0
+_WINCH = "winch-mpp0923d"
 
 
 def write_tolerant_drive(folder: Path) -> None:
@@ -21,3 +23,13 @@ def write_tolerant_drive(folder: Path) -> None:
         assert before in text
         text = text.replace(before, after)
     (folder / f"{NAME}.toml").write_text(text)
+
+
+def write_tolerant_robot(path: Path, text: str) -> None:
+    """Write a robot's file of the shipped winches whose master may be held up for seconds, too."""
+    winch = (Path(cdpr_profiles.__file__).parent / "winches" / f"{_WINCH}.toml").read_text()
+    (path.parent / "winch.toml").write_text(winch.replace('"generic-cia402"', f'"{NAME}"'))
+    write_tolerant_drive(path.parent)
+    assert f'"{_WINCH}"' in text
+    heartbeat = f"master_heartbeat_s = {MASTER_HEARTBEAT_S}\n"
+    path.write_text(heartbeat + text.replace(f'"{_WINCH}"', '"winch.toml"'))

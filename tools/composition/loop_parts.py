@@ -54,7 +54,7 @@ def loop_parts(
         programs=programs,
         supervisor=Supervisor(supervisor_limits(limits, robot), n, period_s, names),
         estimator=estimator,
-        lengths_disagree_m=None if platform is None else platform.lengths_disagree_m,
+        lengths_disagree=None if platform is None else platform.lengths_disagree,
         lowering=lowering,
         last=None if platform is None else platform.last,
         paths=None if platform is None else platform.paths,

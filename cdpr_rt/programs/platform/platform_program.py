@@ -80,7 +80,7 @@ class PlatformParts:
     ) -> None:
         self.model, self.platform = model, model.platform
         self.lengths_allowed_m = min(model.platform.home_tolerance_m, lengths_disagree_m)
-        """The largest residual of the forward kinematics that is allowed."""
+        """By how much the cables' lengths may disagree."""
         self.near_m = max(NEAR_m, NEAR_SHARE * exit_point_diagonal_m(model.platform))
         """How far from its set-point a platform has arrived."""
         self.compensation = compensation
@@ -133,9 +133,9 @@ class PlatformParts:
         """Return what an operator should know of the robot."""
         return [text for text in (self.control.load_cell_fault,) if text]
 
-    def lengths_disagree_m(self) -> float:
-        """Return the residual of the forward kinematics, 0 while cables are slack."""
-        return self.control.residual_m if self.tight else 0.0
+    def lengths_disagree(self) -> tuple[float, int]:
+        """Return how far the lengths are from agreeing, and which cable's is off; 0 while slack."""
+        return (self.control.residual_m, self.control.suspect) if self.tight else (0.0, -1)
 
     def assume_at_home(self, feedback: AxisFeedback) -> None:
         """Take the platform to be at home on tight cables, for the warm-up."""

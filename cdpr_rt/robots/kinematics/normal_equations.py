@@ -14,10 +14,12 @@ import math
 
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.jit import jit
-from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ERROR, FREE, TINY
+from cdpr_rt.robots.kinematics.cable_kernel import ANCHOR, ARC, ERROR, FREE, TINY
 
 FACTOR, GRADIENT, STEP, DIRECTIONS, ACCEPTED, SAVED_POSES, SOLVER_ROWS = 6, 12, 13, 14, 15, 16, 24
 _LEAST_PIVOT = 1e-13
+_LEAST_REDUNDANCY = 1e-6
+_DISTINCT = 0.8
 
 
 @jit
@@ -153,3 +155,33 @@ def covariance(cables: FloatArray, solver: FloatArray, variance: float, result: 
         elif solver[DIRECTIONS, j] != 0.0:
             column[j] = variance
             substitute(solver, column)
+
+
+@jit
+def largest_residual(
+    lengths: FloatArray, cables: FloatArray, solver: FloatArray
+) -> tuple[float, int]:
+    """Return the largest |r_i| / sqrt(p_ii) of cables at the pose that `lengths` (n,) have, in m.
+
+    r are the residuals, p_ii = 1 - J_i N^-1 J_i^T the redundancy numbers, of a FACTOR of N that is
+    not damped (data snooping: Baarda, A testing procedure for use in geodetic networks, 1968). One
+    length that is wrong by s has s sqrt(p_ii) of it, and more than every other. Returns its index
+    besides, -1 where another cable comes near: then they do not tell which one it is.
+    """
+    largest, second, index = 0.0, 0.0, -1
+    x = solver[STEP]
+    for i in range(lengths.size):
+        for j in range(6):
+            x[j] = cables[j, i] * solver[DIRECTIONS, j]
+        substitute(solver, x)
+        redundancy = 1.0
+        for j in range(6):
+            redundancy -= cables[j, i] * x[j]
+        if redundancy < _LEAST_REDUNDANCY:
+            continue
+        residual = abs(cables[FREE, i] + cables[ARC, i] - lengths[i]) / math.sqrt(redundancy)
+        if residual > largest:
+            largest, second, index = residual, largest, i
+        else:
+            second = max(second, residual)
+    return largest, index if second < _DISTINCT * largest else -1

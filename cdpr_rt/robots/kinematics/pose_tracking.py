@@ -25,7 +25,13 @@ from cdpr_rt.jit import jit
 from cdpr_rt.robots.kinematics import free_rotation_kernel as free
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, ERROR, FREE
 from cdpr_rt.robots.kinematics.cable_model import unstretched_length
-from cdpr_rt.robots.kinematics.normal_equations import GRADIENT, assemble, factorise, substitute
+from cdpr_rt.robots.kinematics.normal_equations import (
+    GRADIENT,
+    assemble,
+    factorise,
+    largest_residual,
+    substitute,
+)
 from cdpr_rt.robots.kinematics.pose_search import find_pose
 
 THETA, OMEGA, LOWPASSED_ONCE, LOWPASSED, LENGTH, RATE, TENSION, STRETCH, AT_ZERO = range(9)
@@ -75,11 +81,11 @@ def track_pose(
     swing: FloatArray,
     turns: bool,
     position: FloatArray,
-) -> tuple[float, float]:
-    """Bring `pose` and `twist` (6,) up to the motors' angles (n,); return the residuals.
+) -> tuple[float, int, float]:
+    """Bring `pose` and `twist` (6,) up to the motors' angles (n,).
 
-    They are root mean squares over the cables: of what their lengths are off, m, and of what their
-    rates are off, m/s. `turns` is
+    Returns the largest normalised residual of the lengths, m, its cable, -1 where the lengths do
+    not tell which it is, and the root mean square of what the rates are off, m/s. `turns` is
     whether the platform turns freely in its plane: then it goes to where its tensions have no
     moment. Eqs. (2.6) to (2.9), (3.13) to (3.15).
     """
@@ -88,11 +94,12 @@ def track_pose(
         _turn_to_equilibrium(motors, filters, geometry, pose, rotation, swing)
     _, _, cost = find_pose(geometry, motors[LENGTH], pose, cables, solver, _NO_RESTARTS)
     stretch(motors, cables, up)
-    n = motors.shape[1]
+    n, residual, suspect = motors.shape[1], math.sqrt(cost), -1
     for i in range(n):
         cables[ERROR, i] = -motors[RATE, i]
     assemble(cables, solver)
     if factorise(solver, 0.0):
+        residual, suspect = largest_residual(motors[LENGTH], cables, solver)
         for k in range(6):
             twist[k] = solver[GRADIENT, k]
         substitute(solver, twist)
@@ -102,7 +109,7 @@ def track_pose(
         for k in range(6):
             rate -= cables[k, i] * twist[k]
         inconsistency += rate * rate
-    return math.sqrt(cost / n), math.sqrt(inconsistency / n)
+    return residual, suspect, math.sqrt(inconsistency / n)
 
 
 @jit

@@ -85,7 +85,7 @@ class CableControl:
         self.outcome, self.share, self._limited = 0, 1.0, False
         self.effort_Nm, self.compensation_Nm, self.motor_loss_Nm = np.zeros((3, n))
         self.cogging_Nm = np.zeros(n) if compensation is None else compensation.cogging_Nm
-        self.residual_m, self._rate_inconsistency_m_s = np.inf, 0.0
+        self.residual_m, self.suspect, self._rate_inconsistency_m_s = np.inf, -1, 0.0
         self.estimated = np.array(model.home)
         """Where the platform is, (d,)."""
         self._compensation = compensation
@@ -293,7 +293,8 @@ class CableControl:
 
     def observe(self, feedback: AxisFeedback) -> None:
         """Bring the estimate of the platform's pose up to date, by one cycle."""
-        self.residual_m, self._rate_inconsistency_m_s = self._track(feedback.position_rad)
+        found = self._track(feedback.position_rad)
+        self.residual_m, self.suspect, self._rate_inconsistency_m_s = found
         self._write_coordinates()
 
     def lengths_at_home(self, tension_N: FloatArray) -> FloatArray:

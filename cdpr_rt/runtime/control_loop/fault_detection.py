@@ -26,8 +26,8 @@ class FaultDetection:
             estimate = parts.estimator.estimate
             feedback = cycle.device.feedback
             reaction = supervisor.check(feedback, estimate, engine.setpoint, torque_Nm)
-            if parts.lengths_disagree_m is not None:
-                reaction = supervisor.compare_lengths(parts.lengths_disagree_m())
+            if parts.lengths_disagree is not None:
+                reaction = supervisor.compare_lengths(*parts.lengths_disagree())
         else:
             torque_Nm[:] = 0.0
         # in a fault the drives' alarms are known, and formatting them takes time

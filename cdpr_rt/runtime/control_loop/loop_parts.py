@@ -30,8 +30,8 @@ class LoopParts:
     """By name, in the order of their numbers; `idle` and `hold` are among them."""
     supervisor: Supervisor
     estimator: Estimator
-    lengths_disagree_m: Callable[[], float] | None = None
-    """Returns the residual of the forward kinematics, where cables are redundant."""
+    lengths_disagree: Callable[[], tuple[float, int]] | None = None
+    """Returns how far cable lengths are from agreeing, m, and which cable's is off, or -1."""
     lowering: Lowering | None = None
     """How the platform is lowered, None for a robot without such a program."""
     last: LastLengths | None = None

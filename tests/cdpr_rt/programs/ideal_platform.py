@@ -76,7 +76,7 @@ class IdealControl:
         self.torque_Nm = np.full(n, 10.0)
         self.effort_Nm, self.compensation_Nm = np.zeros((2, n))
         self.motor_loss_Nm, self.cogging_Nm = np.zeros((2, n))
-        self.inertia_kg_m2, self.residual_m = np.full(n, 1e-4), 0.0
+        self.inertia_kg_m2, self.residual_m, self.suspect = np.full(n, 1e-4), 0.0, -1
         self.free_lengths_m = np.zeros(n)
         self.swing_rad = self.swing_m = 0.0
         self._there = model.pose(model.home)

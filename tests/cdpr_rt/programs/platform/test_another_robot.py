@@ -107,7 +107,7 @@ class BeltControl:
         self.tension_N, self.least_N, self.low_N = np.zeros((3, 2))
         self.effort_Nm, self.compensation_Nm, self.motor_loss_Nm, self.cogging_Nm = np.zeros((4, 2))
         self.torque_Nm, self.inertia_kg_m2 = np.full(2, TORQUE_Nm), np.full(2, INERTIA_kg_m2)
-        self.shaped, self.residual_m = self.position, 0.0
+        self.shaped, self.residual_m, self.suspect = self.position, 0.0, -1
 
     @property
     def pose(self) -> FloatArray:
