@@ -13,7 +13,7 @@ from numba import types
 from cdpr_drivers.bus.frames import FrameBuffer, FramePort
 from cdpr_rt.jit import jit_unlocked
 
-_DONTWAIT, _WAITFORONE = 0x40, 0x10000
+_DONTWAIT = 0x40
 _VECTOR = np.dtype([("base", "<u8"), ("size", "<u8")])
 """`struct iovec` of a 64-bit system."""
 _MESSAGE = np.dtype(
@@ -83,15 +83,6 @@ class KernelBatch:
             return 0
         raise OSError(-came, os.strerror(-came))
 
-    def wait(self) -> int:
-        """See `Batch.wait`."""
-        while True:
-            came = _receive_all(self._port.fileno(), self._at, len(self._rows), _WAITFORONE)
-            if came >= 0:
-                return came
-            if came != -errno.EINTR:
-                raise OSError(-came, os.strerror(-came))
-
 
 class SingleFrameBatch:
     """The same, one call of the port for each row: for ports that do more than their socket."""
@@ -118,8 +109,3 @@ class SingleFrameBatch:
         except BlockingIOError:
             pass
         return came
-
-    def wait(self) -> int:
-        """See `Batch.wait`."""
-        self.lengths[0] = self._port.recv_into(self._rows[0])
-        return 1

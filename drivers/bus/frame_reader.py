@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cdpr_drivers.bus.adapters.simbus_socket import Filters
-from cdpr_drivers.bus.frames import FRAME_BYTES, FrameBuffer, FramePort
+from cdpr_drivers.bus.frames import FrameBuffer, FramePort
 from cdpr_drivers.errors import BusError
 
 _FRAMES = 128
@@ -25,9 +25,9 @@ class FrameReader:
     leads_time = False
     """Whether the bus' time goes on only as far as this process lets it."""
 
-    def __init__(self, port: FramePort, row_bytes: int = FRAME_BYTES) -> None:
+    def __init__(self, port: FramePort) -> None:
         self.port = port
-        self.frames = FrameBuffer(_FRAMES, row_bytes)
+        self.frames = FrameBuffer(_FRAMES)
         self._batch = port.batch(self.frames)
         self.take: Callable[[int], None] = discard
         self.on_failure: Callable[[BusError], None] = discard

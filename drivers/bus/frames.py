@@ -22,32 +22,37 @@ FRAME_DTYPE = np.dtype([("can_id", "=u4"), ("length", "u1"), ("pad", "V3"), ("da
 EFF_FLAG = 0x80000000
 RTR_FLAG = 0x40000000
 
+HEAD_BYTES = 24
+"""Of a packet of the simulated bus that has several frames."""
 BUFFER_BYTES = 1 << 21
 SEND_TIMEOUT_S = 1.0
 """How long `send` waits for room before it gives up."""
 
 __all__ = [
-    "BUFFER_BYTES", "EFF_FLAG", "ERR_FLAG", "FRAME", "FRAME_BYTES", "FRAME_DTYPE", "RTR_FLAG",
-    "SEND_TIMEOUT_S", "Batch", "Bytes", "FrameBuffer", "FramePort",
+    "BUFFER_BYTES", "EFF_FLAG", "ERR_FLAG", "FRAME", "FRAME_BYTES", "FRAME_DTYPE", "HEAD_BYTES",
+    "RTR_FLAG", "SEND_TIMEOUT_S", "Batch", "Bytes", "FrameBuffer", "FramePort",
 ]  # fmt: skip
 
 
 class FrameBuffer:
     """Buffer of `n` frames: an array of bytes, a structured one and `n` views of the same memory.
 
-    `row_bytes` is more than 16 where longer packets come between the frames.
+    Before the frames there is room for the head of a packet that has all of them.
     """
 
-    def __init__(self, n: int, row_bytes: int = FRAME_BYTES) -> None:
-        self.bytes: NDArray[np.uint8] = np.zeros((n, row_bytes), np.uint8)
-        """Shape (n, row_bytes)."""
+    def __init__(self, n: int) -> None:
+        memory = np.zeros(HEAD_BYTES + n * FRAME_BYTES, np.uint8)
+        self.packet: memoryview = memoryview(memory.data)
+        """Head and frames."""
+        self.bytes: NDArray[np.uint8] = memory[HEAD_BYTES:].reshape(n, FRAME_BYTES)
+        """Shape (n, 16)."""
         self.rows: list[memoryview] = [memoryview(row.data) for row in self.bytes]
         """The writable views to hand to `send` and `recv_into`."""
 
     @property
     def array(self) -> NDArray[np.void]:
         """Shape (n,), fields can_id, length, data (8 bytes)."""
-        frames: NDArray[np.void] = self.bytes[:, :FRAME_BYTES].view(FRAME_DTYPE)[:, 0]
+        frames: NDArray[np.void] = self.bytes.view(FRAME_DTYPE)[:, 0]
         return frames
 
 
@@ -63,9 +68,6 @@ class Batch(Protocol):
 
     def receive(self) -> int:
         """Fill the first rows with what has come, without waiting; return how many."""
-
-    def wait(self) -> int:
-        """Do the same, but wait for the first packet."""
 
 
 class FramePort(Protocol):

@@ -9,25 +9,83 @@ import socket
 import struct
 import time
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from cdpr_drivers.bus.adapters.simbus_socket import connect, control_message
+from cdpr_drivers.bus.batch import KernelBatch
 from cdpr_drivers.bus.frame_reader import FrameReader, discard
-from cdpr_drivers.bus.frames import FRAME_BYTES
+from cdpr_drivers.bus.frames import FRAME_BYTES, HEAD_BYTES, Batch, Bytes, FrameBuffer
 from cdpr_drivers.bus.socket_port import SocketPort
 from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError
 from cdpr_rt.core.clock import Clock, LockstepClock, PacedClock
 
-_GO, _TIME = b"bus-go\0\0", b"bus-time"
+_GO, _TIME, _FRAMES = b"bus-go\0\0", b"bus-time", b"bus-data"
+_TO_MASTER: Final = {_TIME, _FRAMES}
 _LAYOUT = struct.Struct("<8sdd")
 _CONTROL_BYTES = 65536
+_MOST_FRAMES = 26
+"""In a packet to the bus."""
 _ANSWER_TIMEOUT_S = 5.0
 _MOST_STEPS = 10_000
 _LAST_S = 0.01
 """Bus time in which the drives act on the last commands before it stands still."""
 _LOST_S = 1e-3
 """Wall time of a wait when all buses are lost, which would keep the processor busy."""
+
+
+class LedPort(SocketPort):
+    """A port on a bus that this process leads: a batch goes in one packet, with the next frame.
+
+    Time stands still until that: it is the SYNC at the latest, or a `go`.
+    """
+
+    def __init__(self, url: BusUrl, sock: socket.socket) -> None:
+        super().__init__(url, sock, {"mode": "lockstep"})
+        self._transmit = sock.send
+        self._held: _HeldBatch | None = None
+        self.send = self._send
+
+    def batch(self, frames: FrameBuffer) -> Batch:
+        """Return the batch that sends or receives the rows of `frames`."""
+        fits = len(frames.rows) < _MOST_FRAMES
+        return _HeldBatch(self, frames) if fits else super().batch(frames)
+
+    def hold(self, batch: _HeldBatch) -> None:
+        """Have what is in `batch` sent before, or with, what is sent next."""
+        if self._held is not None:
+            self._transmit(self._held.alone)
+        self._held = batch
+
+    def _send(self, packet: Bytes) -> int:
+        held, self._held = self._held, None
+        if held is None:
+            return self._transmit(packet)
+        if len(packet) == FRAME_BYTES:
+            held.last[:] = packet
+            self._transmit(held.with_next)
+        else:
+            self._transmit(held.alone)
+            self._transmit(packet)
+        return len(packet)
+
+
+class _HeldBatch(KernelBatch):
+    """A batch that an own copy of goes out with the next frame of the port."""
+
+    def __init__(self, port: LedPort, frames: FrameBuffer) -> None:
+        super().__init__(port, frames)
+        n = len(frames.rows)
+        copy = FrameBuffer(n + 1)
+        copy.packet[: _LAYOUT.size] = _LAYOUT.pack(_FRAMES, 0.0, 0.0)
+        self._hold, self._frames, self._copy = port.hold, frames.bytes, copy.bytes[:n]
+        self.last, self.with_next = copy.rows[n], copy.packet
+        self.alone = copy.packet[:-FRAME_BYTES]
+
+    def send(self) -> None:
+        """See `Batch.send`."""
+        self._copy[:] = self._frames
+        self._hold(self)
 
 
 class SimulatedBus(FrameReader):
@@ -40,11 +98,9 @@ class SimulatedBus(FrameReader):
     leads_time = True
 
     def __init__(self, port: SocketPort, now_s: float, next_s: float) -> None:
-        super().__init__(port, _LAYOUT.size)
+        super().__init__(port)
         self.now_s, self.next_s = now_s, next_s
         self.acquired = self.gone = False
-        self._kept = 0
-        """Packets that have been read, in the first rows, and are not processed yet."""
         self._ahead_s = 0.0
         """By how much its clock is ahead of the bus."""
 
@@ -75,36 +131,25 @@ class SimulatedBus(FrameReader):
     def receive_until_time(self) -> bool:
         """Process all frames up to the next time packet; return whether there were any.
 
-        A time packet follows the answers to each SYNC and each `go`. Raises BusError.
+        It follows the answers to each SYNC and each `go`, and has the last of them. Raises
+        BusError.
         """
-        lengths, came = self._batch.lengths, False
+        packet, came = self.frames.packet, False
         while True:
             try:
-                last = self._kept or self._batch.wait()
+                size = self.port.recv_into(packet)
             except OSError as error:
                 raise self.lost(error) from error
-            frames = self._kept = 0
-            while frames < last and lengths[frames] == FRAME_BYTES:
-                frames += 1
+            frames = (size - HEAD_BYTES) // FRAME_BYTES
+            kind, now_s, next_s = _LAYOUT.unpack_from(packet)
+            if frames < 0 or kind not in _TO_MASTER:
+                raise self.lost()
             if frames:
                 came = True
                 self.take(frames)
-            if frames < last:
-                kind, now_s, next_s = _LAYOUT.unpack_from(self.frames.rows[frames])
-                if lengths[frames] != _LAYOUT.size or kind != _TIME:
-                    raise self.lost()
+            if kind == _TIME:
                 self.now_s, self.next_s = now_s + self._ahead_s, next_s + self._ahead_s
-                if frames + 1 < last:
-                    self._keep(frames + 1, last)
                 return came
-
-    def _keep(self, first: int, last: int) -> None:
-        """Keep frames that came after the time packet, from other clients, for the next call."""
-        self._kept = kept = last - first
-        self.frames.bytes[:kept] = self.frames.bytes[first:last]
-        lengths = self._batch.lengths
-        for k in range(kept):
-            lengths[k] = lengths[first + k]
 
     def poll(self) -> bool:
         """Return False: frames come with the time, or they would come by chance."""
@@ -212,7 +257,7 @@ def _lead(url: BusUrl) -> SimulatedBus | None:
     if answer is None:
         sock.close()
         return None
-    port = SocketPort(url, sock, {"mode": "lockstep"})
+    port = LedPort(url, sock)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, bytes(16))
     next_s = answer["next_s"]
     return SimulatedBus(port, float(answer["now_s"]), math.inf if next_s is None else float(next_s))

@@ -12,6 +12,7 @@ import socket
 import struct
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
 
 from cdpr_sim_bus.errors import BusSetupError
@@ -43,6 +44,7 @@ class Client:
         "dropped",
         "essential",
         "filters",
+        "queued",
         "receive",
         "send",
         "sent_s",
@@ -62,6 +64,8 @@ class Client:
         self.dropped = 0
         self.delivered = False
         """Whether a frame was delivered since this was last cleared."""
+        self.queued: deque[bytes] = deque()
+        """Frames of its last packet that have not been carried yet."""
         self.sent_s = 0.0
         """When the last packet was sent, in seconds of the monotonic clock, where stamped."""
         self.receive: Callable[[int], bytes] = sock.recv

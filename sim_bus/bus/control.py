@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import struct
@@ -17,8 +18,16 @@ from cdpr_sim_bus.clock import BusClock, ClockMode
 from cdpr_sim_bus.frame import FRAME_BYTES
 
 _PACKET = struct.Struct("<8sdd")
-_GO, _TIME = b"bus-go\0\0", b"bus-time"
+_GO, _TIME, _FRAMES = b"bus-go\0\0", b"bus-time", b"bus-data"
 _STEPS_A_TURN = 16
+_MOST_HELD = 128
+
+
+def frames_of(packet: bytes) -> list[bytes]:
+    """Return the frames of a packet that has several of them, an empty list for any other."""
+    if not packet.startswith(_FRAMES) or (len(packet) - _PACKET.size) % FRAME_BYTES:
+        return []
+    return [packet[at : at + FRAME_BYTES] for at in range(_PACKET.size, len(packet), FRAME_BYTES)]
 
 
 def is_go(packet: bytes) -> bool:
@@ -37,6 +46,8 @@ class Lead:
         """Bus time up to which a grant runs, None without one."""
         self.time_pending = False
         """Whether a time packet waits for room in the leader's socket."""
+        self._held: list[bytes] = []
+        """Frames for the leader, which go with the next time packet."""
 
     def take(self, client: Client) -> dict[str, Any]:
         """Make `client` the leader; return the answer to it."""
@@ -50,6 +61,7 @@ class Lead:
         self._switch.advance(now_s)
         self._switch.settle()
         self.leader = client
+        client.send = self._hold
         client.delivered = False
         next_s = self._switch.next_event_s()
         return {"lead": {"now_s": now_s, "next_s": None if next_s == math.inf else next_s}}
@@ -57,6 +69,9 @@ class Lead:
     def release(self, client: Client) -> None:
         """End the lead of `client`; bus time stands until a client sends or leads."""
         if client is self.leader:
+            client.send = client.sock.send
+            with contextlib.suppress(OSError):  # it does not read
+                self._send_held(client)
             self._end()
 
     def lose(self, client: Client) -> None:
@@ -68,6 +83,19 @@ class Lead:
     def _end(self) -> None:
         self.leader = self.until_s = None
         self.time_pending = False
+        self._held.clear()
+
+    def _hold(self, frame: bytes) -> None:
+        """Keep a frame for the leader; where many wait they go at once, if there is room."""
+        held = self._held
+        if len(held) == _MOST_HELD and self.leader is not None:
+            self._send_held(self.leader)
+        held.append(frame)
+
+    def _send_held(self, leader: Client) -> None:
+        if self._held:
+            leader.sock.send(_PACKET.pack(_FRAMES, 0.0, 0.0) + b"".join(self._held))
+            self._held.clear()
 
     def go(self, packet: bytes) -> None:
         """Take a grant of the leader; `go_on` carries it out. One without a finite time only
@@ -104,7 +132,8 @@ class Lead:
         packet = _PACKET.pack(_TIME, self._clock.now(0.0), self._switch.next_event_s())
         self.time_pending = False
         try:
-            leader.sock.send(packet)
+            leader.sock.send(packet + b"".join(self._held))
+            self._held.clear()
             leader.delivered = False
         except BlockingIOError:
             self.time_pending = True

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from cdpr_sim_bus.bus.client import PACKET_BYTES, Client, Listener
-from cdpr_sim_bus.bus.control import Lead, handle, is_go
+from cdpr_sim_bus.bus.control import Lead, frames_of, handle, is_go
 from cdpr_sim_bus.bus.switch import Contention, LocalNode, Route, Switch
 from cdpr_sim_bus.bus.watcher import Watcher
 from cdpr_sim_bus.clock import HOLD_S, BusClock, ClockMode
@@ -255,22 +255,26 @@ class Hub(Switch):
                 return
             winner, frame = waiting.pop()
             # the sender of a SYNC waits for the answers, unless time has passed meanwhile
-            if not self._take(frame, winner) or self._paced:
+            if not self._take(frame, winner) or self._paced or winner.queued:
                 self._fetch(winner)
 
     def _fetch(self, client: Client) -> None:
+        queued = client.queued
         try:
-            packet = client.receive(PACKET_BYTES)
-            while len(packet) != FRAME_BYTES:
-                if not self._control(client, packet):
-                    return
+            while not queued:
                 packet = client.receive(PACKET_BYTES)
+                if len(packet) == FRAME_BYTES:
+                    queued.append(packet)
+                elif frames := frames_of(packet):
+                    queued.extend(frames)
+                elif not self._control(client, packet):
+                    return
         except (BlockingIOError, ConnectionResetError):  # see `_serve_client`
             return
         except OSError as error:
             self._remove(client, f"lost: {error.strerror}")
             return
-        self._waiting.add(client, packet)
+        self._waiting.add(client, queued.popleft())
 
     def _serve_client(self, client: Client) -> None:
         """Take the frames of one client until none waits or a SYNC has been answered.
@@ -282,6 +286,10 @@ class Hub(Switch):
                 packet = client.receive(PACKET_BYTES)
                 if len(packet) == FRAME_BYTES:
                     if self._take(packet, client):
+                        return
+                elif frames := frames_of(packet):
+                    synced = [self._take(frame, client) for frame in frames]
+                    if True in synced:
                         return
                 elif not self._control(client, packet):
                     return
@@ -304,7 +312,7 @@ class Hub(Switch):
         if answer is None:
             self._routes.clear()
         else:
-            self._deliver(answer, client)
+            self._transmit(answer, client, client.sock.send)
         return True
 
     def _take(self, frame: bytes, source: Client) -> bool:

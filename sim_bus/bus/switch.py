@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from typing import Protocol
 
@@ -246,9 +246,12 @@ class Switch(ABC):
         if self._paced:
             self.load.occupy(now_s, bits)
 
-    def _deliver(self, packet: bytes, peer: Client) -> None:
+    def _deliver(self, frame: bytes, peer: Client) -> None:
+        self._transmit(frame, peer, peer.send)
+
+    def _transmit(self, packet: bytes, peer: Client, send: Callable[[bytes], object]) -> None:
         try:
-            peer.send(packet)
+            send(packet)
         except BlockingIOError:
             # a client that does not read loses frames; the bus does not wait for it
             peer.dropped += 1

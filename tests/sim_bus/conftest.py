@@ -99,12 +99,14 @@ class Member:
 
     def until_time(self) -> tuple[list[bytes], float, float]:
         """Return the frames up to the next time packet, bus time, and the next event's."""
-        frames = []
-        while len(packet := self.recv()) == 16:
-            frames.append(packet)
-        mark, now_s, next_s = struct.unpack("<8sdd", packet)
-        assert mark == b"bus-time"
-        return frames, now_s, next_s
+        frames = list[bytes]()
+        while True:
+            packet = self.recv()
+            mark, now_s, next_s = struct.unpack_from("<8sdd", packet)
+            frames += [packet[at : at + 16] for at in range(24, len(packet), 16)]
+            if mark == b"bus-time":
+                return frames, now_s, next_s
+            assert mark == b"bus-data"
 
     def go(self, until_s: float) -> tuple[list[bytes], float, float]:
         """Let the bus go on and return what `until_time` does."""

@@ -77,7 +77,7 @@ class Bus:
             pass
 
     def hear(self) -> bytes:
-        self.heard.append(self.sock.recv(512))
+        self.heard.append(self.sock.recv(4096))
         return self.heard[-1]
 
     def send(self, can_id: int, data: bytes = b"") -> None:
@@ -86,7 +86,7 @@ class Bus:
     def until_time(self) -> None:
         while (packet := self.hear())[:8] != b"bus-time":
             assert packet, "the simulator has gone"
-        _, self.now_s, _ = GO.unpack(packet)
+        _, self.now_s, _ = GO.unpack_from(packet)
 
     def go(self, until_s: float) -> None:
         self.sock.send(GO.pack(b"bus-go\0\0", until_s, 0.0))

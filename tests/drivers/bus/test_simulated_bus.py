@@ -8,13 +8,16 @@ from collections.abc import Iterator
 
 import pytest
 
-from cdpr_drivers.bus.frames import FRAME
-from cdpr_drivers.bus.simulated_bus import SimulatedBus
-from cdpr_drivers.bus.socket_port import SocketPort
+from cdpr_drivers.bus.frames import FRAME, Batch, FrameBuffer
+from cdpr_drivers.bus.simulated_bus import LedPort, SimulatedBus
 from cdpr_drivers.bus.url import BusUrl
 from cdpr_drivers.errors import BusError
 
-TIME = struct.Struct("<8sdd")
+PACKET = struct.Struct("<8sdd")
+
+
+def frame(identifier: int) -> bytes:
+    return FRAME.pack(identifier, 8, bytes(8))
 
 
 class Led:
@@ -22,18 +25,30 @@ class Led:
 
     def __init__(self) -> None:
         near, self.far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self.bus = SimulatedBus(SocketPort(BusUrl.parse("simbus:led"), near, {}), 0.0, 0.0)
+        self.port = LedPort(BusUrl.parse("simbus:led"), near)
+        self.bus = SimulatedBus(self.port, 0.0, 0.0)
         self.taken: list[int] = []
         self.bus.take = self._take
 
     def _take(self, last: int) -> None:
         self.taken += self.bus.frames.array["can_id"][:last].tolist()
 
-    def frame(self, identifier: int) -> None:
-        self.far.send(FRAME.pack(identifier, 8, bytes(8)))
+    def send(self, kind: bytes, now_s: float, *identifiers: int) -> None:
+        frames = b"".join(map(frame, identifiers))
+        self.far.send(PACKET.pack(kind, now_s, now_s + 1.0) + frames)
 
-    def time(self, now_s: float) -> None:
-        self.far.send(TIME.pack(b"bus-time", now_s, now_s + 1.0))
+    def time(self, now_s: float, *identifiers: int) -> None:
+        self.send(b"bus-time", now_s, *identifiers)
+
+    def sent(self) -> list[bytes]:
+        """Return the packets that have come at the bus."""
+        packets = []
+        self.far.setblocking(False)
+        while True:
+            try:
+                packets.append(self.far.recv(4096))
+            except BlockingIOError:
+                return packets
 
 
 @pytest.fixture
@@ -45,40 +60,62 @@ def led() -> Iterator[Led]:
 
 
 def test_frames_up_to_the_time_are_taken_in(led: Led) -> None:
-    led.frame(1)
-    led.frame(2)
-    led.time(0.5)
+    led.time(0.5, 1, 2)
     assert led.bus.receive_until_time()
     assert (led.taken, led.bus.now_s, led.bus.next_s) == ([1, 2], 0.5, 1.5)
     led.time(0.6)
     assert not led.bus.receive_until_time()
 
 
-def test_what_a_third_party_sends_behind_the_time_belongs_to_the_next(led: Led) -> None:
-    led.frame(1)
+def test_more_than_one_packet_takes_come_before_the_time(led: Led) -> None:
+    led.send(b"bus-data", 0.0, *range(128))
+    led.time(0.5, 128)
+    led.time(0.6, 129)
+    assert led.bus.receive_until_time()
+    assert (led.taken, led.bus.now_s) == ([*range(129)], 0.5)
+    assert led.bus.receive_until_time()
+    assert (led.taken, led.bus.now_s) == ([*range(130)], 0.6)
+
+
+def commands(led: Led, n: int) -> tuple[Batch, FrameBuffer, bytes]:
+    """Return a batch of n frames, their buffer, and the frames as they go out."""
+    buffer = FrameBuffer(n)
+    for k, row in enumerate(buffer.rows):
+        row[:] = frame(0x200 + k)
+    return led.port.batch(buffer), buffer, b"".join(map(bytes, buffer.rows))
+
+
+def test_commands_go_in_one_packet_with_the_sync(led: Led) -> None:
+    batch, buffer, frames = commands(led, 4)
+    batch.send()
+    assert led.sent() == []
+    buffer.bytes[:] = 0  # they go as they were
+    led.port.send(frame(0x80))
+    head = PACKET.pack(b"bus-data", 0.0, 0.0)
+    assert led.sent() == [head + frames + frame(0x80)]
+    led.port.send(frame(0x80))
+    assert led.sent() == [frame(0x80)]
+
+
+def test_commands_go_before_whatever_else_is_sent(led: Led) -> None:
+    batch, _, frames = commands(led, 2)
+    head = PACKET.pack(b"bus-data", 0.0, 0.0)
+    batch.send()
+    batch.send()
+    assert led.sent() == [head + frames]
     led.time(0.5)
-    for identifier in (2, 3, 4):
-        led.frame(identifier)
-    assert led.bus.receive_until_time()
-    assert (led.taken, led.bus.now_s) == ([1], 0.5)
-    led.frame(5)
-    led.time(0.6)
-    assert led.bus.receive_until_time()
-    assert (led.taken, led.bus.now_s) == ([1, 2, 3, 4, 5], 0.6)
+    assert not led.bus.go(0.5)
+    assert led.sent() == [head + frames, PACKET.pack(b"bus-go\0\0", 0.5, 0.0)]
 
 
-def test_several_words_on_the_time_are_one_each(led: Led) -> None:
-    for k in (1, 2, 3):
-        led.frame(k)
-        led.time(float(k))
-    for k in (1, 2, 3):
-        assert led.bus.receive_until_time()
-        assert (led.taken, led.bus.now_s) == (list(range(1, k + 1)), float(k))
+def test_commands_too_many_for_a_packet_go_one_by_one(led: Led) -> None:
+    batch, _, frames = commands(led, 30)
+    batch.send()
+    assert led.sent() == [frames[at : at + 16] for at in range(0, len(frames), 16)]
 
 
 @pytest.mark.parametrize("packet", [b"", bytes(24), bytes(20)], ids=["gone", "24", "20"])
 def test_what_is_neither_ends_the_bus(led: Led, packet: bytes) -> None:
-    led.frame(1)
     if packet:
         led.far.send(packet)
     else:

@@ -128,6 +128,39 @@ def test_clients_that_wait_together_contend_for_the_bus(stub_node: type) -> None
         mine.close()
 
 
+def test_a_packet_of_several_frames_is_as_many_frames(start_bus: StartBus, stub_node: type) -> None:
+    answer = pack_frame(0x181, b"answer")
+    bus = start_bus(node := stub_node(7, answers=(answer,)))
+    member, other = bus.join(), bus.join()
+    frames = [pack_frame(can_id) for can_id in (0x300, 0x080, 0x200)]
+    member.sock.send(b"bus-data".ljust(24, b"\0") + b"".join(frames))
+    assert [other.recv() for _ in range(4)] == [frames[0], frames[1], answer, frames[2]]
+    assert member.recv() == answer
+    member.status()
+    assert [frame for frame, _ in node.seen] == frames
+    for wrong in (b"bus-data".ljust(24, b"\0"), b"bus-data".ljust(24 + 15, b"\0")):
+        member.sock.send(wrong)
+        assert b"error" in member.recv()
+
+
+def test_frames_of_one_packet_contend_one_by_one(stub_node: type) -> None:
+    hub = Hub([node := stub_node()], mode=ClockMode.LOCKSTEP)
+    pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(2)]
+    for _, theirs in pairs:
+        hub.attach(theirs)
+    together = b"".join(pack_frame(can_id) for can_id in (0x300, 0x100, 0x080, 0x500))
+    pairs[0][0].send(b"bus-data".ljust(24, b"\0") + together)
+    for can_id in (0x200, 0x400):
+        pairs[1][0].send(pack_frame(can_id))
+    while len(node.seen) < 6:
+        hub.turn(1.0)
+    hub.close()
+    order = [int.from_bytes(frame[:4], "little") for frame, _ in node.seen]
+    assert order == [0x200, 0x300, 0x100, 0x080, 0x400, 0x500]
+    for mine, _ in pairs:
+        mine.close()
+
+
 def test_nodes_hear_each_other_and_only_what_they_accept(
     start_bus: StartBus, stub_node: type
 ) -> None:

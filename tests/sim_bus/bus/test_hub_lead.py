@@ -259,6 +259,31 @@ def test_the_time_is_told_as_soon_as_the_master_reads_again(
     assert member.go(1.0) == ([], 1.0, math.inf)
 
 
+def test_many_frames_for_the_master_come_in_parts_and_in_order(
+    start_bus: StartBus, stub_node: type
+) -> None:
+    bus = start_bus(stub_node(1))
+    member, other = bus.join(), bus.join()
+    member.lead()
+    sent = [pack_frame(0x123, k.to_bytes(2, "little")) for k in range(300)]
+    for frame in sent:
+        other.sock.send(frame)
+    other.status()
+    member.sock.send(GO.pack(b"bus-go\0\0", 1.0, 0.0))
+    packets = [member.recv() for _ in range(3)]
+    assert [len(packet) for packet in packets] == [24 + 16 * n for n in (128, 128, 44)]
+    assert [packet[:8] for packet in packets] == [b"bus-data", b"bus-data", b"bus-time"]
+    assert b"".join(packet[24:] for packet in packets) == b"".join(sent)
+    # what is kept when the lead is given back still comes, and then each by itself
+    other.sock.send(sent[0])
+    other.status()
+    member.sock.send(b'{"lead":false}')
+    assert member.recv() == b"bus-data".ljust(24, b"\0") + sent[0]
+    member.status()
+    other.sock.send(sent[1])
+    assert member.recv() == sent[1]
+
+
 def test_the_buses_of_a_robot_take_the_syncs_of_a_cycle_in_order(stub_node: type) -> None:
     """Also those that are sent after the first bus has been looked at, and before the second."""
     taken: list[int] = []
