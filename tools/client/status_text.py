@@ -53,7 +53,8 @@ _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
 
 def status_text(status: dict[str, Any]) -> Group:
     """Return what `cdpr status` shows."""
-    return Group(*_lines(status), _axes(status))
+    described = any(axis.get("name") for axis in status["axes"])  # not before the loop is loaded
+    return Group(*_lines(status), *[_axes(status)] * described)
 
 
 def _lines(status: dict[str, Any]) -> list[Text]:
@@ -81,7 +82,7 @@ def _lines(status: dict[str, Any]) -> list[Text]:
             lines.append(Text(text))
     control = status["control"]
     if control["held"]:
-        lines.append(Text(f"moved by {control['client']}"))
+        lines.append(Text(f"the right to move: {control['client']}"))
     cycle = status["cycle"]
     if cycle:
         lines.append(
