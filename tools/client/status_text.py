@@ -32,6 +32,7 @@ def death_text(status: dict[str, Any]) -> str:
 
 
 GO_ON = "`cdpr path --resume` goes on"
+FALLEN = "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",
@@ -187,7 +188,10 @@ def tightness_text(status: dict[str, Any]) -> str:
     tight = (status.get("program_progress") or {}).get("tight")
     if tight is None or status["state"] != "active":
         return ""
-    return "held by its cables" if tight else "cables loose, power on"
+    if tight:
+        return "held by its cables"
+    fell = (status.get("program_progress") or {}).get("fallen")
+    return f"cables loose, power on{FALLEN if fell else ''}"
 
 
 def _listed(values: Iterable[float], factor: float, digits: int) -> str:

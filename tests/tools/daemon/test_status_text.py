@@ -51,6 +51,16 @@ def test_it_is_told_who_has_the_right_to_move() -> None:
     assert "the right to move: hand" in [str(line) for line in held.renderables]
 
 
+def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() -> None:
+    status = status_of(state="active", program="hold", program_progress={"tight": False})
+    assert "cables loose, power on" in [str(line) for line in status_text(status).renderables]
+    status["program_progress"]["fallen"] = True
+    (line,) = (str(line) for line in status_text(status).renderables if "loose" in str(line))
+    assert line.endswith(
+        "it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
+    )
+
+
 def test_a_part_that_does_not_work_is_told_by_its_option() -> None:
     parts = {"live_view": {"error": "the live view ended: why"}, "stream": {"error": ""}}
     status = status_of(parts=parts)
