@@ -19,10 +19,37 @@ _EVERY_S = 5.0
 _LOG = logging.getLogger("cdpr.compiling")
 
 
+_listeners: list[Callable[[str], None]] = []
+
 _NAME = "CDPR_COMPILING_TOLD"
 """Variable with the name of a socket that has room for one: who gets in tells of compiling."""
 _sockets: list[socket.socket] = []
 """Kept open as long as the process lasts."""
+
+
+@contextmanager
+def compiling_told_to(listener: Callable[[str], None]) -> Iterator[None]:
+    """Call `listener` with how far it is for each kernel that the block compiles.
+
+    In the thread that compiles, and with each notice of another process that is passed on.
+    Only where `tell_of_compiling` is in force.
+    """
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
+
+
+def pass_on(line: str) -> None:
+    """Say a notice of another process, a whole line, in the place of that process."""
+    print(line, end="", file=sys.stderr, flush=True)
+    _tell_listeners(line)
+
+
+def _tell_listeners(text: str) -> None:
+    for listener in _listeners:
+        listener(text.rstrip(" .\n"))
 
 
 def _first_to_tell() -> bool:
@@ -67,8 +94,9 @@ class _Notice(logging.Handler):
     @override
     def emit(self, record: logging.LogRecord) -> None:
         self._kernels += 1
+        _tell_listeners(self._how_far())
         if self._kernels == 1 and _first_to_tell():
-            self._say("once for this machine; this may take minutes ...")
+            self._say(f"{NOTICE} {self._what} once for this machine; this may take minutes ...")
         if self._teller is None:
             self._teller = threading.Thread(target=self._go_on_telling, daemon=True)
             self._teller.start()
@@ -80,11 +108,14 @@ class _Notice(logging.Handler):
             noted = self._kernels
             never.wait(_EVERY_S)
             if noted != self._kernels:
-                self._say(f"goes on: {self._kernels} kernels so far ...")
+                self._say(self._how_far())
         self._teller = None
 
+    def _how_far(self) -> str:
+        return f"{NOTICE} {self._what} goes on: {self._kernels} kernels so far ..."
+
     def _say(self, text: str) -> None:
-        print(f"{NOTICE} {self._what} {text}", file=sys.stderr, flush=True)
+        print(text, file=sys.stderr, flush=True)
 
 
 def tell_of_compiling(what: str = "the numerics") -> None:

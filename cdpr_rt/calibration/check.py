@@ -231,8 +231,10 @@ class _System:
 
     def _effect_m(self, own: IntArray, size: FloatArray) -> float:
         """Return by how much poses that lengths tell are off by a change, at the worst."""
-        at, n = self._at, self._geometry.n
-        x = at.by_pose[:, :n]
-        moved = np.einsum("jra,a->jr", at.by_parameter[:, :n, own], size)
+        at = self._at
+        # of a platform that turns freely the balance of its moments tells the angle, not lengths
+        rows = self._geometry.n + int(self._geometry.turns)
+        x = at.by_pose[:, :rows]
+        moved = np.einsum("jra,a->jr", at.by_parameter[:, :rows, own], size)
         step = np.einsum("jdr,jr->jd", np.linalg.pinv(x), moved)
         return float(np.linalg.norm(step[:, : self._geometry.coordinates], axis=1).max())

@@ -64,10 +64,12 @@ def test_one_that_still_stands_upright_is_tightened_where_it_is() -> None:
     # 15 cm above the stand: from higher up it is chance whether it tips over
     with fallen([0.15, 0.5, 1.45], [0.2, 0.0, 0.0]) as robot:
         assert turned_deg(robot) < 20.0  # the platform may be turned by 15 in use
+        assert robot.progress["fallen"]
         with pytest.raises(CommandRefusedError, match="allowed: from home, lengths"):
             robot.program("tighten")
         robot.carry_out("tighten", **{"from": "lengths"})
         assert robot.progress["tight"], robot.progress["trouble"]
+        assert "fallen" not in robot.progress
         here_m, true_m = robot.progress["position_m"], robot.truth()["position_m"]
         assert here_m == pytest.approx(np.ravel(true_m), abs=0.01)
         robot.carry_out("lower")

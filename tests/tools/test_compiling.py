@@ -97,3 +97,30 @@ def test_what_is_compiled_for_long_is_told_again_and_again(
     assert further
     for line in further:
         assert re.fullmatch(rf"{NOTICE} the test goes on: \d+ kernels so far \.\.\.", line)
+
+
+LISTENED = """
+import logging
+from cdpr_tools.compiling import compiling_told_to, pass_on, tell_of_compiling
+
+heard = []
+tell_of_compiling("the test")
+with compiling_told_to(heard.append):
+    for _ in range(2):
+        logging.getLogger("cdpr.compiling").info("a kernel")
+    pass_on("compiling the drives goes on: 5 kernels so far ...\\n")
+logging.getLogger("cdpr.compiling").info("a kernel")
+print(*heard, sep="\\n")
+"""
+
+
+def test_who_listens_is_told_of_each_kernel_and_of_what_is_passed_on() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LISTENED], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines() == [
+        f"{NOTICE} the test goes on: 1 kernels so far",
+        f"{NOTICE} the test goes on: 2 kernels so far",
+        f"{NOTICE} the drives goes on: 5 kernels so far",
+    ]
+    assert f"{NOTICE} the drives goes on: 5 kernels so far ...\n" in done.stderr

@@ -162,10 +162,12 @@ def _taken(outcome: Outcome, raw_data: str, simulated: bool) -> tuple[dict[str, 
     """Take a good calibration over; return it for JSON, and what there is to say and do."""
     robot = outcome.robot
     found, path = _take_over(outcome, raw_data, simulated)
+    plant = " --plant FILE, where the run had one" if simulated else ""
+    check = f"cdpr calibrate check {robot.reference}{plant}"
     lines = [
         f"calibration {found.version} ({found.identity}) takes effect at the next start: {path}",
         f"take it back: cdpr calibrate undo {robot.reference}",
-        f"see whether it still holds, in two minutes: cdpr calibrate check {robot.reference}",
+        f"see whether it still holds, in two minutes: {check}",
     ]
     if simulated:
         lines.append(

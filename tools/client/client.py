@@ -20,7 +20,7 @@ from cdpr_profiles.reading.places import reference
 from cdpr_rt.refusal import Refusal
 from cdpr_tools.client.refusals import RefusedError
 from cdpr_tools.client.status_text import DEAD, death_text
-from cdpr_tools.daemon.loop_file import launcher_runs
+from cdpr_tools.daemon.loop_file import launcher_does
 from cdpr_tools.daemon.paths import (
     LAUNCHER_SUFFIX,
     find_launcher_files,
@@ -236,8 +236,10 @@ def _only_socket(robot: str | None) -> Path:
         return found[0]
     if not found:
         whose = "" if robot is None else f" for {robot}"
-        if any(map(launcher_runs, find_launcher_files(robot))):
-            raise NoDaemonError(f"the daemon{whose} is starting, or ending: it does not answer")
+        doing = _launcher_does(find_launcher_files(robot))
+        if doing is not None:
+            what = f"is still starting, {doing}" if doing else "is starting, or ending"
+            raise NoDaemonError(f"the daemon{whose} {what}: it does not answer")
         hint = f"; {where}" if (where := unsearched_folders()) else ""
         raise NoDaemonError(
             f"no daemon runs{whose}; `cdpr run {robot or 'ROBOT'}` starts one{hint}"
@@ -246,6 +248,11 @@ def _only_socket(robot: str | None) -> Path:
         return found[0]
     names = ", ".join(path.stem for path in found)
     raise BadInputError(f"{len(found)} daemons run: choose one by --robot ({names})")
+
+
+def _launcher_does(marks: list[Path]) -> str | None:
+    """Return what the first of these launchers that runs is doing, None where none runs."""
+    return next((doing for doing in map(launcher_does, marks) if doing is not None), None)
 
 
 def _is_alive(path: Path) -> bool:
@@ -307,9 +314,9 @@ def await_socket(robot: str | None, unix: Path | None, out: Output) -> None:
         marks = find_launcher_files(robot)
         if unix is not None:
             marks = [unix.with_suffix(LAUNCHER_SUFFIX)]
-        if not any(map(launcher_runs, marks)):
+        if (doing := _launcher_does(marks)) is None:
             return  # nor is one to be expected
-        waiting.go_on("its simulated drives and its processes come up")
+        waiting.go_on(doing or "its simulated drives and its processes come up")
 
 
 def await_start(daemon: Daemon, out: Output) -> None:
@@ -352,7 +359,8 @@ def _still(status: dict[str, Any], waited: bool) -> str:
     One that has been waited for goes on to check its bus; another may stay inactive.
     """
     if status.get("state") == "starting":
-        return "its control loop is loaded, and compiled where this machine runs it first"
+        told = "; ".join(status.get("notices") or ())
+        return told or "its control loop is loaded, and compiled where this machine runs it first"
     booting = ("unconfigured", "inactive") if waited else ("unconfigured",)
     if status.get("state") in booting and not status.get("reason", "none yet"):
         return "its drives are booting"

@@ -32,6 +32,7 @@ def death_text(status: dict[str, Any]) -> str:
 
 
 GO_ON = "`cdpr path --resume` goes on"
+FALLEN = "; it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
 _OPTIONS = {"live_view": "--live", "stream": "--stream"}
 _STAGES = {
     ("tighten", "slack"): "winding in the slack of the cables",
@@ -53,7 +54,8 @@ _COLOURS = {"active": "green", "fault": "red", "dead": "red", "ready": "cyan"}
 
 def status_text(status: dict[str, Any]) -> Group:
     """Return what `cdpr status` shows."""
-    return Group(*_lines(status), _axes(status))
+    described = any(axis.get("name") for axis in status["axes"])  # not before the loop is loaded
+    return Group(*_lines(status), *[_axes(status)] * described)
 
 
 def _lines(status: dict[str, Any]) -> list[Text]:
@@ -81,7 +83,7 @@ def _lines(status: dict[str, Any]) -> list[Text]:
             lines.append(Text(text))
     control = status["control"]
     if control["held"]:
-        lines.append(Text(f"moved by {control['client']}"))
+        lines.append(Text(f"the right to move: {control['client']}"))
     cycle = status["cycle"]
     if cycle:
         lines.append(
@@ -186,7 +188,10 @@ def tightness_text(status: dict[str, Any]) -> str:
     tight = (status.get("program_progress") or {}).get("tight")
     if tight is None or status["state"] != "active":
         return ""
-    return "held by its cables" if tight else "cables loose, power on"
+    if tight:
+        return "held by its cables"
+    fell = (status.get("program_progress") or {}).get("fallen")
+    return f"cables loose, power on{FALLEN if fell else ''}"
 
 
 def _listed(values: Iterable[float], factor: float, digits: int) -> str:

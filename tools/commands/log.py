@@ -70,8 +70,10 @@ def plot(
     target: Annotated[
         Path | None,
         typer.Option(
+            "--png",
             "--out",
-            help="A name ending in .png; beside FILE by default.",
+            metavar="FILE",
+            help="Draw it into NAME.png; beside FILE by default.",
             callback=written_as(".png"),
         ),
     ] = None,

@@ -14,7 +14,7 @@ from itertools import count
 from pathlib import Path
 from typing import IO
 
-from cdpr_tools.compiling import NOTICE, compiling_until
+from cdpr_tools.compiling import NOTICE, compiling_until, pass_on
 from cdpr_tools.errors import BadInputError, WorkFailedError
 
 # the first start on a machine compiles the physics, a slow one for minutes
@@ -158,7 +158,7 @@ def _without_notices(output: str) -> str:
     kept = ""
     for line in output.splitlines(keepends=True):
         if line.startswith(NOTICE) and line.endswith("\n"):
-            print(line, end="", file=sys.stderr, flush=True)
+            pass_on(line)
         else:
             kept += line
     return kept

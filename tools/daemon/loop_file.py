@@ -11,7 +11,7 @@ import os
 import select
 import signal
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Final
@@ -137,34 +137,50 @@ def started(pid: int) -> int:
         return 0
 
 
-_MOST_LAUNCHER_BYTES: Final = 64
+_MOST_DOING: Final = 160
+_MOST_LAUNCHER_BYTES: Final = 64 + _MOST_DOING
 
 
 @contextmanager
-def named_launcher(socket: Path) -> Iterator[None]:
+def named_launcher(socket: Path) -> Iterator[Callable[[str], None]]:
     """Name this process as the launcher of the daemon with this socket, while the block runs.
 
+    Yields a function that tells clients what the launcher is doing, up to 160 characters.
     Nobody is told where the file cannot be written: clients only do not wait then.
     """
     path = socket.with_suffix(LAUNCHER_SUFFIX)
+    name = f"{os.getpid()} {started(os.getpid())}\n".encode()
+
+    def tell(text: str) -> None:
+        with suppress(OSError):  # in one write, which leaves the name as it is
+            os.pwrite(
+                fd, text[:_MOST_DOING].ljust(_MOST_DOING).encode("ascii", "replace"), len(name)
+            )
+
+    fd = -1
     with suppress(OSError):
         path.unlink(missing_ok=True)  # of one that was killed
-        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-            file.write(f"{os.getpid()} {started(os.getpid())}")
+        fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+        os.write(fd, name)
     try:
-        yield
+        yield tell
     finally:
         with suppress(OSError):
             path.unlink()
+        with suppress(OSError):
+            os.close(fd)
 
 
-def launcher_runs(path: Path) -> bool:
-    """Whether the launcher that the file names runs; not where the file cannot be believed."""
+def launcher_does(path: Path) -> str | None:
+    """Return what the launcher that the file names is doing, as far as it tells.
+
+    None where it does not run, or where the file cannot be believed.
+    """
     try:
         with os.fdopen(open_regular(path, links=False), "rb") as file:
-            words = file.read(_MOST_LAUNCHER_BYTES).split()
+            name, _, doing = file.read(_MOST_LAUNCHER_BYTES).decode("ascii").partition("\n")
             trusted = is_trusted(path, os.fstat(file.fileno()).st_uid)
-        pid, since = map(int, words)
+        pid, since = map(int, name.split())
     except (OSError, ValueError, ProfileError):
-        return False
-    return trusted and since > 0 and started(pid) == since
+        return None
+    return brief(doing.strip()) if trusted and since > 0 and started(pid) == since else None

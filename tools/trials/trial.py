@@ -11,7 +11,9 @@ from matplotlib.figure import Figure as Picture
 
 from cdpr_drivers.robot.commissioned import uncommissioned_text, with_commissioned
 from cdpr_profiles import Robot, load_robot
+from cdpr_profiles.calibration.in_force import calibrated
 from cdpr_rt.robots.checks import refuse_impossible
+from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.errors import BadInputError
 from cdpr_tools.output import Output, to_json
 from cdpr_tools.recordings.stored_settings import load_settings
@@ -131,6 +133,8 @@ def perform(settings: TrialSettings, folder: Path, out: Output) -> dict[str, Any
     text = uncommissioned_text(with_commissioned(robot, _path(settings.commissioned)))
     if settings.compensated and text:
         out.note(text)
+    if geometry := geometry_note(calibrated(robot)):
+        out.note(geometry)
     plant = _plant(settings, robot, folder)
     for part in settings.parts:
         compensated = settings.compensated and part != line.WITHOUT

@@ -72,8 +72,11 @@ class PlatformHold(ProgramDefaults):
         return self._active.pose_setpoint
 
     def progress(self) -> dict[str, Any]:
-        """Return whether the platform or the axes are held, and where."""
-        progress = {"tight": self._parts.tight, **self._active.progress()}
+        """Return whether the platform or the axes are held, and where; of one that fell, that."""
+        parts = self._parts
+        progress = {"tight": parts.tight, **self._active.progress()}
+        if parts.last.fallen:
+            progress["fallen"] = True
         left = self._path.left()
         return progress if left is None else {**progress, "path": left}
 

@@ -130,7 +130,7 @@ def test_time_goes_on_where_cycles_begin_anew(tmp_path: Path) -> None:
 
 def test_plot_draws_a_picture(folder: Path, tmp_path: Path) -> None:
     target = tmp_path / "run.png"
-    assert _done("plot", folder, "--out", target)["rows"] == 3990
+    assert _done("plot", folder, "--png", target)["rows"] == 3990
     whole = imread(target)
     _done("plot", folder, "--axis", "left", "--out", target)
     one = imread(target)

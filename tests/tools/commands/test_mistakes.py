@@ -35,11 +35,12 @@ MISTAKES = (
     ("A choice that is none", "cdpr tighten --from nowhere"),
     ("Motors that were not commissioned", "cdpr run planar-3 --bus simbus: --commissioned used"),
     ("Open to the network without a key", "cdpr run planar-3 --bus simbus: --http 0.0.0.0:8080"),
+    ("No folder for recordings", "cdpr run planar-3 --bus simbus: --record notes.mcap"),
     ("A key that others may read", "cdpr status --url http://robot:8080 --key-file key"),
     ("A robot's file that exists", "cdpr robot new misspelt.toml"),
     ("No recording", "cdpr log info notes.mcap"),
     ("A file that holds no path", "cdpr path notes.mcap --run"),
-    ("A picture of another format", "cdpr log plot notes.mcap --out run.jpg"),
+    ("A picture of another format", "cdpr log plot notes.mcap --png run.jpg"),
 )
 HEAD = """\
 # The commonest mistakes, and what is said

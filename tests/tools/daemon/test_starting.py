@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from typing_extensions import override
 
-from cdpr_tools.client.client import await_socket
-from cdpr_tools.daemon.loop_file import launcher_runs, named_launcher, started
+from cdpr_tools.client.client import NoDaemonError, await_socket, open_daemon
+from cdpr_tools.daemon.loop_file import launcher_does, named_launcher, started
 from cdpr_tools.daemon.paths import LAUNCHER_SUFFIX, default_socket
 from cdpr_tools.output import Output
 
@@ -23,6 +23,11 @@ def path(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="cdpr-") as folder:
         monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
         yield default_socket("mine")
+
+
+def where(robot: str) -> str:
+    with open_daemon(robot, None, None, None) as daemon:
+        return daemon.where
 
 
 class ComesUp(Output):
@@ -51,6 +56,20 @@ def test_a_daemon_whose_launcher_runs_is_waited_for(path: Path, named: bool) -> 
     assert not path.with_suffix(LAUNCHER_SUFFIX).exists()
 
 
+def test_it_is_told_what_a_daemon_that_starts_is_doing(path: Path) -> None:
+    mark, out = path.with_suffix(LAUNCHER_SUFFIX), ComesUp(path)
+    with named_launcher(path) as tell, out.server:
+        assert launcher_does(mark) == ""
+        for text in ("compiling the numerics, with many words", "compiling: 7 kernels so far"):
+            tell(text)
+            assert launcher_does(mark) == text  # nothing is left of a longer one before
+        with pytest.raises(NoDaemonError, match=r"mine is still starting, compiling: 7 kernels so"):
+            where("mine")
+        await_socket("mine", None, out)
+    assert out.told == ["the daemon is still starting: compiling: 7 kernels so far ..."]
+    assert launcher_does(mark) is None
+
+
 def test_nobody_waits_for_one_that_nobody_starts(path: Path) -> None:
     out = ComesUp(path)
     await_socket(None, None, out)
@@ -61,5 +80,5 @@ def test_nobody_waits_for_one_that_nobody_starts(path: Path) -> None:
     await_socket("mine", None, out)
     mark.unlink()
     os.mkfifo(mark)
-    assert not launcher_runs(mark)
+    assert launcher_does(mark) is None
     assert out.told == []

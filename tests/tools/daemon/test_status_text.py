@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from rich.table import Table
 
 from cdpr_tools.client.motion import finish
 from cdpr_tools.client.status_text import (
@@ -27,13 +28,37 @@ def status_of(**keys: Any) -> dict[str, Any]:
         "lockstep": False,
         "reason": "",
         "notices": [],
-        "axes": [],
+        "axes": [{"name": "left"}],
         "cycle": None,
         "control": {"held": False},
         "loop": {"silent_s": 0.0},
         "parts": {},
         **keys,
     }
+
+
+def test_of_a_loop_that_is_loaded_no_axes_are_shown_yet() -> None:
+    """Their names are not known before; what is compiled meanwhile stands in the notices."""
+    notices = ["compiling the control loop goes on: 20 kernels so far"]
+    lines = status_text(status_of(state="starting", notices=notices, axes=[{"name": None}] * 3))
+    assert [str(line) for line in lines.renderables] == ["bench: starting", f"note: {notices[0]}"]
+    shown = status_text(status_of(axes=[{"name": "left"}]))
+    assert isinstance(shown.renderables[-1], Table)
+
+
+def test_it_is_told_who_has_the_right_to_move() -> None:
+    held = status_text(status_of(control={"held": True, "client": "hand"}))
+    assert "the right to move: hand" in [str(line) for line in held.renderables]
+
+
+def test_of_a_platform_that_fell_it_is_told_what_comes_before_it_is_tightened() -> None:
+    status = status_of(state="active", program="hold", program_progress={"tight": False})
+    assert "cables loose, power on" in [str(line) for line in status_text(status).renderables]
+    status["program_progress"]["fallen"] = True
+    (line,) = (str(line) for line in status_text(status).renderables if "loose" in str(line))
+    assert line.endswith(
+        "it has fallen: look at it, then `cdpr tighten --from home` where it stands there"
+    )
 
 
 def test_a_part_that_does_not_work_is_told_by_its_option() -> None:

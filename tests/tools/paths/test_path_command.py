@@ -34,7 +34,7 @@ def test_a_preview_with_picture_and_a_plan_for_the_daemon(file, tmp_path, monkey
     take_over(robot, calibration(robot))
     picture = tmp_path / "part.png"
     done = cdpr_here(
-        "path", file, "--robot", "spatial-8", ORIGIN, "--picture", picture, "--keep", "--json"
+        "path", file, "--robot", "spatial-8", ORIGIN, "--png", picture, "--keep", "--json"
     )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout.splitlines()[-1])

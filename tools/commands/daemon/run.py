@@ -7,6 +7,7 @@ import os
 import re
 import socket
 import sys
+import tempfile
 import time
 from contextlib import ExitStack
 from functools import partial
@@ -28,10 +29,12 @@ from cdpr_drivers.robot.robot_buses import (
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_rt.core.shared_block import MOST_AXES, SharedBlock
+from cdpr_rt.private_files import make_private_folder
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_rt.service.recordings.retention import BYTES_PER_AXIS, Retention, size_text
 from cdpr_tools.calibrate.words import geometry_note
 from cdpr_tools.commands.options import JsonOption, RobotBusOption, SafetyIoOption, YesOption
+from cdpr_tools.compiling import compiling_told_to
 from cdpr_tools.composition.simulator import OwnSimulator
 from cdpr_tools.consent import require_consent
 from cdpr_tools.daemon.loop_file import LoopFile, named_launcher
@@ -39,7 +42,14 @@ from cdpr_tools.daemon.paths import SOCKET_SUFFIX, default_recordings, default_s
 from cdpr_tools.daemon.processes.launcher import Launcher
 from cdpr_tools.daemon.processes.notify import ServiceManager
 from cdpr_tools.daemon.settings import Address, RunSettings
-from cdpr_tools.errors import BAD_INPUT, DONE, BadInputError, CommandError, WorkFailedError
+from cdpr_tools.errors import (
+    BAD_INPUT,
+    DONE,
+    BadInputError,
+    CommandError,
+    WorkFailedError,
+    os_error_as,
+)
 from cdpr_tools.output import Output, to_json
 
 _KEPT_DAYS, _KEPT_GB = 30.0, 20.0
@@ -164,10 +174,13 @@ def run(
     if not settings.own_simulator:
         _judge(profile, out)
     _ask(profile, settings, yes)
+    if record is not None:
+        with os_error_as(BadInputError, f"--record {record}"):
+            _require_writable(record)
     settings = settings.with_key_loaded().with_ports_bound()
     manager = ServiceManager()  # before any child is started: none of them speaks for the daemon
     with ExitStack() as stack:
-        stack.enter_context(named_launcher(settings.socket))
+        tell = stack.enter_context(named_launcher(settings.socket))
         if text := uncommissioned_text(with_commissioned(profile, commissioned)):
             out.note(text)
         if text := geometry_note(profile):
@@ -177,11 +190,21 @@ def run(
             out.note(f"starting simulated drives: {len(profile.axes)} ...")
             bus_url = settings.buses[0]
             judge = partial(_judge, profile, out)  # which compiles, where nothing is kept yet
-            simulator = OwnSimulator(
-                profile.reference, bus_url, plant, camera=camera, meanwhile=judge
-            )
+            tell("simulated drives")
+            with compiling_told_to(tell):
+                simulator = OwnSimulator(
+                    profile.reference, bus_url, plant, camera=camera, meanwhile=judge
+                )
             stack.callback(simulator.stop)
+            tell("")
         _launch(profile, settings, out, manager, simulator)
+
+
+def _require_writable(folder: Path) -> None:
+    """Make a folder for recordings, for this user only where it is new; raises OSError."""
+    make_private_folder(folder)
+    with tempfile.TemporaryFile(dir=folder):
+        pass
 
 
 def _judge(robot: Robot, out: Output) -> None:

@@ -11,7 +11,13 @@ import typer
 from cdpr_profiles import Robot
 from cdpr_profiles.calibration.in_force import load_calibrated
 from cdpr_profiles.errors import ProfileError
-from cdpr_tools.commands.options import JsonOption, KeyFileOption, SocketOption, UrlOption
+from cdpr_tools.commands.options import (
+    JsonOption,
+    KeyFileOption,
+    SocketOption,
+    UrlOption,
+    written_as,
+)
 from cdpr_tools.errors import BadInputError, CommandError, os_error_as
 from cdpr_tools.output import Output
 
@@ -35,7 +41,16 @@ def path(
             "--resume and --back which daemon's, where several run.",
         ),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw it into this file, a PNG.")] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            "--png",
+            "--picture",
+            metavar="FILE",
+            help="Draw it into NAME.png.",
+            callback=written_as(".png"),
+        ),
+    ] = None,
     origin: Annotated[
         str | None,
         typer.Option(metavar="'X Y Z'", help="Where G-code's zero is in the room, in mm."),
@@ -87,7 +102,7 @@ def path(
     follows = run or resume or back is not None
     if sum((run, resume, back is not None)) > 1:
         raise BadInputError("--run, --resume, --back: allowed: one of them")
-    looks = ["--picture"] * (picture is not None) + ["--keep"] * keep
+    looks = ["--png"] * (picture is not None) + ["--keep"] * keep
     if follows and looks:
         raise BadInputError(f"{', '.join(looks)}: allowed: without --run, --resume and --back")
     if (file is None) != (resume or back is not None):
@@ -137,7 +152,7 @@ def _preview(
     if picture is not None:
         from cdpr_tools.paths.picture import draw_path  # noqa: PLC0415  # slow to load
 
-        with os_error_as(BadInputError, f"--picture {picture}"):
+        with os_error_as(BadInputError, f"--png {picture}"):
             draw_path(shown, robot, picture)
         out.say(f"picture: {picture}")
     if wrong := previews.obstacle_text(shown):

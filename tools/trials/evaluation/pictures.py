@@ -43,7 +43,7 @@ def of_targets(recorded: Recorded) -> Figure:
     axes[1].set_title("targets")
     if len(turned):
         _orientations(axes[-2], axes[-1], recorded, turned)
-    legend_above(figure, *axes[:2])
+    legend_above(figure, *axes[:2], columns=5)
     return figure
 
 
@@ -65,7 +65,9 @@ def _orientations(off: Axes, over: Axes, recorded: Recorded, errors: FloatArray)
     directions = recorded.directions
     for colour, i, turn in zip(_AXES, directions.about, directions.turns, strict=False):
         name = directions.names[turn]
-        off.plot(errors[:, i], "o-", color=colour, ms=3, lw=0.5, label=name)
+        off.plot(
+            1 + np.arange(len(errors)), errors[:, i], "o-", color=colour, ms=3, lw=0.5, label=name
+        )
     off.axhline(0.0, color="black", lw=0.5)
     off.set(xlabel="target", ylabel="deg", title="true orientation less target")
     legend_beside_title(off)
