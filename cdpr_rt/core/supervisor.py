@@ -262,13 +262,14 @@ class Supervisor:
         self._limits = np.zeros(n, _LIMITS)
         for name in _FIGURES:
             self._limits[name] = getattr(limits, name)
-        self._limits["period_s"] = period_s
+        self._limits["period_s"] = self._period_s = period_s
         wanted = DEFAULT_REACTIONS | dict(limits.reactions)
         self._reactions = np.array([wanted.get(limit, 0) for limit in Limit], np.int64)
         self._past = np.zeros(n, _PAST)
         self._window = np.zeros((limits.window_cycles, n), np.int64)
         self._verdict = np.zeros(1, _VERDICT)
         self._told = ""
+        self._disagree_s = 0.0
         self._judged: tuple[Any, Any, Any, Any] = (None,) * 4
         """Whose arrays the kernel is bound to."""
         self._check: Callable[..., int] = _check
@@ -280,6 +281,7 @@ class Supervisor:
         self._window[:] = 0
         self._verdict[:] = np.zeros(1, _VERDICT)
         self._told = ""
+        self._disagree_s = 0.0
 
     def check(
         self,
@@ -336,10 +338,13 @@ class Supervisor:
     def compare_lengths(self, disagree_m: float, axis: int) -> int:
         """Judge by how much cable lengths contradict each other; return the `Reaction` so far.
 
-        `axis` is that of the cable which contradicts the others, -1 where that is not known.
+        `axis` is that of the cable which contradicts the others, -1 where that is not known. It
+        counts once it has lasted `broken_within_s`: that a cable has broken is told as such.
         """
         allowed = self.limits.lengths_disagree_m
-        if not disagree_m <= allowed:
+        agree = disagree_m <= allowed
+        self._disagree_s = 0.0 if agree else self._disagree_s + self._period_s
+        if self._disagree_s > self.limits.broken_within_s:
             _judge(self._verdict, self._reactions, int(Limit.LENGTHS), axis, disagree_m, allowed)
         return int(self._verdict["reaction"][0])
 

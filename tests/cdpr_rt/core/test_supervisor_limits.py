@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -314,6 +315,23 @@ def test_no_limit_of_the_kernel_is_left_untried():
 
 
 # -- cables
+
+
+@pytest.mark.parametrize(("axis", "named"), [(1, "axis 2: "), (-1, "")])
+def test_lengths_that_disagree_for_longer_than_a_break_takes(axis: int, named: str) -> None:
+    limits = dataclasses.replace(SAFE, lengths_disagree_m=0.03, broken_within_s=0.05)
+    supervisor, cycle = Supervisor(limits, 2, PERIOD_S), Cycle()
+    told = []
+    for off_m, cycles in ((0.029, 200), (0.031, 49), (0.03, 1), (math.nan, 50)):
+        for _ in range(cycles):
+            cycle.check(supervisor)
+            told.append(supervisor.compare_lengths(off_m, axis))
+    assert told == [Reaction.NONE] * (len(told) - 1) + [Reaction.CONTROLLED_STOP]
+    assert supervisor.axis == axis
+    assert supervisor.reason().startswith(f"{named}the cables' lengths disagree by")
+    supervisor.reset()
+    cycle.check(supervisor)
+    assert supervisor.compare_lengths(math.nan, axis) == Reaction.NONE
 
 
 def test_a_cable_that_was_never_tight_is_not_slack():
