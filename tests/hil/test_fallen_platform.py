@@ -5,17 +5,32 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cdpr_profiles.reading.places import SHIPPED
 from cdpr_rt.core.states import LoopState
 from cdpr_tools.trials.evaluation.pose_log import read_pose_log
 from cdpr_tools.trials.lockstep import CommandRefusedError, LockstepRobot
 
 LOOSE_N, TAKES_UP_N = 15.0, 40.0
 """What no winch pulls with that is not told to, and what slack is taken up with, and friction."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped robots with half as many cycles a second, which take half the time."""
+    place = tmp_path_factory.mktemp("robots")
+    for name in ("spatial-8", "suspended-8"):
+        shipped = (SHIPPED / "robots" / f"{name}.toml").read_text()
+        assert "sync_period_s = 0.001" in shipped
+        (place / f"{name}.toml").write_text(
+            shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.002")
+        )
+    return place
 
 
 def turned_deg(robot: LockstepRobot) -> float:
@@ -29,9 +44,11 @@ def highest_N(robot: LockstepRobot, since: int) -> float:
 
 
 @contextmanager
-def fallen(position_m: list[float], rotation_rad: list[float]) -> Iterator[LockstepRobot]:
+def fallen(
+    folder: Path, position_m: list[float], rotation_rad: list[float]
+) -> Iterator[LockstepRobot]:
     """Yield a robot whose platform has fallen from there, and that has power again."""
-    with LockstepRobot("spatial-8") as robot:
+    with LockstepRobot(folder / "spatial-8.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=position_m, rotation_rad=rotation_rad)
@@ -43,8 +60,8 @@ def fallen(position_m: list[float], rotation_rad: list[float]) -> Iterator[Locks
         yield robot
 
 
-def test_one_that_has_turned_over_is_not_pulled_at() -> None:
-    with fallen([-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
+def test_one_that_has_turned_over_is_not_pulled_at(folder: Path) -> None:
+    with fallen(folder, [-0.45, -0.3, 1.7], [0.18, 0.18, 0.0]) as robot:
         assert turned_deg(robot) > 60.0
         with pytest.raises(CommandRefusedError, match="it has fallen, may have turned over"):
             robot.program("tighten")
@@ -60,9 +77,9 @@ def test_one_that_has_turned_over_is_not_pulled_at() -> None:
         assert highest_N(robot, since) < TAKES_UP_N
 
 
-def test_one_that_still_stands_upright_is_tightened_where_it_is() -> None:
+def test_one_that_still_stands_upright_is_tightened_where_it_is(folder: Path) -> None:
     # 15 cm above the stand: from higher up it is chance whether it tips over
-    with fallen([0.15, 0.5, 1.45], [0.2, 0.0, 0.0]) as robot:
+    with fallen(folder, [0.15, 0.5, 1.45], [0.2, 0.0, 0.0]) as robot:
         assert turned_deg(robot) < 20.0  # the platform may be turned by 15 in use
         assert robot.progress["fallen"]
         with pytest.raises(CommandRefusedError, match="allowed: from home, lengths"):
@@ -77,9 +94,9 @@ def test_one_that_still_stands_upright_is_tightened_where_it_is() -> None:
 
 
 @contextmanager
-def held_by_axes(name: str, position_m: list[float]) -> Iterator[LockstepRobot]:
+def held_by_axes(folder: Path, name: str, position_m: list[float]) -> Iterator[LockstepRobot]:
     """Yield a robot whose platform hangs, each cable held by itself, as after brakes."""
-    with LockstepRobot(name) as robot:
+    with LockstepRobot(folder / f"{name}.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=position_m)
@@ -95,9 +112,9 @@ def held_by_axes(name: str, position_m: list[float]) -> Iterator[LockstepRobot]:
     [("spatial-8", [-0.4, 0.5, 1.7]), ("suspended-8", [1.5, 1.0, 1.5])],
 )
 def test_one_that_brakes_have_held_is_held_where_it_hangs(
-    name: str, position_m: list[float]
+    folder: Path, name: str, position_m: list[float]
 ) -> None:
-    with held_by_axes(name, position_m) as robot:
+    with held_by_axes(folder, name, position_m) as robot:
         engine = robot.loop.engine
         known = engine.parts.estimator
         length_m = known.estimate.cable_length_m.copy()
