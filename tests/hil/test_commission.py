@@ -36,22 +36,27 @@ def commission(
     return last_line(cdpr(*base, "--out", out, *more))
 
 
-@pytest.fixture(scope="module")
-def slower(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same winch with a quarter of the cycles a second, which take a quarter of the time."""
-    path = tmp_path_factory.mktemp("winch") / "winch-4ms.toml"
+def winch_in_cycles(folder: Path, period_s: float) -> Path:
+    """Write the shipped winch with fewer cycles a second, which take less time."""
+    path = folder / f"winch-{1e3 * period_s:g}ms.toml"
     shipped = (SHIPPED / "winches" / "winch-mpp0923d.toml").read_text()
-    text = shipped.replace("sync_period_s = 0.001", "sync_period_s = 0.004")
+    text = shipped.replace("sync_period_s = 0.001", f"sync_period_s = {period_s}")
     assert text != shipped
     path.write_text(text)
     return path
 
 
 @pytest.fixture(scope="module")
+def slower(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return winch_in_cycles(tmp_path_factory.mktemp("winch"), 0.004)
+
+
+@pytest.fixture(scope="module")
 def default(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """A tenth of the measurements has to do here; `make demo` makes them all."""
+    """A tenth of the measurements has to do here; `make demo` makes them all, in its own cycles."""
     out = tmp_path_factory.mktemp("default")
-    return out, commission(out, "--quick")
+    winch = winch_in_cycles(tmp_path_factory.mktemp("winch"), 0.002)
+    return out, commission(out, "--quick", winch=winch)
 
 
 def test_default_plant_reaches_the_figures(default: tuple[Path, dict[str, Any]]) -> None:
