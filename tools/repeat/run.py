@@ -178,9 +178,15 @@ def _running(command: Sequence[str], work: Path, out: int) -> Iterator[subproces
 
 
 def _end(process: subprocess.Popen[bytes], work: Path) -> None:
-    """Ask the command to end, wait for whatever it has started, kill what does not."""
+    """Wait for whatever the command has started, kill what does not end.
+
+    Where the command itself has not ended, ask all of them to.
+    """
     if process.poll() is None:
         process.terminate()
+        for pid in processes_of(work):
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGTERM)
     end_s = time.monotonic() + _END_S
     while (left := processes_of(work)) and time.monotonic() < end_s:
         process.poll()

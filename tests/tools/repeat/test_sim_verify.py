@@ -96,18 +96,20 @@ def test_a_command_that_fails_or_writes_nothing_proves_nothing(tmp_path: Path) -
 def test_a_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     keep = tmp_path / "kept"
     script = tmp_path / "sleeps.sh"
-    script.write_text(f"#!/bin/sh\nsleep {SLOW_S} & echo begun > begun; wait\n")
+    left = f"trap 'echo asked > asked' TERM; sleep {SLOW_S} & echo begun > begun; wait"
+    script.write_text(f"#!/bin/sh\n({left}) & wait\n")
     script.chmod(0o755)
     process = subprocess.Popen(
         cdpr("sim", "verify", "--keep", keep, "--", script), stderr=subprocess.PIPE, text=True
     )
     work = keep / "run-1" / "files"
     wait_until((work / "begun").exists)
-    assert len(processes_of(work)) == 2
+    assert len(processes_of(work)) == 3
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=SLOW_S)
     assert process.returncode == 1 and "cdpr: stopped on request, in run 1" in told
     assert processes_of(work) == []
+    assert (work / "asked").exists()  # what the command has started is asked to end, not killed
 
 
 def test_processes_are_stopped_one_at_a_time_and_go_on() -> None:
