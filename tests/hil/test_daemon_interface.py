@@ -16,6 +16,7 @@ from typing import Any
 
 import httpx
 import pytest
+import requests
 import schemathesis
 from daemon_lab import (
     RIGHT,
@@ -32,6 +33,7 @@ from daemon_rig import RealDaemon, alive, until
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
+from requests.adapters import HTTPAdapter
 
 MORE_MEMORY_B = 40e6
 
@@ -73,8 +75,22 @@ def resident_B(pid: int) -> int:
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
+class ConnectsFrom(HTTPAdapter):
+    """Connects from `address`, one of this machine's."""
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        super().__init__()
+
+    def init_poolmanager(self, *given: Any, **more: Any) -> None:
+        super().init_poolmanager(*given, source_address=(self._address, 0), **more)
+
+
 def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int:
-    """Send made-up requests of every kind, right ones and wrong ones; return how many."""
+    """Send made-up requests of every kind, right ones and wrong ones; return how many.
+
+    Each comes from another address: who has tried too many wrong tokens waits a second for each.
+    """
     sent = 0
     for found in description.get_all_operations():
         operation = found.ok()
@@ -87,7 +103,12 @@ def fuzz(description: Any, url: str, leave_out: set[str], **headers: str) -> int
             def try_it(case: schemathesis.Case) -> None:
                 nonlocal sent
                 sent += 1
-                case.call_and_validate(base_url=url, headers={**RIGHT, **headers})
+                with requests.Session() as session:
+                    address = f"127.0.{1 + sent // 250}.{1 + sent % 250}"
+                    session.mount("http://", ConnectsFrom(address))
+                    case.call_and_validate(
+                        base_url=url, session=session, headers={**RIGHT, **headers}
+                    )
 
             if mode is schemathesis.GenerationMode.NEGATIVE:
                 with suppress(Unsatisfiable):  # where there is nothing that could be wrong
