@@ -32,9 +32,16 @@ UPGRADE = {
 }
 
 
+@pytest.fixture
+def refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests with many wrong requests that are not about how late these are answered."""
+    monkeypatch.setattr(access_control, "_THROTTLE_S", 0.0)
+
+
 # -- the key
 
 
+@pytest.mark.usefixtures("refused_at_once")
 def test_without_the_key_there_is_the_status_and_nothing_else(rig: Rig) -> None:
     with httpx.Client(base_url=rig.guarded_url) as client:
         assert client.get("/status").status_code == 200
@@ -53,6 +60,7 @@ def test_without_the_key_there_is_the_status_and_nothing_else(rig: Rig) -> None:
     assert rig.loop.commands == []
 
 
+@pytest.mark.usefixtures("refused_at_once")
 def test_where_no_key_was_given_any_user_may_look_on_and_stop_and_nothing_else(rig: Rig) -> None:
     with httpx.Client(base_url=rig.url) as client:
         refused = 0
@@ -77,6 +85,7 @@ def test_where_no_key_was_given_any_user_may_look_on_and_stop_and_nothing_else(r
     assert rig.service.lease.holder() is None
 
 
+@pytest.mark.usefixtures("refused_at_once")
 @pytest.mark.parametrize(
     "given",
     ["", "Bearer", "Bearer x", f"Basic {KEY.decode()}", f"Bearer {KEY.decode()}x", "Bearer \xe9"],
