@@ -132,14 +132,14 @@ def test_one_that_brakes_have_held_is_held_where_it_hangs(
         assert robot.progress["tight"], robot.progress["trouble"]
 
 
-def test_drives_that_lose_their_power_together_let_it_fall_as_well() -> None:
-    with LockstepRobot("spatial-8") as robot:
+def test_drives_that_lose_their_power_together_let_it_fall_as_well(folder: Path) -> None:
+    with LockstepRobot(folder / "spatial-8.toml") as robot:
         robot.enable()
         robot.carry_out("tighten")
         robot.carry_out("pose", position_m=[-0.4, 0.5, 1.7])
         for axis in range(8):
             robot.inject_fault(axis, 1, 0x3220)
-        robot.run(10.0)
+        robot.run(12.0)  # the stop under control is given up after ten
         assert robot.state is LoopState.FAULT
         robot.command("acknowledge")
         robot.enable()
