@@ -173,7 +173,7 @@ class LowerProgram(PlatformProgram):
         Pretension would fling the platform where one of the cables has broken; so would tensions
         for the estimated pose, which follows a cable that runs in or an encoder that jumps.
         """
-        self._there.array[:] = self._parts.model.poses(self._control.estimated[None])[0]
+        self._there.array[:] = self._parts.model.poses(self._control.shaped[None])[0]
         self._parts.model.kinematics.wrench_matrix(self._there, self._W)
         self._weight_only.solve(self._W, self._weight, self._weight_tension_N)
         torque_Nm[:] = -self._cable * np.maximum(self._weight_tension_N, self._drum_tension_N)
