@@ -165,8 +165,9 @@ def _orientation_lines(platform: Platform) -> list[str]:
 def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
     """Return a line for each cable on how far the platform gets when it breaks, at the worst."""
     lines = [
-        f"if a cable breaks (predicted, worst corners): how far it swings within {SWING_S:g} s; how far",
-        "away and aside it is at most until the others have let it down, to the ground it began on:",
+        f"if a cable breaks (predicted, worst corner): how far it swings within {SWING_S:g} s, "
+        "and how far",
+        "away and aside it is at most until the others have let it down to its ground:",
     ]
     for axis in axes:
         broken = axis["broken"]
