@@ -47,6 +47,8 @@ _STEP_rad = 0.2
 """Of the quickest oscillation, of rotors and platform or a foot on the ground, in a step."""
 _GROUND_FRICTION = 0.2
 """Less than most floors have, so that the platform slides further."""
+_GROUND_DAMPING = 0.25
+"""Over the critical one: what strikes the ground bounces."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +174,7 @@ class CableLoss:
         course["integral_rate_1_s"] = HANGING_LOAD_1_s
         course["up"], course["ground_m"] = model.positions - 1, self._ground_m
         course["foot_N_m"], course["friction"] = foot_N_m, _GROUND_FRICTION
-        course["foot_N_s_m"] = 2.0 * math.sqrt(foot_N_m / per_kg)
+        course["foot_N_s_m"] = 2.0 * _GROUND_DAMPING * math.sqrt(foot_N_m / per_kg)
         return course
 
     def _noticed_s(self, cable: int) -> float:
