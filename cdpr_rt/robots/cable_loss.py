@@ -1,85 +1,184 @@
-"""Where a platform comes to rest when one of its cables breaks: a static estimate."""
+"""What a platform does when one of its cables breaks: how far it swings, and how far it gets.
+
+Computed in time, as no place of equilibrium tells it: motors give way to what is above their
+torque, and the winches that are left then let the platform down.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.optimize import NonlinearConstraint, minimize
+from numpy.typing import NDArray
 
-from cdpr_profiles.platform import Platform
+from cdpr_profiles import Robot
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.control.winch_speed_loop import (
+    DRUM_TENSION_SHARE,
+    BANDWIDTH_rad_s,
+    FASTEST_IN_m_s,
+    HANGING_LOAD_1_s,
+    UNKNOWN_POSE_m_s,
+)
+from cdpr_rt.robots.fall_kernel import COURSE, WINCHES, fall
 from cdpr_rt.robots.kinematics.cable_kernel import ARC, CABLE_ROWS, FREE, run_cables
-from cdpr_rt.robots.platform_model import cable_kinematics
-from cdpr_rt.robots.rigid_body import free_directions, home_rotation, in_space, rotation
+from cdpr_rt.robots.kinematics.pose import Pose
+from cdpr_rt.robots.platform.body_kernel import body_of
+from cdpr_rt.robots.platform_model import platform_model_of
+from cdpr_rt.robots.resonance import highest_rad_s
+from cdpr_rt.robots.rigid_body import free_directions, in_space, inertia_kg_m2, is_point
+from cdpr_rt.robots.robot_arrays import limits_of
 
-_FURTHEST_RAD = 0.9 * np.pi
-"""A platform may turn over; half a turn has no single rotation vector."""
-_STEPS, _DONE_m = 200, 1e-9
+SWING_S = 1.0
+"""What counts as the swing; afterwards the platform is being let down."""
+_LONGEST_S = 30.0
+_NOTICED_LATE, _NOTICING_S, _NOTICED_S = 1.5, 0.015, 0.25
+"""Over the time in which the rotor gets too fast; what filters and buses take besides; at most,
+which is for cables that pull with next to nothing."""
+_MISLED_SHARE = 0.25
+"""Of the span of tensions, which is where the control's proportional part is saturated."""
+_FRICTIONS = (0.0, 0.03, 0.06)
+"""Of the winches, as shares of the motors' rated torques."""
+_CABLE_DAMPING_S = 2e-3
+_NEAREST_m = 1e-3
+_STEP_rad = 0.2
+"""Of the quickest oscillation, of rotors and platform or a foot on the ground, in a step."""
+_GROUND_FRICTION = 0.2
+"""Less than most floors have, so that the platform slides further."""
+_GROUND_DAMPING = 0.25
+"""Over the critical one: what strikes the ground bounces."""
 
 
 @dataclass(frozen=True)
 class Swing:
-    """How far a platform swings that was at rest at a position when a cable broke."""
+    """What a platform does that was at rest at a position when a cable broke."""
 
     cable: int
     position_m: tuple[float, ...]
     swing_m: float
-    """Distance of the origin's new position from there."""
+    """Largest distance of the origin from there within `SWING_S`."""
     turn_rad: float
-    to_m: tuple[float, ...]
+    """Largest angle from its orientation within `SWING_S`."""
+    away_m: float
+    """Largest distance from there until it lies still, on the ground."""
+    aside_m: float
+    """Likewise, but for height."""
 
 
-def worst_swings(platform: Platform) -> list[Swing]:
-    """Return for each cable the largest swing from any corner of the box of targets."""
-    corners = list(product(*zip(platform.workspace_min_m, platform.workspace_max_m, strict=True)))
-    cables = range(len(platform.exit_points_m))
-    return [
-        max((swing_of(platform, i, corner) for corner in corners), key=lambda swing: swing.swing_m)
-        for i in cables
-    ]
+def corner_swings(robot: Robot) -> list[list[Swing]]:
+    """Return for each cable what the platform does at each corner of the box of targets.
 
-
-def swing_of(platform: Platform, cable: int, position_m: tuple[float, ...]) -> Swing:
-    """Return where the platform comes to rest on the other cables.
-
-    That is the least height of its centre of mass at which no other cable is longer than it was:
-    rho(p, Q) <= rho, tension being what the constraint costs. Cables do not stretch, winches do
-    not turn, and what it passes on the way is not looked at; it swings through to about as far on
-    the other side before it comes to rest.
+    In the orientation of home. The robot has to have a platform.
     """
-    size, geometry = len(platform.home_m), cable_kinematics(platform).geometry
-    start, Q0 = in_space(position_m), home_rotation(platform)
-    kept = [i for i in range(len(platform.exit_points_m)) if i != cable]
-    mass_m = in_space(platform.centre_of_mass_m)
-    chosen = list(free_directions(platform))
-    limits = [(-np.inf, np.inf) if i < 3 else (-_FURTHEST_RAD, _FURTHEST_RAD) for i in chosen]
-    cables = np.empty((CABLE_ROWS, geometry.shape[1]))
+    loss, platform = CableLoss(robot), robot.platform
+    assert platform is not None  # asked for by who has one
+    corners = list(product(*zip(platform.workspace_min_m, platform.workspace_max_m, strict=True)))
+    return [[loss.swing(i, corner) for corner in corners] for i in range(len(robot.axes))]
 
-    def pose(x: FloatArray) -> FloatArray:
-        moved = np.zeros(6)
-        moved[chosen] = x
-        return np.vstack([start + moved[:3], rotation(moved[3:]) @ Q0])
 
-    def height(x: FloatArray) -> float:
-        there = pose(x)
-        return float((there[0] + there[1:] @ mass_m)[size - 1])
+class CableLoss:
+    """Predicts what a robot's platform does when a cable breaks; the robot has to have one.
 
-    def lengths(x: FloatArray) -> FloatArray:
-        run_cables(geometry, pose(x), cables)
-        return np.asarray((cables[FREE] + cables[ARC])[kept])
+    - At rest, tensions are the least that keep the control's reserve from their lower bounds.
+    - Until the loss is noticed, each motor pulls on as before. The pose that the control computes
+      follows the cable as it runs in, and the platform is pulled the other way, with a quarter of
+      the span of tensions. With the broken cable's tension t, its rotor's mass m at the cable and
+      the highest speed v of the limits, that lasts 1.5 m v/t + 15 ms, 0.25 s at most.
+    - Then the winches let it down as the program `lower` does where the pose is not known.
+    - Cables are elastic, without weight. Winches rub with 0, 3 or 6 % of the motor's rated torque,
+      whichever gets a figure the largest: what rubs may keep the platform or turn it over.
+    - The ground is level, as high as the platform stands at home.
+    """
 
-    rho = lengths(np.zeros(len(chosen)))
-    found = minimize(
-        height,
-        np.zeros(len(chosen)),
-        method="SLSQP",
-        bounds=limits,
-        constraints=NonlinearConstraint(lambda x: rho - lengths(x), 0.0, np.inf),
-        options={"maxiter": _STEPS, "ftol": _DONE_m},
-    )
-    p = pose(found.x)[0]
-    turn = float(np.linalg.norm([x for i, x in zip(chosen, found.x, strict=True) if i >= 3]))
-    swing_m = float(np.linalg.norm(p - start))
-    return Swing(cable, tuple(position_m), swing_m, turn, tuple(p[:size].tolist()))
+    def __init__(self, robot: Robot) -> None:
+        """Take a robot."""
+        self._model = model = platform_model_of(robot)
+        limits, n, self._axes = limits_of(robot), len(robot.axes), robot.axes
+        self._period_s = robot.sync_period_s
+        winches, motors = zip(*((one.winch, one.winch.motor) for one in robot.axes), strict=True)
+        per_rad = np.array([abs(winch.cable_m_per_motor_rad) for winch in winches])
+        self._rated_N = np.array([motor.rated_torque_Nm for motor in motors]) / per_rad
+        self._fastest_m_s = np.broadcast_to(limits.speed_rad_s, (n,)) * per_rad
+        self._EA_N = np.array([winch.cable.stiffness_N for winch in winches])
+        self._winches = np.zeros(n, WINCHES)
+        rotor_kg = np.array([motor.rotor_inertia_kg_m2 for motor in motors]) / per_rad**2
+        self._winches["rotor_kg"] = rotor_kg
+        self._winches["gain_N_s_m"] = BANDWIDTH_rad_s * rotor_kg
+        self._winches["low_N"] = DRUM_TENSION_SHARE * model.low_N
+        self._winches["high_N"] = np.minimum(model.high_N, limits.torque_Nm / per_rad)
+        self._resting = model.least_tensions(model.low_N + model.reserve_N, model.high_N)
+        self._weight_only = model.least_tensions(np.zeros(n), model.high_N)
+        self._body, self._free = body_of(model.platform), np.zeros(6)
+        self._free[list(free_directions(model.platform))] = 1.0
+        self._feet = np.unique(model.corners, axis=0)
+        home = model.home_pose
+        standing = home.p + self._feet @ home.Q.T
+        self._ground_m = float(standing[:, model.positions - 1].min())
+
+    def swing(self, cable: int, position_m: tuple[float, ...]) -> Swing:
+        """Return what the platform does at a position when a cable, counted from 0, breaks."""
+        start = self._model.pose(np.array(position_m))
+        up, first = self._model.positions - 1, slice(math.ceil(SWING_S / self._period_s))
+        most = np.zeros(4)
+        for friction in _FRICTIONS:
+            path = self.path(cable, start, friction)
+            moved = path[:, 0] - start.p
+            away = np.linalg.norm(moved, axis=1)
+            aside = np.linalg.norm(np.delete(moved, up, axis=1), axis=1)
+            cosine = (np.einsum("kij,ij->k", path[first, 1:], start.Q) - 1.0) / 2.0
+            turn = math.acos(min(max(float(cosine.min()), -1.0), 1.0))
+            most = np.maximum(most, (away[first].max(), turn, away.max(), aside.max()))
+        return Swing(cable, tuple(position_m), *most.tolist())
+
+    def path(self, cable: int, start: Pose, friction: float = 0.0) -> FloatArray:
+        """Return the poses (c, 4, 3) of all cycles from when a cable breaks until it lies still.
+
+        At most those of 30 s. The platform is at rest at `start`; winches rub with `friction`
+        times the motor's rated torque.
+        """
+        model, winches = self._model, self._winches
+        W, tension_N = np.zeros((model.size, len(winches))), np.zeros(len(winches))
+        model.kinematics.wrench_matrix(start, W)
+        self._resting.solve(W, model.weight(), tension_N)
+        winches["held_N"] = tension_N
+        self._weight_only.solve(W, model.weight(), tension_N)
+        winches["weight_N"] = tension_N
+        cables = np.empty((CABLE_ROWS, len(winches)))
+        run_cables(model.kinematics.geometry, start.array, cables)
+        winches["stiffness_N_m"] = self._EA_N / np.maximum(cables[FREE] + cables[ARC], _NEAREST_m)
+        winches["damping_N_s_m"] = _CABLE_DAMPING_S * winches["stiffness_N_m"]
+        winches["friction_N"] = friction * self._rated_N
+        path = np.empty((math.ceil(_LONGEST_S / self._period_s), 4, 3))
+        cycles = fall(
+            self._course(cable, start), winches, self._body, self._free,
+            model.kinematics.geometry, self._feet, start.array, path,
+        )  # fmt: skip
+        return path[:cycles]
+
+    def _course(self, cable: int, start: Pose) -> NDArray[np.void]:
+        model, platform, period_s = self._model, self._model.platform, self._period_s
+        quickest_rad_s = highest_rad_s(model, self._axes, start.p[: model.positions])
+        steps = math.ceil(period_s * quickest_rad_s / _STEP_rad)
+        per_kg = 1.0 / platform.mass_kg
+        if not is_point(platform):
+            arms_m = np.linalg.norm(self._feet - in_space(platform.centre_of_mass_m), axis=1)
+            per_kg += float(arms_m.max() ** 2 / np.linalg.eigvalsh(inertia_kg_m2(platform))[0])
+        foot_N_m = (_STEP_rad * steps / period_s) ** 2 / (per_kg * len(self._feet))
+        course = np.zeros(1, COURSE)
+        course["period_s"], course["steps"], course["cut"] = period_s, steps, cable
+        course["held_cycles"] = math.ceil(self._noticed_s(cable) / period_s)
+        course["misled_N"] = _MISLED_SHARE * (model.high_N - model.low_N)[cable]
+        course["paying_out_m_s"], course["fastest_in_m_s"] = UNKNOWN_POSE_m_s, FASTEST_IN_m_s
+        course["integral_rate_1_s"] = HANGING_LOAD_1_s
+        course["up"], course["ground_m"] = model.positions - 1, self._ground_m
+        course["foot_N_m"], course["friction"] = foot_N_m, _GROUND_FRICTION
+        course["foot_N_s_m"] = 2.0 * _GROUND_DAMPING * math.sqrt(foot_N_m / per_kg)
+        return course
+
+    def _noticed_s(self, cable: int) -> float:
+        own = self._winches[cable]
+        momentum = own["rotor_kg"] * self._fastest_m_s[cable]
+        slack = own["held_N"] * (_NOTICED_S - _NOTICING_S) < _NOTICED_LATE * momentum
+        return _NOTICED_S if slack else _NOTICED_LATE * momentum / own["held_N"] + _NOTICING_S

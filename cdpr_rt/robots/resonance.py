@@ -29,8 +29,18 @@ def lowest_resonance_Hz(
 
     Tensions, gear and drum count for nothing. Frequencies are in Hz.
     """
+    squares = _squares(model, axes, position_m)[..., 0]
+    return np.asarray(np.sqrt(squares) / (2.0 * np.pi)).reshape(np.shape(position_m)[:-1])
+
+
+def highest_rad_s(model: PlatformModel, axes: Sequence[RobotAxis], position_m: FloatArray) -> float:
+    """Return the highest angular frequency of the same at one position (dimensions,), rad/s."""
+    return float(np.sqrt(_squares(model, axes, position_m)[0, -1]))
+
+
+def _squares(model: PlatformModel, axes: Sequence[RobotAxis], position_m: FloatArray) -> FloatArray:
+    """Return the eigenvalues, ascending, of m positions, (m, n)."""
     platform, geometry = model.platform, model.about_mass.geometry
-    shape = np.shape(position_m)[:-1]
     Q, chosen = model.home_pose.Q, list(free_directions(platform))
     poses = model.poses(np.reshape(position_m, (-1, model.positions)))
     poses[:, 0] += Q @ in_space(platform.centre_of_mass_m)
@@ -48,5 +58,4 @@ def lowest_resonance_Hz(
     )
     root = np.sqrt(np.array([w.cable.stiffness_N for w in winches]) / rho)
     inner = A @ mobility @ np.swapaxes(A, -1, -2) + np.diag(rotors_per_kg)
-    squares = np.linalg.eigvalsh(root[..., :, None] * inner * root[..., None, :])
-    return np.asarray(np.sqrt(squares[..., 0]) / (2.0 * np.pi)).reshape(shape)
+    return np.asarray(np.linalg.eigvalsh(root[..., :, None] * inner * root[..., None, :]))

@@ -12,7 +12,7 @@ from cdpr_profiles import Robot
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
 from cdpr_rt.errors import GeometryError
-from cdpr_rt.robots.cable_loss import worst_swings
+from cdpr_rt.robots.cable_loss import SWING_S, corner_swings
 from cdpr_rt.robots.free_rotation import free_rotation
 from cdpr_rt.robots.kinematics.free_rotation_kernel import SWINGS_m
 from cdpr_rt.robots.platform.loop_design import STIFFNESS_SHARES, designed_loop
@@ -55,12 +55,14 @@ def _of_tensions(
     moving = np.array([statics.margin_N(points, wanted, turn) for turn in turns])
     lengths = np.array([statics.lengths(points, turn) for turn in turns])
     at_home_m, least_N = statics.lengths(home), statics.least_tensions_N(home)
-    for figures, swing in zip(axes, worst_swings(platform), strict=True):
+    for figures, swings in zip(axes, corner_swings(robot), strict=True):
+        worst = max(swings, key=lambda swing: swing.swing_m)
         figures["broken"] = {
-            "at_m": swing.position_m,
-            "to_m": swing.to_m,
-            "swing_m": swing.swing_m,
-            "turn_rad": swing.turn_rad,
+            "at_m": worst.position_m,
+            "swing_m": worst.swing_m,
+            "turn_rad": worst.turn_rad,
+            "away_m": max(swing.away_m for swing in swings),
+            "aside_m": max(swing.aside_m for swing in swings),
         }
     for i, figures in enumerate(axes):
         figures["cable_at_home_m"] = float(at_home_m[i])
@@ -161,10 +163,11 @@ def _orientation_lines(platform: Platform) -> list[str]:
 
 
 def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
-    """Return a line for each cable on how far the platform swings when it breaks, at the worst."""
+    """Return a line for each cable on how far the platform gets when it breaks, at the worst."""
     lines = [
-        "if a cable breaks and the other winches stand still, the platform comes to rest on the "
-        "others (the worst corner):"
+        f"if a cable breaks (predicted, worst corner): how far it swings within {SWING_S:g} s, "
+        "and how far",
+        "away and aside it is at most until the others have let it down to its ground:",
     ]
     for axis in axes:
         broken = axis["broken"]
@@ -173,6 +176,7 @@ def _broken_lines(axes: Sequence[dict[str, Any]]) -> list[str]:
         )
         if broken["turn_rad"] > math.radians(1.0):
             line += f" and turns by {math.degrees(broken['turn_rad']):.0f} deg"
+        line += f"; {broken['away_m']:.2f} m away, {broken['aside_m']:.2f} m aside"
         lines.append(line)
     return lines
 

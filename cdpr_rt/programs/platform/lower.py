@@ -10,26 +10,24 @@ import numpy as np
 
 from cdpr_profiles.platform import Platform
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.control.winch_speed_loop import (
+    DRUM_TENSION_SHARE,
+    FASTEST_IN_m_s,
+    FIXED_END_1_s,
+    HANGING_LOAD_1_s,
+    UNKNOWN_POSE_m_s,
+    WinchSpeedLoop,
+)
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.platform.arrival import Arrival
 from cdpr_rt.programs.platform.platform_program import PlatformParts, PlatformProgram
-from cdpr_rt.programs.platform.winch_speed_loop import (
-    FIXED_END_1_s,
-    HANGING_LOAD_1_s,
-    WinchSpeedLoop,
-)
 
 HOME_SPEED_m_s = 0.25
 """Speed at which the platform goes home, to its stand; it turns back no faster, in proportion."""
 SET_DOWN_m_s = 0.02
 """Speed at which the cables set it down there."""
-UNKNOWN_POSE_m_s = 0.15
-"""Speed at which the cables let it down where its pose is not known."""
-_FASTEST_IN_m_s = 0.5
-_DRUM_TENSION_SHARE = 0.25
-"""Tension that keeps a cable on its drum, over the least tension."""
 _ARRIVED_m, _ARRIVED_S, _ARRIVING_S = 0.01, 0.25, 2.0
 _LATE = 1.5
 """Time allowed for the way home, over the time that it should take."""
@@ -114,7 +112,7 @@ class LowerProgram(PlatformProgram):
         self._was_tight = self._parts.tight
         self._without_pose = not self._was_tight
         # slack cables are left as loose as they are
-        self._drum_tension_N[:] = 0.0 if self._without_pose else _DRUM_TENSION_SHARE * self._least
+        self._drum_tension_N[:] = 0.0 if self._without_pose else DRUM_TENSION_SHARE * self._least
         self._stage = "home"
         if self._parts.tight:
             super().start(feedback, setpoint, torque_Nm)
@@ -170,11 +168,12 @@ class LowerProgram(PlatformProgram):
         self._without_pose = self._without_pose or blind
 
     def _carry_weight(self, torque_Nm: FloatArray) -> None:
-        """Begin with the tensions that carry the estimated weight, without pretension.
+        """Begin with the tensions that carry the weight at the set-point, without pretension.
 
-        Pretension would fling the platform where one of the cables has broken.
+        Pretension would fling the platform where one of the cables has broken; so would tensions
+        for the estimated pose, which follows a cable that runs in or an encoder that jumps.
         """
-        self._there.array[:] = self._parts.model.poses(self._control.estimated[None])[0]
+        self._there.array[:] = self._parts.model.poses(self._control.shaped[None])[0]
         self._parts.model.kinematics.wrench_matrix(self._there, self._W)
         self._weight_only.solve(self._W, self._weight, self._weight_tension_N)
         torque_Nm[:] = -self._cable * np.maximum(self._weight_tension_N, self._drum_tension_N)
@@ -188,7 +187,7 @@ class LowerProgram(PlatformProgram):
         winches = self._winches
         winches.low_N[:], winches.high_N[:] = self._drum_tension_N, self._high
         winches.paying_out_m_s[:] = speed_m_s
-        winches.fastest_in_m_s = _FASTEST_IN_m_s
+        winches.fastest_in_m_s = FASTEST_IN_m_s
         winches.integral_rate_1_s = rate_1_s
         # faster than the platform can be is a jump of the encoder
         parts = self._parts
@@ -207,7 +206,7 @@ class LowerProgram(PlatformProgram):
             return
         # a cable that runs in carries nothing, however its winch trembles: it may be a broken one
         running_in = self._cable * winches.speed_rad_s < -_RUNNING_IN_m_s
-        unloaded = winches.tension_N <= _LIGHT * _DRUM_TENSION_SHARE * self._least
+        unloaded = winches.tension_N <= _LIGHT * DRUM_TENSION_SHARE * self._least
         light = bool((unloaded | running_in).all())
         paid_out_m = float((self._cable * (feedback.position_rad - self._here)).max())
         if not light or paid_out_m > _STILL_m:

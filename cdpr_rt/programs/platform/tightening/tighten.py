@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_rt.arrays import FloatArray
+from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.core.exchange import AxisFeedback, Setpoint
 from cdpr_rt.programs.arguments import CommandArguments
 from cdpr_rt.programs.base import ProgramError
@@ -25,7 +26,6 @@ from cdpr_rt.programs.platform.tightening.standing import (
     would_move,
 )
 from cdpr_rt.programs.platform.tightening.standing_tensions import OVERSHOOT, StandingTensions
-from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.robots.persistence.last_lengths import StoppedLengths, index_disagreement
 
 TAKE_UP_m_s = 0.05

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from cdpr_profiles import load_robot
+from cdpr_rt.control.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.core.estimate import Estimator
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.programs.base import ProgramError
 from cdpr_rt.programs.model import model_of
 from cdpr_rt.programs.platform.platform_program import PlatformParts
 from cdpr_rt.programs.platform.tightening.index_path import index_path
-from cdpr_rt.programs.platform.winch_speed_loop import WinchSpeedLoop
 from cdpr_rt.programs.registry import platform_parts
 from cdpr_rt.robots.robot_arrays import limits_of, winches_of
 from cdpr_rt.robots.statics import statics_of

@@ -8,17 +8,23 @@ from cdpr_rt.arrays import FloatArray
 from cdpr_rt.core.exchange import AxisFeedback
 from cdpr_rt.jit import jit
 
-_BANDWIDTH_rad_s = 100.0
-_FILTER_S = 0.005
+BANDWIDTH_rad_s = 100.0
+FILTER_S = 0.005
 _FASTEST_m_s = 5.0
 FIXED_END_1_s = 60.0
 """Integral rate where the cables' ends are fixed."""
 HANGING_LOAD_1_s = 4.0
 """Integral rate under a load ten times the rotor's mass at the cable, without oscillation."""
+UNKNOWN_POSE_m_s = 0.15
+"""Speed at which the cables let a platform down whose pose is not known."""
+FASTEST_IN_m_s = 0.5
+"""Speed at which they take in slack meanwhile."""
+DRUM_TENSION_SHARE = 0.25
+"""Tension that keeps a cable on its drum meanwhile, over the least tension."""
 
 
 @jit
-def _control_speed(
+def control_speed(
     period: float,
     weight: float,
     low: FloatArray,
@@ -35,6 +41,7 @@ def _control_speed(
     tension: FloatArray,
     torque: FloatArray,
 ) -> None:
+    """Write tensions and torques of a cycle; arrays are those of `WinchSpeedLoop`, (n,)."""
     for i in range(position.size):
         raw = (position[i] - last[i]) / period
         last[i] = position[i]
@@ -68,9 +75,9 @@ class WinchSpeedLoop:
     ) -> None:
         n = len(cable_m)
         self._period_s = period_s
-        self._weight = period_s / (period_s + _FILTER_S)
+        self._weight = period_s / (period_s + FILTER_S)
         self._cable = np.array(cable_m, float)
-        self._gain = np.broadcast_to(inertia_kg_m2, (n,)) * _BANDWIDTH_rad_s
+        self._gain = np.broadcast_to(inertia_kg_m2, (n,)) * BANDWIDTH_rad_s
         self.low_N = np.zeros(n)
         """Lowest tension."""
         self.high_N = np.zeros(n)
@@ -95,7 +102,7 @@ class WinchSpeedLoop:
 
     def update(self, feedback: AxisFeedback, torque_Nm: FloatArray) -> None:
         """Write the torques of this cycle."""
-        _control_speed(
+        control_speed(
             self._period_s, self._weight, self.low_N, self.high_N, self.paying_out_m_s,
             self.fastest_in_m_s, self._cable, self._gain, self.integral_rate_1_s,
             feedback.position_rad, self._last, self.speed_rad_s, self._integral, self.tension_N,

@@ -1,0 +1,60 @@
+"""What `cdpr robot show` says of a cable that breaks is true of simulated robots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_profiles import load_robot
+from cdpr_rt.core.states import LoopState
+from cdpr_rt.robots.cable_loss import SWING_S, CableLoss
+from cdpr_tools.trials.evaluation.pose_log import read_pose_log
+from cdpr_tools.trials.lockstep import LockstepRobot
+
+CUT = 12
+MOST = 1.3
+"""By how much truth may exceed what is predicted."""
+LEAST = 0.4
+"""Of what is predicted the platform does at least; else anything would be on the safe side."""
+
+
+@pytest.mark.parametrize(
+    ("robot", "cable", "place_m"),
+    [
+        (load_robot("point-4").path, 0, (1.2, 1.0, 1.8)),
+        (Path(__file__).parent / "robots" / "light-box.toml", 0, (0.2, -0.15, 0.8)),
+    ],
+    ids=lambda value: getattr(value, "stem", None),
+)
+def test_a_platform_swings_and_gets_as_far_as_predicted(
+    robot: Path, cable: int, place_m: tuple[float, ...], tmp_path: Path
+) -> None:
+    slower = tmp_path / robot.name
+    text = robot.read_text()
+    assert text.count("sync_period_s") == 1
+    slower.write_text(text.replace("sync_period_s = 0.001", "sync_period_s = 0.002"))
+    predicted = CableLoss(load_robot(slower)).swing(cable, place_m)
+    with LockstepRobot(slower) as rig:
+        rig.enable()
+        rig.carry_out("tighten")
+        rig.carry_out("pose", position_m=list(place_m))
+        rig.run(1.5)
+        first = rig.cycle + rig.sync_offset
+        rig.inject_fault(cable, CUT, 1)
+        rig._turn_until(lambda: rig.loop.busy, 1.0, "a reaction")
+        rig._turn_until(lambda: not rig.loop.busy, 30.0, "the power off")
+        assert rig.state is LoopState.FAULT
+        log = read_pose_log(rig.truth_log)
+    log = log[log["sync_index"] >= first]
+    moved = log["position_m"] - log["position_m"][0]
+    away = np.linalg.norm(moved, axis=1)
+    aside = np.linalg.norm(moved[:, :2], axis=1)
+    swing_m = away[log["time_s"] <= log["time_s"][0] + SWING_S].max()
+    for true_m, told_m in (
+        (swing_m, predicted.swing_m),
+        (away.max(), predicted.away_m),
+        (aside.max(), predicted.aside_m),
+    ):
+        assert LEAST * told_m < true_m < MOST * told_m
