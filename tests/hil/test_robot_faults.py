@@ -136,6 +136,18 @@ def test_the_winches_that_are_left_let_the_platform_down(
     assert records["tension_N"][-1].max() < 8.0
 
 
+def test_a_cable_of_eight_that_slips_is_noticed_by_the_others() -> None:
+    """By 60 mm, which leaves it tight enough not to be taken for a broken one."""
+    with LockstepRobot("spatial-8") as robot:
+        robot.enable()
+        robot.carry_out("tighten", 60.0)
+        robot.run(0.3)
+        robot.inject_fault(1, 13, 60)
+        end_of_fault(robot)
+        assert robot.state is LoopState.FAULT
+        assert "the cables' lengths disagree by" in robot.loop.life.reason
+
+
 def test_a_lowering_that_fails_does_not_leave_motors_with_power(hanging: LockstepRobot) -> None:
     def mistaken(*_: object) -> None:
         raise ValueError("a mistake")
