@@ -30,9 +30,10 @@ class StateArrays:
     """State of n axes as arrays: the rows named in `axis_codec`, one column per axis."""
 
     def __init__(self, n: int) -> None:
-        self.ints: Ints = np.zeros((codec.INT_ROWS, n), np.int64)
-        self.floats: FloatArray = np.zeros((codec.FLOAT_ROWS, n))
-        self.flags: BoolArray = np.zeros((codec.FLAG_ROWS, n), np.bool_)
+        # a column more: views of some axes are as little contiguous, and have the same machine code
+        self.ints: Ints = np.zeros((codec.INT_ROWS, n + 1), np.int64)[:, :n]
+        self.floats: FloatArray = np.zeros((codec.FLOAT_ROWS, n + 1))[:, :n]
+        self.flags: BoolArray = np.zeros((codec.FLAG_ROWS, n + 1), np.bool_)[:, :n]
         self.words: WordArray = np.zeros((1, n), np.uint16)
 
     def view(self, first: int, last: int) -> StateArrays:
