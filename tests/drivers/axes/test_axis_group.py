@@ -219,7 +219,7 @@ def test_the_cause_is_told_before_what_follows_from_it(bus: str) -> None:
 
 
 def test_a_drive_that_goes_off_by_itself_is_not_enabled_again(bus: str) -> None:
-    """By a controlword of somebody else, between ours and the SYNC: these go together if we lead."""
+    """By somebody else's controlword, between ours and the SYNC: these go together if we lead."""
     with open_rig(bus, lead=False) as rig:
         rig.enable()
         with can.Bus(interface="simbus", channel=rig.bus[7:]) as other:
