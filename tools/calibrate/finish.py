@@ -17,7 +17,7 @@ from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
 from cdpr_rt.calibration.outcome import Method, Outcome, calibration_of
 from cdpr_rt.calibration.readings.camera_data import HandEye, Images
-from cdpr_rt.calibration.readings.data import CalibrationData, load_points, with_points
+from cdpr_rt.calibration.readings.data import CalibrationData, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
 from cdpr_rt.robots.checks import refuse_impossible
 from cdpr_rt.robots.persistence.calibration_state import (
@@ -25,6 +25,7 @@ from cdpr_rt.robots.persistence.calibration_state import (
     mark_not_calibrated,
     not_calibrated_reason,
 )
+from cdpr_tools.calibrate.measuring.begin import points_of
 from cdpr_tools.errors import BadInputError, WorkFailedError
 from cdpr_tools.output import Output
 
@@ -54,7 +55,7 @@ def identified(
     seen = data.observations(robot, geometry.model)
     if points is not None:
         try:
-            there = [one for one in load_points(points) if not so_far or one.pose < seen.poses]
+            there = [one for one in points_of(points, robot) if not so_far or one.pose < seen.poses]
             seen = with_points(seen, there, geometry.coordinates)
         except InvalidRequestError as error:
             raise BadInputError(f"--points {points}: {error}") from None

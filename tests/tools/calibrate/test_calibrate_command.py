@@ -231,7 +231,8 @@ def test_points_are_taken_besides_a_camera() -> None:
         ("pose,x_mm,y_mm,z_mm\n0,2,3,4\n", "line 2: pose"),
         ("pose,x_mm,y_mm,z_mm,sigma_mm\n1,2,3,4,-1\n", "sigma_mm"),
         ("pose,x_mm,y_mm,z_mm\n1,2,3,4,5\n", "line 2: 5 cells"),
-        ("pose,x_mm,y_mm,z_mm\n99,2,3,4\n", "pose 99; allowed: 1 to 45"),
+        ("pose,x_mm,y_mm,z_mm\n99,200,300,400\n", "pose 99; allowed: 1 to 45"),
+        ("pose,x_mm,y_mm,z_mm\n1,0.2,,1.4\n2,-0.3,0.4,\n", "within 1.4 mm of the room's origin"),
     ],
 )
 def test_bad_points_are_refused(tmp_path: Path, text: str, named: str) -> None:

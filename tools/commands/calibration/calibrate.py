@@ -181,7 +181,7 @@ def run(
         known = _hand_eye(hand_eye)
         count, listed = poses_wanted(profile, poses)
         if points is not None:
-            check_points(points, None if resume else count)
+            check_points(points, profile, None if resume else count)
 
     given: dict[runs.Source, bool] = {
         "camera": camera,
@@ -199,7 +199,7 @@ def run(
             settings = settings.model_copy(update={"points": str(points.resolve())})
         elif settings.points is not None:
             points = Path(settings.points)
-            check_points(points, None)
+            check_points(points, profile, None)
         kept = runs.Kept.of_before(folder, profile)
     else:
         _require_new(folder, runs.DATA, overwrite)
