@@ -35,14 +35,15 @@ _LOST_S = 1e-3
 
 
 class LedPort(SocketPort):
-    """A port on a bus that this process leads: a batch goes in one packet, with the next frame.
+    """A port on a bus that this process leads: a batch goes in one packet.
 
-    Time stands still until that: it is the SYNC at the latest, or a `go`.
+    Where no other bus is led, that has the next frame as well: time stands still until it comes,
+    and it is the SYNC at the latest, or a `go`. The SYNC of another bus would let time pass.
     """
 
-    def __init__(self, url: BusUrl, sock: socket.socket) -> None:
+    def __init__(self, url: BusUrl, sock: socket.socket, *, only: bool = True) -> None:
         super().__init__(url, sock, {"mode": "lockstep"})
-        self._transmit = sock.send
+        self._transmit, self._only = sock.send, only
         self._held: _HeldBatch | None = None
         self.send = self._send
 
@@ -52,10 +53,12 @@ class LedPort(SocketPort):
         return _HeldBatch(self, frames) if fits else super().batch(frames)
 
     def hold(self, batch: _HeldBatch) -> None:
-        """Have what is in `batch` sent before, or with, what is sent next."""
+        """Have what is in `batch` sent with what is sent next, or at once."""
         if self._held is not None:
             self._transmit(self._held.alone)
-        self._held = batch
+        self._held = batch if self._only else None
+        if not self._only:
+            self._transmit(batch.alone)
 
     def _send(self, packet: Bytes) -> int:
         held, self._held = self._held, None
@@ -201,7 +204,7 @@ class SimulatedBusClock(LockstepClock):
 
     def _lead_again(self, url: BusUrl) -> SimulatedBus:
         connect(url.channel).close()  # raises where there is none
-        bus = _lead(url)
+        bus = _lead(url, only=len(self._by_url) == 1)
         if bus is None:
             raise BusError(f"{url}: the bus has come back with another clock; begin anew")
         bus.set_time(self.now_s)
@@ -229,8 +232,9 @@ def open_clock(urls: Iterable[BusUrl], *, real_time: bool = False) -> Clock:
     the clock is CLOCK_MONOTONIC.
     """
     buses: dict[str, SimulatedBus] = {}
+    urls = list(urls)
     for url in urls:
-        led = _lead(url)
+        led = _lead(url, only=len(urls) == 1)
         if led is None:
             for bus in buses.values():
                 bus.release()
@@ -239,7 +243,7 @@ def open_clock(urls: Iterable[BusUrl], *, real_time: bool = False) -> Clock:
     return SimulatedBusClock(buses, real_time=real_time) if buses else PacedClock()
 
 
-def _lead(url: BusUrl) -> SimulatedBus | None:
+def _lead(url: BusUrl, *, only: bool) -> SimulatedBus | None:
     """Return the bus with this process as its leader, None where it cannot be."""
     if url.interface != "simbus":
         return None
@@ -257,7 +261,7 @@ def _lead(url: BusUrl) -> SimulatedBus | None:
     if answer is None:
         sock.close()
         return None
-    port = LedPort(url, sock)
+    port = LedPort(url, sock, only=only)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, bytes(16))
     next_s = answer["next_s"]
     return SimulatedBus(port, float(answer["now_s"]), math.inf if next_s is None else float(next_s))

@@ -108,6 +108,15 @@ def test_commands_go_before_whatever_else_is_sent(led: Led) -> None:
     assert led.sent() == [head + frames, PACKET.pack(b"bus-go\0\0", 0.5, 0.0)]
 
 
+def test_commands_do_not_wait_where_another_bus_lets_time_pass(led: Led) -> None:
+    _, buffer, frames = commands(led, 4)
+    port = LedPort(led.port.url, led.port._sock, only=False)
+    port.batch(buffer).send()
+    assert led.sent() == [PACKET.pack(b"bus-data", 0.0, 0.0) + frames]
+    port.send(frame(0x80))
+    assert led.sent() == [frame(0x80)]
+
+
 def test_commands_too_many_for_a_packet_go_one_by_one(led: Led) -> None:
     batch, _, frames = commands(led, 30)
     batch.send()
