@@ -30,7 +30,7 @@ class RefusalCode(StrEnum):
 
 
 @dataclass(frozen=True)
-class Refusal:
+class CommandRefusal:
     """Why a command was refused, for programs; as text for people.
 
     An error of the loop that is raised with it, in place of a text, carries it to the reply.
@@ -80,7 +80,7 @@ class Refusal:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, value: Any) -> Refusal | None:
+    def from_json(cls, value: Any) -> CommandRefusal | None:
         """Return what an answer holds, None where it is not a refusal as it is known here."""
         try:
             refusal = cls(**{**value, "code": RefusalCode(value["code"])})
@@ -96,7 +96,7 @@ def shown(value: Any) -> str:
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 
-def refusal_of(error: Exception) -> Refusal | None:
+def refusal_of(error: Exception) -> CommandRefusal | None:
     """Return the refusal that an error of the loop carries, None where it has only words."""
     first = error.args[0] if error.args else None
-    return first if isinstance(first, Refusal) else None
+    return first if isinstance(first, CommandRefusal) else None

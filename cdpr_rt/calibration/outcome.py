@@ -23,14 +23,14 @@ from cdpr_rt.calibration.markers.coverage import Coverage, listed
 from cdpr_rt.calibration.verification.held_out import Unused
 from cdpr_rt.calibration.verification.more_poses import MORE
 from cdpr_rt.calibration.verification.verdict import (
-    Change,
+    CalibrationChange,
     OpenDirection,
     camera_table,
     parameter_table,
 )
 from cdpr_rt.calibration.verification.verification import Verification
 
-Method = Literal["points", "redundancy", "camera"]
+CalibrationMethod = Literal["points", "redundancy", "camera"]
 _WANTED_mm_PER_m = 0.3
 """1.5 mm for 5 m of frame, 3 sigma."""
 _MOST_OVER_WANTED = 3.0
@@ -47,7 +47,7 @@ class Outcome:
 
     robot: Robot
     found: Fit
-    method: Method
+    method: CalibrationMethod
     faults: list[Fault]
     open_directions: list[OpenDirection]
     verified: Verification
@@ -63,7 +63,7 @@ class Outcome:
     known_room: bool
     """Whether anything was measured in the room: points, or places of markers."""
     unused: Unused
-    change: Change
+    change: CalibrationChange
     """By how much it changes the robot's file."""
     birge_ratio: float
     """How many times as large errors at measured points not used are as predicted; nan without."""

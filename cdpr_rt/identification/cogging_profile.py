@@ -20,7 +20,7 @@ from cdpr_rt.control.compensation import AxisCompensation, FrictionFeedforward
 from cdpr_rt.errors import ControlError
 from cdpr_rt.identification import HarmonicResult, ThesisResult
 
-Method = Literal["thesis", "better"]
+CompensationMethod = Literal["thesis", "better"]
 
 _MOST_SAMPLES = 1 << 16
 _LONGEST_s = 0.5
@@ -189,7 +189,7 @@ class CoggingProfile(_Part):
 
     def compensation(
         self,
-        method: Method,
+        method: CompensationMethod,
         identity: DriveIdentity,
         bounds: MotorBounds,
         *,

@@ -19,7 +19,7 @@ class PlannerBusyError(ControlError):
     """No path can be planned now."""
 
 
-class PathPlanner:
+class PathPlanRunner:
     """Plans one path at a time; who has asked looks at `job` until it is not `planning`."""
 
     def __init__(self) -> None:

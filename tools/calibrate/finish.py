@@ -15,7 +15,7 @@ from cdpr_profiles.calibration.in_force import in_force, next_version, take_over
 from cdpr_profiles.errors import ProfileError
 from cdpr_rt.calibration.calibrate import calibrate
 from cdpr_rt.calibration.estimation.parameters import CableGeometry
-from cdpr_rt.calibration.outcome import Method, Outcome, calibration_of
+from cdpr_rt.calibration.outcome import CalibrationMethod, Outcome, calibration_of
 from cdpr_rt.calibration.readings.camera_data import HandEye, Images
 from cdpr_rt.calibration.readings.data import CalibrationData, load_points, with_points
 from cdpr_rt.errors import ControlError, InvalidRequestError
@@ -59,7 +59,7 @@ def identified(
         except InvalidRequestError as error:
             raise BadInputError(f"--points {points}: {error}") from None
     images = None if data.camera is None else Images(data.camera, data.sightings())
-    method: Method = "points" if seen.measured.any() else "redundancy"
+    method: CalibrationMethod = "points" if seen.measured.any() else "redundancy"
     return calibrate(robot, geometry, seen, "camera" if images else method, images)
 
 

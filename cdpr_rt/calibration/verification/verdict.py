@@ -164,7 +164,7 @@ def predicted_std(found: Fit, poses: FloatArray, relative: bool = False) -> Floa
 
 
 @dataclass(frozen=True)
-class Change:
+class CalibrationChange:
     """By how much a calibration changes a robot's file, all parameters together."""
 
     moved_m: float
@@ -185,7 +185,7 @@ class Change:
         return self.chance < _CHANCE
 
 
-def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> Change:
+def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> CalibrationChange:
     """Return how far a fit is from the robot's file, at poses (M, 4, 3).
 
     With parameters v, their covariance C and that known before K, v^T C^-1 v would be near to chi
@@ -199,7 +199,9 @@ def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> C
     scaled = covariance / np.outer(known, known)
     squares = float(v / known @ np.linalg.solve(scaled, v / known)) if size else 0.0
     A = _by_parameters(found, poses, relative)[:, : geometry.coordinates]
-    return Change(float(np.sqrt(((A @ v) ** 2).sum() / len(poses))), squares, max(told, 0.0))
+    return CalibrationChange(
+        float(np.sqrt(((A @ v) ** 2).sum() / len(poses))), squares, max(told, 0.0)
+    )
 
 
 def _by_parameters(found: Fit, poses: FloatArray, relative: bool) -> FloatArray:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cdpr_profiles import Robot
 from cdpr_rt.calibration.readings.data import load_points
-from cdpr_tools.calibrate.measuring.run import Source
+from cdpr_tools.calibrate.measuring.run import PoseSource
 from cdpr_tools.errors import BadInputError
 
 
@@ -19,7 +19,7 @@ def check_points(path: Path, poses: int | None) -> None:
             )
 
 
-def source_of(robot: Robot, asked: list[Source]) -> Source:
+def source_of(robot: Robot, asked: list[PoseSource]) -> PoseSource:
     """Return what a run is to use besides lengths and tensions; raises BadInputError."""
     if not asked and robot.platform is not None and len(robot.platform.controlled) == 6:
         return "camera"

@@ -15,7 +15,7 @@ from cdpr_rt.control.compensation import AxisCompensation, Compensation, Frictio
 from cdpr_rt.control.compensation import _torque as compensate
 from cdpr_rt.control.pid import _update as pid_update
 from cdpr_rt.control.tuning import design_pid, sweep_gain
-from cdpr_rt.control.validation import Metrics, evaluate, worst
+from cdpr_rt.control.validation import ValidationMetrics, evaluate, worst
 from cdpr_rt.identification import (
     SecondPass,
     SweepData,
@@ -312,7 +312,7 @@ def judged_turns(setpoint_rad, setpoint_velocity_rad_s, lead_in_rad):
     return marked
 
 
-def validate(done: Commissioned) -> dict[str, Metrics]:
+def validate(done: Commissioned) -> dict[str, ValidationMetrics]:
     """The ramps of the thesis' validation, both ways, judged on the true angle."""
     bench, plant = done.bench, done.bench.plant
     gains = design_pid(done.harmonic.inertia_kg_m2.value, LATENCY, BANDWIDTH).gains
