@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import pickle
 from typing import Any
 
 import pytest
 
 from cdpr_rt.errors import ControlError
 from cdpr_rt.refusal import CommandRefusal, RefusalCode, refusal_of
+from cdpr_rt.runtime.control_loop.lifecycle import RefusedError
 
 RANGE = {"index": 1, "low": -2.0, "high": 2.0}
 STATE = {"state": "fault", "allowed": ["ready", "active"]}
@@ -70,6 +72,14 @@ def test_it_is_told_in_words_and_survives_json(refusal: CommandRefusal, text: st
     assert CommandRefusal.from_json(json.loads(json.dumps(refusal.as_json()))) == refusal
 
 
+def test_the_loop_s_error_can_be_pickled_and_takes_other_words() -> None:
+    refusal = REFUSALS[0][0]
+    copy = pickle.loads(pickle.dumps(RefusedError(refusal)))
+    assert type(copy) is RefusedError
+    assert (str(copy), refusal_of(copy)) == (str(refusal), refusal)
+    assert str(type(copy)("other words")) == "other words"
+
+
 def test_an_error_carries_it_and_one_of_words_none() -> None:
     refusal = REFUSALS[0][0]
     assert refusal_of(ControlError(refusal)) is refusal
@@ -89,6 +99,18 @@ def test_an_error_carries_it_and_one_of_words_none() -> None:
         {"code": "out_of_range", "command": "jog", "asked": [], "arguments": RANGE},
         {"code": "not_in_state", "command": "jog", "arguments": {"state": "a", "allowed": [1]}},
         {"code": "not_tight", "command": "jog", "more": 1},
+        {"code": "not_tight", "command": 1},
+        {"code": "not_tight", "command": "jog", "asked": []},
+        {"code": "not_tight", "command": "jog", "arguments": "none"},
+        {"code": "not_calibrated", "command": "jog", "arguments": {"why": 1}},
+        {"code": "not_in_state", "command": "jog", "arguments": {**STATE, "state": []}},
+        {"code": "not_in_state", "command": "jog", "arguments": {**STATE, "allowed": "ready"}},
+        {"code": "out_of_range", "command": "jog", "asked": {"a": "b"}, "arguments": RANGE},
+        {"code": "out_of_range", "command": "jog", "arguments": {**RANGE, "low": "1"}},
+        {"code": "out_of_range", "command": "jog", "arguments": {**RANGE, "index": -1}},
+        {"code": "out_of_range", "command": "jog", "arguments": {**RANGE, "index": "1"}},
+        {"code": "nothing_left", "command": "path", "arguments": {"left": "path"}},
+        {"code": "bad_source", "command": "tighten", "arguments": {"why": "x", "allowed": None}},
     ],
 )
 def test_what_is_not_one_as_it_is_known_here_is_none(value: Any) -> None:

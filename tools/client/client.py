@@ -129,7 +129,7 @@ class Daemon:
         if answer.get("state") == DEAD:
             raise WorkFailedError(death_text(self.get("/status")))
         if (refusal := CommandRefusal.from_json(answer.get("refusal"))) is not None:
-            raise DaemonRefusalError(refusal)
+            raise DaemonRefusalError.of(refusal)
         raise WorkFailedError(message)
 
 

@@ -107,7 +107,8 @@ def require_held(status: dict[str, Any]) -> None:
     state = str(status["state"])
     if state != "active":
         states = {"state": state, "allowed": ["active"]}
-        raise DaemonRefusalError(CommandRefusal(RefusalCode.NOT_IN_STATE, "path", arguments=states))
+        refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "path", arguments=states)
+        raise DaemonRefusalError.of(refusal)
     if (status.get("program_progress") or {}).get("tight") is False:
         raise WorkFailedError("path: the cables are not tight; `cdpr tighten` first")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, Self
 
 from cdpr_rt.refusal import CommandRefusal, RefusalCode
 from cdpr_tools.errors import BadInputError, WorkFailedError
@@ -32,11 +32,16 @@ _REMEDIES: Final = {
 
 
 class DaemonRefusalError(WorkFailedError):
-    """The loop has refused a command, and has said why by a code."""
+    """The loop has refused a command; `refusal` says why by a code, None where only words do."""
 
-    def __init__(self, refusal: CommandRefusal, text: str = "") -> None:
-        super().__init__((text or str(refusal)) + _remedy(refusal))
+    def __init__(self, text: str, refusal: CommandRefusal | None = None) -> None:
+        super().__init__(text)  # the one argument: pickle and type(error)(text) make it anew by it
         self.refusal = refusal
+
+    @classmethod
+    def of(cls, refusal: CommandRefusal, text: str = "") -> Self:
+        """Return the error of a refusal, in its own words or in `text`, with what is to be done."""
+        return cls((text or str(refusal)) + _remedy(refusal), refusal)
 
 
 def _remedy(refusal: CommandRefusal) -> str:
@@ -62,12 +67,14 @@ def in_typed_words(
         yield
     except DaemonRefusalError as error:
         refusal = error.refusal
+        if refusal is None:
+            raise
         if refusal.code is RefusalCode.OUT_OF_RANGE:
             if _KEYS.keys().isdisjoint(refusal.asked):
                 raise
             raise BadInputError(_out_of_range(refusal, axes)) from None
         typed = asked if refusal.asked and asked else command
-        raise DaemonRefusalError(refusal, f"{typed}: {refusal.reason(**words)}") from None
+        raise DaemonRefusalError.of(refusal, f"{typed}: {refusal.reason(**words)}") from None
 
 
 def _out_of_range(refusal: CommandRefusal, axes: Sequence[str]) -> str:

@@ -81,7 +81,7 @@ class Told:
 
     def post(self, _path: str, body: dict[str, Any]) -> None:
         if self.refusal:
-            raise DaemonRefusalError(self.refusal)
+            raise DaemonRefusalError.of(self.refusal)
         self.posted.append(body)
 
     def renew(self) -> None: ...

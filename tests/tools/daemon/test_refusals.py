@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import socket
 import threading
 from pathlib import Path
@@ -20,7 +21,7 @@ RANGE = {"index": 1, "low": -1.0, "high": 1.0}
 
 def told(refusal: CommandRefusal, *typed: Any, **words: Any) -> str:
     with pytest.raises(DaemonRefusalError) as raised, in_typed_words(*typed, **words):
-        raise DaemonRefusalError(refusal)
+        raise DaemonRefusalError.of(refusal)
     return str(raised.value)
 
 
@@ -61,7 +62,7 @@ def test_a_number_out_of_its_bounds_is_bad_input_in_units_that_are_typed(
 ) -> None:
     refusal = CommandRefusal(RefusalCode.OUT_OF_RANGE, "pid", asked, {**RANGE, "index": index})
     with pytest.raises(BadInputError) as raised, in_typed_words("move", "", ("left", "right")):
-        raise DaemonRefusalError(refusal)
+        raise DaemonRefusalError.of(refusal)
     assert str(raised.value) == text
 
 
@@ -83,14 +84,26 @@ def test_a_number_that_no_option_stands_for_is_told_as_the_loop_tells_it() -> No
 )
 def test_the_remedy_follows_from_the_state(state: str, allowed: list[str], remedy: str) -> None:
     states = {"state": state, "allowed": allowed}
-    text = str(
-        DaemonRefusalError(CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states))
-    )
+    refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)
+    text = str(DaemonRefusalError.of(refusal))
     assert text == f"jog: not in state {state}; allowed in {' or '.join(allowed)}{remedy}"
     # words alone have none
     assert told(
         CommandRefusal(RefusalCode.NOT_CALIBRATED, "jog", {}, {"why": text}), "jog"
     ).endswith(text)
+
+
+def test_the_error_goes_from_process_to_process_and_takes_other_words() -> None:
+    states = {"state": "ready", "allowed": ["active"]}
+    refusal = CommandRefusal(RefusalCode.NOT_IN_STATE, "jog", arguments=states)
+    error = DaemonRefusalError.of(refusal)
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is DaemonRefusalError
+    assert (str(copy), copy.refusal) == (str(error), refusal)
+    other = type(error)("jog: words")
+    assert str(other) == "jog: words"
+    with pytest.raises(DaemonRefusalError, match=r"^jog: words$"), in_typed_words("move"):
+        raise other
 
 
 @pytest.mark.parametrize(
