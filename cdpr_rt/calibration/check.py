@@ -75,7 +75,7 @@ class DetectedChange:
         effect = f"positions are off by up to {1e3 * self.effect_m:.1f} mm"
         return f"{what}; {effect}: {_ADVICE[self.kind]}"
 
-    def told(self) -> dict[str, object]:
+    def as_json(self) -> dict[str, object]:
         """Return it for JSON, cables counted from 1."""
         return {
             "kind": self.kind,

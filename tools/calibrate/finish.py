@@ -125,7 +125,7 @@ def finish(
     with out.stage(f"fitting {len(data.poses)} poses"):
         outcome = replace(identified(robot, data, points, geometry), adopt=adopt)
         known = None if judge is None else judge(outcome)
-    told: dict[str, Any] = {**outcome.told(), "data": str(source)}
+    told: dict[str, Any] = {**outcome.as_json(), "data": str(source)}
     out.say(*_lines(outcome, data))
     if known is not None:
         told["verification"] = {**told["verification"], **known.verification()}
@@ -230,7 +230,7 @@ def distrust_again(robot: Robot) -> None:
 
 def _lines(outcome: Outcome, data: CalibrationData) -> list[str]:
     """Return the outcome for people."""
-    told = outcome.told()
+    told = outcome.as_json()
     lines = [f"{outcome.robot.name}: {told['poses']} poses, in the frame of {told['frame']}"]
     if data.left_out:
         lines.append(f"{len(data.left_out)} poses were refused, the last: {data.left_out[-1]}")

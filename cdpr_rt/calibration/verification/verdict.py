@@ -170,14 +170,15 @@ class CalibrationChange:
     moved_m: float
     """Root mean square of by how much positions in the workspace move."""
     chi_squared: float
-    told: float
+    degrees_of_freedom: float
     """How many parameters the observations tell; chi squared on the average if the file is right.
     """
 
     @property
     def chance(self) -> float:
         """How often noise alone would change as much."""
-        return float(chi2.sf(self.chi_squared, self.told)) if self.told > 0.0 else 1.0
+        degrees = self.degrees_of_freedom
+        return float(chi2.sf(self.chi_squared, degrees)) if degrees > 0.0 else 1.0
 
     @property
     def significant(self) -> bool:
@@ -195,12 +196,12 @@ def change_of(found: Fit, poses: FloatArray, relative: bool, larger: float) -> C
     geometry = found.geometry
     v, known, size = geometry.values(), geometry.known_std(), geometry.size
     covariance = larger**2 * found.uncertainty[:size, :size]
-    told = size - float((np.diag(found.covariance)[:size] / found.inflation / known**2).sum())
+    degrees = size - float((np.diag(found.covariance)[:size] / found.inflation / known**2).sum())
     scaled = covariance / np.outer(known, known)
     squares = float(v / known @ np.linalg.solve(scaled, v / known)) if size else 0.0
     A = _by_parameters(found, poses, relative)[:, : geometry.coordinates]
     return CalibrationChange(
-        float(np.sqrt(((A @ v) ** 2).sum() / len(poses))), squares, max(told, 0.0)
+        float(np.sqrt(((A @ v) ** 2).sum() / len(poses))), squares, max(degrees, 0.0)
     )
 
 

@@ -123,15 +123,16 @@ class RigOperator:
         try:
             if self._ended(within_s):
                 return None
-            told = rig.progress
+            progress = rig.progress
             rig.program("hold")
             self._ended(_BRAKE_S)
         except WorkFailedError as error:
             raise self._trip(str(error)) from None
         here = self._here()
-        kept = told["trouble"] or told["held_back"] or told["missing"] or "still on its way"
+        kept = progress["trouble"] or progress["held_back"] or progress["missing"]
         return TargetNotReached(
-            here, f"{self._apart(here, place)} off after {within_s:.0f} s: {kept}"
+            here,
+            f"{self._apart(here, place)} off after {within_s:.0f} s: {kept or 'still on its way'}",
         )
 
     def _finish(self, within_s: float) -> None:
@@ -172,8 +173,8 @@ class RigOperator:
 
     def _here(self) -> FloatArray:
         """Return the place (d,) at which the controller has the platform."""
-        told = self.rig.progress
-        return np.array([*told["position_m"], *told.get("rotation_rad", ())])
+        progress = self.rig.progress
+        return np.array([*progress["position_m"], *progress.get("rotation_rad", ())])
 
     def _planned_s(self, place: FloatArray, speed_m_s: float) -> float:
         """Return how long the way from here takes that `pose` plans, from rest to rest."""

@@ -296,7 +296,7 @@ def test_a_wrong_size_of_all_sheets_is_told_by_the_cables(layout: object) -> Non
     assert len(sized) == 1 and "smaller than told" in sized[0].text
     assert sized[0].size == pytest.approx(-0.0385, abs=0.008)
     assert off_mm(what, done.found.poses) < 3.0
-    assert ("places of markers are known" in done.told()["frame"]) == bool(layout.known)  # type: ignore[attr-defined]
+    assert ("places of markers are known" in done.as_json()["frame"]) == bool(layout.known)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("drums", [(0.02,) * 8, (0.0, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0)])
@@ -342,7 +342,7 @@ def test_what_no_pose_held_out_verifies_is_not_taken_over() -> None:
         for one, out in zip(what.images.sightings, held_out(20), strict=True)
     ]
     done = outcome_of(what, what.seen, replace(what.images, sightings=blind))
-    assert done.told()["verification"]["reference"] == "none"
+    assert done.as_json()["verification"]["reference"] == "none"
     assert any("nothing verifies it" in text for text in done.objections())
 
 
